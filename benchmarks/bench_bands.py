@@ -18,13 +18,13 @@ from typing import NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.assessment.replay import replay_compensated
-from thermocomp.datasets.virtual import record
-from thermocomp.files import recordings
+from thermocomp.judging.replay import replay_compensated
 from thermocomp.models.training import train
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
-from thermocomp.simulation.protocol import Physics
+from thermocomp.recordings.readers import recordings
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
+from thermocomp.virtual.datasets import record
+from thermocomp.virtual.protocol import Physics
 
 TARGETS = ("x1_um", "y1_um", "z_um")
 LEARNED, JUDGED = (3, 5, 10), 3

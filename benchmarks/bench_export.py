@@ -18,14 +18,14 @@ import numpy as np
 
 from thermocomp.core.provenance import RULES, HonestError
 from thermocomp.core.reading import Reading
-from thermocomp.datasets.virtual import record
-from thermocomp.exporters.block.tables import gather
-from thermocomp.exporters.c99 import translate
-from thermocomp.exporters.vectors import Readings, replay
+from thermocomp.export.block.tables import gather
+from thermocomp.export.c99.c99 import translate
+from thermocomp.export.vectors import Readings, replay
 from thermocomp.models.training import train
 from thermocomp.models.watching import find_watch
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.stacking import stack
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.virtual.datasets import record
 
 GOAL_US, CALLS = 1.0, 4000
 HONEST = HonestError("made up", 1.0, 1.0, 2.0, 5.0, 5.0, {}, "accepted", "so that it runs", rules=RULES)

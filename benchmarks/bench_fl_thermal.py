@@ -16,15 +16,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.assessment.compare import compare
-from thermocomp.assessment.replay import replay
-from thermocomp.assessment.sensorsets import choose_sets
 from thermocomp.core.zero import FIRST_READING
-from thermocomp.files import recordings
+from thermocomp.judging import splits
+from thermocomp.judging.compare import compare
+from thermocomp.judging.replay import replay
+from thermocomp.judging.sensorsets import choose_sets
 from thermocomp.models.training import train
-from thermocomp.recording import splits
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.readers import recordings
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
 
 FloatArray = NDArray[np.float64]
 

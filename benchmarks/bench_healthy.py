@@ -15,13 +15,13 @@ from pathlib import Path
 import numpy as np
 
 from thermocomp.core.watch import Watch
-from thermocomp.datasets.virtual import record
-from thermocomp.files import recordings
-from thermocomp.files.mapping import read_mapping
 from thermocomp.models.watching import find_watch
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.readers import recordings
+from thermocomp.recordings.readers.mapping import read_mapping
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
 from thermocomp.runtime.watch import GOOD, WORDS, begin, look
+from thermocomp.virtual.datasets import record
 
 TESTS = 9
 HERE = Path(__file__).resolve().parents[1]

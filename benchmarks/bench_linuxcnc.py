@@ -15,9 +15,9 @@ import numpy as np
 from linuxcnclive import AXES, PERIOD, Live, Trace, live
 from numpy.typing import NDArray
 
-from thermocomp.adapters.linuxcnc.halsetup import HalSettings
-from thermocomp.adapters.linuxcnc.sink import LinuxCncSink
 from thermocomp.core.correction import Correction
+from thermocomp.live.adapters.linuxcnc.halsetup import HalSettings
+from thermocomp.live.adapters.linuxcnc.sink import LinuxCncSink
 
 GOAL_MS, SECONDS, EVERY = 20.0, 20.0, 0.01
 PROGRAM = "G21 G90 G64\n" + "G1 X60 Z-40 F3600\nG1 X-60 Z40\n" * 100 + "M2\n"

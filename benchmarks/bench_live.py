@@ -25,8 +25,8 @@ from linuxcnclive import AXES, Live, live
 from shopfloor import CONFIG
 
 from bench_fleet import model
-from thermocomp.adapters.linuxcnc.halsetup import HalSettings
 from thermocomp.files import modelfile
+from thermocomp.live.adapters.linuxcnc.halsetup import HalSettings
 
 GOAL_MS, SECONDS, LEVELS = 20.0, 20.0, 8
 STEP = 2.0  # um between two levels

@@ -96,11 +96,11 @@ def operations() -> Iterator[str]:
 def revise(program: Path, proof: str) -> dict[str, float]:
     """Revise a program by the command; us per line, of the processor for it and its children, memory in MB."""
     sys.modules["matplotlib"] = None  # type: ignore[assignment]
-    from thermocomp.adapters.linuxcnc import rs274process
     from thermocomp.cli.app import run
     from thermocomp.core.inputs import Input
     from thermocomp.core.lineardynamic import LinearDynamic
     from thermocomp.files import modelfile
+    from thermocomp.nc.linuxcnc import rs274process
 
     if proof == "unproved":
         rs274process.PYTHON = Path("/nowhere")
@@ -154,7 +154,7 @@ def revise(program: Path, proof: str) -> dict[str, float]:
 
 def revisions() -> bool:
     """Revise programs of growing length and say whether their memory is bounded."""
-    from thermocomp.adapters.linuxcnc.rs274 import find_obstacle
+    from thermocomp.nc.linuxcnc.rs274 import find_obstacle
 
     jobs = [(size, "unproved") for size in SIZES] + ([(PROVED, "proved")] if find_obstacle() is None else [])
     memory: dict[tuple[int, str], float] = {}

@@ -24,13 +24,13 @@ from thermocomp.core.inputs import Input
 from thermocomp.core.provenance import RULES, HonestError
 from thermocomp.core.reading import Reading
 from thermocomp.core.stack import Stack
-from thermocomp.datasets.virtual import record
 from thermocomp.models.dynamic import DynamicRidge
 from thermocomp.models.training import train
 from thermocomp.models.watching import find_watch
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.stacking import stack
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.watch import begin, look
+from thermocomp.virtual.datasets import record
 
 FloatArray = NDArray[np.float64]
 

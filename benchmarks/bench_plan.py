@@ -26,16 +26,16 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.assessment.planning import Candidate, make_grid, plan
-from thermocomp.assessment.replay import replay_compensated
-from thermocomp.core.trial import Trial
-from thermocomp.datasets.virtual import record
-from thermocomp.iso230.stopping import judge_running
+from thermocomp.judging.planning.planning import Candidate, make_grid, plan
+from thermocomp.judging.planning.trial import Trial
+from thermocomp.judging.replay import replay_compensated
+from thermocomp.judging.settling.stopping import judge_running
 from thermocomp.models.training import train
-from thermocomp.recording.cycles import make_single_cycle
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.stacking import stack
-from thermocomp.simulation.protocol import Physics
+from thermocomp.recordings.cycles import make_single_cycle
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.stacking import stack
+from thermocomp.virtual.datasets import record
+from thermocomp.virtual.protocol import Physics
 
 Gap = Literal["speed", "stop", "room", "duration"]
 GAPS: tuple[Gap, ...] = get_args(Gap)

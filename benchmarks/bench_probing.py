@@ -13,17 +13,17 @@ from pathlib import Path
 
 import numpy as np
 
-from thermocomp.assessment.compare import compare
-from thermocomp.assessment.probing import Probings
-from thermocomp.assessment.replay import replay_compensated
-from thermocomp.assessment.study import honest_error
 from thermocomp.core.correction import Limits
-from thermocomp.datasets.virtual import record
-from thermocomp.files import recordings
+from thermocomp.judging.compare import compare
+from thermocomp.judging.probing import Probings
+from thermocomp.judging.replay import replay_compensated
+from thermocomp.judging.splits import Judging, Split
+from thermocomp.judging.study import honest_error
 from thermocomp.models.training import train
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.splits import Judging, Split
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.readers import recordings
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
+from thermocomp.virtual.datasets import record
 
 METHODS = ("averaged", "dynamic", "ols")
 #: for `averaged` on fl_thermal, probed every 2 h: share of the error without, and the error itself [um]

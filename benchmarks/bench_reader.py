@@ -45,8 +45,8 @@ def make(path: Path, rows: int, kind: str) -> None:
 
 def measure(path: Path) -> dict[str, float]:
     """Read and check a file; sizes in bytes, times in seconds."""
-    from thermocomp.files.recordings import read
-    from thermocomp.recording.quality import check
+    from thermocomp.recordings.checks.quality import check
+    from thermocomp.recordings.readers.recordings import read
 
     def peak() -> int:
         return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024

@@ -13,11 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
-from thermocomp.files.protocols import read_protocol
-from thermocomp.simulation.centre import MachiningCentre
-from thermocomp.simulation.experiments import simulate
-from thermocomp.simulation.machine import Air, Drive
-from thermocomp.simulation.nonlinear import NonlinearCentre
+from thermocomp.virtual.centre import MachiningCentre
+from thermocomp.virtual.experiments import simulate
+from thermocomp.virtual.machine import Air, Drive
+from thermocomp.virtual.nonlinear import NonlinearCentre
+from thermocomp.virtual.protocolfile import read_protocol
 
 GOAL_SECONDS, GOAL_STEPS, GOAL_NONLINEAR, GOAL_MEMORY, GOAL_DRIFT = 1.0, 35_000.0, 3_000.0, 3.0, 0.01
 
@@ -70,7 +70,7 @@ def full_model(n_steps: int = 360) -> tuple[float, float, float]:
     sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))
     from finite_elements import machines
     from finite_elements.transient import Stepper
-    from thermocomp.simulation.statespace import ReducedModel
+    from thermocomp.virtual.statespace import ReducedModel
 
     full, small = machines.centre(), ReducedModel.load("centre")
     shares = {"rotation": 0.8125, "flow": 1.0}
@@ -101,8 +101,8 @@ def full_model(n_steps: int = 360) -> tuple[float, float, float]:
 CHILD = """
 import sys, tracemalloc
 from pathlib import Path
-from thermocomp.files.protocols import read_protocol
-from thermocomp.simulation.experiments import simulate
+from thermocomp.virtual.protocolfile import read_protocol
+from thermocomp.virtual.experiments import simulate
 next(simulate(read_protocol(Path(sys.argv[1]))))
 tracemalloc.start()
 (test,) = simulate(read_protocol(Path(sys.argv[2])))

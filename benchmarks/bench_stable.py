@@ -12,11 +12,11 @@ from dataclasses import replace
 import numpy as np
 
 import thermocomp as tc
-from thermocomp.assessment.compare import compare
-from thermocomp.assessment.results import Comparison
-from thermocomp.recording import splits
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
+from thermocomp.judging import splits
+from thermocomp.judging.compare import compare
+from thermocomp.judging.results import Comparison
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
 
 METHODS = ("ols", "partial-f", "mra", "dynamic")
 #: sets of five with which what was accepted has to stay so

@@ -16,16 +16,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.assessment.guards import find_guard
-from thermocomp.assessment.robustness import stress
 from thermocomp.core.correction import Correction, Limits
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.watch import Watch
-from thermocomp.files import recordings
+from thermocomp.judging.guards import find_guard
+from thermocomp.judging.robustness import stress
 from thermocomp.models.training import train
 from thermocomp.models.watching import find_watch
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.readers import recordings
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
 from thermocomp.runtime import batch
 from thermocomp.runtime.limits import fade
 from thermocomp.runtime.watch import GOOD, begin, look

@@ -18,15 +18,15 @@ from joblib import Parallel, delayed
 from numpy.typing import NDArray
 from scipy import stats
 
-from thermocomp.assessment.compare import compare
 from thermocomp.core.machine import Channel
+from thermocomp.judging import splits
+from thermocomp.judging.compare import compare
 from thermocomp.models.methods import METHODS, deployable
-from thermocomp.recording import splits
-from thermocomp.recording.cycles import Cycle
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
-from thermocomp.recording.starts import COLD, Start
+from thermocomp.recordings.cycles import Cycle
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
+from thermocomp.recordings.starts import COLD, Start
 
 FloatArray = NDArray[np.float64]
 

@@ -23,7 +23,7 @@ from thermocomp.core.position import PositionModel, slope_unit
 from thermocomp.core.profile import PolynomialProfile
 from thermocomp.core.structure import Structure
 from thermocomp.core.terms import Variable
-from thermocomp.volumetric.model import ThermalStates, VolumetricModel
+from thermocomp.runtime.geometry.volumetric import ThermalStates, VolumetricModel
 
 FloatArray = NDArray[np.float64]
 

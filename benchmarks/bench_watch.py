@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core.watch import LASTING, Watch
-from thermocomp.datasets.virtual import record
-from thermocomp.files import recordings
 from thermocomp.models.watching import find_watch
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.readers import recordings
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
 from thermocomp.runtime.watch import GOOD, SWAPPED, WatchState, begin, look
+from thermocomp.virtual.datasets import record
 
 FloatArray = NDArray[np.float64]
 

@@ -9,11 +9,11 @@ from hypothesis import settings
 from reviseruns import PLATE, judged, write_models
 from smallmachine import small_machine
 
-from thermocomp.adapters.linuxcnc import rs274
-from thermocomp.api.revision import job as jobs
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
+from thermocomp.nc.linuxcnc import rs274
+from thermocomp.nc.revision import job as jobs
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
 
 ROOT = Path(__file__).resolve().parent.parent
 

@@ -20,8 +20,8 @@ from cases import CASES
 from published import evaluate, read_log
 
 from thermocomp import __version__
-from thermocomp.core.draft import write_text
 from thermocomp.core.exceptions import InputError, ThermocompError, explain_unknown
+from thermocomp.files.draft import write_text
 
 HERE = Path(__file__).resolve().parent
 LOG = HERE / "published_block.md"

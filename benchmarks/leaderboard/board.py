@@ -10,7 +10,7 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 from published import Line
 from work import attempt, ready
 
-from thermocomp.assessment.pieces import explain
+from thermocomp.judging.pieces import explain
 from thermocomp.models.methods import METHODS
 
 Found = dict[str, Any]

@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from thermocomp.datasets.virtual import record
-from thermocomp.files import recordings
-from thermocomp.files.mapping import read_mapping
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.splits import Judging, Split, by_rows, leave_one_cycle_out, leave_one_file_out
-from thermocomp.recording.stacking import stack
-from thermocomp.simulation.protocol import Physics
+from thermocomp.judging.splits import Judging, Split, by_rows, leave_one_cycle_out, leave_one_file_out
+from thermocomp.recordings.readers import recordings
+from thermocomp.recordings.readers.mapping import read_mapping
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
+from thermocomp.virtual.datasets import record
+from thermocomp.virtual.protocol import Physics
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = Path(os.environ.get("THERMOCOMP_DATA", ROOT.parent / "shared" / "data"))

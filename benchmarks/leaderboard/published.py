@@ -8,13 +8,13 @@ from typing import NamedTuple
 from cases import FL_THERMAL, displacements
 from work import load
 
-from thermocomp.assessment.compare import compare
-from thermocomp.core.draft import write_text
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.zero import FIRST_READING
-from thermocomp.files import recordings
-from thermocomp.recording import splits
-from thermocomp.recording.stacking import stack
+from thermocomp.files.draft import write_text
+from thermocomp.judging import splits
+from thermocomp.judging.compare import compare
+from thermocomp.recordings.readers import recordings
+from thermocomp.recordings.stacking import stack
 
 #: evaluations per model, in all
 MOST = 3

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from cases import CASES, Made
 
-from thermocomp.assessment.compare import compare
-from thermocomp.assessment.pieces import explain
+from thermocomp.judging.compare import compare
+from thermocomp.judging.pieces import explain
 from thermocomp.models.foreign import adopt_estimator
 from thermocomp.models.methods import METHODS, NamedEstimator
 

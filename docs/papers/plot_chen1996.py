@@ -22,9 +22,9 @@ import textwrap
 
 import matplotlib.pyplot as plt
 
+from thermocomp.papers.report import papers as page
 from thermocomp.papers.studies import run
 from thermocomp.papers.study import Figure
-from thermocomp.report import papers as page
 
 study = run("chen1996")
 numbers = study.numbers

@@ -12,7 +12,7 @@ adds recordings of your own, ``--models all`` the slower methods.
 import matplotlib.pyplot as plt
 
 from thermocomp.papers import cross
-from thermocomp.report import papers as page
+from thermocomp.papers.report import papers as page
 
 study = cross.run(0)
 numbers = study.numbers

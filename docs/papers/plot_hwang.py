@@ -17,8 +17,8 @@ says of the method.
 
 import matplotlib.pyplot as plt
 
+from thermocomp.papers.report import papers as page
 from thermocomp.papers.studies import run
-from thermocomp.report import papers as page
 
 study = run("hwang")
 numbers = study.numbers

@@ -17,8 +17,8 @@ which ``thermocomp revise`` would revise in the same way, read back and milled.
 
 import matplotlib.pyplot as plt
 
+from thermocomp.papers.report import papers as page
 from thermocomp.papers.studies import run
-from thermocomp.report import papers as page
 
 study = run("precompensation")
 numbers = study.numbers

@@ -16,8 +16,8 @@ its models on-line, without saying under which conditions; we take another day w
 
 import matplotlib.pyplot as plt
 
+from thermocomp.papers.report import papers as page
 from thermocomp.papers.studies import run
-from thermocomp.report import papers as page
 
 study = run("stepwise2017")
 numbers = study.numbers

@@ -17,8 +17,8 @@ stand beside ours; what is compared is whether what it says of the methods also 
 
 import matplotlib.pyplot as plt
 
+from thermocomp.papers.report import papers as page
 from thermocomp.papers.studies import run
-from thermocomp.report import papers as page
 
 study = run("wessel2004")
 numbers = study.numbers

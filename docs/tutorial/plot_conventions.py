@@ -23,8 +23,8 @@ import pencil  # the drawings' arrows, boxes and labels
 from thermocomp.core.components import BY_CODE, COMPONENTS
 from thermocomp.core.machine import Axis, Machine
 from thermocomp.core.structure import Structure
-from thermocomp.volumetric import exact
-from thermocomp.volumetric.kinematics import INDEX, Kinematics
+from thermocomp.runtime.geometry import exact
+from thermocomp.runtime.geometry.kinematics import INDEX, Kinematics
 
 
 def machine(code, **more):

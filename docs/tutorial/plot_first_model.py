@@ -17,17 +17,17 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from thermocomp.assessment import study
-from thermocomp.assessment.compare import compare
 from thermocomp.core.correction import Limits
 from thermocomp.core.reading import Reading
-from thermocomp.datasets.virtual import record
 from thermocomp.files import modelfile
+from thermocomp.judging import study
+from thermocomp.judging.compare import compare
+from thermocomp.judging.splits import leave_one_cycle_out
 from thermocomp.models.dynamic import DynamicRidge
-from thermocomp.recording.quality import check
-from thermocomp.recording.splits import leave_one_cycle_out
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.checks.quality import check
+from thermocomp.recordings.stacking import stack
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.virtual.datasets import record
 
 # %%
 # 1. The test
@@ -43,13 +43,13 @@ for cycle in recording.cycles:
     print("cycle", cycle.name)
 
 # %%
-# With files of your own this step is ``recording = thermocomp.files.recordings.read("drift.csv")``.
+# With files of your own this step is ``recording = thermocomp.recordings.readers.recordings.read("drift.csv")``.
 #
 # 2. Is the recording sound?
 # --------------------------
 #
-# `~thermocomp.recording.quality.check` looks for gaps, for sensors that are stuck, spike or were never connected, and
-# for the numbers that instruments write in place of a missing value.
+# `~thermocomp.recordings.checks.quality.check` looks for gaps, for sensors that are stuck, spike or were never
+# connected, and for the numbers that instruments write in place of a missing value.
 
 findings = check(recording)
 for f in findings:

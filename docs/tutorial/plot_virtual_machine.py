@@ -14,8 +14,8 @@ ten hours of stop) and looks at what a metrologist would look at.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from thermocomp.simulation.centre import MachiningCentre
-from thermocomp.simulation.machine import Air, Drive
+from thermocomp.virtual.centre import MachiningCentre
+from thermocomp.virtual.machine import Air, Drive
 
 machine = MachiningCentre()
 room = Air(temperature=22.0, stratification=0.5)

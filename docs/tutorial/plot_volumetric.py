@@ -18,18 +18,18 @@ import numpy as np
 from thermocomp.core.components import BY_CODE
 from thermocomp.core.machine import Axis, Machine
 from thermocomp.core.structure import Structure
-from thermocomp.datasets import virtual
-from thermocomp.files import codecolumns
-from thermocomp.files.profiles import from_recording
-from thermocomp.models.position import PositionOptions, fit_position
-from thermocomp.models.positionoptions import fill_options
 from thermocomp.models.training import train
-from thermocomp.recording.stacking import stack
-from thermocomp.simulation.centre import MachiningCentre
-from thermocomp.simulation.experiments import simulate
-from thermocomp.simulation.volume import VolumetricTruth
-from thermocomp.volumetric.kinematics import INDEX
-from thermocomp.volumetric.model import VolumetricModel
+from thermocomp.recordings.readers import codecolumns
+from thermocomp.recordings.readers.profiles import from_recording
+from thermocomp.recordings.stacking import stack
+from thermocomp.runtime.geometry.kinematics import INDEX
+from thermocomp.runtime.geometry.volumetric import VolumetricModel
+from thermocomp.virtual import datasets as virtual
+from thermocomp.virtual.centre import MachiningCentre
+from thermocomp.virtual.experiments import simulate
+from thermocomp.virtual.volume import VolumetricTruth
+from thermocomp.volumetric.models.position import PositionOptions, fit_position
+from thermocomp.volumetric.models.positionoptions import fill_options
 
 # %%
 # 1. The recordings
@@ -50,8 +50,8 @@ assert len(codes) == 18
 # 2. From profiles to components
 # ------------------------------
 #
-# `~thermocomp.models.positionoptions.fill_options` looks at the profiles, never at a temperature, and says what each of
-# them asks for: how many powers of the position move with the temperatures (none, if heat does nothing but noise),
+# `~thermocomp.volumetric.models.positionoptions.fill_options` looks at the profiles, never at a temperature, and says
+# what each of them asks for: how many powers of the position move with the temperatures (none, if heat does nothing but noise),
 # whether the profile shifts as a whole, and about which position it turns. Then the cold profile is fitted, and
 # the slopes are learned from the temperatures. These are absolute: a laser reads the machine as it is that
 # morning, and mornings differ.
@@ -135,7 +135,7 @@ plt.show()
 # ----------------------
 #
 # 1,000 random points, each in a random instant of that day. The true error is composed by
-# `~thermocomp.simulation.volume`, which knows how the machine is built and nothing of our model. It is counted from the
+# `~thermocomp.virtual.volume`, which knows how the machine is built and nothing of our model. It is counted from the
 # zero that was set at the test position when the day began; the correction is what the axes are told to move besides.
 
 truth = VolumetricTruth(MachiningCentre().observables)

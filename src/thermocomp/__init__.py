@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from thermocomp.api.inputs import read, training_table
     from thermocomp.api.plan import may_stop, plan
-    from thermocomp.api.revise import revise
     from thermocomp.api.verbs import assess, compare, fit, select, simulate
     from thermocomp.core.correction import Correction, Deviation, Limits
     from thermocomp.core.exceptions import ThermocompError
@@ -40,8 +39,9 @@ if TYPE_CHECKING:
     from thermocomp.models.second_order import SecondOrderRegression
     from thermocomp.models.sensors import SensorSelector
     from thermocomp.models.subsets import BestSubset
-    from thermocomp.recording.recording import Recording
-    from thermocomp.recording.starts import Start
+    from thermocomp.nc.revise import revise
+    from thermocomp.recordings.recording import Recording
+    from thermocomp.recordings.starts import Start
 
 __version__ = version("thermocomp")
 
@@ -53,18 +53,18 @@ _PUBLIC = {
     "compare": "thermocomp.api.verbs",
     "fit": "thermocomp.api.verbs",
     "assess": "thermocomp.api.verbs",
-    "revise": "thermocomp.api.revise",
+    "revise": "thermocomp.nc.revise",
     "plan": "thermocomp.api.plan",
     "may_stop": "thermocomp.api.plan",
     "freeze": "thermocomp.models.pipelines",
     "training_table": "thermocomp.api.inputs",
-    "Recording": "thermocomp.recording.recording",
-    "Start": "thermocomp.recording.starts",
+    "Recording": "thermocomp.recordings.recording",
+    "Start": "thermocomp.recordings.starts",
     # what runs at the machine
     "Correction": "thermocomp.core.correction",
     "Deviation": "thermocomp.core.correction",
     "ErrorModel": "thermocomp.core.model",
-    "Probings": "thermocomp.assessment.probing",
+    "Probings": "thermocomp.judging.probing",
     "Limits": "thermocomp.core.correction",
     "LinearDynamic": "thermocomp.core.lineardynamic",
     "Polynomial": "thermocomp.core.polynomial",

@@ -10,13 +10,13 @@ import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
-from thermocomp.adapters.linuxcnc.expansion import expand as expanding
-from thermocomp.adapters.linuxcnc.expansion.expand import expand
-from thermocomp.adapters.linuxcnc.expansion.origins import SYSTEMS
-from thermocomp.adapters.linuxcnc.expansion.proof import compare, compare_parameters
-from thermocomp.adapters.linuxcnc.rs274 import HIGHEST_TOOL, Stored, read
-from thermocomp.adapters.linuxcnc.stored import draw_controller
 from thermocomp.core.exceptions import InputError, ProgramError
+from thermocomp.nc.linuxcnc.expansion import expand as expanding
+from thermocomp.nc.linuxcnc.expansion.expand import expand
+from thermocomp.nc.linuxcnc.expansion.origins import SYSTEMS
+from thermocomp.nc.linuxcnc.expansion.proof import compare, compare_parameters
+from thermocomp.nc.linuxcnc.rs274 import HIGHEST_TOOL, Stored, read
+from thermocomp.nc.linuxcnc.stored import draw_controller
 
 pytestmark = pytest.mark.usefixtures("interpreter")
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from thermocomp.adapters.linuxcnc import rs274
-from thermocomp.adapters.linuxcnc.expansion.expand import expand
 from thermocomp.core.exceptions import ProgramError
+from thermocomp.nc.linuxcnc import rs274
+from thermocomp.nc.linuxcnc.expansion.expand import expand
 
 pytestmark = pytest.mark.usefixtures("interpreter")
 

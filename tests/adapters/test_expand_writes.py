@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from thermocomp.adapters.linuxcnc.expansion import expand as expanding
 from thermocomp.core.exceptions import InputError, ProgramError
+from thermocomp.nc.linuxcnc.expansion import expand as expanding
 
 
 @pytest.mark.parametrize("name", ["a\nG0 Z-50 (x)", "a)G0 Z-50(", "50%;a", "\u0416" + "x" * 200])

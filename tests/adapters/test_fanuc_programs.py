@@ -8,12 +8,12 @@ from typing import NamedTuple
 import pytest
 from nc_law import Growing
 
-from thermocomp.adapters.linuxcnc import rs274
-from thermocomp.adapters.linuxcnc.verification.translation import Translator
-from thermocomp.adapters.linuxcnc.verification.verify import Ledger
 from thermocomp.core.exceptions import ProgramError
 from thermocomp.nc.expansion.unroll import unroll
 from thermocomp.nc.interpreter.block import Setup
+from thermocomp.nc.linuxcnc import rs274
+from thermocomp.nc.linuxcnc.verification.translation import Translator
+from thermocomp.nc.linuxcnc.verification.verify import Ledger
 from thermocomp.nc.parser.tokens import split_lines
 from thermocomp.nc.planner.timeline import MotionLimits
 from thermocomp.nc.rewrite.coordinates import Coordinates

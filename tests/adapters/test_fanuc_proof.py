@@ -7,8 +7,8 @@ import pytest
 from fanuc_generator import program
 from test_fanuc_programs import PROGRAMS, REFUSED, SETUP, Trial, revise
 
-from thermocomp.adapters.linuxcnc.verification.verify import prove
 from thermocomp.core.exceptions import InputError, ProgramError, Unprovable
+from thermocomp.nc.linuxcnc.verification.verify import prove
 
 #: why a random program is refused
 FOR_A_REASON = ("uses the offset that the correction is put in", "has not been positioned", "is no thermal drift")

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from thermocomp.adapters.linuxcnc.sink import LinuxCncSink
 from thermocomp.core.exceptions import ThermocompError
+from thermocomp.live.adapters.linuxcnc.sink import LinuxCncSink
 
 AXIS = {"offset": 1.0, "slope": 0.0, "reference": 0.0, "position": 0.0, "demand": 1.0, "in_force": 1.0, "alarm": ""}
 GOOD: dict[str, Any] = {"beat": 0, "ticks": 1, "timeout": 2.0, "suspended": "", "still": False, "axes": {"Z": AXIS}}

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from linuxcnclive import AXES, LIMIT, PERIOD, Live, Trace, live
 
-from thermocomp.adapters.linuxcnc.halsetup import HalSettings, Pattern
-from thermocomp.adapters.linuxcnc.sink import LinuxCncSink
 from thermocomp.core.correction import Correction
+from thermocomp.live.adapters.linuxcnc.halsetup import HalSettings, Pattern
+from thermocomp.live.adapters.linuxcnc.sink import LinuxCncSink
 
 RATE = 20.0
 #: of LinuxCNC and of what is written, with three decimals of a micron [um]

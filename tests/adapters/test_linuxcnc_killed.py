@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 from linuxcnclive import AXES, PERIOD, Live, live
 
-from thermocomp.adapters.linuxcnc.halsetup import HalSettings, Pattern
-from thermocomp.adapters.linuxcnc.sink import LinuxCncSink
 from thermocomp.core.correction import Correction
 from thermocomp.core.exceptions import ThermocompError
+from thermocomp.live.adapters.linuxcnc.halsetup import HalSettings, Pattern
+from thermocomp.live.adapters.linuxcnc.sink import LinuxCncSink
 
 RATE, MAGNITUDE, FINE = 20.0, 50.0, 0.002
 

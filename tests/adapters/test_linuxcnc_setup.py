@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from linuxcncmill import write_linuxcnc_mill
 
-from thermocomp.adapters.linuxcnc.halsetup import COMPONENT_NAME, HAL_NAME, HalSettings, prepare
 from thermocomp.cli.app import run
 from thermocomp.core.exceptions import InputError, SettingError
+from thermocomp.live.adapters.linuxcnc.halsetup import COMPONENT_NAME, HAL_NAME, HalSettings, prepare
 
 
 def test_it_is_written_beside_the_ini_and_what_is_to_do_is_told(

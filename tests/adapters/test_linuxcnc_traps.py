@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from linuxcnclive import AXES, PERIOD, Live, live
 
-from thermocomp.adapters.linuxcnc.halsetup import HalSettings, Pattern
-from thermocomp.adapters.linuxcnc.sink import LinuxCncSink
 from thermocomp.core.correction import Correction
 from thermocomp.core.exceptions import ThermocompError
 from thermocomp.core.ports import Confirming, Sink
+from thermocomp.live.adapters.linuxcnc.halsetup import HalSettings, Pattern
+from thermocomp.live.adapters.linuxcnc.sink import LinuxCncSink
 
 QUICK = HalSettings(axes=AXES, rate=100.0)
 

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from thermocomp.adapters.linuxcnc import rs274
-from thermocomp.adapters.linuxcnc.verification.states import build_stored
-from thermocomp.adapters.linuxcnc.verification.verify import Ledger, Shift, prove
 from thermocomp.core.exceptions import InputError, ProgramError
 from thermocomp.nc.interpreter.block import Block, Modal, Setup
+from thermocomp.nc.linuxcnc import rs274
+from thermocomp.nc.linuxcnc.verification.states import build_stored
+from thermocomp.nc.linuxcnc.verification.verify import Ledger, Shift, prove
 from thermocomp.nc.parser.line import Line
 from thermocomp.nc.rewrite.revise import Revised
 

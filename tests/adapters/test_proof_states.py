@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 from test_precompensation_proof import NONE, PLAIN, Vector, ledger, shift, write
 
-from thermocomp.adapters.linuxcnc.verification import states
-from thermocomp.adapters.linuxcnc.verification.verify import Proof, prove
 from thermocomp.core.exceptions import ProgramError, Unprovable
 from thermocomp.nc.interpreter.block import Setup
+from thermocomp.nc.linuxcnc.verification import states
+from thermocomp.nc.linuxcnc.verification.verify import Proof, prove
 
 pytestmark = pytest.mark.usefixtures("interpreter")
 

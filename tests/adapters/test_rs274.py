@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thermocomp.adapters.linuxcnc import rs274, rs274process
-from thermocomp.adapters.linuxcnc.rs274 import Canonical, ProgramFrame, Stored, read
 from thermocomp.core.exceptions import InputError, ProgramError
+from thermocomp.nc.linuxcnc import rs274, rs274process
+from thermocomp.nc.linuxcnc.rs274 import Canonical, ProgramFrame, Stored, read
 
 pytestmark = pytest.mark.usefixtures("interpreter")
 

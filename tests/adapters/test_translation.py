@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 import pytest
 
-from thermocomp.adapters.linuxcnc import rs274
-from thermocomp.adapters.linuxcnc.verification.translation import Translator, UntranslatableError, translate
 from thermocomp.core.exceptions import ProgramError
 from thermocomp.nc.expansion.unroll import unroll
 from thermocomp.nc.interpreter.block import PLANES, Block, Setup
 from thermocomp.nc.interpreter.interpret import follow_program
+from thermocomp.nc.linuxcnc import rs274
+from thermocomp.nc.linuxcnc.verification.translation import Translator, UntranslatableError, translate
 from thermocomp.nc.parser.tokens import read_lines, split_lines
 
 pytestmark = pytest.mark.usefixtures("interpreter")

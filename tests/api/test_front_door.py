@@ -19,12 +19,12 @@ from smallmachine import small_machine
 import thermocomp as tc
 from thermocomp.api.results import Assessed, Compared, FittedModels, Result, Selected
 from thermocomp.api.verbs import SelectionMethod
-from thermocomp.assessment.compare import compare as own_compare
 from thermocomp.core.exceptions import InputError
+from thermocomp.judging import splits
+from thermocomp.judging.compare import compare as own_compare
 from thermocomp.models.methods import METHODS
-from thermocomp.recording import splits
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.stacking import stack
 
 FAST = ("ols", "partial-f")
 
@@ -231,7 +231,7 @@ def test_selection(results: dict[str, Result], recording: Recording) -> None:
 
 
 def test_recordings_come_as_anything(recording: Recording, tmp_path: Path) -> None:
-    from thermocomp.files.recordings import write
+    from thermocomp.recordings.readers.recordings import write
 
     write(recording, tmp_path / "r.csv")
     ways: list[Any] = [

@@ -8,18 +8,17 @@ import pytest
 from rich.console import Console
 from smallmachine import small_machine
 
-from thermocomp.assessment import study
-from thermocomp.assessment.compare import compare, split_by_cycle
-from thermocomp.assessment.results import Assessment, Comparison
 from thermocomp.cli.output import show_assess, show_comparison, show_fit
 from thermocomp.core.band import Band
 from thermocomp.core.inputs import Input
 from thermocomp.core.paceddynamic import LaggedInput, PacedDynamic, SpeedState
+from thermocomp.judging import splits, study
+from thermocomp.judging.compare import compare, split_by_cycle
+from thermocomp.judging.results import Assessment, Comparison
 from thermocomp.models.training import train
-from thermocomp.recording import splits
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
-from thermocomp.recording.starts import Start
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
+from thermocomp.recordings.starts import Start
 from thermocomp.report import records
 from thermocomp.report.bands import describe_bands
 from thermocomp.runtime import batch

@@ -18,19 +18,18 @@ from distributed import Client
 from smallmachine import small_machine
 
 import thermocomp as tc
-from thermocomp.assessment import cluster as clusters
-from thermocomp.assessment import selecting
-from thermocomp.assessment.choice import Settings
-from thermocomp.assessment.compare import compare
-from thermocomp.assessment.pieces import work_through
-from thermocomp.assessment.results import Comparison
-from thermocomp.assessment.sharing import shared_among
 from thermocomp.cli.app import run
 from thermocomp.core.exceptions import FitError, InputError, MissingExtraError
+from thermocomp.judging import cluster as clusters
+from thermocomp.judging import selecting, splits
+from thermocomp.judging.choice import Settings
+from thermocomp.judging.compare import compare
+from thermocomp.judging.pieces import work_through
+from thermocomp.judging.results import Comparison
+from thermocomp.judging.sharing import shared_among
 from thermocomp.models.ols import LeastSquares
 from thermocomp.papers import cross, studies
-from thermocomp.recording import splits
-from thermocomp.recording.samples import Samples
+from thermocomp.recordings.samples import Samples
 
 
 @pytest.fixture(scope="module")
@@ -211,7 +210,7 @@ def test_no_scheduler_there(listens: bool, monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_without_dask(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delitem(sys.modules, "thermocomp.assessment.cluster")
+    monkeypatch.delitem(sys.modules, "thermocomp.judging.cluster")
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(MissingExtraError, match=r"pip install 'thermocomp\[dask\]'"), shared_among("tcp://here:1"):
         pass

@@ -8,11 +8,6 @@ import pytest
 from driftmodels import judged
 from smallmachine import small_machine
 
-from thermocomp.assessment import study
-from thermocomp.assessment.compare import ALL, compare, n_pieces
-from thermocomp.assessment.judge import judge
-from thermocomp.assessment.replay import replay, replay_compensated
-from thermocomp.assessment.robustness import Robustness, pool_robustness, stress
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import FitError, InputError, ModelFileError
 from thermocomp.core.inputs import Support
@@ -21,13 +16,17 @@ from thermocomp.core.machine import Channel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.reading import Reading
 from thermocomp.files import modelfile
+from thermocomp.judging import splits, study
+from thermocomp.judging.compare import ALL, compare, n_pieces
+from thermocomp.judging.judge import judge
+from thermocomp.judging.replay import replay, replay_compensated
+from thermocomp.judging.robustness import Robustness, pool_robustness, stress
 from thermocomp.models.methods import METHODS
 from thermocomp.models.training import train
-from thermocomp.recording import splits
-from thermocomp.recording.cycles import Cycle
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.cycles import Cycle
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
 from thermocomp.runtime.compensator import Compensator
 
 METHOD_NAMES = sorted(METHODS)

@@ -7,15 +7,14 @@ import pandas as pd
 import pytest
 from smallmachine import small_machine
 
-from thermocomp.assessment import coverage, study
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
 from thermocomp.core.validity import Validity
 from thermocomp.files import modelfile
-from thermocomp.recording import splits
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
+from thermocomp.judging import coverage, splits, study
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
 
 
 def with_room(start: str = "2024-03-01T20:00:00") -> Recording:

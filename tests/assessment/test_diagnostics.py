@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from thermocomp.assessment.diagnostics import collinearity, diagnose
+from thermocomp.judging.diagnostics import collinearity, diagnose
 from thermocomp.models.selection.collinearity import Spectrum
 
 RNG = np.random.default_rng(4)

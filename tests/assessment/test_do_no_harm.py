@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy import stats
 
-from thermocomp.assessment import do_no_harm
-from thermocomp.assessment.do_no_harm import JudgedUnit, Verdict, holm, join_verdicts, margin_of, measure
 from thermocomp.core.learned import Learned, probe_noise
+from thermocomp.judging import do_no_harm
+from thermocomp.judging.do_no_harm import JudgedUnit, Verdict, holm, join_verdicts, margin_of, measure
 
 FloatArray = NDArray[np.float64]
 

@@ -8,17 +8,17 @@ import pytest
 from smallmachine import small_machine
 from watchedmachine import LOST, failing, watched_model
 
-from thermocomp.assessment import study
-from thermocomp.assessment.faultlog import find_costs, find_faults
-from thermocomp.assessment.metrics import rms
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.reading import Reading
+from thermocomp.judging import study
+from thermocomp.judging.faultlog import find_costs, find_faults
+from thermocomp.judging.metrics import rms
 from thermocomp.models.training import train
 from thermocomp.models.watching import find_watch
-from thermocomp.recording.cycles import find_cycles
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.stacking import stack
-from thermocomp.recording.starts import Start
+from thermocomp.recordings.cycles import find_cycles
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.stacking import stack
+from thermocomp.recordings.starts import Start
 from thermocomp.report.bands import describe_bands
 from thermocomp.report.faults import describe_faults, describe_held
 from thermocomp.runtime.compensator import Compensator

@@ -13,18 +13,17 @@ import pytest
 from numpy.typing import ArrayLike
 from smallmachine import small_machine
 
-from thermocomp.assessment import refit, selecting, study
-from thermocomp.assessment.choice import Settings
-from thermocomp.assessment.compare import compare
-from thermocomp.assessment.pieces import work_through
 from thermocomp.core.exceptions import FitError, InputError
+from thermocomp.judging import refit, selecting, splits, study
+from thermocomp.judging.choice import Settings
+from thermocomp.judging.compare import compare
+from thermocomp.judging.pieces import work_through
 from thermocomp.models import training
 from thermocomp.models.methods import METHODS, deployable
 from thermocomp.models.ols import LeastSquares
-from thermocomp.recording import splits
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
 
 ERRORS = [
     InputError("of the settings"),
@@ -161,7 +160,7 @@ def test_a_model_that_fails_on_the_way_to_few_sensors(samples: Samples, monkeypa
             raise MemoryError
         return train(name, *arguments, **how)
 
-    monkeypatch.setattr("thermocomp.assessment.budget.train", some)
+    monkeypatch.setattr("thermocomp.judging.budget.train", some)
     settings = Settings(models=["ols", "dynamic"], max_sensors=2)
     (choice,) = selecting.select("pareto", samples, judging, settings)
     assert choice.reason.startswith("dynamic with")

@@ -7,19 +7,18 @@ import pandas as pd
 import pytest
 from smallmachine import small_machine
 
-from thermocomp.assessment import study
-from thermocomp.assessment.choice import Settings
-from thermocomp.assessment.compare import compare
-from thermocomp.assessment.leaks import find_learned_rows
-from thermocomp.assessment.selecting import select
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
-from thermocomp.recording import splits
-from thermocomp.recording.cycles import Cycle, find_cycles, make_single_cycle
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
-from thermocomp.recording.starts import COLD, Start
+from thermocomp.judging import splits, study
+from thermocomp.judging.choice import Settings
+from thermocomp.judging.compare import compare
+from thermocomp.judging.leaks import find_learned_rows
+from thermocomp.judging.selecting import select
+from thermocomp.recordings.cycles import Cycle, find_cycles, make_single_cycle
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
+from thermocomp.recordings.starts import COLD, Start
 
 
 @pytest.fixture(scope="module")

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from smallmachine import small_machine
 
-from thermocomp.assessment import learningcurve
-from thermocomp.assessment.learningcurve import LearningCurve, Point, learning_curve, n_pieces
 from thermocomp.core.exceptions import FitError
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.splits import Judging, Split, leave_one_cycle_out
-from thermocomp.recording.stacking import stack
+from thermocomp.judging.planning import learningcurve
+from thermocomp.judging.planning.learningcurve import LearningCurve, Point, learning_curve, n_pieces
+from thermocomp.judging.splits import Judging, Split, leave_one_cycle_out
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
 
 
 def small(speeds: Sequence[float] = (1000.0, 2500.0, 1800.0, 3000.0)) -> Samples:

@@ -10,7 +10,7 @@ from test_cluster import assert_same
 
 import thermocomp as tc
 from thermocomp.api.results import Compared
-from thermocomp.recording.recording import Recording
+from thermocomp.recordings.recording import Recording
 
 #: a worker takes no more, as docs/many_recordings.rst says; its nanny would kill it
 BOUND = 1 << 30

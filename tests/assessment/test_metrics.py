@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from thermocomp.assessment.metrics import METRICS, bias, mae, max_abs, peak_to_peak, reduction, rms
+from thermocomp.judging.metrics import METRICS, bias, mae, max_abs, peak_to_peak, reduction, rms
 
 MEASURED, PREDICTED = np.array([3.0, -4.0, 0.0, 5.0]), np.array([2.0, -4.0, 2.0, 5.0])
 

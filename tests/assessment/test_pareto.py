@@ -8,18 +8,17 @@ import pandas as pd
 import pytest
 from smallmachine import crowded_machine, small_machine, two_that_matter
 
-from thermocomp.assessment import budget, pareto, sensorsets
-from thermocomp.assessment.choice import Settings
-from thermocomp.assessment.compare import compare
-from thermocomp.assessment.metrics import rms
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.machine import Channel
-from thermocomp.files.recordings import read
+from thermocomp.judging import budget, pareto, sensorsets, splits
+from thermocomp.judging.choice import Settings
+from thermocomp.judging.compare import compare
+from thermocomp.judging.metrics import rms
 from thermocomp.models.selection.standins import Answer
-from thermocomp.recording import splits
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
-from thermocomp.recording.starts import COLD
+from thermocomp.recordings.readers.recordings import read
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
+from thermocomp.recordings.starts import COLD
 
 
 def silent(_: str, /, steps: int = 1) -> None:

@@ -6,12 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from thermocomp.assessment.planning import KINDS, SPEEDS, Plan, make_grid, plan
 from thermocomp.core.exceptions import FitError, InputError
+from thermocomp.judging.planning.planning import KINDS, SPEEDS, Plan, make_grid, plan
 from thermocomp.models.doubt import find_doubt
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
 
 TOP = 3000.0
 MINUTE = 60.0

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from profilemachine import day, planted, profiles
 
-from thermocomp.assessment.position import n_pieces, study, study_all
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.inputs import Support
+from thermocomp.judging.splits import by_rows, leave_one_cycle_out, leave_one_file_out
 from thermocomp.models.ols import LeastSquares
-from thermocomp.models.position import PositionOptions, fit_position
-from thermocomp.models.positionoptions import SETTINGS, fill_options
-from thermocomp.recording.cycles import Cycle
-from thermocomp.recording.profiles import Profiles
-from thermocomp.recording.splits import by_rows, leave_one_cycle_out, leave_one_file_out
+from thermocomp.recordings.cycles import Cycle
+from thermocomp.recordings.profiles import Profiles
+from thermocomp.volumetric.judging.position import n_pieces, study, study_all
+from thermocomp.volumetric.models.position import PositionOptions, fit_position
+from thermocomp.volumetric.models.positionoptions import SETTINGS, fill_options
 
 # each day is warmer than the one before, so the last one goes beyond what was learned
 OLS = PositionOptions(method=LeastSquares(fit_intercept=False), support=Support(margin=1.0))

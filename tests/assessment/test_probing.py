@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import thermocomp as tc
-from thermocomp.assessment.probing import Probed, Probings
-from thermocomp.assessment.replay import replay_compensated
-from thermocomp.assessment.study import assess
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.reading import Reading
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.stacking import stack
+from thermocomp.judging.probing import Probed, Probings
+from thermocomp.judging.replay import replay_compensated
+from thermocomp.judging.study import assess
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.stacking import stack
 from thermocomp.report.probings import describe_probings
 from thermocomp.runtime.adaptation import Probing
 from thermocomp.runtime.compensator import Compensator

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from smallmachine import small_machine
 
-from thermocomp.assessment.compare import compare
-from thermocomp.assessment.recommend import GROUPS, PAIRS, inner_splits
-from thermocomp.assessment.results import Rules
 from thermocomp.core.exceptions import InputError
-from thermocomp.recording import splits
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
-from thermocomp.recording.starts import COLD
+from thermocomp.judging import splits
+from thermocomp.judging.compare import compare
+from thermocomp.judging.recommend import GROUPS, PAIRS, inner_splits
+from thermocomp.judging.results import Rules
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
+from thermocomp.recordings.starts import COLD
 
 SIX = (1000.0, 2500.0, 1800.0, 3000.0, 1400.0, 2200.0)
 

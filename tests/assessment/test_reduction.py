@@ -8,16 +8,16 @@ import pytest
 from poorcontroller import growing_machine, left, noisy_machine, temperatures
 from smallmachine import small_machine, two_that_matter
 
-from thermocomp.assessment.reduction import Reduction, method_of, reduce_model
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.provenance import RULES, HonestError
-from thermocomp.exporters.reduced import SHAPES, as_it_is, find_axis, fits, in_mm, linear_factors, mark
-from thermocomp.files.mapping import read_mapping
-from thermocomp.files.recordings import read
+from thermocomp.export.reduction.judging import Reduction, method_of, reduce_model
+from thermocomp.export.reduction.reduced import SHAPES, as_it_is, find_axis, fits, in_mm, linear_factors, mark
 from thermocomp.models.training import train
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.readers.mapping import read_mapping
+from thermocomp.recordings.readers.recordings import read
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.stacking import stack
 
 JUDGED = HonestError("test", 1.0, 1.0, 2.0, 5.0, 5.0, {"1": 1.0}, "accepted", "better", 3, rules=RULES)
 

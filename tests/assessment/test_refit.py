@@ -8,13 +8,13 @@ import pytest
 from smallmachine import small_machine
 
 import thermocomp as tc
-from thermocomp.assessment import study
-from thermocomp.assessment.compare import compare
 from thermocomp.core.exceptions import FitError
+from thermocomp.judging import study
+from thermocomp.judging.compare import compare
+from thermocomp.judging.splits import Judging, leave_one_cycle_out
 from thermocomp.models.training import Trained, train
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.splits import Judging, leave_one_cycle_out
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +74,7 @@ def test_what_leans_on_a_sensor_when_it_is_written_is_unproven(
             return replace(trained, model=replace(trained.model, coefficients=factors))
         return trained
 
-    monkeypatch.setattr("thermocomp.assessment.refit.train", leaning)
+    monkeypatch.setattr("thermocomp.judging.refit.train", leaning)
     (after,) = compare(samples, ["ols"], judging).overall()
     assert after.word == "unproven"
     assert "worse than none" in after.reason

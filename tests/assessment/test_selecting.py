@@ -6,15 +6,14 @@ import numpy as np
 import pytest
 from smallmachine import crowded_machine
 
-from thermocomp.assessment import selecting
-from thermocomp.assessment.choice import Choice, Settings, Table, format_cell
 from thermocomp.core.exceptions import FitError, InputError
+from thermocomp.judging import selecting, splits
+from thermocomp.judging.choice import Choice, Settings, Table, format_cell
 from thermocomp.models.grouping import CorrelationGrouping
 from thermocomp.models.selection import subsetsearch
 from thermocomp.models.selection.subsets import best_subsets
-from thermocomp.recording import splits
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
 
 METHODS = ("grouping", "partial-f", "stepwise", "subsets", "ace", "pareto")
 SETTINGS = Settings(max_sensors=3, models=["ols"])

@@ -8,18 +8,18 @@ import pandas as pd
 import pytest
 from numpy.typing import NDArray
 
-from thermocomp.assessment.replay import replay
-from thermocomp.assessment.sensitivity import sensitivity
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Variable
-from thermocomp.datasets.virtual import record
+from thermocomp.judging.replay import replay
+from thermocomp.judging.sensitivity import sensitivity
 from thermocomp.models.grouping import CorrelationGrouping
 from thermocomp.models.numerics.leastsquares import lstsq
 from thermocomp.models.training import train
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
+from thermocomp.virtual.datasets import record
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

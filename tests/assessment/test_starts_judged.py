@@ -10,22 +10,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from smallmachine import small_machine
 
-from thermocomp.assessment import study
-from thermocomp.assessment.judge import judge
-from thermocomp.assessment.replay import replay, replay_compensated
-from thermocomp.assessment.robustness import stress
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.zero import FIRST_READING, Zeroing
-from thermocomp.files import recordings
 from thermocomp.iso230 import part3
+from thermocomp.judging import study
+from thermocomp.judging.judge import judge
+from thermocomp.judging.replay import replay, replay_compensated
+from thermocomp.judging.robustness import stress
+from thermocomp.judging.splits import Split, by_rows, by_time, leave_one_cycle_out
 from thermocomp.models.training import train
-from thermocomp.recording.cycles import Cycle, find_cycles
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.splits import Split, by_rows, by_time, leave_one_cycle_out
-from thermocomp.recording.stacking import stack
-from thermocomp.recording.starts import Start
+from thermocomp.recordings.cycles import Cycle, find_cycles
+from thermocomp.recordings.readers import recordings
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.stacking import stack
+from thermocomp.recordings.starts import Start
 
 TARGET = "z_um"
 FAMILIES = ("ols", "mra", "dynamic", "arx", "arx-net", "ace-monotone", "mlp", "gp")

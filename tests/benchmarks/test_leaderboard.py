@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 import thermocomp
-from thermocomp.assessment.replay import replay
-from thermocomp.assessment.robustness import stress
-from thermocomp.datasets.virtual import record
+from thermocomp.judging.replay import replay
+from thermocomp.judging.robustness import stress
 from thermocomp.models.training import train
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.stacking import stack
+from thermocomp.virtual.datasets import record
 
 pytestmark = pytest.mark.long  # processes that import everything
 FOLDER = Path(__file__).resolve().parents[2] / "benchmarks" / "leaderboard"

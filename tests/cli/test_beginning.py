@@ -9,14 +9,15 @@ import numpy as np
 import pytest
 from smallmachine import small_machine
 
-from thermocomp.assessment.replay import replay_compensated as replayed
 from thermocomp.cli.app import run
 from thermocomp.core.provenance import HonestError
-from thermocomp.files import modelfile, recordings
+from thermocomp.files import modelfile
+from thermocomp.judging.replay import replay_compensated as replayed
 from thermocomp.models.training import train
-from thermocomp.recording.cycles import Cycle
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.cycles import Cycle
+from thermocomp.recordings.readers import recordings
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.stacking import stack
 
 ROW = 300
 

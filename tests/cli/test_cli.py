@@ -17,10 +17,11 @@ from thermocomp.cli.app import app, run
 from thermocomp.cli.extras import needs
 from thermocomp.core.exceptions import MissingExtraError
 from thermocomp.core.machine import Channel
-from thermocomp.files import modelfile, recordings
+from thermocomp.files import modelfile
 from thermocomp.models.methods import METHODS
-from thermocomp.recording.cycles import find_cycles
-from thermocomp.recording.recording import Recording
+from thermocomp.recordings.cycles import find_cycles
+from thermocomp.recordings.readers import recordings
+from thermocomp.recordings.recording import Recording
 
 RESULT_KEYS = {
     "model",

@@ -12,8 +12,8 @@ from smallmachine import small_machine
 
 from thermocomp import __version__
 from thermocomp.cli.app import COMMANDS, app, run
-from thermocomp.datasets import virtual
-from thermocomp.files import recordings
+from thermocomp.recordings.readers import recordings
+from thermocomp.virtual import datasets as virtual
 
 
 def test_the_line_of_a_command_is_that_of_its_docstring() -> None:

@@ -287,7 +287,7 @@ def test_without_onnx_it_says_what_to_install(
 
 
 def test_onnx_is_loaded_by_nothing_that_does_without() -> None:
-    code = "import sys, thermocomp.cli.export, thermocomp.exporters.onnxpackage; print('onnx' in sys.modules)"
+    code = "import sys, thermocomp.export.commands.export, thermocomp.export.onnx.package; print('onnx' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
 

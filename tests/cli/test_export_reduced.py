@@ -12,7 +12,8 @@ from smallmachine import small_machine
 from thermocomp.cli.app import run
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
-from thermocomp.files import modelfile, recordings
+from thermocomp.files import modelfile
+from thermocomp.recordings.readers import recordings
 
 NAMES = ["tc_thermal.md", "tc_thermal_check.py", "tc_thermal_reduced.svg", "tc_thermal_vectors.csv"]
 MAIN = {"klipper": "tc_thermal.cfg", "heidenhain": "tc_thermal.txt", "fanuc": "tc_thermal.nc"}

@@ -7,9 +7,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from thermocomp.api.iso230 import length
 from thermocomp.cli.app import run
 from thermocomp.core.exceptions import InputError
+from thermocomp.iso230.verbs import length
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 POSITIONING = DOCS / "files" / "positioning.csv"

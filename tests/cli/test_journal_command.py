@@ -9,9 +9,8 @@ from smallmachine import small_machine
 from thermocomp.cli.app import run
 from thermocomp.core.correction import Correction, Deviation
 from thermocomp.core.machine import Channel
-from thermocomp.files import recordings
-from thermocomp.files.journal import Journal, JournalLimits
-from thermocomp.files.journalrows import (
+from thermocomp.live.journal.journal import Journal, JournalLimits
+from thermocomp.live.journal.journalrows import (
     AlarmRow,
     ConfirmationRow,
     MeasurementRow,
@@ -22,6 +21,7 @@ from thermocomp.files.journalrows import (
     Target,
     UpdateRow,
 )
+from thermocomp.recordings.readers import recordings
 
 BEGIN = 1_790_000_000.0
 

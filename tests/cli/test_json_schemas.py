@@ -15,11 +15,11 @@ from smallmill import write_mill
 from thermocomp.cli import app
 from thermocomp.cli.app import run
 from thermocomp.core.machine import Channel
-from thermocomp.files import recordings
-from thermocomp.files.journal import Journal, JournalLimits
-from thermocomp.files.journalrows import AlarmRow, ReadingRow, Start, Target
+from thermocomp.live.journal.journal import Journal, JournalLimits
+from thermocomp.live.journal.journalrows import AlarmRow, ReadingRow, Start, Target
 from thermocomp.papers import studies
 from thermocomp.papers.study import Claim, Study, StudyTable
+from thermocomp.recordings.readers import recordings
 
 DOCS = Path(__file__).parents[2] / "docs"
 SCHEMAS = DOCS / "files" / "json"

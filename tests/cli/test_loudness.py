@@ -9,7 +9,7 @@ from smallmachine import small_machine
 
 from thermocomp.cli import progress
 from thermocomp.cli.app import run
-from thermocomp.files import mending
+from thermocomp.recordings.readers import mending
 
 
 @pytest.fixture

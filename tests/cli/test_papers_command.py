@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from smallmachine import small_machine
 
-from thermocomp.cli import papers
 from thermocomp.cli.app import run
-from thermocomp.files import recordings
 from thermocomp.papers import cross, studies
+from thermocomp.papers.commands import papers
 from thermocomp.papers.study import Claim, Figure, Panel, PlotCurve, Progress, Study, StudyTable
-from thermocomp.recording.recording import Recording
+from thermocomp.recordings.readers import recordings
+from thermocomp.recordings.recording import Recording
 
 CLAIMS = (
     Claim(("H-16",), "Grouping raises [it]", "3.3", "2.5", True),

@@ -8,7 +8,7 @@ from smallmachine import small_machine
 
 import thermocomp as tc
 from thermocomp.cli.app import run
-from thermocomp.files import recordings
+from thermocomp.recordings.readers import recordings
 
 
 @pytest.fixture

@@ -8,9 +8,9 @@ import pandas as pd
 import pytest
 from profilemachine import profiles
 
-from thermocomp.cli import positiontables
 from thermocomp.cli.app import run
 from thermocomp.files import positionfile
+from thermocomp.volumetric.commands import positiontables
 
 
 @pytest.fixture

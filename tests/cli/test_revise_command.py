@@ -11,7 +11,7 @@ import pytest
 from driftmodels import lags
 from reviseruns import HONEST, PLATE, judged, revise, said, table, without_header, write_models
 
-from thermocomp.files import jobstate
+from thermocomp.nc.revision import jobstate
 from thermocomp.nc.rewrite.header import MARK
 
 # -- what is written -------------------------------------------------------------------------------------------------

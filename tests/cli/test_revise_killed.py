@@ -59,7 +59,7 @@ def test_the_interpreter_s_folder_goes_too(job_folder: Path, monkeypatch: pytest
     temporary = job_folder / "tmp"
     temporary.mkdir()
     monkeypatch.setenv("TMPDIR", str(temporary))
-    code = "import sys, time\nfrom pathlib import Path\nfrom thermocomp.adapters.linuxcnc.rs274 import read\n"
+    code = "import sys, time\nfrom pathlib import Path\nfrom thermocomp.nc.linuxcnc.rs274 import read\n"
     code += "calls = read(Path(sys.argv[1]))\nnext(calls)\nprint('begun', flush=True)\ntime.sleep(60)\n"
     with subprocess.Popen([sys.executable, "-c", code, "part.ngc"], stdout=subprocess.PIPE, text=True) as killed:
         assert killed.stdout is not None

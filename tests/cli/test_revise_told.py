@@ -9,10 +9,10 @@ from driftmodels import lags
 from matplotlib.figure import Figure
 from reviseruns import PLATE, judged, revise, said, write_models
 
-from thermocomp.api.revision import job as jobs
+from thermocomp.nc.report import revision as pictures
+from thermocomp.nc.revision import job as jobs
 from thermocomp.nc.rewrite.header import MARK
 from thermocomp.nc.rewrite.revise import Revision
-from thermocomp.report import revision as pictures
 
 MILL = 'structure = "{}"\n' + "".join(f"[axes.{name}]\ntravel = ['-500 mm', '500 mm']\n" for name in "XYZ")
 TURNED = PLATE.replace("G0 X0 Y0 Z50\n", "G0 X0 Y0 Z50 A90\n")

@@ -10,9 +10,9 @@ import pytest
 from driftmodels import lags, static
 from reviseruns import HONEST, PLATE, judged, revise, said, table, write_models
 
-from thermocomp.adapters.linuxcnc.verification.verify import Proof, prove
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.validity import Validity
+from thermocomp.nc.linuxcnc.verification.verify import Proof, prove
 from thermocomp.nc.rewrite.header import MARK
 
 # -- how far to trust it ---------------------------------------------------------------------------------------------
@@ -262,7 +262,7 @@ def test_a_wrong_move_is_found_and_nothing_is_written(
         revised.write_bytes(revised.read_bytes().replace(b"\nX20", b"\nX21"))
         return asked(original, revised, *others)
 
-    monkeypatch.setattr("thermocomp.api.revision.job.prove", spoil)
+    monkeypatch.setattr("thermocomp.nc.revision.job.prove", spoil)
     before = set(job_folder.iterdir())
     assert revise(proved=True) == 2
     assert "part.ngc: line 18: LinuxCNC's interpreter disagrees: it moves X by 1000.00 um instead of 0.00 um" in said(

@@ -13,10 +13,10 @@ import pandas as pd
 import pytest
 from smallmachine import crowded_machine
 
-from thermocomp.assessment.choice import LOOKED_AT_BY, Settings
 from thermocomp.cli.app import run
 from thermocomp.core.machine import Channel
-from thermocomp.files import recordings
+from thermocomp.judging.choice import LOOKED_AT_BY, Settings
+from thermocomp.recordings.readers import recordings
 
 
 @pytest.fixture(scope="module")

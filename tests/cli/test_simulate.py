@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from thermocomp.cli.app import run
-from thermocomp.datasets.virtual import EXPERIMENTS
-from thermocomp.files.recordings import read
+from thermocomp.recordings.readers.recordings import read
+from thermocomp.virtual.datasets import EXPERIMENTS
 
 PROTOCOL = """
 sampling = "1 min"
@@ -58,7 +58,7 @@ def test_what_is_there_is_not_written_over(
     output = tmp_path / "rec.csv"
     output.write_text("precious", encoding="utf-8")
     # what is never run needs no answer
-    monkeypatch.setattr("thermocomp.datasets.virtual.record", None)
+    monkeypatch.setattr("thermocomp.virtual.datasets.record", None)
     assert run(["simulate", str(protocol), "-o", str(output)]) == 2
     assert "exists already" in capsys.readouterr().err
     assert output.read_text(encoding="utf-8") == "precious"

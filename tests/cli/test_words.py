@@ -17,7 +17,7 @@ from smallmachine import small_machine
 from thermocomp.cli import terminal
 from thermocomp.cli.app import run
 from thermocomp.cli.terminal import marked, words
-from thermocomp.files import mending
+from thermocomp.recordings.readers import mending
 from thermocomp.report.layout import Column, Layout, Toned
 
 CLI = Path(terminal.__file__).parent

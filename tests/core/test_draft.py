@@ -12,16 +12,16 @@ from pathlib import Path
 
 import pytest
 
-from thermocomp.core.draft import draft, drafts, refuse_existing
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.scratch import scratch
+from thermocomp.files.draft import draft, drafts, refuse_existing
+from thermocomp.files.scratch import scratch
 
 pytestmark = pytest.mark.skipif(find_spec("fcntl") is None, reason="files are not locked here")
 
 WRITER = """
 import sys
 from pathlib import Path
-from thermocomp.core.draft import draft
+from thermocomp.files.draft import draft
 target = Path(sys.argv[1])
 with draft(target, overwrite=True) as path:
     path.write_text("half")
@@ -68,7 +68,7 @@ def test_a_killed_run_is_cleared_away_and_a_living_one_is_not(tmp_path: Path) ->
 
 def test_many_at_once_do_not_take_each_other_for_dead(tmp_path: Path) -> None:
     code = (
-        "import sys\nfrom pathlib import Path\nfrom thermocomp.core.draft import draft\n"
+        "import sys\nfrom pathlib import Path\nfrom thermocomp.files.draft import draft\n"
         "folder, name = Path(sys.argv[1]), sys.argv[2]\n"
         "for k in range(300):\n    with draft(folder / f'{name}-{k}', overwrite=False) as p: p.write_text('x')\n"
     )

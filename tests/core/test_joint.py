@@ -25,7 +25,7 @@ from thermocomp.core.terms import Variable
 from thermocomp.files import jsonfile, modelfile
 from thermocomp.models.covering import find_joint_support
 from thermocomp.models.training import train
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.stacking import stack
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.group import TOGETHER
 

@@ -8,10 +8,10 @@ import pytest
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.datasets.virtual import EXPERIMENTS, find_experiment, record
-from thermocomp.recording.recording import Recording
-from thermocomp.simulation.experiments import SimulatedTest, simulate
-from thermocomp.simulation.kits import CHEN_PLACES, HWANG_PLACES
+from thermocomp.recordings.recording import Recording
+from thermocomp.virtual.datasets import EXPERIMENTS, find_experiment, record
+from thermocomp.virtual.experiments import SimulatedTest, simulate
+from thermocomp.virtual.kits import CHEN_PLACES, HWANG_PLACES
 
 FloatArray = NDArray[np.float64]
 HOUR, MINUTE = 3600.0, 60.0

@@ -17,10 +17,10 @@ from numpydoc.docscrape import NumpyDocString  # type: ignore[import-untyped]
 from numpydoc.validate import validate  # type: ignore[import-untyped]
 
 from thermocomp.cli.app import app
-from thermocomp.files.limits import Limits
-from thermocomp.files.mapping import ColumnMap, CycleRule, Mapping, ReadOptions, TimeColumn, read_mapping
-from thermocomp.files.recordings import read
-from thermocomp.recording.cleaning import Cut, Resample, Rezero, Shift, Swap
+from thermocomp.recordings.cleaning import Cut, Resample, Rezero, Shift, Swap
+from thermocomp.recordings.readers.limits import Limits
+from thermocomp.recordings.readers.mapping import ColumnMap, CycleRule, Mapping, ReadOptions, TimeColumn, read_mapping
+from thermocomp.recordings.readers.recordings import read
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"

@@ -18,7 +18,7 @@ from smallmachine import small_machine
 import thermocomp
 from thermocomp.cli.app import run
 from thermocomp.core.reading import Reading
-from thermocomp.files import recordings
+from thermocomp.recordings.readers import recordings
 from thermocomp.runtime.compensator import Compensator
 
 PAGE = Path(__file__).parents[2] / "docs" / "house.rst"

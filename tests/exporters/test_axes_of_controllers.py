@@ -17,12 +17,13 @@ from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.position import PositionModel
 from thermocomp.core.terms import Variable
 from thermocomp.core.zero import Zeroing
-from thermocomp.exporters import beckhoff, siemens
-from thermocomp.exporters.axes import find_drives, write_values
-from thermocomp.exporters.block.tables import gather
-from thermocomp.exporters.facts import Facts
-from thermocomp.exporters.structuredtext import translate
-from thermocomp.exporters.vectors import Readings
+from thermocomp.export.axes import find_drives, write_values
+from thermocomp.export.beckhoff import package as beckhoff
+from thermocomp.export.block.tables import gather
+from thermocomp.export.facts import Facts
+from thermocomp.export.siemens import package as siemens
+from thermocomp.export.st.structuredtext import translate
+from thermocomp.export.vectors import Readings
 from thermocomp.runtime.compensator import Compensator
 
 FACTS = Facts("model.json", "0" * 64, "0", "2026-01-31")

@@ -22,9 +22,9 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Variable
 from thermocomp.core.zero import Zeroing
-from thermocomp.exporters.block.tables import gather
-from thermocomp.exporters.c99 import translate
-from thermocomp.exporters.vectors import Readings, make_readings, replay
+from thermocomp.export.block.tables import gather
+from thermocomp.export.c99.c99 import translate
+from thermocomp.export.vectors import Readings, make_readings, replay
 from thermocomp.runtime.compensator import Compensator
 
 FloatArray = NDArray[np.float64]

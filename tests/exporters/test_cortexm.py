@@ -8,8 +8,8 @@ import pytest
 from watchedmachine import watched_model
 
 from thermocomp.core.correction import Limits
-from thermocomp.exporters.cpackage import write_package
-from thermocomp.exporters.facts import Facts
+from thermocomp.export.c99.package import write_package
+from thermocomp.export.facts import Facts
 from thermocomp.runtime.compensator import Compensator
 
 BOARD = Path(__file__).parent / "cortexm7"

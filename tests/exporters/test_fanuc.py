@@ -16,11 +16,11 @@ from poorcontroller import exported, growing_machine, left, page_numbers, temper
 
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
-from thermocomp.exporters.facts import Facts
-from thermocomp.exporters.fanuc import UNCONFIRMED, write_fanuc
-from thermocomp.exporters.heidenhain import write_heidenhain
-from thermocomp.exporters.klipper import write_klipper
-from thermocomp.exporters.reduced import as_it_is
+from thermocomp.export.facts import Facts
+from thermocomp.export.fanuc.package import UNCONFIRMED, write_fanuc
+from thermocomp.export.heidenhain.package import write_heidenhain
+from thermocomp.export.klipper.package import write_klipper
+from thermocomp.export.reduction.reduced import as_it_is
 
 FACTS = Facts("model.json", "0" * 64, "1.0", "2026-01-31")
 ON, T, FORCE, Z = 500, 501, 523, 5203

@@ -20,9 +20,9 @@ from poorcontroller import (
 )
 
 from thermocomp.core.correction import Limits
-from thermocomp.exporters.facts import Facts
-from thermocomp.exporters.heidenhain import UNCONFIRMED, formula, write_heidenhain
-from thermocomp.exporters.reduced import as_it_is
+from thermocomp.export.facts import Facts
+from thermocomp.export.heidenhain.package import UNCONFIRMED, formula, write_heidenhain
+from thermocomp.export.reduction.reduced import as_it_is
 
 FACTS = Facts("model.json", "0" * 64, "1.0", "2026-01-31")
 

@@ -14,10 +14,10 @@ from poorcontroller import exported, growing_machine, klipper, left, left_out_cy
 
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
-from thermocomp.exporters.facts import Facts
-from thermocomp.exporters.klipper import write_klipper
-from thermocomp.exporters.reduced import as_it_is
-from thermocomp.recording.recording import Recording
+from thermocomp.export.facts import Facts
+from thermocomp.export.klipper.package import write_klipper
+from thermocomp.export.reduction.reduced import as_it_is
+from thermocomp.recordings.recording import Recording
 
 FACTS = Facts("model.json", "0" * 64, "1.0", "2026-01-31")
 

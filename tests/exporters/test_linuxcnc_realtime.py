@@ -14,10 +14,10 @@ from linuxcncexported import MODULES, fill_in, installed, live_export
 from linuxcnclive import Live
 
 from thermocomp.core.correction import Limits
-from thermocomp.exporters.block.tables import gather
-from thermocomp.exporters.facts import Facts
-from thermocomp.exporters.linuxcncpackage import write_package
-from thermocomp.exporters.vectors import Readings, replay
+from thermocomp.export.block.tables import gather
+from thermocomp.export.facts import Facts
+from thermocomp.export.linuxcnc.package import write_package
+from thermocomp.export.vectors import Readings, replay
 from thermocomp.runtime.compensator import Compensator
 
 FACTS = Facts("model.json", "0" * 64, "1", "2026-01-31")

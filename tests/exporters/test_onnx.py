@@ -28,10 +28,10 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.position import PositionModel
 from thermocomp.core.zero import Zeroing
-from thermocomp.exporters.facts import Facts
-from thermocomp.exporters.onnxpackage import write_package
-from thermocomp.exporters.onnxvectors import answer, pick_readings, pick_zero
-from thermocomp.exporters.vectors import Readings
+from thermocomp.export.facts import Facts
+from thermocomp.export.onnx.package import write_package
+from thermocomp.export.onnx.vectors import answer, pick_readings, pick_zero
+from thermocomp.export.vectors import Readings
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.gate import explain_implausible, find_plausible_range
 

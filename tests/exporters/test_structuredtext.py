@@ -21,14 +21,14 @@ from thermocomp.core.inputs import Support
 from thermocomp.core.joint import JointSupport
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.zero import Zeroing
-from thermocomp.exporters.block.tables import gather
-from thermocomp.exporters.facts import Facts
-from thermocomp.exporters.stpackage import write_package
-from thermocomp.exporters.structuredtext import Unit, translate
-from thermocomp.exporters.ststatements import RESERVED
-from thermocomp.exporters.sttest import write_test
-from thermocomp.exporters.vectors import Readings, make_readings, replay
-from thermocomp.files.recordings import read
+from thermocomp.export.block.tables import gather
+from thermocomp.export.facts import Facts
+from thermocomp.export.st.package import write_package
+from thermocomp.export.st.structuredtext import Unit, translate
+from thermocomp.export.st.ststatements import RESERVED
+from thermocomp.export.st.sttest import write_test
+from thermocomp.export.vectors import Readings, make_readings, replay
+from thermocomp.recordings.readers.recordings import read
 from thermocomp.runtime.compensator import Compensator
 
 FREE = Limits(magnitude=1e9, rate=1e9)

@@ -10,13 +10,13 @@ from spoiling import models_of, spoiled
 from watchedmachine import LOST, failing, watched_model
 
 from thermocomp.core.correction import Limits
-from thermocomp.datasets import virtual
-from thermocomp.exporters.cpackage import write_package
-from thermocomp.exporters.facts import Facts
-from thermocomp.exporters.vectors import Answers, Readings, replay
-from thermocomp.files.recordings import read
-from thermocomp.recording.recording import Recording
+from thermocomp.export.c99.package import write_package
+from thermocomp.export.facts import Facts
+from thermocomp.export.vectors import Answers, Readings, replay
+from thermocomp.recordings.readers.recordings import read
+from thermocomp.recordings.recording import Recording
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.virtual import datasets as virtual
 
 pytestmark = pytest.mark.skipif(not COMPILERS, reason="there is no C compiler")
 

@@ -11,8 +11,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from thermocomp.core.exceptions import InputError, RecordingError, UnitError
-from thermocomp.files.mapping import ColumnMap, CycleRule, Mapping, ReadOptions, TimeColumn
-from thermocomp.files.recordings import read
+from thermocomp.recordings.readers.mapping import ColumnMap, CycleRule, Mapping, ReadOptions, TimeColumn
+from thermocomp.recordings.readers.recordings import read
 
 GOOD = "time_s,t1_C,drift_um\n0,20.5,0\n15,20.6,1\n"
 

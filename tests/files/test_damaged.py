@@ -29,13 +29,14 @@ from thermocomp.core.provenance import Provenance
 from thermocomp.core.terms import Variable
 from thermocomp.core.validity import Validity
 from thermocomp.core.zero import Zeroing
-from thermocomp.files import jobstate, modelfile, positionfile
+from thermocomp.files import modelfile, positionfile
 from thermocomp.files.machines import read_machine
-from thermocomp.files.mapping import read_mapping
+from thermocomp.nc.revision import jobstate
 from thermocomp.nc.thermal import start
 from thermocomp.nc.thermal.drift import Drift
 from thermocomp.nc.thermal.stations import Station
-from thermocomp.volumetric.model import VolumetricModel
+from thermocomp.recordings.readers.mapping import read_mapping
+from thermocomp.runtime.geometry.volumetric import VolumetricModel
 
 MARKS = pack_marks(np.array([1, 5], dtype=np.uint32))
 JOINT = JointSupport((1,), (0.5,), ((0.0,), (3.0,)), 1.5, (0,), ((0.0, 3000.0),), (60.0,))

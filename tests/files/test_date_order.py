@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from thermocomp.cli.app import run
 from thermocomp.core.exceptions import InputError, TwoReadingsError
-from thermocomp.files.mapping import Mapping, TimeColumn
-from thermocomp.files.mending import read_or_offer
-from thermocomp.files.recordings import read
-from thermocomp.recording.recording import Recording
+from thermocomp.recordings.readers.mapping import Mapping, TimeColumn
+from thermocomp.recordings.readers.mending import read_or_offer
+from thermocomp.recordings.readers.recordings import read
+from thermocomp.recordings.recording import Recording
 
 #: how dates are written of which day and month cannot be told apart
 SLASHES = ("%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%m-%d-%Y", "%d/%m/%y", "%m/%d/%y", "%y/%m/%d", "%y-%m-%d")

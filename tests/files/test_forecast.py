@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.files import forecast
+from thermocomp.nc.revision import forecast
 from thermocomp.nc.thermal.inputs import InputSignal
 
 

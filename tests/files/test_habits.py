@@ -11,9 +11,9 @@ import pandas as pd
 import pytest
 
 from thermocomp.core.exceptions import InputError, RecordingError
-from thermocomp.files.mapping import ColumnMap, Mapping, ReadOptions, TimeColumn
-from thermocomp.files.recordings import read
-from thermocomp.recording.recording import Recording
+from thermocomp.recordings.readers.mapping import ColumnMap, Mapping, ReadOptions, TimeColumn
+from thermocomp.recordings.readers.recordings import read
+from thermocomp.recordings.recording import Recording
 
 BEGIN = datetime(2024, 5, 6, 8)
 #: time [s], speed [1/min], two temperatures [degC], displacement [um]

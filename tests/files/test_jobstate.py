@@ -8,10 +8,11 @@ import pytest
 from driftmodels import lags, net, ticking
 
 from thermocomp.core.exceptions import InputError, ModelFileError
-from thermocomp.core.jobstate import JobState
-from thermocomp.files import jobstate, jsonfile, modelfile
+from thermocomp.files import jsonfile, modelfile
+from thermocomp.nc.revision import jobstate
 from thermocomp.nc.thermal import start
 from thermocomp.nc.thermal.drift import Drift
+from thermocomp.nc.thermal.jobstate import JobState
 from thermocomp.nc.thermal.stations import Station
 
 NOON = datetime(2026, 11, 21, 12, 0, 0, 250000, tzinfo=UTC)

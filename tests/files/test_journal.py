@@ -19,9 +19,9 @@ from hypothesis import strategies as st
 from thermocomp.core.correction import Correction, Deviation
 from thermocomp.core.exceptions import InputError, SettingError
 from thermocomp.core.machine import Channel
-from thermocomp.files.journal import Journal, JournalLimits
-from thermocomp.files.journalreader import JournalReader
-from thermocomp.files.journalrows import (
+from thermocomp.live.journal.journal import Journal, JournalLimits
+from thermocomp.live.journal.journalreader import JournalReader
+from thermocomp.live.journal.journalrows import (
     KINDS,
     LONGEST,
     AlarmRow,

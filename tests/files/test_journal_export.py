@@ -13,14 +13,22 @@ import thermocomp as tc
 from thermocomp.core.correction import Correction, uncompensated
 from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.core.machine import Channel
-from thermocomp.datasets import virtual
-from thermocomp.files import recordings
-from thermocomp.files.journal import Journal, JournalLimits
-from thermocomp.files.journalexport import Exported, export
-from thermocomp.files.journalreader import JournalReader
-from thermocomp.files.journalrows import ConfirmationRow, DemandRow, MeasurementRow, ReadingRow, Row, Start, Target
-from thermocomp.recording.quality import check
-from thermocomp.recording.recording import Recording
+from thermocomp.live.journal.journal import Journal, JournalLimits
+from thermocomp.live.journal.journalexport import Exported, export
+from thermocomp.live.journal.journalreader import JournalReader
+from thermocomp.live.journal.journalrows import (
+    ConfirmationRow,
+    DemandRow,
+    MeasurementRow,
+    ReadingRow,
+    Row,
+    Start,
+    Target,
+)
+from thermocomp.recordings.checks.quality import check
+from thermocomp.recordings.readers import recordings
+from thermocomp.recordings.recording import Recording
+from thermocomp.virtual import datasets as virtual
 
 FloatArray = NDArray[np.float64]
 BEGIN = 1_790_000_000.0

@@ -11,10 +11,10 @@ import pytest
 from hostile_files import HOSTILE
 
 from thermocomp.core.exceptions import InputError, RecordingError
-from thermocomp.files.limits import _COUNTED, Limits
-from thermocomp.files.mapping import ColumnMap, Mapping, ReadOptions, read_mapping
-from thermocomp.files.parquet import open_parquet
-from thermocomp.files.recordings import read
+from thermocomp.recordings.readers.limits import _COUNTED, Limits
+from thermocomp.recordings.readers.mapping import ColumnMap, Mapping, ReadOptions, read_mapping
+from thermocomp.recordings.readers.parquet import open_parquet
+from thermocomp.recordings.readers.recordings import read
 
 TEXT = "time_s,t1_C,drift_um,cycle\n# remark\n0,20.5,0,a\n\n15,20.6,1,b\n30,20.6,1,c\n"
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from thermocomp.core.exceptions import RecordingError
-from thermocomp.files.mapping import read_mapping
-from thermocomp.files.mending import read_or_offer
-from thermocomp.files.recordings import read
-from thermocomp.recording.recording import Recording
+from thermocomp.recordings.readers.mapping import read_mapping
+from thermocomp.recordings.readers.mending import read_or_offer
+from thermocomp.recordings.readers.recordings import read
+from thermocomp.recordings.recording import Recording
 
 FOLDER = Path(__file__).parent / "recordings"
 BEGIN = "2024-05-27T08:00:00"

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from thermocomp.core.exceptions import InputError, UnitError
-from thermocomp.files.mapping import ColumnMap, CycleRule, Mapping, ReadOptions, TimeColumn, read_mapping
+from thermocomp.recordings.readers.mapping import ColumnMap, CycleRule, Mapping, ReadOptions, TimeColumn, read_mapping
 
 VORON = Path(__file__).parent / "voron.toml"
 

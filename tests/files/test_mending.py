@@ -11,10 +11,10 @@ from smallmachine import small_machine
 
 from thermocomp.cli.app import run
 from thermocomp.core.exceptions import InputError, RecordingError, TwoReadingsError
-from thermocomp.files.mapping import Mapping, read_mapping
-from thermocomp.files.mending import Draft, Question, mend, read_or_offer, take_best, to_toml
-from thermocomp.files.recordings import read
-from thermocomp.recording.quality import check
+from thermocomp.recordings.checks.quality import check
+from thermocomp.recordings.readers.mapping import Mapping, read_mapping
+from thermocomp.recordings.readers.mending import Draft, Question, mend, read_or_offer, take_best, to_toml
+from thermocomp.recordings.readers.recordings import read
 
 Spoil = Callable[[pd.DataFrame], None]
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.files import ncprogram
+from thermocomp.nc.revision import ncprogram
 
 BYTES = bytes(range(256)) + b"\r\nG1 X1\n\nlast"
 

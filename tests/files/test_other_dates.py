@@ -9,8 +9,8 @@ import pytest
 
 from thermocomp.cli.app import run
 from thermocomp.core.exceptions import TwoReadingsError
-from thermocomp.files.mapping import check_content
-from thermocomp.files.recordings import read
+from thermocomp.recordings.readers.mapping import check_content
+from thermocomp.recordings.readers.recordings import read
 
 DAY = timedelta(days=1)
 #: tests on three days, of which the time runs on as if they were one

@@ -15,9 +15,9 @@ from smallmachine import small_machine
 import thermocomp as tc
 from thermocomp.api.results import FittedModels
 from thermocomp.core.machine import Channel
-from thermocomp.files.recordings import read, write
-from thermocomp.recording.cycles import Cycle
-from thermocomp.recording.recording import Recording
+from thermocomp.recordings.cycles import Cycle
+from thermocomp.recordings.readers.recordings import read, write
+from thermocomp.recordings.recording import Recording
 
 #: one of each kind: with feed rates, angles, no spindle, days of milling, many channels, several cycles
 KINDS = ("chen1996-slope", "chen1996-new", "wessel-sets", "wessel-milling", "iso230-axis", "stepwise2017")

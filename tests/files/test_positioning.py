@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.files.positioning import read
+from thermocomp.volumetric.files.positioning import read
 
 HEADING = "position_mm,deviation_um,direction,run"
 

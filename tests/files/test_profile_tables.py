@@ -9,9 +9,9 @@ import pytest
 from profilemachine import profiles
 
 from thermocomp.core.exceptions import InputError, RecordingError, ThermocompError, UnitError
-from thermocomp.files.mapping import ColumnMap, Mapping
-from thermocomp.files.profiles import ProfileOptions, from_recording, read, read_places
-from thermocomp.recording.profiles import Profiles
+from thermocomp.recordings.profiles import Profiles
+from thermocomp.recordings.readers.mapping import ColumnMap, Mapping
+from thermocomp.recordings.readers.profiles import ProfileOptions, from_recording, read, read_places
 
 
 def made() -> Profiles:

@@ -7,14 +7,14 @@ from pathlib import Path
 import pytest
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.datasets.virtual import EXPERIMENTS
-from thermocomp.files.protocols import TIMES, read_protocol
-from thermocomp.simulation.climate import CLIMATES, STABLE, Climate
-from thermocomp.simulation.instruments import Touch
-from thermocomp.simulation.kits import KITS
-from thermocomp.simulation.protocol import Experiment, Plan
-from thermocomp.simulation.segments import Feed, Lot, SteadySegment, Stretch, Stroke
-from thermocomp.simulation.sensors import Fault
+from thermocomp.virtual.climate import CLIMATES, STABLE, Climate
+from thermocomp.virtual.datasets import EXPERIMENTS
+from thermocomp.virtual.instruments import Touch
+from thermocomp.virtual.kits import KITS
+from thermocomp.virtual.protocol import Experiment, Plan
+from thermocomp.virtual.protocolfile import TIMES, read_protocol
+from thermocomp.virtual.segments import Feed, Lot, SteadySegment, Stretch, Stroke
+from thermocomp.virtual.sensors import Fault
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 PAGE = (DOCS / "protocols.rst").read_text(encoding="utf-8")

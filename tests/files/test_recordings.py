@@ -12,11 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from thermocomp.core.exceptions import RecordingError, UnitError
-from thermocomp.core.headings import understand
-from thermocomp.files.mapping import ColumnMap, CycleRule, Mapping, ReadOptions, TimeColumn, read_mapping
-from thermocomp.files.recordings import read
-from thermocomp.recording.cycles import Cycle, make_single_cycle
-from thermocomp.recording.quality import check
+from thermocomp.recordings.checks.quality import check
+from thermocomp.recordings.cycles import Cycle, make_single_cycle
+from thermocomp.recordings.readers.headings import understand
+from thermocomp.recordings.readers.mapping import ColumnMap, CycleRule, Mapping, ReadOptions, TimeColumn, read_mapping
+from thermocomp.recordings.readers.recordings import read
 
 VORON = Path(__file__).parent / "voron.toml"
 #: 9.9E37 is SCPI's infinity
@@ -192,8 +192,8 @@ def test_the_time_is_found_and_counted_from_the_first_row(
 
 
 def test_a_long_file_is_read_in_parts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("thermocomp.files.textfile._CHUNK", 3)
-    monkeypatch.setattr("thermocomp.files.stamps._CHUNK", 2)
+    monkeypatch.setattr("thermocomp.recordings.readers.textfile._CHUNK", 3)
+    monkeypatch.setattr("thermocomp.recordings.readers.stamps._CHUNK", 2)
     rows = [f"2024-05-01T10:00:{k:02d},{k}.5,{k // 4}" for k in range(8)]
 
     recording = read(_csv(tmp_path, "\n".join(["time,t1_C,cycle", *rows])))

@@ -18,17 +18,18 @@ from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError, ModelFileError
 from thermocomp.core.reading import Reading
 from thermocomp.core.zero import Zeroing
-from thermocomp.datasets.virtual import record
-from thermocomp.files import jsonfile, statefile
+from thermocomp.files import jsonfile
 from thermocomp.files.typed import encode
+from thermocomp.live import statefile
 from thermocomp.models.training import train
 from thermocomp.models.watching import find_watch
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
 from thermocomp.runtime.adaptation import Probing
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.orders import order, rezero
 from thermocomp.runtime.state import CompensatorState, Status
+from thermocomp.virtual.datasets import record
 
 NOW = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
 FEW = ("t_housing_C", "t_motor_C", "t_column_front_left_C", "t_z_bearing_C", "spindle_rpm")

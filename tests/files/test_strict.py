@@ -17,9 +17,9 @@ from thermocomp.core.inputs import Input
 from thermocomp.core.provenance import RULES
 from thermocomp.files import jsonfile, modelfile
 from thermocomp.files.machines import read_machine
-from thermocomp.files.mapping import read_mapping
-from thermocomp.files.protocols import read_protocol
+from thermocomp.recordings.readers.mapping import read_mapping
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.virtual.protocolfile import read_protocol
 
 MODEL = replace(lags(room=True), honest_error=ACCEPTED)
 Change = Callable[[dict[str, Any]], object]

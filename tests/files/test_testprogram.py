@@ -7,16 +7,16 @@ from typing import get_args
 
 import pytest
 
-from thermocomp.adapters.linuxcnc import rs274
-from thermocomp.assessment.planning import make_grid
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
-from thermocomp.core.trial import Trial
-from thermocomp.files import recordings
-from thermocomp.files.testprogram import Dialect, stretches, write_program, write_sheet, write_test
+from thermocomp.judging.planning.planning import make_grid
+from thermocomp.judging.planning.testprogram import Dialect, stretches, write_program, write_sheet, write_test
+from thermocomp.judging.planning.trial import Trial
 from thermocomp.nc.interpreter.block import Setup
 from thermocomp.nc.interpreter.interpret import follow_program
+from thermocomp.nc.linuxcnc import rs274
 from thermocomp.nc.parser.tokens import read_lines
+from thermocomp.recordings.readers import recordings
 
 GRID = make_grid(4321.0, 2.0)
 CHANNELS = (

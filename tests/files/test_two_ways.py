@@ -7,10 +7,10 @@ import pandas as pd
 import pytest
 
 from thermocomp.core.exceptions import InputError, RecordingError
-from thermocomp.files.mapping import Mapping, ReadOptions, TimeColumn
-from thermocomp.files.numbers import Notation, Signs
-from thermocomp.files.recordings import read
-from thermocomp.recording.recording import Recording
+from thermocomp.recordings.readers.mapping import Mapping, ReadOptions, TimeColumn
+from thermocomp.recordings.readers.numbers import Notation, Signs
+from thermocomp.recordings.readers.recordings import read
+from thermocomp.recordings.recording import Recording
 
 TEMPERATURES = [20.0 + k / 8 for k in range(400)]
 

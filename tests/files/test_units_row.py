@@ -10,10 +10,10 @@ import pytest
 
 from thermocomp.cli.app import run
 from thermocomp.core.exceptions import InputError, TwoReadingsError
-from thermocomp.files.mapping import Mapping, check_content
-from thermocomp.files.recordings import read
-from thermocomp.recording.quality import check
-from thermocomp.recording.recording import Recording
+from thermocomp.recordings.checks.quality import check
+from thermocomp.recordings.readers.mapping import Mapping, check_content
+from thermocomp.recordings.readers.recordings import read
+from thermocomp.recordings.recording import Recording
 
 #: three tests on three days, each beginning at a later hour than the last one ended
 INSTANTS = [

@@ -16,42 +16,42 @@ from allwriters import WRITERS, Writer
 
 import thermocomp
 from thermocomp.cli.app import run
-from thermocomp.core.draft import write_text
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.scratch import is_scratch
-from thermocomp.files import mending
+from thermocomp.files.draft import write_text
+from thermocomp.files.scratch import is_scratch
+from thermocomp.recordings.readers import mending
 
 PACKAGE = Path(thermocomp.__file__).parent
 #: blocks inside which files are written that become others, or that nobody keeps
 SHELTERS = {"draft", "drafts", "scratch"}
 #: functions that write into a draft or a folder that they are given
 GIVEN = {
-    "adapters/linuxcnc/_rs274_child.py": {"run": 1},  # a process of its own, in the folder of its run
-    "adapters/linuxcnc/rs274process.py": {"__init__": 2, "_lay_out": 5},
-    "adapters/linuxcnc/verification/verify.py": {"of": 1},
-    "api/revision/expanded.py": {"write_expanded": 1},
-    "api/revision/job.py": {"_write": 3},
-    "files/journal.py": {"_set_aside": 1},  # a journal that is damaged is moved aside, not lost
-    "files/ncprogram.py": {"open_to_write": 1, "replace_lines": 1},
-    "service/loop.py": {"_put_aside": 1},  # a state that is refused is moved aside, not lost
+    "nc/linuxcnc/_rs274_child.py": {"run": 1},  # a process of its own, in the folder of its run
+    "nc/linuxcnc/rs274process.py": {"__init__": 2, "_lay_out": 5},
+    "nc/linuxcnc/verification/verify.py": {"of": 1},
+    "nc/revision/expanded.py": {"write_expanded": 1},
+    "nc/revision/job.py": {"_write": 3},
+    "live/journal/journal.py": {"_set_aside": 1},  # a journal that is damaged is moved aside, not lost
+    "nc/revision/ncprogram.py": {"open_to_write": 1, "replace_lines": 1},
+    "live/loop.py": {"_put_aside": 1},  # a state that is refused is moved aside, not lost
 }
 #: who writes files; each is a kind in `allwriters.WRITERS`, or stands behind one
 WRITING = {
-    "adapters/linuxcnc/halsetup.py",
-    "adapters/linuxcnc/expansion/expand.py",
-    "api/revision/job.py",
-    "cli/export.py",
+    "live/adapters/linuxcnc/halsetup.py",
+    "nc/linuxcnc/expansion/expand.py",
+    "nc/revision/job.py",
+    "export/commands/export.py",
     "cli/map.py",
-    "cli/serve.py",  # the configuration of its demo: a text, never over another
+    "live/commands/serve.py",  # the configuration of its demo: a text, never over another
     "files/jsonfile.py",
-    "files/recordings.py",
-    "files/testprogram.py",
+    "recordings/readers/recordings.py",
+    "judging/planning/testprogram.py",
     "report/assessed.py",
     "report/checks.py",
     "report/html.py",
-    "report/iso230.py",
-    "report/papers.py",
-    "report/volumetric.py",
+    "iso230/report/iso230.py",
+    "papers/report/papers.py",
+    "volumetric/report/volumetric.py",
 }
 _WRITES = {"write_text", "write_bytes", "touch", "symlink_to", "hardlink_to", "open_to_write", "replace_lines"}
 _WRITES |= {"to_csv", "to_parquet", "to_excel", "to_json", "to_pickle", "tofile", "savetxt", "savez", "write_table"}
@@ -89,7 +89,7 @@ def writes(call: ast.Call) -> bool:
 def found() -> Iterator[tuple[str, str, ast.Call, bool]]:
     for path in sorted(PACKAGE.rglob("*.py")):
         file = path.relative_to(PACKAGE).as_posix()
-        if file not in ("core/draft.py", "core/scratch.py"):
+        if file not in ("files/draft.py", "files/scratch.py"):
             for function, call, sheltered in functions(ast.parse(path.read_text(encoding="utf-8"))):
                 yield file, function, call, sheltered
 

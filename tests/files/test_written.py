@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
-from thermocomp.files.recordings import read, write
-from thermocomp.recording.cycles import Cycle, make_single_cycle
-from thermocomp.recording.recording import Recording
+from thermocomp.recordings.cycles import Cycle, make_single_cycle
+from thermocomp.recordings.readers.recordings import read, write
+from thermocomp.recordings.recording import Recording
 
 #: 9.9E37 is SCPI's infinity
 NUMBERS = st.floats(allow_nan=True, allow_infinity=False).filter(lambda x: not abs(x) >= 9.9e37)

@@ -10,7 +10,7 @@ from finite_elements.materials import material
 from finite_elements.screw import Screw
 from finite_elements.transient import factorised
 from thermocomp.core.exceptions import InputError
-from thermocomp.simulation.axes import STATIONS, TEST_POSITION
+from thermocomp.virtual.axes import STATIONS, TEST_POSITION
 
 FloatArray = NDArray[np.float64]
 RUNNING = {"rotation": 0.8, "flow": 1.0, "feed_x": 0.2, "feed_y": 0.2, "feed_z": 0.2}

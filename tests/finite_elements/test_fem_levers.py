@@ -20,7 +20,7 @@ from finite_elements.column import Column
 from finite_elements.machines import dimensions
 from finite_elements.materials import data, material
 from finite_elements.part import Part
-from thermocomp.simulation.axes import STATIONS, TEST_POSITION
+from thermocomp.virtual.axes import STATIONS, TEST_POSITION
 
 FloatArray = NDArray[np.float64]
 #: from a place x, y, z [m] to the displacement there [um]

@@ -15,9 +15,9 @@ from finite_elements.reduction import basis, project, reduce, write
 from finite_elements.screw import Screw
 from finite_elements.transient import Stepper
 from thermocomp.core.exceptions import InputError
-from thermocomp.simulation.heat import HeatSources
-from thermocomp.simulation.machine import Drive
-from thermocomp.simulation.statespace import REFERENCE_TEMPERATURE, ReducedModel
+from thermocomp.virtual.heat import HeatSources
+from thermocomp.virtual.machine import Drive
+from thermocomp.virtual.statespace import REFERENCE_TEMPERATURE, ReducedModel
 
 FloatArray = NDArray[np.float64]
 HOUR = 3600.0
@@ -193,7 +193,7 @@ def test_equal_numbers_make_equal_files(tmp_path: Path, shipped: ReducedModel) -
 
 
 def test_the_shipped_files_are_small() -> None:
-    import thermocomp.simulation as package
+    import thermocomp.virtual as package
 
     for name in MODELS:
         assert (Path(package.__path__[0]) / "reduced" / f"{name}.npz").stat().st_size < 2e6

@@ -8,7 +8,7 @@ from finite_elements.materials import material
 from finite_elements.part import Part
 from finite_elements.screw import Screw
 from thermocomp.core.exceptions import InputError
-from thermocomp.simulation.axes import N_HATS
+from thermocomp.virtual.axes import N_HATS
 
 STEEL = material("steel")
 SCREW = Screw(diameter=0.04, length=1.0, nut=(0.2, 0.8), cells=60)

@@ -17,19 +17,21 @@ from linuxcncmill import write_linuxcnc_mill
 from reviseruns import PLATE, judged
 from smallmachine import small_machine
 
-from thermocomp.adapters.linuxcnc import halsetup
-from thermocomp.adapters.linuxcnc.halsetup import COMPONENT_NAME, HAL_NAME, HalSettings
 from thermocomp.cli.app import run
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.position import PositionModel
 from thermocomp.core.profile import SplineProfile
-from thermocomp.core.trial import Trial
-from thermocomp.files import modelfile, positionfile, recordings, testprogram
+from thermocomp.files import modelfile, positionfile
+from thermocomp.iso230.report import iso230 as iso230pages
+from thermocomp.judging.planning import testprogram
+from thermocomp.judging.planning.trial import Trial
+from thermocomp.live.adapters.linuxcnc import halsetup
+from thermocomp.live.adapters.linuxcnc.halsetup import COMPONENT_NAME, HAL_NAME, HalSettings
+from thermocomp.papers.report import papers as paperpages
+from thermocomp.recordings.readers import recordings
 from thermocomp.report import assessed, checks, html
-from thermocomp.report import iso230 as iso230pages
-from thermocomp.report import papers as paperpages
-from thermocomp.report import volumetric as volumetricpages
+from thermocomp.volumetric.report import volumetric as volumetricpages
 
 _FANUC = (
     "%\nO1234\nG21 G90 G17 G94\nT1 M6\nS4000 M3\nG0 G54 X0. Y0. Z50.\nG1 Z0. F30.\nM98 P100 L2\nX100.\n"

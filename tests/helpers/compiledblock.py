@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.exporters.block.tables import gather
-from thermocomp.exporters.c99 import translate
-from thermocomp.exporters.vectors import Answers, Readings, replay
+from thermocomp.export.block.tables import gather
+from thermocomp.export.c99.c99 import translate
+from thermocomp.export.vectors import Answers, Readings, replay
 from thermocomp.runtime.compensator import Compensator
 
 FloatArray = NDArray[np.float64]

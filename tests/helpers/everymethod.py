@@ -8,8 +8,9 @@ from smallmachine import small_machine
 from spoiling import models_of
 
 from thermocomp.core.model import ErrorModel
-from thermocomp.files import modelfile, recordings
-from thermocomp.recording.recording import Recording
+from thermocomp.files import modelfile
+from thermocomp.recordings.readers import recordings
+from thermocomp.recordings.recording import Recording
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "export.rst"
 WHOLE = ("c99", "linuxcnc", "st", "st-twincat", "st-scl", "siemens", "beckhoff", "onnx")

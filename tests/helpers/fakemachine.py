@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.simulation.kits import CENTRE
-from thermocomp.simulation.machine import Air, Drive, Truth
+from thermocomp.virtual.kits import CENTRE
+from thermocomp.virtual.machine import Air, Drive, Truth
 
 FloatArray = NDArray[np.float64]
 

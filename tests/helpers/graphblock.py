@@ -6,11 +6,11 @@ import numpy as np
 import onnxruntime
 from numpy.typing import NDArray
 
-from thermocomp.exporters.block.tables import Tables, gather
-from thermocomp.exporters.onnxgraph import translate
-from thermocomp.exporters.onnxnodes import serialize
-from thermocomp.exporters.onnxvectors import without_watch
-from thermocomp.exporters.vectors import Readings
+from thermocomp.export.block.tables import Tables, gather
+from thermocomp.export.onnx.graph import translate
+from thermocomp.export.onnx.nodes import serialize
+from thermocomp.export.onnx.vectors import without_watch
+from thermocomp.export.vectors import Readings
 from thermocomp.runtime.compensator import Compensator
 
 FloatArray = NDArray[np.float64]

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from thermocomp.recording.recording import Recording
+from thermocomp.recordings.recording import Recording
 
 NAMES = [
     "$x^{$",

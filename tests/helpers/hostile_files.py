@@ -16,8 +16,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from thermocomp.core.exceptions import ThermocompError
-from thermocomp.files.recordings import read
-from thermocomp.recording.quality import check
+from thermocomp.recordings.checks.quality import check
+from thermocomp.recordings.readers.recordings import read
 
 SHEET = "xl/worksheets/sheet1.xml"
 _MAIN = 'xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main"'

@@ -19,8 +19,8 @@ from typing import Any
 
 from allwriters import WRITERS, Writer
 
-from thermocomp.core.draft import write_text
-from thermocomp.core.scratch import is_scratch
+from thermocomp.files.draft import write_text
+from thermocomp.files.scratch import is_scratch
 
 #: of a run: more versions than it lives for
 _ENOUGH = 1000

@@ -17,7 +17,7 @@ import linuxcncrun
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.adapters.linuxcnc.halsetup import HalSettings, Pattern, set_up
+from thermocomp.live.adapters.linuxcnc.halsetup import HalSettings, Pattern, set_up
 
 #: of the servo thread [s]
 PERIOD = 0.001

@@ -5,9 +5,9 @@ import random
 import sys
 from pathlib import Path
 
-from thermocomp.adapters.linuxcnc.sink import LinuxCncSink
 from thermocomp.core.correction import Correction
 from thermocomp.core.exceptions import ThermocompError
+from thermocomp.live.adapters.linuxcnc.sink import LinuxCncSink
 
 
 async def main() -> None:

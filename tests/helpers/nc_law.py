@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from thermocomp.adapters.linuxcnc import rs274
-from thermocomp.adapters.linuxcnc.verification.verify import Ledger, Proof, prove
 from thermocomp.nc.interpreter.block import Point, Setup
+from thermocomp.nc.linuxcnc import rs274
+from thermocomp.nc.linuxcnc.verification.verify import Ledger, Proof, prove
 from thermocomp.nc.planner.timeline import MotionLimits
 from thermocomp.nc.rewrite.coordinates import Coordinates
 from thermocomp.nc.rewrite.demand import Demand, Field

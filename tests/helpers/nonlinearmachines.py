@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.simulation.centre import MachiningCentre
-from thermocomp.simulation.machine import Air, Drive, Truth
-from thermocomp.simulation.toolsystem import RestingTool
+from thermocomp.virtual.centre import MachiningCentre
+from thermocomp.virtual.machine import Air, Drive, Truth
+from thermocomp.virtual.toolsystem import RestingTool
 
 FloatArray = NDArray[np.float64]
 AIR = Air(22.0)

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from smallmachine import small_machine
 
 from thermocomp.cli.app import run
-from thermocomp.files import recordings
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.readers import recordings
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.stacking import stack
 
 FloatArray = NDArray[np.float64]
 DATE = ["--date", "2026-01-31", "--jobs", "1"]

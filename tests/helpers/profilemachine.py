@@ -8,11 +8,11 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from thermocomp.core.machine import Channel
-from thermocomp.files.profiles import from_recording
 from thermocomp.papers.chen1996.setup import recordings
-from thermocomp.recording.cycles import Cycle
-from thermocomp.recording.profiles import Profiles
-from thermocomp.recording.recording import Recording
+from thermocomp.recordings.cycles import Cycle
+from thermocomp.recordings.profiles import Profiles
+from thermocomp.recordings.readers.profiles import from_recording
+from thermocomp.recordings.recording import Recording
 
 FloatArray = NDArray[np.float64]
 

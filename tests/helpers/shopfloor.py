@@ -27,14 +27,14 @@ from numpy.typing import NDArray
 from thermocomp.core.correction import Limits
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.reading import Reading
-from thermocomp.datasets.virtual import record
 from thermocomp.files import modelfile
+from thermocomp.live.build import find_experiment
 from thermocomp.models.training import train
 from thermocomp.models.watching import find_watch
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.stacking import stack
 from thermocomp.runtime.compensator import Compensator
-from thermocomp.service.build import find_experiment
-from thermocomp.simulation.experiments import simulate
+from thermocomp.virtual.datasets import record
+from thermocomp.virtual.experiments import simulate
 
 CONFIG = """
 models = ["model.json"]

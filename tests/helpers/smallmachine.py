@@ -8,8 +8,8 @@ import pandas as pd
 
 from thermocomp.core import lagbank
 from thermocomp.core.machine import Channel
-from thermocomp.recording.cycles import find_cycles
-from thermocomp.recording.recording import Recording
+from thermocomp.recordings.cycles import find_cycles
+from thermocomp.recordings.recording import Recording
 
 
 def small_machine(speeds: Sequence[float] = (1000.0, 2500.0, 1800.0, 3000.0), *, seed: int = 0) -> Recording:

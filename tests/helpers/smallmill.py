@@ -9,7 +9,8 @@ from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.position import PositionModel
 from thermocomp.core.profile import SplineProfile
 from thermocomp.core.terms import Variable
-from thermocomp.files import modelfile, positionfile, recordings
+from thermocomp.files import modelfile, positionfile
+from thermocomp.recordings.readers import recordings
 
 #: um/m per degC, um per degC, urad
 SLOPE, DRIFT, SQUARENESS = 2.0, 3.0, 10.0

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from thermocomp.core.model import ErrorModel
 from thermocomp.models.training import train
 from thermocomp.models.watching import find_watch
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.stacking import stack
 
 FloatArray = NDArray[np.float64]
 Damage = Callable[[FloatArray, np.random.Generator], None]

@@ -15,8 +15,8 @@ from typing import NamedTuple
 from state_pieces import joined
 from state_run import MOVES, STILL, Move, Ran, State, bare, followed, run, turned
 
-from thermocomp.adapters.linuxcnc import rs274
 from thermocomp.core.exceptions import ThermocompError
+from thermocomp.nc.linuxcnc import rs274
 
 Vector = tuple[float, float, float]
 

@@ -4,7 +4,7 @@ import math
 
 from state_run import MOVES, Move, Ran
 
-from thermocomp.adapters.linuxcnc import rs274
+from thermocomp.nc.linuxcnc import rs274
 
 #: of a place from the path, beside the largest correction [mm]
 OFF = 1e-3

@@ -9,9 +9,9 @@ from itertools import groupby
 from pathlib import Path
 from typing import NamedTuple
 
-from thermocomp.adapters.linuxcnc import rs274
-from thermocomp.adapters.linuxcnc.rs274process import InterpreterJob, InterpreterRun
 from thermocomp.core.exceptions import ThermocompError
+from thermocomp.nc.linuxcnc import rs274
+from thermocomp.nc.linuxcnc.rs274process import InterpreterJob, InterpreterRun
 
 #: states that are drawn
 STATES = 8

@@ -15,9 +15,9 @@ import numpy as np
 from blark import transform as b
 from blark.parse import parse_source_code
 
-from thermocomp.exporters.block.tables import gather
-from thermocomp.exporters.structuredtext import NOTHING, Unit, translate
-from thermocomp.exporters.vectors import Answers, Readings, replay
+from thermocomp.export.block.tables import gather
+from thermocomp.export.st.structuredtext import NOTHING, Unit, translate
+from thermocomp.export.vectors import Answers, Readings, replay
 from thermocomp.runtime.compensator import Compensator
 
 _PYTHON = {"LREAL": float, "DINT": int, "BOOL": bool}

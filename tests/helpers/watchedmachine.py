@@ -10,8 +10,8 @@ from smallmachine import small_machine
 from thermocomp.core.model import ErrorModel
 from thermocomp.models.training import train
 from thermocomp.models.watching import find_watch
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.stacking import stack
 
 #: with t3_C it does harm; it was never judged with t2_C and t3_C lost together
 LOST = {"t1_C": 1.5, "t2_C": 2.5, "t3_C": 9.0, "t1_C, t2_C": 3.0, "t1_C, t3_C": 9.5}

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from thermocomp.core.exceptions import InputError
 from thermocomp.iso230.part2 import assess
 from thermocomp.iso230.tables import positioning_content, positioning_tables
-from thermocomp.recording.positioning import Positioning
+from thermocomp.volumetric.positioning import Positioning
 
 FloatArray = NDArray[np.float64]
 

@@ -15,14 +15,14 @@ from thermocomp.core.machine import Channel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.provenance import HonestError, Provenance
 from thermocomp.core.terms import Variable
-from thermocomp.datasets.virtual import record
 from thermocomp.iso230.part3 import assess, detect, find_pairs, find_stations
 from thermocomp.iso230.tables import thermal_content, thermal_tables, with_uncertainty
 from thermocomp.iso230.thermaltest import Pair, ThermalCurve, ThermalTest, evaluate_curve
 from thermocomp.models.training import train
-from thermocomp.recording.cycles import make_single_cycle
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.cycles import make_single_cycle
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.stacking import stack
+from thermocomp.virtual.datasets import record
 
 FloatArray = NDArray[np.float64]
 

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 from smallmachine import small_machine
 
 from thermocomp.core.machine import Channel
-from thermocomp.iso230.averaging import scatter
-from thermocomp.iso230.exponentials import fit
-from thermocomp.iso230.settling import Phase, find_driven_rows, find_phases, settle, time_constants
 from thermocomp.iso230.tables import settling_content, time_constant_tables
-from thermocomp.recording.cycles import make_single_cycle
-from thermocomp.recording.recording import Recording
+from thermocomp.judging.settling.averaging import scatter
+from thermocomp.judging.settling.exponentials import fit
+from thermocomp.judging.settling.settling import Phase, find_driven_rows, find_phases, settle, time_constants
+from thermocomp.recordings.cycles import make_single_cycle
+from thermocomp.recordings.recording import Recording
 
 FloatArray = NDArray[np.float64]
 

@@ -6,8 +6,8 @@ import pytest
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.iso230.stopping import foretell, judge_running
-from thermocomp.recording.recording import Recording
+from thermocomp.judging.settling.stopping import foretell, judge_running
+from thermocomp.recordings.recording import Recording
 
 Curve = tuple[NDArray[np.float64], NDArray[np.float64]]
 

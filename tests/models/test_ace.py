@@ -15,12 +15,12 @@ from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.inputs import Input, Support
-from thermocomp.datasets.virtual import record
 from thermocomp.files import modelfile
 from thermocomp.models.ace import ACE, SampledFunction, TransformRegressor, half_window, nearest
 from thermocomp.models.ace_monotone import MonotoneACE
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.ols import LeastSquares
+from thermocomp.virtual.datasets import record
 
 FloatArray = NDArray[np.float64]
 

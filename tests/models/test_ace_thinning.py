@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 
 from thermocomp.core.additive import Additive, Curve
 from thermocomp.core.inputs import Input
-from thermocomp.datasets.virtual import record
-from thermocomp.files import modelfile, recordings
+from thermocomp.files import modelfile
 from thermocomp.models.ace import ACE
 from thermocomp.models.ace_thinning import POINTS, SMALL, TOLERANCE, thin
 from thermocomp.models.training import train
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.readers import recordings
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.stacking import stack
+from thermocomp.virtual.datasets import record
 
 FloatArray = NDArray[np.float64]
 

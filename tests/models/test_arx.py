@@ -20,7 +20,7 @@ from thermocomp.models.arx_net import NetARX
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.numerics.leastsquares import join_columns, triangle
 from thermocomp.models.selection import orders
-from thermocomp.recording.samples import Samples
+from thermocomp.recordings.samples import Samples
 
 FloatArray = NDArray[np.float64]
 

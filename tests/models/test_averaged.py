@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from thermocomp.core import lagbank
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.paceddynamic import PacedDynamic
-from thermocomp.files import recordings
 from thermocomp.models.averaged import DIRECTIONS, AveragedDynamic
 from thermocomp.models.numerics.folds import halve, number_folds
 from thermocomp.models.numerics.structures import fit_each
 from thermocomp.models.pacedfeatures import PacedFeatures
 from thermocomp.models.training import fit_method, train
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.readers import recordings
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
 
 FloatArray = NDArray[np.float64]
 

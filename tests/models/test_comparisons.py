@@ -18,13 +18,13 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
-from thermocomp.assessment import study
-from thermocomp.assessment.compare import compare
-from thermocomp.assessment.replay import replay
 from thermocomp.core.exceptions import FitError, InputError, ModelFileError
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.files import modelfile
+from thermocomp.judging import splits, study
+from thermocomp.judging.compare import compare
+from thermocomp.judging.replay import replay
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.gp import GaussianProcess
 from thermocomp.models.lasso import ElasticNet, Lasso
@@ -36,8 +36,7 @@ from thermocomp.models.pls import PartialLeastSquares
 from thermocomp.models.ridge import Ridge
 from thermocomp.models.shrinkage import ShrunkRegressor, choose, scaling
 from thermocomp.models.training import train
-from thermocomp.recording import splits
-from thermocomp.recording.samples import Samples
+from thermocomp.recordings.samples import Samples
 
 FloatArray = NDArray[np.float64]
 

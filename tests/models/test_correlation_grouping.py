@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from thermocomp.core.exceptions import FitError, InputError
-from thermocomp.datasets.virtual import record
 from thermocomp.files import modelfile
 from thermocomp.models.grouping import CorrelationGrouping
 from thermocomp.models.numerics.leastsquares import join_columns, lstsq, triangle
 from thermocomp.models.selection import exhaustive
 from thermocomp.models.selection.collinearity import spectrum
 from thermocomp.models.training import train
-from thermocomp.recording.samples import Samples
+from thermocomp.recordings.samples import Samples
+from thermocomp.virtual.datasets import record
 
 FloatArray = NDArray[np.float64]
 

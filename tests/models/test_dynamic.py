@@ -12,7 +12,7 @@ from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.models.dynamic import MINUTE, DynamicRidge
 from thermocomp.models.numerics.folds import number_folds
 from thermocomp.models.pacedfeatures import SHORTEST_LAG
-from thermocomp.recording.samples import Samples
+from thermocomp.recordings.samples import Samples
 
 LAGS = {"temperature_lags": ((), (20 * MINUTE,)), "speed_lags": ((20 * MINUTE,), (20 * MINUTE, 90 * MINUTE))}
 

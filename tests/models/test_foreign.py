@@ -14,10 +14,11 @@ from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
-from thermocomp.assessment.compare import compare, n_pieces
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.inputs import Input, Support
 from thermocomp.core.polynomial import Polynomial
+from thermocomp.judging import splits
+from thermocomp.judging.compare import compare, n_pieces
 from thermocomp.models.dynamic import DynamicRidge
 from thermocomp.models.foreign import ForeignRegressor, adopt_estimator
 from thermocomp.models.methods import METHODS, NamedEstimator, deployable, expand
@@ -28,8 +29,7 @@ from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.models.sensors import SensorSelector
 from thermocomp.models.training import train
 from thermocomp.models.unfrozen import EstimatorModel
-from thermocomp.recording import splits
-from thermocomp.recording.samples import Samples
+from thermocomp.recordings.samples import Samples
 
 FloatArray = NDArray[np.float64]
 DYNAMIC = DynamicRidge(speed=["spindle_rpm"], temperature_lags=((1200.0,),), speed_lags=((1200.0, 5400.0),))

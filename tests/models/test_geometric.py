@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from profilemachine import along_y
 
 from thermocomp.core.profile import SplineProfile
-from thermocomp.models.geometric import fit_profile
-from thermocomp.simulation.geometry import PROFILES, cold_profile
+from thermocomp.virtual.geometry import PROFILES, cold_profile
+from thermocomp.volumetric.models.geometric import fit_profile
 
 FloatArray = NDArray[np.float64]
 

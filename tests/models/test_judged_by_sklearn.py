@@ -9,8 +9,9 @@ from sklearn import config_context
 from sklearn.model_selection import LeaveOneGroupOut, cross_val_score
 from smallmachine import small_machine
 
-from thermocomp.assessment.compare import compare
 from thermocomp.core.inputs import Support
+from thermocomp.judging import splits
+from thermocomp.judging.compare import compare
 from thermocomp.models.arx_net import NetARX
 from thermocomp.models.gp import GaussianProcess
 from thermocomp.models.methods import METHODS
@@ -18,9 +19,8 @@ from thermocomp.models.mlp import SigmoidNet
 from thermocomp.models.mlp_sklearn import SklearnNet
 from thermocomp.models.ppr import ProjectionPursuit
 from thermocomp.models.timed import TimedRegressor
-from thermocomp.recording import splits
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
 
 #: those that would take long as they are
 QUICK: dict[str, Any] = {

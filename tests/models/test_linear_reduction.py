@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.models import reduced
+from thermocomp.export.reduction import models as reduced
+from thermocomp.export.reduction.models import LinearReduction
 from thermocomp.models.base import ThermalRegressor
-from thermocomp.models.reduced import LinearReduction
 
 FloatArray = NDArray[np.float64]
 

@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
-from thermocomp.models.position import PositionOptions, fit_position
-from thermocomp.recording.cycles import make_single_cycle
-from thermocomp.recording.profiles import Profiles
-from thermocomp.recording.recording import Recording
+from thermocomp.recordings.cycles import make_single_cycle
+from thermocomp.recordings.profiles import Profiles
+from thermocomp.recordings.recording import Recording
+from thermocomp.volumetric.models.position import PositionOptions, fit_position
 
 FloatArray = NDArray[np.float64]
 POSITIONS = np.linspace(0.0, 500.0, 6)

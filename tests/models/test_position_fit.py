@@ -9,13 +9,13 @@ from profilemachine import EQ6, LAW, along_y, planted, profiles, states
 
 from thermocomp.core.exceptions import FitError, InputError, RecordingError
 from thermocomp.core.lineardynamic import LinearDynamic
-from thermocomp.models.geometric import fit_profile
 from thermocomp.models.ols import LeastSquares
-from thermocomp.models.position import PositionOptions, fit_position
 from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.papers.chen1996.law import OURS, plant, temperatures
 from thermocomp.papers.chen1996.setup import DIFFERENCES, SLOPE_VARIABLES
-from thermocomp.recording.profiles import Profiles
+from thermocomp.recordings.profiles import Profiles
+from thermocomp.volumetric.models.geometric import fit_profile
+from thermocomp.volumetric.models.position import PositionOptions, fit_position
 
 FloatArray = NDArray[np.float64]
 

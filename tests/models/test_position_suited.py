@@ -10,9 +10,9 @@ from profilemachine import EQ6, along_y, profiles, states
 
 from thermocomp.core.exceptions import FitError
 from thermocomp.core.machine import Channel
-from thermocomp.models.position import PositionOptions, fit_position
-from thermocomp.models.positionoptions import fill_options
-from thermocomp.recording.profiles import Profiles
+from thermocomp.recordings.profiles import Profiles
+from thermocomp.volumetric.models.position import PositionOptions, fit_position
+from thermocomp.volumetric.models.positionoptions import fill_options
 
 FloatArray = NDArray[np.float64]
 

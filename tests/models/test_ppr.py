@@ -11,15 +11,15 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
-from thermocomp.assessment.compare import compare
 from thermocomp.core.additive import Additive
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.files import modelfile
+from thermocomp.judging import splits
+from thermocomp.judging.compare import compare
 from thermocomp.models import ppr
 from thermocomp.models.methods import METHODS, Method
 from thermocomp.models.ppr import ProjectionPursuit
-from thermocomp.recording import splits
-from thermocomp.recording.samples import Samples
+from thermocomp.recordings.samples import Samples
 
 FloatArray = NDArray[np.float64]
 

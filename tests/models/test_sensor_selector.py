@@ -16,8 +16,8 @@ from thermocomp.models.partial_f import PartialF
 from thermocomp.models.ridge import Ridge
 from thermocomp.models.sensors import SELECTORS, SensorSelector
 from thermocomp.models.subsets import BestSubset
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
 
 LOOSE = PartialF(f_enter=0.1, f_delete=0.05)  # the checks bring columns that tell nothing
 

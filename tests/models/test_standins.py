@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from smallmachine import two_that_matter
 
-from thermocomp.assessment.sensorsets import choose_sets
-from thermocomp.files.recordings import read
+from thermocomp.judging.sensorsets import choose_sets
 from thermocomp.models.numerics.folds import halve
 from thermocomp.models.selection.standins import Answer, make_up
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
-from thermocomp.recording.starts import COLD
+from thermocomp.recordings.readers.recordings import read
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
+from thermocomp.recordings.starts import COLD
 
 
 def products(*columns: np.ndarray) -> np.ndarray:

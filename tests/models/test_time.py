@@ -25,8 +25,8 @@ from thermocomp.models.dynamic import DynamicRidge
 from thermocomp.models.methods import METHODS
 from thermocomp.models.timed import TimedRegressor, derive_steps
 from thermocomp.models.training import train
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
 
 FloatArray = NDArray[np.float64]
 MINUTE = 60.0

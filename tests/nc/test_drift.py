@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 from thermocomp.core.correction import Correction, Deviation
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
-from thermocomp.datasets.virtual import record
 from thermocomp.models.arx import ARX
 from thermocomp.nc.thermal import start
 from thermocomp.nc.thermal.drift import SOON, Drift
@@ -22,6 +21,7 @@ from thermocomp.nc.thermal.inputs import Inputs, InputSignal, constants
 from thermocomp.nc.thermal.stations import Station
 from thermocomp.papers.common import fit_and_freeze, predict_deviation
 from thermocomp.papers.precompensation.setup import POSITIONS, samples_of
+from thermocomp.virtual.datasets import record
 
 ORIGIN = (0.0, 0.0, 0.0)
 REMEMBERING: list[Callable[[], ErrorModel]] = [lags, ticking, net]

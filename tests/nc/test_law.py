@@ -10,8 +10,8 @@ from nc_interpreter import PROGRAMS, needs_programs
 from nc_law import Growing, Steady, Still, Trial, revise
 from random_programs import programs
 
-from thermocomp.adapters.linuxcnc import rs274
 from thermocomp.core.exceptions import InputError, ProgramError
+from thermocomp.nc.linuxcnc import rs274
 from thermocomp.nc.rewrite import header
 
 pytestmark = pytest.mark.usefixtures("interpreter")

@@ -8,9 +8,9 @@ import pytest
 from nc_interpreter import PROGRAMS, needs_programs
 from nc_law import STATED, Growing, Trial, revise
 
-from thermocomp.adapters.linuxcnc import rs274
-from thermocomp.adapters.linuxcnc.expansion.expand import expand
 from thermocomp.core.exceptions import InputError, ProgramError
+from thermocomp.nc.linuxcnc import rs274
+from thermocomp.nc.linuxcnc.expansion.expand import expand
 
 pytestmark = pytest.mark.usefixtures("interpreter")
 

@@ -9,9 +9,9 @@ from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 from nc_law import STATED, Growing, revise
 
-from thermocomp.adapters.linuxcnc.verification import states
 from thermocomp.core.exceptions import ProgramError, Unprovable
 from thermocomp.nc.interpreter.block import Setup
+from thermocomp.nc.linuxcnc.verification import states
 
 HEAD = "G21 G90 G17 G40 G80 G94 G54\nG64 P0.01 G99\nT5 M6\nS12000 M3\nG43 H5\nG0 X0 Y0 Z20\n"
 #: a program is short enough as it is drawn

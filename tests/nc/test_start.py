@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.jobstate import JobState
 from thermocomp.core.model import ErrorModel
 from thermocomp.nc.thermal import start
 from thermocomp.nc.thermal.drift import Drift
 from thermocomp.nc.thermal.inputs import InputSignal
+from thermocomp.nc.thermal.jobstate import JobState
 from thermocomp.nc.thermal.stations import Station
 
 ORIGIN = (0.0, 0.0, 0.0)

@@ -2,11 +2,11 @@
 
 import pytest
 
-from thermocomp.adapters.linuxcnc.verification.states import build_stored
 from thermocomp.core.exceptions import InputError
 from thermocomp.nc.interpreter.block import Modal, Setup
 from thermocomp.nc.interpreter.interpret import follow_program
 from thermocomp.nc.interpreter.startup import complete_codes, modal, tidy
+from thermocomp.nc.linuxcnc.verification.states import build_stored
 from thermocomp.nc.parser.tokens import Controller, read_lines
 from thermocomp.nc.planner.timeline import MotionLimits, time_blocks
 

@@ -9,9 +9,9 @@ from typing import Literal
 import pytest
 from nc_law import STATED, Growing, Steady, Trial, revise
 
-from thermocomp.adapters.linuxcnc import rs274
 from thermocomp.core.exceptions import ProgramError
 from thermocomp.nc.interpreter.block import Point, Setup
+from thermocomp.nc.linuxcnc import rs274
 from thermocomp.nc.rewrite.frame import Vector
 
 pytestmark = pytest.mark.usefixtures("interpreter")

@@ -22,7 +22,7 @@ from thermocomp.papers.chen1996.slope import LearnedPositioning
 from thermocomp.papers.chen1996.unseen import DYNAMIC, MRA, NET, NONE, Unseen
 from thermocomp.papers.studies import run
 from thermocomp.papers.study import Claim, Study
-from thermocomp.recording.samples import Samples
+from thermocomp.recordings.samples import Samples
 
 pytestmark = pytest.mark.long
 

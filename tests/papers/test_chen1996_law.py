@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from thermocomp.models.mlp import SigmoidNet
-from thermocomp.models.position import PositionOptions, slope_samples
 from thermocomp.papers.chen1996 import law
 from thermocomp.papers.chen1996.law import DESIGNS, OURS, Law, Recovery
 from thermocomp.papers.chen1996.setup import EQ6, EQ8, TEMPERATURES
 from thermocomp.papers.study import FloatArray
+from thermocomp.volumetric.models.position import PositionOptions, slope_samples
 
 DAYS = range(3)
 

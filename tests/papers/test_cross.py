@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from smallmachine import small_machine
 
-from thermocomp.assessment.robustness import stress
 from thermocomp.core.exceptions import InputError
-from thermocomp.files import recordings as files
+from thermocomp.judging.robustness import stress
 from thermocomp.models.methods import METHODS
 from thermocomp.models.training import train
 from thermocomp.papers import cross
 from thermocomp.papers.cross import CrossExperiment, Row
-from thermocomp.recording.cycles import find_cycles, make_single_cycle
-from thermocomp.recording.recording import Recording
+from thermocomp.recordings.cycles import find_cycles, make_single_cycle
+from thermocomp.recordings.readers import recordings as files
+from thermocomp.recordings.recording import Recording
 
 METHODS_HERE = ("ols", "dynamic", "arx")
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from thermocomp.datasets.virtual import record
 from thermocomp.models.selection.grouping import Interval
 from thermocomp.papers.common import predict_deviation
 from thermocomp.papers.hwang import redo as hwang
 from thermocomp.papers.hwang import setup as hwang_setup
 from thermocomp.papers.study import Claim, Study, tell_nobody
-from thermocomp.recording.recording import Recording
+from thermocomp.recordings.recording import Recording
+from thermocomp.virtual.datasets import record
 
 FloatArray = NDArray[np.float64]
 

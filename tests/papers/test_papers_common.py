@@ -13,9 +13,9 @@ from thermocomp.models.ols import LeastSquares
 from thermocomp.papers import common, pictures
 from thermocomp.papers.common import Errors
 from thermocomp.papers.study import Claims, Ours, Part, Study, StudyTable
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
 
 
 @pytest.fixture(scope="module")

@@ -8,19 +8,19 @@ import pandas as pd
 import pytest
 from numpy.typing import NDArray
 
-from thermocomp.adapters.linuxcnc import rs274
 from thermocomp.core.inputs import Input
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.machine import Channel
-from thermocomp.datasets.virtual import find_experiment, record
+from thermocomp.nc.linuxcnc import rs274
 from thermocomp.nc.thermal.drift import Drift
 from thermocomp.nc.thermal.start import begin_cold
 from thermocomp.papers.precompensation import cutting, program
 from thermocomp.papers.precompensation.cutting import COLD, COLDER, HOUR, WARM, WARMER, Changing
 from thermocomp.papers.precompensation.setup import POSITIONS, SPEED
-from thermocomp.recording.cycles import find_cycles
-from thermocomp.recording.recording import Recording
-from thermocomp.simulation.climate import STABLE
+from thermocomp.recordings.cycles import find_cycles
+from thermocomp.recordings.recording import Recording
+from thermocomp.virtual.climate import STABLE
+from thermocomp.virtual.datasets import find_experiment, record
 
 FloatArray = NDArray[np.float64]
 

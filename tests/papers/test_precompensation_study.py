@@ -14,9 +14,9 @@ from thermocomp.papers.precompensation import cutting
 from thermocomp.papers.precompensation import redo as precompensation
 from thermocomp.papers.precompensation import setup as precompensation_setup
 from thermocomp.papers.study import Claim, Study, tell_nobody
-from thermocomp.recording.cycles import find_cycles
-from thermocomp.recording.recording import Recording
-from thermocomp.simulation.protocol import Experiment
+from thermocomp.recordings.cycles import find_cycles
+from thermocomp.recordings.recording import Recording
+from thermocomp.virtual.protocol import Experiment
 
 FloatArray = NDArray[np.float64]
 

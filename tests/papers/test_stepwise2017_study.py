@@ -7,12 +7,12 @@ import pytest
 from numpy.typing import NDArray
 from smallmachine import small_machine
 
-from thermocomp.datasets.virtual import record
 from thermocomp.papers.stepwise2017 import redo as stepwise2017
 from thermocomp.papers.stepwise2017 import setup as stepwise2017_setup
 from thermocomp.papers.study import Claim, Study, tell_nobody
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.stacking import stack
+from thermocomp.virtual.datasets import record
 
 FloatArray = NDArray[np.float64]
 

@@ -11,7 +11,6 @@ import pytest
 from numpy.typing import ArrayLike, NDArray
 
 from thermocomp.core.machine import Channel
-from thermocomp.datasets.virtual import record
 from thermocomp.models.selection.equivalents import equivalents
 from thermocomp.models.selection.maximal_correlation import MaximalCorrelations
 from thermocomp.papers.study import Claim, Study
@@ -21,9 +20,10 @@ from thermocomp.papers.wessel2004 import spindle as wessel2004_spindle
 from thermocomp.papers.wessel2004 import tools as wessel2004_tools
 from thermocomp.papers.wessel2004.sets import Selection
 from thermocomp.papers.wessel2004.trial import ACE_NAME, FROM_START, MLR_NAME, Trial, loop_width, place, stacked, trial
-from thermocomp.recording.cycles import make_single_cycle
-from thermocomp.recording.recording import Recording
-from thermocomp.simulation.protocol import Physics
+from thermocomp.recordings.cycles import make_single_cycle
+from thermocomp.recordings.recording import Recording
+from thermocomp.virtual.datasets import record
+from thermocomp.virtual.protocol import Physics
 
 FloatArray = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ import pytest
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
-from thermocomp.recording.cleaning import Cut, Resample, Rezero, Shift, Step, Swap, clean
-from thermocomp.recording.rows import Rows
+from thermocomp.recordings.cleaning import Cut, Resample, Rezero, Shift, Step, Swap, clean
+from thermocomp.recordings.rows import Rows
 
 CHANNELS = (
     Channel("n_rpm", "spindle_speed", "1/min"),

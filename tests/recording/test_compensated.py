@@ -10,13 +10,13 @@ from smallmachine import small_machine
 
 import thermocomp as tc
 from thermocomp.core.exceptions import InputError, RecordingError
-from thermocomp.core.headings import understand
 from thermocomp.core.machine import Channel
-from thermocomp.files import recordings
-from thermocomp.files.mapping import Mapping, read_mapping
-from thermocomp.recording.compensated import beside, refuse_compensated
-from thermocomp.recording.quality import check
-from thermocomp.recording.recording import Recording
+from thermocomp.recordings.checks.quality import check
+from thermocomp.recordings.compensated import beside, refuse_compensated
+from thermocomp.recordings.readers import recordings
+from thermocomp.recordings.readers.headings import understand
+from thermocomp.recordings.readers.mapping import Mapping, read_mapping
+from thermocomp.recordings.recording import Recording
 
 
 def compensated(drop: str = "", **columns: float) -> Recording:

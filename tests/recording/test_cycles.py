@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thermocomp.core.exceptions import RecordingError
-from thermocomp.recording.cycles import Cycle, find_cycles, make_single_cycle, split_by_labels
+from thermocomp.recordings.cycles import Cycle, find_cycles, make_single_cycle, split_by_labels
 
 
 @given(

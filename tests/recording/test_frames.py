@@ -8,8 +8,8 @@ import pandas as pd
 import pytest
 
 from thermocomp.core.exceptions import InputError, RecordingError, UnitError
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.stacking import stack
 
 TABLE = pd.DataFrame(
     {"time_min": [0.0, 1.0, 2.5], "T1": [20.0, 21.0, np.inf], "drift_mm": [0.0, 0.001, 0.002], "n": [0, 0, 9]}

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from thermocomp.datasets import virtual
-from thermocomp.files.mapping import read_mapping
-from thermocomp.files.recordings import read
-from thermocomp.recording.quality import check, lasting_trouble, troubled_rows
-from thermocomp.recording.recording import Recording
+from thermocomp.recordings.checks.quality import check, lasting_trouble, troubled_rows
+from thermocomp.recordings.readers.mapping import read_mapping
+from thermocomp.recordings.readers.recordings import read
+from thermocomp.recordings.recording import Recording
+from thermocomp.virtual import datasets as virtual
 
 ROOT = Path(__file__).resolve().parents[2]
 #: experiment, seed and how many tests it has

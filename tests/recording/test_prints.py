@@ -15,12 +15,12 @@ from smallmachine import small_machine
 
 from thermocomp.core.fingerprints import Prints, unpack_marks
 from thermocomp.core.machine import Channel
-from thermocomp.datasets import virtual
-from thermocomp.files.recordings import read
-from thermocomp.recording.cycles import make_single_cycle
-from thermocomp.recording.fingerprints import LENGTH, fingerprint, overlap, repeats
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.cycles import make_single_cycle
+from thermocomp.recordings.fingerprints import LENGTH, fingerprint, overlap, repeats
+from thermocomp.recordings.readers.recordings import read
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
+from thermocomp.virtual import datasets as virtual
 
 FloatArray = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ import pytest
 from profilemachine import along_y, profiles
 
 from thermocomp.core.exceptions import InputError, RecordingError
-from thermocomp.recording.profiles import Profiles
+from thermocomp.recordings.profiles import Profiles
 
 
 def at(positions: list[float], values: np.ndarray | None = None) -> Profiles:

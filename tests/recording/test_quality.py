@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from thermocomp.core.machine import Channel
 from thermocomp.core.units import HOUSE_UNITS
-from thermocomp.recording.cycles import find_cycles, make_single_cycle
-from thermocomp.recording.quality import Finding, check, lasting_trouble, troubled_rows
-from thermocomp.recording.recording import Recording
+from thermocomp.recordings.checks.quality import Finding, check, lasting_trouble, troubled_rows
+from thermocomp.recordings.cycles import find_cycles, make_single_cycle
+from thermocomp.recordings.recording import Recording
 
 FloatArray = NDArray[np.float64]
 

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.core.machine import Channel
 from thermocomp.core.zero import FIRST_READING, Zeroing
-from thermocomp.recording import stacking
-from thermocomp.recording.cycles import Cycle, make_single_cycle
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.starts import COLD, Start
+from thermocomp.recordings import stacking
+from thermocomp.recordings.cycles import Cycle, make_single_cycle
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.starts import COLD, Start
 
 CHANNELS = (
     Channel("t1_C", "temperature", "degC"),

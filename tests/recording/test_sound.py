@@ -5,14 +5,13 @@ from dataclasses import replace
 import numpy as np
 from smallmachine import small_machine
 
-from thermocomp.assessment import study
-from thermocomp.assessment.compare import compare
-from thermocomp.recording import splits
-from thermocomp.recording.cycles import Cycle
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.sound import drop_unsound
-from thermocomp.recording.stacking import stack
-from thermocomp.recording.starts import Start
+from thermocomp.judging import splits, study
+from thermocomp.judging.compare import compare
+from thermocomp.recordings.checks.sound import drop_unsound
+from thermocomp.recordings.cycles import Cycle
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.stacking import stack
+from thermocomp.recordings.starts import Start
 
 
 def spoiled(column: str, rows: slice, by: float, recording: Recording | None = None) -> Recording:

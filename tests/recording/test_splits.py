@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 from smallmachine import small_machine
 
-from thermocomp.assessment import study
 from thermocomp.core.exceptions import InputError
-from thermocomp.recording import splits
-from thermocomp.recording.cycles import Cycle
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
-from thermocomp.recording.starts import COLD
+from thermocomp.judging import splits, study
+from thermocomp.recordings.cycles import Cycle
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
+from thermocomp.recordings.starts import COLD
 
 
 def test_rows(samples: Samples) -> None:

@@ -6,9 +6,9 @@ import pytest
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
-from thermocomp.recording.cycles import make_single_cycle
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.tilts import with_tilts
+from thermocomp.recordings.cycles import make_single_cycle
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.tilts import with_tilts
 
 TABLE = {"y1_um": [0.0, 5.0], "y2_um": [0.0, 2.0], "x1_um": [0.0, -1.0], "x2_um": [0.0, 1.0], "t": [20.0, 30.0]}
 TEST = Recording(

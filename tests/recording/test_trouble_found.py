@@ -12,13 +12,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from thermocomp.datasets import virtual
-from thermocomp.files.mapping import ColumnMap, Mapping, TimeColumn
-from thermocomp.files.recordings import read
-from thermocomp.recording.findings import Finding, Signal, speed_changes
-from thermocomp.recording.jumps import find_edges
-from thermocomp.recording.quality import check, lasting_trouble, troubled_rows
-from thermocomp.recording.recording import Recording
+from thermocomp.recordings.checks.findings import Finding, Signal, speed_changes
+from thermocomp.recordings.checks.jumps import find_edges
+from thermocomp.recordings.checks.quality import check, lasting_trouble, troubled_rows
+from thermocomp.recordings.readers.mapping import ColumnMap, Mapping, TimeColumn
+from thermocomp.recordings.readers.recordings import read
+from thermocomp.recordings.recording import Recording
+from thermocomp.virtual import datasets as virtual
 
 FloatArray = NDArray[np.float64]
 

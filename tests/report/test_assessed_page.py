@@ -11,13 +11,14 @@ from matplotlib.collections import PolyCollection
 from watchedmachine import failing, watched_model
 
 import thermocomp as tc
-from thermocomp.assessment import study
-from thermocomp.assessment.faultlog import FaultLog, find_costs, find_faults
-from thermocomp.assessment.study import Judged
 from thermocomp.cli.app import run
-from thermocomp.files import modelfile, recordings
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.starts import Start
+from thermocomp.files import modelfile
+from thermocomp.judging import study
+from thermocomp.judging.faultlog import FaultLog, find_costs, find_faults
+from thermocomp.judging.study import Judged
+from thermocomp.recordings.readers import recordings
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.starts import Start
 from thermocomp.report import assessed, faults
 from thermocomp.report.layout import in_um
 from thermocomp.report.sections import Section

@@ -7,15 +7,15 @@ import pytest
 from matplotlib.collections import PolyCollection
 from smallmachine import crowded_machine, small_machine
 
-from thermocomp.assessment.compare import compare
-from thermocomp.assessment.replay import replay
-from thermocomp.assessment.results import Comparison
 from thermocomp.core.contributions import gains
 from thermocomp.core.paceddynamic import PacedDynamic
+from thermocomp.judging import splits
+from thermocomp.judging.compare import compare
+from thermocomp.judging.replay import replay
+from thermocomp.judging.results import Comparison
 from thermocomp.models.training import train
-from thermocomp.recording import splits
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
 from thermocomp.report import contributions, figures, html
 from thermocomp.report.drawing import Drawn
 from thermocomp.report.layout import in_um

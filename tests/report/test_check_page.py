@@ -10,9 +10,9 @@ import pytest
 from smallmachine import small_machine
 
 from thermocomp.core.machine import Channel
-from thermocomp.recording.findings import Finding
-from thermocomp.recording.quality import check
-from thermocomp.recording.recording import Recording
+from thermocomp.recordings.checks.findings import Finding
+from thermocomp.recordings.checks.quality import check
+from thermocomp.recordings.recording import Recording
 from thermocomp.report import checks
 
 

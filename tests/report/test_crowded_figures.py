@@ -10,12 +10,11 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 from smallmachine import small_machine
 
-from thermocomp.assessment import budget
-from thermocomp.assessment.compare import compare
-from thermocomp.assessment.results import Comparison
+from thermocomp.judging import budget, splits
+from thermocomp.judging.compare import compare
+from thermocomp.judging.results import Comparison
 from thermocomp.models.selection.standins import Answer
-from thermocomp.recording import splits
-from thermocomp.recording.samples import Samples
+from thermocomp.recordings.samples import Samples
 from thermocomp.report import figures, html, selections
 from thermocomp.report.drawing import drawing, log_ticks
 

@@ -14,25 +14,26 @@ from hostile import NAMES, renamed
 from matplotlib.figure import Figure
 from smallmachine import small_machine
 
-from thermocomp.assessment import selecting, study
-from thermocomp.assessment.choice import Settings
-from thermocomp.assessment.compare import compare
-from thermocomp.assessment.faultlog import find_faults
 from thermocomp.core.shown import shorten
 from thermocomp.iso230 import part2
-from thermocomp.iso230.settling import time_constants
+from thermocomp.iso230.report import iso230 as iso230pages
+from thermocomp.iso230.report import iso230figures
+from thermocomp.judging import selecting, splits, study
+from thermocomp.judging.choice import Settings
+from thermocomp.judging.compare import compare
+from thermocomp.judging.faultlog import find_faults
+from thermocomp.judging.settling.settling import time_constants
 from thermocomp.models.training import train
 from thermocomp.models.watching import find_watch
 from thermocomp.papers.pictures import single
+from thermocomp.papers.report import papers
 from thermocomp.papers.study import Claim, PlotCurve, Study, StudyTable
-from thermocomp.recording import splits
-from thermocomp.recording.findings import Finding
-from thermocomp.recording.positioning import Positioning
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.stacking import stack
-from thermocomp.recording.starts import Start
-from thermocomp.report import assessed, checks, drawing, faults, figures, html, iso230figures, papers
-from thermocomp.report import iso230 as iso230pages
+from thermocomp.recordings.checks.findings import Finding
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.stacking import stack
+from thermocomp.recordings.starts import Start
+from thermocomp.report import assessed, checks, drawing, faults, figures, html
+from thermocomp.volumetric.positioning import Positioning
 
 REPORT = Path(figures.__file__).parent
 

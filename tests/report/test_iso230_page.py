@@ -10,13 +10,13 @@ from smallmachine import small_machine
 from thermocomp.core.inputs import Input
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Variable
-from thermocomp.datasets.virtual import record
 from thermocomp.iso230 import part2, part3
-from thermocomp.iso230.settling import time_constants
+from thermocomp.iso230.report import iso230 as pages
+from thermocomp.iso230.report import iso230figures as figures
 from thermocomp.iso230.thermaltest import ThermalTest
-from thermocomp.recording.positioning import Positioning
-from thermocomp.report import iso230 as pages
-from thermocomp.report import iso230figures as figures
+from thermocomp.judging.settling.settling import time_constants
+from thermocomp.virtual.datasets import record
+from thermocomp.volumetric.positioning import Positioning
 
 
 def positioning_test(*, both: bool = True) -> Positioning:

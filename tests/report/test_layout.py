@@ -5,8 +5,8 @@ import math
 import pytest
 from rich.console import Console
 
-from thermocomp.assessment.choice import Table
 from thermocomp.cli.terminal import print_table
+from thermocomp.judging.choice import Table
 from thermocomp.report.html import environment
 from thermocomp.report.layout import Column, Layout, Toned, laid_out
 

@@ -10,7 +10,7 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.core.provenance import RULES, HonestError
 from thermocomp.models.training import train
 from thermocomp.models.watching import find_watch
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.stacking import stack
 from thermocomp.report.losses import describe_losses
 
 

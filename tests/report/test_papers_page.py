@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure as Canvas
 
+from thermocomp.papers.report import papers
 from thermocomp.papers.study import Claim, Figure, Panel, PlotCurve, Study, StudyTable
-from thermocomp.report import papers
 
 HOURS = np.linspace(0.0, 10.0, 5000)
 CLAIMS = (

@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from smallmachine import small_machine
 
-from thermocomp.assessment.planning import SAME, Covered, Plan, plan
-from thermocomp.core.trial import Trial
-from thermocomp.recording.stacking import stack
+from thermocomp.judging.planning.planning import SAME, Covered, Plan, plan
+from thermocomp.judging.planning.trial import Trial
+from thermocomp.recordings.stacking import stack
 from thermocomp.report import plans
 
 

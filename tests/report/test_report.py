@@ -13,15 +13,14 @@ import pytest
 from rich.console import Console
 from smallmachine import small_machine
 
-from thermocomp.assessment import study
-from thermocomp.assessment.compare import compare
-from thermocomp.assessment.results import Comparison
 from thermocomp.cli.output import show_comparison
 from thermocomp.files import modelfile
-from thermocomp.recording import splits
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
+from thermocomp.judging import splits, study
+from thermocomp.judging.compare import compare
+from thermocomp.judging.results import Comparison
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
 from thermocomp.report import figures, html
 from thermocomp.report.summary import cautions, summarise, verdict
 

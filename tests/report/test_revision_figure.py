@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from thermocomp.nc.report import revision
 from thermocomp.nc.rewrite.course import Bound, Run
-from thermocomp.report import revision
 
 
 def made(seconds: float = 600.0, n: int = 50) -> Run:

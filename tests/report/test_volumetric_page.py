@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from smallmill import write_mill
 
-from thermocomp.assessment.volumetric import Volumetric, study
 from thermocomp.core.machine import Axis, Machine
 from thermocomp.core.structure import Structure
-from thermocomp.files import recordings
 from thermocomp.files.machines import read_machine
-from thermocomp.recording.recording import Recording
-from thermocomp.report import volumetric as page
-from thermocomp.report import volumetric_figures as figures
-from thermocomp.report import volumetric_space as space
-from thermocomp.report import volumetric_tables
+from thermocomp.recordings.readers import recordings
+from thermocomp.recordings.recording import Recording
+from thermocomp.volumetric.judging.volumetric import Volumetric, study
+from thermocomp.volumetric.report import volumetric as page
+from thermocomp.volumetric.report import volumetric_figures as figures
+from thermocomp.volumetric.report import volumetric_space as space
+from thermocomp.volumetric.report import volumetric_tables
 
 
 @pytest.fixture(scope="module")

@@ -8,11 +8,11 @@ import pytest
 from numpy.typing import NDArray
 
 from thermocomp.core.watch import LASTING, Watch
-from thermocomp.datasets import virtual
 from thermocomp.models.watching import find_watch
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
 from thermocomp.runtime.watch import GOOD, MISSING, SWAPPED, begin, look
+from thermocomp.virtual import datasets as virtual
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -18,9 +18,9 @@ from thermocomp.core.position import PositionModel
 from thermocomp.core.reading import Reading
 from thermocomp.core.zero import Zeroing
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.geometry.straight import straight_lines
+from thermocomp.runtime.geometry.volumetric import VolumetricModel
 from thermocomp.runtime.limits import limit_line
-from thermocomp.volumetric.model import VolumetricModel
-from thermocomp.volumetric.straight import straight_lines
 
 FloatArray = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ import pytest
 from test_adaptation import MODEL
 
 from thermocomp.core.reading import Reading
-from thermocomp.files import statefile
+from thermocomp.live import statefile
 from thermocomp.runtime.adaptation import APART, Probing
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.identity import KNOWN, MOST_KEYS, remember

@@ -17,15 +17,15 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.core.provenance import RULES, HonestError
 from thermocomp.core.reading import Reading
 from thermocomp.core.watch import Watch
-from thermocomp.datasets import virtual
 from thermocomp.files import modelfile
 from thermocomp.models.training import train
 from thermocomp.models.watching import find_watch
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.limits import fade
 from thermocomp.runtime.watch import GOOD, MISSING, OFF, STEPPED, STUCK, WORDS, WatchState, begin, look
+from thermocomp.virtual import datasets as virtual
 
 FloatArray = NDArray[np.float64]
 SIX = ("t_housing_C", "t_motor_C", "t_column_front_left_C", "t_z_bearing_C", "t_table_C", "t_enclosure_C")

@@ -10,9 +10,10 @@ from smallmill import warmed, write_mill
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.reading import Reading
-from thermocomp.files import modelfile, positionfile, statefile
-from thermocomp.service.build import build
-from thermocomp.service.config import read_config
+from thermocomp.files import modelfile, positionfile
+from thermocomp.live import statefile
+from thermocomp.live.build import build
+from thermocomp.live.config import read_config
 
 CONFIG = """
 state = "state.json"

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.service.config import Page, read_config
-from thermocomp.service.network import MqttIn
+from thermocomp.live.config import Page, read_config
+from thermocomp.live.network import MqttIn
 
 GOOD = """
 models = ["model.json"]
@@ -169,7 +169,7 @@ def test_whatever_is_written_there_is_told_not_a_traceback(monkeypatch: pytest.M
             if isinstance(table, dict) and rng.random() < 0.3:
                 last = rng.choice(["mqtt", "file", "kind", "other"])
             table[last] = deepcopy(rng.choice(values))
-        monkeypatch.setattr("thermocomp.service.config.read_toml", lambda *_, content=content: content)
+        monkeypatch.setattr("thermocomp.live.config.read_toml", lambda *_, content=content: content)
         try:
             read_config("serve.toml")
         except InputError as e:

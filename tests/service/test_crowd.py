@@ -12,7 +12,7 @@ import pytest
 from test_doors import HOLD, served, serving
 from test_page import RIGHT, fed
 
-from thermocomp.service import connections, page
+from thermocomp.live.page import connections, page
 
 #: an answer takes no longer, whoever else is there [s]; on an idle computer it takes some hundredths of a second
 SOON = 5.0

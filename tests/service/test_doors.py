@@ -16,9 +16,9 @@ from test_loop import Given, machine
 from test_page import RIGHT, TOKEN, asking, fed, run
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.service import web
-from thermocomp.service.loop import Service
-from thermocomp.service.page import make_app
+from thermocomp.live.loop import Service
+from thermocomp.live.page import web
+from thermocomp.live.page.page import make_app
 
 HOLD = {"target": "z_um", "do": "hold"}
 OWN = "http://127.0.0.1"

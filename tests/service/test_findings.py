@@ -16,8 +16,8 @@ from smallmill import warmed
 from thermocomp.core.alone import alone
 from thermocomp.core.exceptions import InputError
 from thermocomp.files import modelfile
-from thermocomp.service.config import read_config
-from thermocomp.service.findings import find_faults, find_faults_now, runs_now
+from thermocomp.live.config import read_config
+from thermocomp.live.findings import find_faults, find_faults_now, runs_now
 
 GOOD = """
 models = ["model.json"]

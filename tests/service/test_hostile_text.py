@@ -18,15 +18,15 @@ from hypothesis import strategies as st
 from test_loop import machine
 from test_page import TOKEN
 
-from thermocomp.adapters.mqtt import MqttSource
-from thermocomp.adapters.plain import ReplaySource
-from thermocomp.adapters.probes import MqttProbe
 from thermocomp.core.exceptions import InputError, ThermocompError
 from thermocomp.core.ports import Probe, Source
-from thermocomp.service import web
-from thermocomp.service.config import read_config
-from thermocomp.service.loop import Service
-from thermocomp.service.page import make_app
+from thermocomp.live.adapters.mqtt import MqttSource
+from thermocomp.live.adapters.plain import ReplaySource
+from thermocomp.live.adapters.probes import MqttProbe
+from thermocomp.live.config import read_config
+from thermocomp.live.loop import Service
+from thermocomp.live.page import web
+from thermocomp.live.page.page import make_app
 
 Message = tuple[str, bytes]
 

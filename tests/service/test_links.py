@@ -9,15 +9,15 @@ import httpx
 import pytest
 from test_loop import Broken, Given, machine, running, say, until
 
-from thermocomp.adapters.mqtt import MqttSink, MqttSource
-from thermocomp.adapters.plain import FileSink, ReplaySource
 from thermocomp.core.correction import Correction
 from thermocomp.core.exceptions import ThermocompError
 from thermocomp.core.ports import Status
 from thermocomp.core.reading import Measurement, Reading
-from thermocomp.service import links
-from thermocomp.service.loop import Service
-from thermocomp.service.page import make_app
+from thermocomp.live import links
+from thermocomp.live.adapters.mqtt import MqttSink, MqttSource
+from thermocomp.live.adapters.plain import FileSink, ReplaySource
+from thermocomp.live.loop import Service
+from thermocomp.live.page.page import make_app
 
 
 class Outlandish(Exception):  # noqa: N818 - of a library that nobody knows

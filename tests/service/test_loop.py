@@ -13,18 +13,17 @@ import pytest
 from broker import Mosquitto
 from driftmodels import ACCEPTED, growing
 
-from thermocomp.adapters.mqtt import MqttSink, MqttSource
-from thermocomp.adapters.plain import FileSink
-from thermocomp.adapters.probes import MqttProbe
 from thermocomp.core.correction import Correction, Limits
 from thermocomp.core.exceptions import InputError, ThermocompError
 from thermocomp.core.ports import Status as LinkStatus
 from thermocomp.core.reading import Measurement, Reading
-from thermocomp.files import statefile
+from thermocomp.live import loop, statefile
+from thermocomp.live.adapters.mqtt import MqttSink, MqttSource
+from thermocomp.live.adapters.plain import FileSink
+from thermocomp.live.adapters.probes import MqttProbe
+from thermocomp.live.loop import Service
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.state import Status
-from thermocomp.service import loop
-from thermocomp.service.loop import Service
 
 QUICK = Limits(rate=1e9)
 

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thermocomp.adapters.messages import read_measurement, read_message, write_message
 from thermocomp.core.correction import Correction
 from thermocomp.core.exceptions import ReadingError
 from thermocomp.core.reading import Measurement
+from thermocomp.live.adapters.messages import read_measurement, read_message, write_message
 
 
 def test_values_by_name() -> None:

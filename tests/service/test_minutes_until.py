@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from thermocomp.service.settling import minutes_until
+from thermocomp.live.settling import minutes_until
 
 MINUTE = 60.0
 

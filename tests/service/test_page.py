@@ -15,11 +15,11 @@ from watchedmachine import failing, watched_model
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.reading import Measurement, Reading
+from thermocomp.live.clock import Clock
+from thermocomp.live.loop import Service
+from thermocomp.live.page import page, web
+from thermocomp.live.page.page import make_app
 from thermocomp.runtime.compensator import Compensator
-from thermocomp.service import page, web
-from thermocomp.service.clock import Clock
-from thermocomp.service.loop import Service
-from thermocomp.service.page import make_app
 
 TOKEN = "0123456789abcdef"
 RIGHT = {"Authorization": f"Bearer {TOKEN}"}

@@ -7,15 +7,15 @@ from pathlib import Path
 import pytest
 from test_loop import Given, machine, running, say, until
 
-from thermocomp.adapters.plain import FileSink
 from thermocomp.core.reading import Measurement, Reading
-from thermocomp.files.journal import JournalLimits
-from thermocomp.files.journalexport import export
-from thermocomp.files.journalreader import JournalReader
-from thermocomp.files.journalrows import measured_by
+from thermocomp.live.adapters.plain import FileSink
+from thermocomp.live.journal.journal import JournalLimits
+from thermocomp.live.journal.journalexport import export
+from thermocomp.live.journal.journalreader import JournalReader
+from thermocomp.live.journal.journalrows import measured_by
+from thermocomp.live.loop import Service
+from thermocomp.live.recorder import Recorder
 from thermocomp.runtime.state import Status
-from thermocomp.service.loop import Service
-from thermocomp.service.recorder import Recorder
 
 
 def recorded(folder: Path, own: str = "off") -> tuple[Service, Given]:

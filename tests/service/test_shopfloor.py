@@ -13,8 +13,8 @@ from linuxcnclive import AXES, PERIOD, live
 from numpy.typing import NDArray
 from shopfloor import running, undisturbed
 
-from thermocomp.adapters.linuxcnc.halsetup import HalSettings
-from thermocomp.files.journalreader import JournalReader
+from thermocomp.live.adapters.linuxcnc.halsetup import HalSettings
+from thermocomp.live.journal.journalreader import JournalReader
 
 #: fastest change of a correction, in seconds of the world: of the service and of the controller [um/s]
 ASKED, RATE = 20.0, 30.0

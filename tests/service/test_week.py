@@ -10,15 +10,15 @@ import pytest
 from shopfloor import model
 from test_page import Told, asking
 
-from thermocomp.adapters.plain import FileSink
 from thermocomp.core.correction import Limits
 from thermocomp.core.reading import Measurement, Reading
-from thermocomp.datasets.virtual import record
-from thermocomp.files.journal import JournalLimits
+from thermocomp.live.adapters.plain import FileSink
+from thermocomp.live.journal.journal import JournalLimits
+from thermocomp.live.loop import Service
+from thermocomp.live.page.page import make_app
+from thermocomp.live.recorder import Recorder
 from thermocomp.runtime.compensator import Compensator
-from thermocomp.service.loop import Service
-from thermocomp.service.page import make_app
-from thermocomp.service.recorder import Recorder
+from thermocomp.virtual.datasets import record
 
 
 @pytest.mark.parametrize("days", [2, pytest.param(7, marks=pytest.mark.long)])

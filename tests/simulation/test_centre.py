@@ -10,12 +10,12 @@ import pytest
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.simulation.axes import N_HATS
-from thermocomp.simulation.centre import CentreState, MachiningCentre
-from thermocomp.simulation.heat import BearingFriction, HeatSources, swept
-from thermocomp.simulation.joints import Joints, slide_with_friction
-from thermocomp.simulation.machine import Air, Drive, Truth, VirtualMachine
-from thermocomp.simulation.statespace import REFERENCE_TEMPERATURE
+from thermocomp.virtual.axes import N_HATS
+from thermocomp.virtual.centre import CentreState, MachiningCentre
+from thermocomp.virtual.heat import BearingFriction, HeatSources, swept
+from thermocomp.virtual.joints import Joints, slide_with_friction
+from thermocomp.virtual.machine import Air, Drive, Truth, VirtualMachine
+from thermocomp.virtual.statespace import REFERENCE_TEMPERATURE
 
 FloatArray = NDArray[np.float64]
 HOUR = 3600.0
@@ -98,8 +98,8 @@ def test_another_arithmetic_gives_the_same_machine() -> None:
     """Kernels of linear algebra for other processors round differently: far below the instruments' resolution."""
     script = (
         "import numpy as np\n"
-        "from thermocomp.simulation.centre import MachiningCentre\n"
-        "from thermocomp.simulation.machine import Air, Drive\n"
+        "from thermocomp.virtual.centre import MachiningCentre\n"
+        "from thermocomp.virtual.machine import Air, Drive\n"
         "m = MachiningCentre()\n"
         "d = [Drive(2600.0, (600.0, 1000.0, 600.0))] * 2000 + [Drive()] * 2000\n"
         "_, t = m.run(m.init(Air(22.0)), d, np.tile(Air(22.0).values, (4000, 1)), 20.0)\n"

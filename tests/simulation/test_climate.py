@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.simulation.climate import CLIMATES, STABLE, STILL, Climate, filter_first_order, wandering
+from thermocomp.virtual.climate import CLIMATES, STABLE, STILL, Climate, filter_first_order, wandering
 
 HOUR = 3600.0
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from thermocomp.simulation.convection import (
+from thermocomp.virtual.convection import (
     KELVIN,
     STEFAN_BOLTZMANN,
     Face,

@@ -9,15 +9,15 @@ from fakemachine import FakeMachine
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.simulation import experiments
-from thermocomp.simulation.climate import STILL
-from thermocomp.simulation.experiments import SimulatedTest, run, simulate
-from thermocomp.simulation.instruments import Touch, mounting
-from thermocomp.simulation.kits import CENTRE
-from thermocomp.simulation.machine import Drive
-from thermocomp.simulation.protocol import Experiment, Plan, Programme
-from thermocomp.simulation.segments import SteadySegment
-from thermocomp.simulation.sensors import Fault
+from thermocomp.virtual import experiments
+from thermocomp.virtual.climate import STILL
+from thermocomp.virtual.experiments import SimulatedTest, run, simulate
+from thermocomp.virtual.instruments import Touch, mounting
+from thermocomp.virtual.kits import CENTRE
+from thermocomp.virtual.machine import Drive
+from thermocomp.virtual.protocol import Experiment, Plan, Programme
+from thermocomp.virtual.segments import SteadySegment
+from thermocomp.virtual.sensors import Fault
 
 FloatArray = NDArray[np.float64]
 GOLDEN = [[22.22, 22.1, 22.28, 0.15], [48.76, 49.92, 22.74, 59.94], [75.82, 78.14, 23.1, 119.75]]

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from thermocomp.simulation.fits import AIR_CONDUCTIVITY, AIR_JUMP, Fit
-from thermocomp.simulation.nonlinear import GRIP, SEAT, TAPER
+from thermocomp.virtual.fits import AIR_CONDUCTIVITY, AIR_JUMP, Fit
+from thermocomp.virtual.nonlinear import GRIP, SEAT, TAPER
 
 SOLID = Fit(radius=10.0, bore=0.0, outside=25.0, length=50.0, squeeze=6.0, linear=1000.0)
 

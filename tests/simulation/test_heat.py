@@ -7,11 +7,11 @@ import pytest
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.simulation.centre import CentreState, MachiningCentre
-from thermocomp.simulation.heat import BearingFriction, HeatSources
-from thermocomp.simulation.joints import Joints
-from thermocomp.simulation.machine import Air, Drive, Truth
-from thermocomp.simulation.statespace import REFERENCE_TEMPERATURE, ReducedModel
+from thermocomp.virtual.centre import CentreState, MachiningCentre
+from thermocomp.virtual.heat import BearingFriction, HeatSources
+from thermocomp.virtual.joints import Joints
+from thermocomp.virtual.machine import Air, Drive, Truth
+from thermocomp.virtual.statespace import REFERENCE_TEMPERATURE, ReducedModel
 
 FloatArray = NDArray[np.float64]
 AIR = Air(20.0)

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.simulation.axes import TEST_POSITION
-from thermocomp.simulation.centre import MachiningCentre
-from thermocomp.simulation.geometry import cold_profile
-from thermocomp.simulation.instruments import Touch, displacement, mounting, thermometer
-from thermocomp.simulation.kits import CENTRE, CHEN_PLACES, HWANG_PLACES, KITS, Kit, labelled
-from thermocomp.simulation.probes import positioning
-from thermocomp.simulation.toolsystem import RestingTool
+from thermocomp.virtual.axes import TEST_POSITION
+from thermocomp.virtual.centre import MachiningCentre
+from thermocomp.virtual.geometry import cold_profile
+from thermocomp.virtual.instruments import Touch, displacement, mounting, thermometer
+from thermocomp.virtual.kits import CENTRE, CHEN_PLACES, HWANG_PLACES, KITS, Kit, labelled
+from thermocomp.virtual.probes import positioning
+from thermocomp.virtual.toolsystem import RestingTool
 
 
 def test_the_kits_belong_to_their_machines() -> None:

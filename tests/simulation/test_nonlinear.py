@@ -10,13 +10,13 @@ from nonlinearmachines import AIR, HEATED, at, steps
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.datasets.virtual import EXPERIMENTS, record
-from thermocomp.simulation.centre import CentreState, MachiningCentre
-from thermocomp.simulation.convection import Face, Faces
-from thermocomp.simulation.machine import Air, Drive
-from thermocomp.simulation.nonlinear import CENTRE_FACES, TAPER, TOOL_FACES, NonlinearCentre, NonlinearTool
-from thermocomp.simulation.statespace import ReducedModel
-from thermocomp.simulation.toolsystem import RestingTool, ToolState
+from thermocomp.virtual.centre import CentreState, MachiningCentre
+from thermocomp.virtual.convection import Face, Faces
+from thermocomp.virtual.datasets import EXPERIMENTS, record
+from thermocomp.virtual.machine import Air, Drive
+from thermocomp.virtual.nonlinear import CENTRE_FACES, TAPER, TOOL_FACES, NonlinearCentre, NonlinearTool
+from thermocomp.virtual.statespace import ReducedModel
+from thermocomp.virtual.toolsystem import RestingTool, ToolState
 
 FloatArray = NDArray[np.float64]
 HOUR = 3600.0
@@ -67,7 +67,7 @@ def test_films_that_do_not_change_are_those_of_the_model(tool: NonlinearTool) ->
     model = tool.model
     known = RestingTool(model=model, convection=0.0, stiction=0.0)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("thermocomp.simulation.nonlinear.Faces", Constant)
+        patch.setattr("thermocomp.virtual.nonlinear.Faces", Constant)
         machine = NonlinearTool(model=model, **LINEAR_TOOL | {"faces": TOOL_FACES})
         _, truth = machine.run(machine.init(AIR), [HEATED] * 100, steps(100), 60.0)
     _, expected = known.run(known.init(AIR), [HEATED] * 100, steps(100), 60.0)

@@ -8,10 +8,10 @@ import pytest
 from nonlinearmachines import AIR, HEATED, at, steps
 from numpy.typing import NDArray
 
-from thermocomp.simulation.convection import Faces
-from thermocomp.simulation.machine import Air, Drive
-from thermocomp.simulation.nonlinear import CENTRE_FACES, SEAT, TAPER, NonlinearCentre, NonlinearTool
-from thermocomp.simulation.statespace import REFERENCE_TEMPERATURE
+from thermocomp.virtual.convection import Faces
+from thermocomp.virtual.machine import Air, Drive
+from thermocomp.virtual.nonlinear import CENTRE_FACES, SEAT, TAPER, NonlinearCentre, NonlinearTool
+from thermocomp.virtual.statespace import REFERENCE_TEMPERATURE
 
 FloatArray = NDArray[np.float64]
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from thermocomp.simulation.nonlinear import FRONT, REAR
-from thermocomp.simulation.preload import EXPANSION, Grease
+from thermocomp.virtual.nonlinear import FRONT, REAR
+from thermocomp.virtual.preload import EXPANSION, Grease
 
 
 def test_oil_thins_by_the_standard() -> None:

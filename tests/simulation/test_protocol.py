@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from thermocomp.core.exceptions import InputError, SettingError
-from thermocomp.simulation.machine import Drive
-from thermocomp.simulation.protocol import Experiment, Plan, Programme
-from thermocomp.simulation.segments import Feed, Lot, SteadySegment, Stretch, Stroke
-from thermocomp.simulation.sensors import Fault
+from thermocomp.virtual.machine import Drive
+from thermocomp.virtual.protocol import Experiment, Plan, Programme
+from thermocomp.virtual.segments import Feed, Lot, SteadySegment, Stretch, Stroke
+from thermocomp.virtual.sensors import Fault
 
 MINUTE = 60.0
 

@@ -5,7 +5,7 @@ import pytest
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
-from thermocomp.simulation.sensors import Fault, Sensor, apply_lags, read, with_faults
+from thermocomp.virtual.sensors import Fault, Sensor, apply_lags, read, with_faults
 
 TEMPERATURE = Channel("t_C", "temperature", "degC")
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.simulation.statespace import ReducedModel
+from thermocomp.virtual.statespace import ReducedModel
 
 FloatArray = NDArray[np.float64]
 

@@ -5,9 +5,9 @@ import pytest
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.simulation.machine import Air, Drive, Truth, VirtualMachine
-from thermocomp.simulation.statespace import REFERENCE_TEMPERATURE
-from thermocomp.simulation.toolsystem import RestingTool, ToolState
+from thermocomp.virtual.machine import Air, Drive, Truth, VirtualMachine
+from thermocomp.virtual.statespace import REFERENCE_TEMPERATURE
+from thermocomp.virtual.toolsystem import RestingTool, ToolState
 
 FloatArray = NDArray[np.float64]
 AIR = Air(20.0)

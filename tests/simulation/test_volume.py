@@ -10,18 +10,18 @@ from scipy.linalg import expm
 
 from thermocomp.core.machine import Axis, Machine
 from thermocomp.core.structure import Structure
-from thermocomp.simulation.axes import AXES, STATIONS, TEST_BAR, TEST_POSITION, TRAVEL, weigh_stations
-from thermocomp.simulation.centre import MachiningCentre
-from thermocomp.simulation.climate import STILL
-from thermocomp.simulation.experiments import SimulatedTest, run
-from thermocomp.simulation.geometry import PROFILES, SAG, SQUARENESS, cold_profile, find_cold_component
-from thermocomp.simulation.kits import CENTRE
-from thermocomp.simulation.machine import Drive
-from thermocomp.simulation.probes import COMPONENTS, PROBE_DISTANCE, weigh_tool_point
-from thermocomp.simulation.protocol import Programme
-from thermocomp.simulation.segments import SteadySegment
-from thermocomp.simulation.volume import VolumetricTruth
-from thermocomp.volumetric.kinematics import INDEX, Kinematics
+from thermocomp.runtime.geometry.kinematics import INDEX, Kinematics
+from thermocomp.virtual.axes import AXES, STATIONS, TEST_BAR, TEST_POSITION, TRAVEL, weigh_stations
+from thermocomp.virtual.centre import MachiningCentre
+from thermocomp.virtual.climate import STILL
+from thermocomp.virtual.experiments import SimulatedTest, run
+from thermocomp.virtual.geometry import PROFILES, SAG, SQUARENESS, cold_profile, find_cold_component
+from thermocomp.virtual.kits import CENTRE
+from thermocomp.virtual.machine import Drive
+from thermocomp.virtual.probes import COMPONENTS, PROBE_DISTANCE, weigh_tool_point
+from thermocomp.virtual.protocol import Programme
+from thermocomp.virtual.segments import SteadySegment
+from thermocomp.virtual.volume import VolumetricTruth
 
 FloatArray = NDArray[np.float64]
 HOUR = 3600.0

@@ -10,8 +10,8 @@ from volumetricmachine import FloatArray, machines, random_machine, random_value
 
 from thermocomp.core.components import COMPONENTS
 from thermocomp.core.machine import Machine
-from thermocomp.volumetric import exact
-from thermocomp.volumetric.kinematics import Kinematics
+from thermocomp.runtime.geometry import exact
+from thermocomp.runtime.geometry.kinematics import Kinematics
 
 CODES = [c.code for c in COMPONENTS]
 

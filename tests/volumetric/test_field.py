@@ -15,10 +15,10 @@ from thermocomp.core.machine import Machine, Source
 from thermocomp.core.position import PositionModel
 from thermocomp.core.profile import PolynomialProfile
 from thermocomp.core.provenance import RULES, HonestError
-from thermocomp.volumetric.field import ErrorField
-from thermocomp.volumetric.kinematics import INDEX, Kinematics
-from thermocomp.volumetric.model import VolumetricModel
-from thermocomp.volumetric.straight import straight_lines
+from thermocomp.runtime.geometry.field import ErrorField
+from thermocomp.runtime.geometry.kinematics import INDEX, Kinematics
+from thermocomp.runtime.geometry.straight import straight_lines
+from thermocomp.runtime.geometry.volumetric import VolumetricModel
 
 #: C-22, Eq. (6), for y in mm and d in mm (E-C6): 1000 times as much in um
 CHEN = PolynomialProfile(

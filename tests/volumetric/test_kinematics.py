@@ -9,8 +9,8 @@ from thermocomp.core.components import COMPONENTS
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Axis, Machine
 from thermocomp.core.structure import Structure
-from thermocomp.volumetric import exact
-from thermocomp.volumetric.kinematics import INDEX, Kinematics
+from thermocomp.runtime.geometry import exact
+from thermocomp.runtime.geometry.kinematics import INDEX, Kinematics
 
 POINT = np.array([100.0, 200.0, 300.0])
 

@@ -14,8 +14,8 @@ from volumetricmachine import FloatArray, random_machine
 from thermocomp.core.components import COMPONENTS
 from thermocomp.core.machine import Axis, Machine
 from thermocomp.core.structure import Structure
-from thermocomp.volumetric import exact
-from thermocomp.volumetric.kinematics import INDEX, Kinematics
+from thermocomp.runtime.geometry import exact
+from thermocomp.runtime.geometry.kinematics import INDEX, Kinematics
 
 Pose = FloatArray  # 4 x 4: from the body's frame to the world
 STRUCTURES = ("w X' b Z Y (C1) t", "w Y' X' b Z t", "XYZF", "YXFZ", "FXYZ", "XFZY", "XFZ", "ZF")

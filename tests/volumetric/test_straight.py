@@ -7,9 +7,9 @@ from volumetricmachine import by_hand
 from thermocomp.core.machine import Source
 from thermocomp.core.position import PositionModel
 from thermocomp.core.profile import PolynomialProfile
-from thermocomp.volumetric.field import ErrorField
-from thermocomp.volumetric.model import VolumetricModel
-from thermocomp.volumetric.straight import straight_lines
+from thermocomp.runtime.geometry.field import ErrorField
+from thermocomp.runtime.geometry.straight import straight_lines
+from thermocomp.runtime.geometry.volumetric import VolumetricModel
 
 
 def along(axis: str, component: str, *coefficients: float) -> PositionModel:

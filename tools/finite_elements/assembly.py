@@ -11,7 +11,7 @@ from scipy.sparse import csr_matrix
 
 from finite_elements.part import Part, Surface
 from thermocomp.core.exceptions import InputError
-from thermocomp.simulation.machine import Air
+from thermocomp.virtual.machine import Air
 
 FloatArray = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from skfem import BilinearForm
 
 from finite_elements.part import Surface
 from finite_elements.space import Facets, Space, Weight
-from thermocomp.simulation.machine import Air
+from thermocomp.virtual.machine import Air
 
 FloatArray = NDArray[np.float64]
 MIDDLE = Air.REFERENCE_HEIGHT

@@ -18,8 +18,8 @@ from finite_elements.revolution import with_joints
 from finite_elements.screw import Screw
 from finite_elements.spindle import spindle
 from finite_elements.toolholder import toolholder
-from thermocomp.simulation.axes import N_HATS, STATIONS, TEST_POSITION
-from thermocomp.simulation.statespace import ReducedModel
+from thermocomp.virtual.axes import N_HATS, STATIONS, TEST_POSITION
+from thermocomp.virtual.statespace import ReducedModel
 
 FloatArray = NDArray[np.float64]
 

@@ -20,7 +20,7 @@ from scipy.sparse import csr_matrix
 from finite_elements.assembly import FullModel
 from finite_elements.transient import factorised
 from thermocomp.core.exceptions import InputError
-from thermocomp.simulation.statespace import ReducedModel
+from thermocomp.virtual.statespace import ReducedModel
 
 FloatArray = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from finite_elements.materials import Material
 from finite_elements.part import Part
 from finite_elements.space import Space
 from thermocomp.core.exceptions import InputError
-from thermocomp.simulation.axes import N_HATS
+from thermocomp.virtual.axes import N_HATS
 
 FloatArray = NDArray[np.float64]
 

@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.zero import Zeroing
-from thermocomp.files import mapping as mappings
-from thermocomp.files.mending import read_or_offer
-from thermocomp.recording import splits
-from thermocomp.recording.quality import check
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.sound import drop_unsound
-from thermocomp.recording.splits import Judging
-from thermocomp.recording.stacking import stack
-from thermocomp.recording.starts import Start
+from thermocomp.judging import splits
+from thermocomp.judging.splits import Judging
+from thermocomp.recordings.checks.quality import check
+from thermocomp.recordings.checks.sound import drop_unsound
+from thermocomp.recordings.readers import mapping as mappings
+from thermocomp.recordings.readers.mending import read_or_offer
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
+from thermocomp.recordings.starts import Start
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
@@ -49,7 +49,7 @@ def read(path: str | Path, mapping: str | Path | mappings.Mapping | None = None)
     Raises
     ------
     RecordingError, UnitError
-        See `thermocomp.files.recordings.read`; a note of the error offers a mapping, where one would help.
+        See `thermocomp.recordings.readers.recordings.read`; a note of the error offers a mapping, where one would help.
 
     Examples
     --------

@@ -9,16 +9,15 @@ import pandas as pd
 
 from thermocomp.api.inputs import Given, Prepared, Starts, judging_of, prepare, recordings_of
 from thermocomp.api.results import Result
-from thermocomp.assessment import learningcurve, planning
-from thermocomp.assessment.learningcurve import LearningCurve
-from thermocomp.assessment.planning import Candidate, Plan
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
-from thermocomp.files import testprogram
-from thermocomp.files.mapping import Mapping
-from thermocomp.files.testprogram import Dialect
-from thermocomp.iso230.stopping import Running, judge_running
-from thermocomp.recording.splits import Judging
+from thermocomp.judging.planning import learningcurve, planning, testprogram
+from thermocomp.judging.planning.learningcurve import LearningCurve
+from thermocomp.judging.planning.planning import Candidate, Plan
+from thermocomp.judging.planning.testprogram import Dialect
+from thermocomp.judging.settling.stopping import Running, judge_running
+from thermocomp.judging.splits import Judging
+from thermocomp.recordings.readers.mapping import Mapping
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -10,15 +10,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from thermocomp.assessment.choice import Choice
-from thermocomp.assessment.results import Assessment, Comparison
-from thermocomp.assessment.study import Fitted, Judged
 from thermocomp.core.columns import Columns
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.explained import Explanations, explain_all
 from thermocomp.core.model import ErrorModel
+from thermocomp.judging.choice import Choice
+from thermocomp.judging.results import Assessment, Comparison
+from thermocomp.judging.study import Fitted, Judged
 from thermocomp.models.methods import deployable
-from thermocomp.recording.recording import Recording
+from thermocomp.recordings.recording import Recording
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

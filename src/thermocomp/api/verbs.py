@@ -7,22 +7,22 @@ from typing import Any, Literal
 
 from thermocomp.api.inputs import Given, LeaveOne, Starts, prepare, recordings_of, starts_of, trouble_of
 from thermocomp.api.results import Assessed, Compared, FittedModels, Selected
-from thermocomp.assessment import compare as comparing
-from thermocomp.assessment import do_no_harm, selecting
-from thermocomp.assessment import study as studies
-from thermocomp.assessment.choice import Settings
-from thermocomp.assessment.probing import Probings
-from thermocomp.assessment.results import Assessment, Rules
-from thermocomp.assessment.sharing import shared_among
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.inputs import Support
 from thermocomp.core.model import ErrorModel
-from thermocomp.datasets import virtual
 from thermocomp.files import modelfile
-from thermocomp.files.mapping import Mapping
-from thermocomp.recording.recording import Recording
-from thermocomp.simulation.protocol import Physics
+from thermocomp.judging import compare as comparing
+from thermocomp.judging import do_no_harm, selecting
+from thermocomp.judging import study as studies
+from thermocomp.judging.choice import Settings
+from thermocomp.judging.probing import Probings
+from thermocomp.judging.results import Assessment, Rules
+from thermocomp.judging.sharing import shared_among
+from thermocomp.recordings.readers.mapping import Mapping
+from thermocomp.recordings.recording import Recording
+from thermocomp.virtual import datasets as virtual
+from thermocomp.virtual.protocol import Physics
 
 DEFAULT_MODELS = ("ols", "partial-f", "mra", "dynamic", "averaged")
 SelectionMethod = Literal["pareto", "subsets", "grouping", "partial-f", "stepwise", "ace"]
@@ -116,7 +116,7 @@ def compare(
         Take temperatures as they are; without it they are counted from the start of each test.
     starts : Start or sequence of Start, optional
         How all recordings begin, or each of them, such as ``Start("continued", earlier=(monday,))``; found out without
-        it. See `thermocomp.recording.starts.Start`.
+        it. See `thermocomp.recordings.starts.Start`.
     mapping : str, Path or Mapping, optional
         What the columns of files are.
     support, margin : str, float
@@ -125,7 +125,7 @@ def compare(
         Also replay with noise and lost sensors, as ``thermocomp compare`` does: a model that they make worse than none
         is unproven. Without it, which is quicker, none is accepted.
     primary : str, optional
-        Method that is named beforehand, see `thermocomp.assessment.results.Rules`.
+        Method that is named beforehand, see `thermocomp.judging.results.Rules`.
     harm_margin : float, optional
         Harm in a single unit that is let pass, stated before judging [um].
     limits : Limits or None
@@ -361,7 +361,7 @@ def select(
     inputs, split, leave_one, absolute, starts, mapping, jobs, scheduler, progress
         As for `compare`.
     **settings
-        Of the method, see `thermocomp.assessment.choice.Settings`: ``max_sensors=5``, ``threshold=0.95``.
+        Of the method, see `thermocomp.judging.choice.Settings`: ``max_sensors=5``, ``threshold=0.95``.
 
     Returns
     -------

@@ -12,7 +12,7 @@ from thermocomp.cli.options import (
 )
 from thermocomp.cli.progress import show_steps
 from thermocomp.cli.terminal import console
-from thermocomp.core.draft import refuse_existing
+from thermocomp.files.draft import refuse_existing
 
 
 def assess(
@@ -67,11 +67,11 @@ def assess(
     if output is not None:
         refuse_existing([output], overwrite, [model, *recordings], ".html")
     tests = read_recordings(recordings, mapping)
-    from thermocomp.assessment import study as studies
-    from thermocomp.assessment.probing import Probings
-    from thermocomp.assessment.results import Rules
     from thermocomp.cli import output as out
     from thermocomp.files import modelfile
+    from thermocomp.judging import study as studies
+    from thermocomp.judging.probing import Probings
+    from thermocomp.judging.results import Rules
 
     probings = None if probing is None else Probings.parse(probing)
     models = modelfile.read(model)

@@ -11,8 +11,8 @@ from thermocomp.cli.options import read_recordings
 from thermocomp.core.exceptions import InputError
 
 if TYPE_CHECKING:
-    from thermocomp.recording.recording import Recording
-    from thermocomp.recording.starts import Start
+    from thermocomp.recordings.recording import Recording
+    from thermocomp.recordings.starts import Start
 
 
 @Parameter(name="*")
@@ -48,7 +48,7 @@ class Beginning:
         InputError
             The options do not go together, or a file or a channel is not there.
         """
-        from thermocomp.recording.starts import Start
+        from thermocomp.recordings.starts import Start
 
         if self.gap is not None and not self.continues:
             raise InputError("--gap is the time between two files: name the earlier one with --continues")
@@ -73,7 +73,7 @@ class Beginning:
 def _zero(text: str, test: "Recording", mapping: Path | None) -> dict[str, float]:
     """Return temperatures by channel, from a text or from the start of a recording."""
     from thermocomp.core.zero import Zeroing
-    from thermocomp.recording.starts import level
+    from thermocomp.recordings.starts import level
 
     if "=" not in text:
         (other,) = read_recordings([Path(text)], mapping)

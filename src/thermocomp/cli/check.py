@@ -7,7 +7,7 @@ from thermocomp.cli.options import (
     read_recordings,
 )
 from thermocomp.cli.terminal import console
-from thermocomp.core.draft import refuse_existing
+from thermocomp.files.draft import refuse_existing
 
 
 def check(
@@ -43,7 +43,7 @@ def check(
         refuse_existing([output], overwrite, recordings, ".html")
     tests = read_recordings(recordings, mapping, tell=False)
     from thermocomp.cli import checked
-    from thermocomp.recording.quality import check as findings_of
+    from thermocomp.recordings.checks.quality import check as findings_of
 
     findings = [findings_of(test) for test in tests]
     if output is not None:

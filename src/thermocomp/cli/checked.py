@@ -8,8 +8,8 @@ from rich.console import Console
 
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.terminal import marked, print_table, words
-from thermocomp.recording.findings import Finding
-from thermocomp.recording.recording import Recording
+from thermocomp.recordings.checks.findings import Finding
+from thermocomp.recordings.recording import Recording
 from thermocomp.report import records
 from thermocomp.report.layout import Column, Layout, Toned
 

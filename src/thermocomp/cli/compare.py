@@ -60,9 +60,9 @@ def compare(
         (what was judged until then is shown).
     """
     ready = study.prepare(recordings, beginning, [output], overwrite, ".html")
-    from thermocomp.assessment import compare as comparing
-    from thermocomp.assessment.sharing import shared_among
     from thermocomp.cli import output as out
+    from thermocomp.judging import compare as comparing
+    from thermocomp.judging.sharing import shared_among
 
     samples, judging, rules, limits = ready.samples, ready.judging, study.rules(primary), compensator.limits()
     with (

@@ -74,12 +74,12 @@ def fit(
         0 done, 1 a component was refused, 2 unusable input.
     """
     ready = study.prepare(recordings, beginning, [output], overwrite, ".json", tilt=tilt)
-    from thermocomp.assessment import study as studies
-    from thermocomp.assessment.compare import n_pieces
-    from thermocomp.assessment.sharing import shared_among
     from thermocomp.cli import output as out
     from thermocomp.core.inputs import Support
     from thermocomp.files import modelfile
+    from thermocomp.judging import study as studies
+    from thermocomp.judging.compare import n_pieces
+    from thermocomp.judging.sharing import shared_among
 
     samples, judging = ready.samples, ready.judging
     with (

@@ -8,7 +8,7 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.core.shown import replace_unprintable
 
 if TYPE_CHECKING:
-    from thermocomp.recording.recording import Recording
+    from thermocomp.recordings.recording import Recording
 
 FLAGS = {
     "--quiet": "Nothing on the error stream but errors: no progress, no trouble of recordings.",

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import OptionalOutput
 from thermocomp.cli.terminal import console, make_console, words
-from thermocomp.core.draft import refuse_existing, write_text
 from thermocomp.core.exceptions import InputError, Remedy
+from thermocomp.files.draft import refuse_existing, write_text
 
 if TYPE_CHECKING:
-    from thermocomp.files.mending import Mended, Question
+    from thermocomp.recordings.readers.mending import Mended, Question
 
 _stderr = make_console(stderr=True)
 
@@ -54,11 +54,11 @@ def map(
         refuse_existing(
             [output], overwrite, [p for p in (recording, mapping) if p is not None and p != output], ".toml"
         )
-    from thermocomp.files.mapping import read_mapping
-    from thermocomp.files.mending import mend, take_best, to_toml
     from thermocomp.files.plaintext import read_text
     from thermocomp.files.tomlfile import MOST
-    from thermocomp.recording.quality import check
+    from thermocomp.recordings.checks.quality import check
+    from thermocomp.recordings.readers.mapping import read_mapping
+    from thermocomp.recordings.readers.mending import mend, take_best, to_toml
 
     begun = ""
     if mapping is not None:
@@ -91,7 +91,7 @@ def map(
 
 
 def _content(mended: "Mended", output: Path | None, left: Sequence[str]) -> dict[str, Any]:
-    from thermocomp.files.mending import to_toml
+    from thermocomp.recordings.readers.mending import to_toml
 
     return {
         "file": None if output is None else str(output),
@@ -107,8 +107,8 @@ def _content(mended: "Mended", output: Path | None, left: Sequence[str]) -> dict
 
 def _ask(question: "Question") -> Remedy | None:
     """Put a question on the terminal; return the answer, or None for leaving it as it is."""
-    from thermocomp.files.mapping import check_content
-    from thermocomp.files.mending import to_toml
+    from thermocomp.recordings.readers.mapping import check_content
+    from thermocomp.recordings.readers.mending import to_toml
 
     _stderr.print(f"\n[bold]?[/] {words(question.text)}", soft_wrap=True)
     for k, option in enumerate(question.options, start=1):

@@ -8,21 +8,21 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from thermocomp.assessment.choice import Settings
 from thermocomp.cli import loudness
 from thermocomp.cli.exits import STDIN
 from thermocomp.cli.terminal import make_console, words
 from thermocomp.core.correction import Limits
-from thermocomp.core.draft import refuse_existing
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.scratch import scratch
 from thermocomp.core.zero import Zeroing
+from thermocomp.files.draft import refuse_existing
+from thermocomp.files.scratch import scratch
+from thermocomp.judging.choice import Settings
 
 if TYPE_CHECKING:
     from thermocomp.api.inputs import LeaveOne, Prepared
-    from thermocomp.assessment.results import Rules
     from thermocomp.cli.beginning import Beginning
-    from thermocomp.recording.recording import Recording
+    from thermocomp.judging.results import Rules
+    from thermocomp.recordings.recording import Recording
 
 _stderr = make_console(stderr=True)
 
@@ -95,7 +95,7 @@ class StudyOptions:
         """
         tests = read_recordings(paths, self.mapping)
         from thermocomp.api.inputs import prepare
-        from thermocomp.recording.tilts import with_tilts
+        from thermocomp.recordings.tilts import with_tilts
 
         if not self.target:
             raise InputError(f"name what to predict with --target: {_displacements(tests)}")
@@ -134,7 +134,7 @@ class StudyOptions:
 
     def rules(self, primary: str | None = None) -> "Rules":
         """Return what is stated before judging."""
-        from thermocomp.assessment.results import Rules
+        from thermocomp.judging.results import Rules
 
         return Rules(self.harm_margin, primary)
 
@@ -180,8 +180,8 @@ def read_recordings(paths: list[Path], mapping: Path | None, *, tell: bool = Tru
     """
     if not paths:
         raise InputError("no recording given: name at least one CSV, XLSX or Parquet file")
-    from thermocomp.files import mapping as mappings
-    from thermocomp.files.mending import read_or_offer
+    from thermocomp.recordings.readers import mapping as mappings
+    from thermocomp.recordings.readers.mending import read_or_offer
 
     columns = mappings.read_mapping(mapping) if mapping is not None else None
     found = _read_all(paths, lambda named: [read_or_offer(p, columns) for p in named])
@@ -195,7 +195,7 @@ def read_recordings(paths: list[Path], mapping: Path | None, *, tell: bool = Tru
 def _read_all(paths: list[Path], read: "Callable[[list[Path]], list[Recording]]") -> "list[Recording]":
     if STDIN not in paths:
         return read(paths)
-    from thermocomp.files.limits import Limits as FileLimits
+    from thermocomp.recordings.readers.limits import Limits as FileLimits
 
     if paths.count(STDIN) > 1:
         raise InputError("-: there is one standard input")

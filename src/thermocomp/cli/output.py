@@ -6,16 +6,16 @@ from pathlib import Path
 
 from rich.console import Console
 
-from thermocomp.assessment import coverage
-from thermocomp.assessment.choice import Choice
-from thermocomp.assessment.do_no_harm import JudgedUnit
-from thermocomp.assessment.faultlog import find_faults
-from thermocomp.assessment.results import Assessment, Comparison
-from thermocomp.assessment.study import Fitted, Judged
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.terminal import mark, print_table, words
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.starts import Start
+from thermocomp.judging import coverage
+from thermocomp.judging.choice import Choice
+from thermocomp.judging.do_no_harm import JudgedUnit
+from thermocomp.judging.faultlog import find_faults
+from thermocomp.judging.results import Assessment, Comparison
+from thermocomp.judging.study import Fitted, Judged
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.starts import Start
 from thermocomp.report import records
 from thermocomp.report.bands import describe_bands
 from thermocomp.report.faults import describe_faults, describe_held
@@ -24,7 +24,7 @@ from thermocomp.report.losses import describe_losses
 from thermocomp.report.probings import describe_probings
 from thermocomp.report.running import describe_running
 from thermocomp.report.summary import cautions, describe_unlike
-from thermocomp.simulation.protocol import Experiment
+from thermocomp.virtual.protocol import Experiment
 
 
 def show_comparison(

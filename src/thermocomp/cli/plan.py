@@ -13,12 +13,12 @@ from thermocomp.cli.options import OptionalOutput, StudyOptions, read_recordings
 from thermocomp.cli.progress import show_steps
 from thermocomp.cli.terminal import console, print_table, words
 from thermocomp.core.exceptions import InputError
-from thermocomp.files.testprogram import Dialect, picture_of, sheet_of
+from thermocomp.judging.planning.testprogram import Dialect, picture_of, sheet_of
 
 if TYPE_CHECKING:
     from thermocomp.api.plan import Planned
-    from thermocomp.assessment.planning import Candidate
-    from thermocomp.iso230.stopping import Running
+    from thermocomp.judging.planning.planning import Candidate
+    from thermocomp.judging.settling.stopping import Running
 
 
 @Parameter(name="*")
@@ -98,7 +98,7 @@ def plan(
         )
     ready = study.prepare(recordings, beginning, files, overwrite, "", judged=False)
     from thermocomp.api import plan as api
-    from thermocomp.assessment import learningcurve
+    from thermocomp.judging.planning import learningcurve
 
     steps = 1 + (0 if no_curve else learningcurve.n_pieces(api.units_of(ready)))
     with show_steps(steps, hidden=json) as progress:

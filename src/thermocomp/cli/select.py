@@ -58,9 +58,9 @@ def select(
     """
     settings.check(method)
     ready = study.prepare(recordings, beginning, [output], overwrite, ".html", judged=method == "pareto")
-    from thermocomp.assessment import selecting
-    from thermocomp.assessment.sharing import shared_among
     from thermocomp.cli import output as out
+    from thermocomp.judging import selecting
+    from thermocomp.judging.sharing import shared_among
 
     samples, judging = ready.samples, ready.judging
     with (

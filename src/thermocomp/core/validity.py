@@ -18,7 +18,7 @@ class Validity:
         So many of them are left when those that are alike count once.
     nearest : float or None
         Distance of the two units that are most alike, in standard deviations of the inputs; None with a single unit.
-        Below `thermocomp.assessment.coverage.ALIKE` two units are alike.
+        Below `thermocomp.judging.coverage.ALIKE` two units are alike.
     speeds : tuple of float
         Spindle speeds that were run; those nearer than 2 % of the largest are one [1/min]; empty if none was recorded.
     ambient : tuple of float or None

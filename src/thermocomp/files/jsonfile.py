@@ -10,9 +10,9 @@ from typing import Any, NoReturn
 from pydantic import ConfigDict, TypeAdapter, ValidationError, with_config
 from pydantic_core import ErrorDetails, SchemaValidator
 
-from thermocomp.core.draft import write_text
 from thermocomp.core.exceptions import InputError, ModelFileError, SettingError
 from thermocomp.core.shown import replace_unprintable
+from thermocomp.files.draft import write_text
 from thermocomp.files.plaintext import list_errors, read_text
 
 #: bytes of a file, at most; models of additive curves over 9,000 rows had 8 million each before they were thinned
@@ -163,7 +163,7 @@ def write(text: str, path: str | Path, *, overwrite: bool) -> None:
     Raises
     ------
     InputError
-        See `thermocomp.core.draft.drafts`.
+        See `thermocomp.files.draft.drafts`.
     """
     write_text(text, Path(path), overwrite=overwrite)
 

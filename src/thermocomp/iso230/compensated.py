@@ -5,14 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.assessment.leaks import find_learned_rows
-from thermocomp.assessment.replay import are_absolute, replay_compensated
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.stacking import stack
-from thermocomp.recording.starts import Start, find_starts
+from thermocomp.judging.leaks import find_learned_rows
+from thermocomp.judging.replay import are_absolute, replay_compensated
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.stacking import stack
+from thermocomp.recordings.starts import Start, find_starts
 
 FloatArray = NDArray[np.float64]
 

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.recording.positioning import Positioning
+from thermocomp.volumetric.positioning import Positioning
 
 FloatArray = NDArray[np.float64]
 

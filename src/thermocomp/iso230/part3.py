@@ -19,12 +19,12 @@ from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
 from thermocomp.core.model import ErrorModel
-from thermocomp.iso230.averaging import WINDOW, average_test
 from thermocomp.iso230.compensated import replay_models
-from thermocomp.iso230.settling import Phase, find_driven_rows, find_phases, settle
 from thermocomp.iso230.thermaltest import HOUR, Kind, Pair, Targets, ThermalCurve, ThermalTest, evaluate_averaged_curve
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.starts import Start
+from thermocomp.judging.settling.averaging import WINDOW, average_test
+from thermocomp.judging.settling.settling import Phase, find_driven_rows, find_phases, settle
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.starts import Start
 
 FloatArray = NDArray[np.float64]
 

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from thermocomp.assessment.choice import Cell, Table
 from thermocomp.iso230.part2 import UNCERTAINTY, PositioningResult
-from thermocomp.iso230.settling import Settling
 from thermocomp.iso230.thermaltest import Figures, Targets, ThermalCurve, ThermalTest
+from thermocomp.judging.choice import Cell, Table
+from thermocomp.judging.settling.settling import Settling
 
 _CAPTION_60 = "Counted from the start of the test; rows averaged over {minutes:.3g} min."
 _CAPTION_U = " ±: expanded uncertainty (k = 2) by the noise, its serial correlation within that time minded."

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
-from thermocomp.iso230.averaging import AveragedCurve, K
-from thermocomp.iso230.settling import Settling
-from thermocomp.recording.recording import Recording
+from thermocomp.judging.settling.averaging import AveragedCurve, K
+from thermocomp.judging.settling.settling import Settling
+from thermocomp.recordings.recording import Recording
 
 FloatArray = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from thermocomp.models.averaged import AveragedDynamic
 from thermocomp.models.numerics.folds import number_folds
 from thermocomp.models.numerics.structures import average, fit_each, share_out
 from thermocomp.models.pacedfeatures import PacedFeatures
-from thermocomp.recording.samples import Samples
+from thermocomp.recordings.samples import Samples
 
 FloatArray = NDArray[np.float64]
 

@@ -27,8 +27,8 @@ from thermocomp.models.foreign import adopt_estimator, catch_failures, check_num
 from thermocomp.models.methods import Method, NamedEstimator, find_method, make_method
 from thermocomp.models.timed import TimedRegressor
 from thermocomp.models.unfrozen import UnfrozenRegressor
-from thermocomp.recording.fingerprints import fingerprint
-from thermocomp.recording.samples import Samples
+from thermocomp.recordings.fingerprints import fingerprint
+from thermocomp.recordings.samples import Samples
 
 BoolArray = NDArray[np.bool_]
 FloatArray = NDArray[np.float64]

@@ -13,7 +13,7 @@ from thermocomp.models.averaged import LAGS, POWERS, RUNNING, STOPPED
 from thermocomp.models.numerics.folds import halve, number_folds
 from thermocomp.models.numerics.structures import fit_each, share_out
 from thermocomp.models.pacedfeatures import PacedFeatures, usual_step
-from thermocomp.recording.samples import Samples
+from thermocomp.recordings.samples import Samples
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

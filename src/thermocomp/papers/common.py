@@ -7,8 +7,6 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 import pandas as pd
 
-from thermocomp.assessment import metrics
-from thermocomp.assessment.replay import replay
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.inputs import Support
 from thermocomp.core.machine import Channel
@@ -16,13 +14,15 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Variable
 from thermocomp.core.zero import FIRST_READING
+from thermocomp.judging import metrics
+from thermocomp.judging.replay import replay
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.training import train
 from thermocomp.papers.study import BoolArray, FloatArray, StudyTable
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
-from thermocomp.recording.starts import COLD
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
+from thermocomp.recordings.starts import COLD
 
 _Item = TypeVar("_Item")
 
@@ -85,7 +85,7 @@ def stacked(
     ----------
     recordings : sequence of Recording
     targets, inputs : sequence of str
-        See `thermocomp.recording.stacking.stack`.
+        See `thermocomp.recordings.stacking.stack`.
     rezero : bool
         True: temperatures are counted from the start of each test; False: as read.
 

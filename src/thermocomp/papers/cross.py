@@ -6,17 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import spearmanr
 
-from thermocomp.assessment.compare import compare, n_pieces
-from thermocomp.assessment.replay import replay
-from thermocomp.assessment.results import Assessment
-from thermocomp.datasets.virtual import record
+from thermocomp.judging.compare import compare, n_pieces
+from thermocomp.judging.replay import replay
+from thermocomp.judging.results import Assessment
+from thermocomp.judging.splits import Judging, Split, leave_one_cycle_out
 from thermocomp.models.methods import expand
 from thermocomp.papers.common import rms, stacked
 from thermocomp.papers.pictures import curves, single
 from thermocomp.papers.study import Claim, Figure, Progress, Study, StudyTable, tell_nobody
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples
-from thermocomp.recording.splits import Judging, Split, leave_one_cycle_out
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.samples import Samples
+from thermocomp.virtual.datasets import record
 
 #: the papers' methods, least squares beside them, and ours; all are fast. `thermocomp.models.methods.METHODS` has more
 FAST = ("ols", "mra", "mlp", "ace", "grouping", "partial-f", "arx", "ace-monotone", "dynamic")

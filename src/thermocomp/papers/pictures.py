@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from thermocomp.papers.study import Figure, FloatArray, Panel, PlotCurve, Style
-from thermocomp.recording.samples import Samples
+from thermocomp.recordings.samples import Samples
 
 
 def curves(

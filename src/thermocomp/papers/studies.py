@@ -5,10 +5,10 @@ from dataclasses import replace
 from functools import partial
 from importlib import import_module
 
-from thermocomp.assessment.pieces import elsewhere, work_through
 from thermocomp.core.exceptions import FitError
+from thermocomp.judging.pieces import elsewhere, work_through
 from thermocomp.papers.study import Claim, Progress, Study, tell_nobody
-from thermocomp.simulation.protocol import Physics
+from thermocomp.virtual.protocol import Physics
 
 #: each is a package beside this module, with ``redo.run(seed, progress) -> Study``
 STUDIES = ("chen1996", "wessel2004", "hwang", "precompensation", "stepwise2017")

@@ -8,13 +8,13 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from thermocomp.assessment import coverage
-from thermocomp.assessment.diagnostics import Collinearity
-from thermocomp.assessment.results import Assessment, Comparison
-from thermocomp.assessment.study import Judged
-from thermocomp.core.draft import write_text
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.splits import Judging
+from thermocomp.files.draft import write_text
+from thermocomp.judging import coverage
+from thermocomp.judging.diagnostics import Collinearity
+from thermocomp.judging.results import Assessment, Comparison
+from thermocomp.judging.splits import Judging
+from thermocomp.judging.study import Judged
+from thermocomp.recordings.recording import Recording
 from thermocomp.report import faults, figures, probings
 from thermocomp.report.html import draw_runs, page
 from thermocomp.report.layout import laid_out
@@ -62,7 +62,7 @@ def write(judged: Judged, recordings: Sequence[Recording], path: Path, *, overwr
     judged, recordings
         See `render`.
     path, overwrite
-        See `thermocomp.core.draft.drafts`.
+        See `thermocomp.files.draft.drafts`.
     """
     write_text(render(judged, recordings), path, overwrite=overwrite)
 

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from thermocomp.assessment.results import Assessment
 from thermocomp.core.model import ErrorModel
+from thermocomp.judging.results import Assessment
 
 
 def describe_bands(models: Sequence[ErrorModel], assessments: Sequence[Assessment]) -> list[str]:

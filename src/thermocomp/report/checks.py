@@ -8,10 +8,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from thermocomp.core.draft import write_text
 from thermocomp.core.machine import Channel
-from thermocomp.recording.findings import Finding
-from thermocomp.recording.recording import Recording
+from thermocomp.files.draft import write_text
+from thermocomp.recordings.checks.findings import Finding
+from thermocomp.recordings.recording import Recording
 from thermocomp.report import records
 from thermocomp.report.drawing import add_legend, drawing, svg
 from thermocomp.report.figures import COLOURS, POINTS, SHADE, FloatArray, thin_points
@@ -55,7 +55,7 @@ def write(
     recordings, findings
         See `render`.
     path, overwrite
-        See `thermocomp.core.draft.drafts`.
+        See `thermocomp.files.draft.drafts`.
     """
     write_text(render(recordings, findings), path, overwrite=overwrite)
 

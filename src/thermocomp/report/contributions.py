@@ -9,7 +9,7 @@ from thermocomp.core.contributions import contributions, gains
 from thermocomp.core.paceddynamic import PacedDynamic
 from thermocomp.core.shown import shorten
 from thermocomp.models.pacedfeatures import usual_step
-from thermocomp.recording.samples import Samples
+from thermocomp.recordings.samples import Samples
 from thermocomp.report.drawing import Drawn, add_legend, drawing, svg
 from thermocomp.report.figures import COLOURS, LONGEST, MEASURED, NONE, FloatArray, thin_points
 from thermocomp.report.layout import Column, Layout

@@ -8,11 +8,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from thermocomp.assessment.faultlog import Cost, Fault, FaultLog, find_costs, find_faults
-from thermocomp.assessment.study import Judged
 from thermocomp.core.correction import Limits
 from thermocomp.core.shown import shorten
-from thermocomp.recording.recording import Recording
+from thermocomp.judging.faultlog import Cost, Fault, FaultLog, find_costs, find_faults
+from thermocomp.judging.study import Judged
+from thermocomp.recordings.recording import Recording
 from thermocomp.report.drawing import Drawn, add_legend, drawing, name_ticks, svg
 from thermocomp.report.figures import LETTERS, LONGEST, MEASURED, POINTS, PREDICTED, SHADE, FloatArray
 from thermocomp.report.layout import Column, Layout

@@ -7,9 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from thermocomp.assessment.results import Assessment, Comparison
 from thermocomp.core.shown import shorten
-from thermocomp.recording.recording import Recording
+from thermocomp.judging.results import Assessment, Comparison
+from thermocomp.recordings.recording import Recording
 from thermocomp.report.drawing import Drawn, add_legend, drawing, log_ticks, name_ticks, svg
 
 FloatArray = NDArray[np.float64]

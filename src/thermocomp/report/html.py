@@ -8,13 +8,13 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescap
 from markupsafe import Markup
 
 from thermocomp import __version__
-from thermocomp.assessment.choice import Choice
-from thermocomp.assessment.results import Assessment, Comparison
-from thermocomp.core.draft import write_text
 from thermocomp.core.paceddynamic import PacedDynamic
 from thermocomp.core.shown import replace_unprintable
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples
+from thermocomp.files.draft import write_text
+from thermocomp.judging.choice import Choice
+from thermocomp.judging.results import Assessment, Comparison
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.samples import Samples
 from thermocomp.report import contributions, figures, selections
 from thermocomp.report.bands import describe_coverage
 from thermocomp.report.drawing import Drawn
@@ -126,7 +126,7 @@ def write_choices(
     choices, recordings
         See `render_choices`.
     path, overwrite
-        See `thermocomp.core.draft.drafts`.
+        See `thermocomp.files.draft.drafts`.
     """
     write_text(render_choices(choices, recordings), path, overwrite=overwrite)
 
@@ -149,7 +149,7 @@ def write(
     samples : Samples, optional
         See `render`.
     overwrite : bool
-        See `thermocomp.core.draft.drafts`.
+        See `thermocomp.files.draft.drafts`.
     """
     write_text(render(comparison, recordings, samples), path, overwrite=overwrite)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from thermocomp.assessment.choice import Cell, Table, format_cell
+from thermocomp.judging.choice import Cell, Table, format_cell
 
 
 class Toned(str):

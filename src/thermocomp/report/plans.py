@@ -6,9 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from thermocomp.assessment.learningcurve import LearningCurve
-from thermocomp.assessment.planning import SAME, Plan
-from thermocomp.core.trial import Trial
+from thermocomp.judging.planning.learningcurve import LearningCurve
+from thermocomp.judging.planning.planning import SAME, Plan
+from thermocomp.judging.planning.trial import Trial
 from thermocomp.report.drawing import Drawn, add_legend, drawing, name_ticks, svg
 from thermocomp.report.figures import MEASURED, NONE, PREDICTED, RESIDUAL, SHADE
 

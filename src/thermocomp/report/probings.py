@@ -5,10 +5,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from thermocomp.assessment.results import Assessment
-from thermocomp.assessment.study import Judged
 from thermocomp.core.shown import shorten
-from thermocomp.recording.recording import Recording
+from thermocomp.judging.results import Assessment
+from thermocomp.judging.study import Judged
+from thermocomp.recordings.recording import Recording
 from thermocomp.report.drawing import Drawn, add_legend, drawing, svg
 from thermocomp.report.figures import LONGEST, MEASURED, NONE, POINTS, PREDICTED, clock
 from thermocomp.report.sections import Section, Shown

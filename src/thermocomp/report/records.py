@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from thermocomp.assessment.position import CycleErrors, PositionStudy
-from thermocomp.assessment.results import Assessment
 from thermocomp.core.exceptions import Remedy
 from thermocomp.core.machine import Channel
 from thermocomp.core.model import ErrorModel
-from thermocomp.models.positionoptions import Setting
-from thermocomp.recording.findings import Finding
-from thermocomp.recording.recording import Recording
+from thermocomp.judging.results import Assessment
+from thermocomp.recordings.checks.findings import Finding
+from thermocomp.recordings.recording import Recording
 from thermocomp.report.layout import Column
+from thermocomp.volumetric.judging.position import CycleErrors, PositionStudy
+from thermocomp.volumetric.models.positionoptions import Setting
 
 #: values of a remedy that are shown
 _FEW = 6

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from thermocomp.assessment.results import Assessment
+from thermocomp.judging.results import Assessment
 
 #: models of which it is said what they leave without gate and limits; there is a number for each in the JSON
 MOST = 4

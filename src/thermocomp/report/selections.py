@@ -7,9 +7,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
-from thermocomp.assessment.budget import Budget
-from thermocomp.assessment.choice import Choice, Table
 from thermocomp.core.shown import shorten
+from thermocomp.judging.budget import Budget
+from thermocomp.judging.choice import Choice, Table
 from thermocomp.models.grouping import CorrelationGrouping
 from thermocomp.report.drawing import Drawn, add_legend, drawing, log_ticks, name_ticks, svg
 from thermocomp.report.figures import COLOURS, LONGEST, NONE

@@ -6,17 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from thermocomp.assessment import coverage, do_no_harm
-from thermocomp.assessment.choice import Table
-from thermocomp.assessment.metrics import METRICS
-from thermocomp.assessment.results import Assessment, Comparison
-from thermocomp.assessment.robustness import Robustness
 from thermocomp.core.validity import Validity
+from thermocomp.judging import coverage, do_no_harm
+from thermocomp.judging.choice import Table
+from thermocomp.judging.metrics import METRICS
+from thermocomp.judging.results import Assessment, Comparison
+from thermocomp.judging.robustness import Robustness
 from thermocomp.models.methods import METHODS
 from thermocomp.models.training import train
-from thermocomp.recording.quality import check
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples
+from thermocomp.recordings.checks.quality import check
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.samples import Samples
 from thermocomp.report import records
 from thermocomp.report.running import describe_running
 

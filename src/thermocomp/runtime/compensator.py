@@ -30,6 +30,8 @@ from thermocomp.runtime.adaptation import Probing
 from thermocomp.runtime.advance import advance
 from thermocomp.runtime.clocking import place
 from thermocomp.runtime.gate import explain_implausible, is_number
+from thermocomp.runtime.geometry.straight import best_lines
+from thermocomp.runtime.geometry.volumetric import VolumetricModel
 from thermocomp.runtime.group import Group
 from thermocomp.runtime.identity import remember, sift
 from thermocomp.runtime.limits import fade, limit_line
@@ -37,8 +39,6 @@ from thermocomp.runtime.lines import DeviationLine, constant, evaluate, straight
 from thermocomp.runtime.lookout import Lookout
 from thermocomp.runtime.state import Compensated, CompensatorState, Reference, Status
 from thermocomp.runtime.watch import WatchState, begin
-from thermocomp.volumetric.model import VolumetricModel
-from thermocomp.volumetric.straight import best_lines
 
 #: after a restart a correction has caught up once it is so near to what its models want [um]
 ARRIVED = 0.1

@@ -13,7 +13,7 @@ from thermocomp.core.position import PositionModel
 from thermocomp.runtime import adaptation
 from thermocomp.runtime.adaptation import Adaptation, Probing
 from thermocomp.runtime.advance import Advanced
-from thermocomp.volumetric.straight import best_line
+from thermocomp.runtime.geometry.straight import best_line
 
 
 class DeviationLine(NamedTuple):

@@ -5,7 +5,7 @@ import numpy as np
 from thermocomp.core.components import BY_CODE
 from thermocomp.core.machine import Machine, Source
 from thermocomp.core.position import PositionModel
-from thermocomp.volumetric.kinematics import Kinematics
+from thermocomp.runtime.geometry.kinematics import Kinematics
 
 #: a lever effect that nobody sees [um]
 NEGLIGIBLE = 0.5

@@ -15,9 +15,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.jobstate import JobState
 from thermocomp.nc.interpreter.block import Point
 from thermocomp.nc.thermal.inputs import FloatArray, Inputs, Wiring
+from thermocomp.nc.thermal.jobstate import JobState
 from thermocomp.nc.thermal.start import ThermalStart, hand_over_state
 from thermocomp.nc.thermal.stations import AXES, Station, check_stations
 

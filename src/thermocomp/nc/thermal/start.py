@@ -11,10 +11,10 @@ import numpy as np
 
 from thermocomp.core.autoregressive import Ticking
 from thermocomp.core.exceptions import InputError, explain_unknown
-from thermocomp.core.jobstate import JobState, StationState
 from thermocomp.core.model import ErrorModel, State
 from thermocomp.core.units import read_with_unit as with_unit
 from thermocomp.nc.thermal.inputs import SPEED, Inputs, Wiring
+from thermocomp.nc.thermal.jobstate import JobState, StationState
 from thermocomp.nc.thermal.stations import Station
 
 #: a speed that explains a measured deviation is looked for between so many

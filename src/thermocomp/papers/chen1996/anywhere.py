@@ -1,7 +1,7 @@
 """Chen, Yuan, Ni 1996, headline: the error anywhere in the work volume, compensated.
 
 The synthesis itself is in the paper's ref. 6; here it is that of `thermocomp.volumetric`. What is compensated is judged
-by `thermocomp.simulation.volume`, which knows the machine and nothing of that synthesis.
+by `thermocomp.virtual.volume`, which knows the machine and nothing of that synthesis.
 """
 
 from collections.abc import Collection, Mapping
@@ -12,22 +12,22 @@ from typing import NamedTuple
 import numpy as np
 
 from thermocomp.core.components import BY_CODE, COMPONENTS
-from thermocomp.datasets import virtual
-from thermocomp.models.position import PositionFit
 from thermocomp.papers.chen1996.setup import TENFOLD
 from thermocomp.papers.chen1996.volume import LearnedVolume
 from thermocomp.papers.common import Errors, rms
 from thermocomp.papers.pictures import single
 from thermocomp.papers.study import Claims, Figure, FloatArray, Ours, PlotCurve, StudyTable
-from thermocomp.simulation.axes import AXES, TEST_POSITION, TRAVEL
-from thermocomp.simulation.centre import MachiningCentre
-from thermocomp.simulation.experiments import SimulatedTest, simulate
-from thermocomp.simulation.geometry import find_cold_component
-from thermocomp.simulation.probes import NEARER, swing
-from thermocomp.simulation.volume import VolumetricTruth
-from thermocomp.volumetric.kinematics import INDEX, Kinematics
-from thermocomp.volumetric.model import VolumetricModel
-from thermocomp.volumetric.straight import straight_lines
+from thermocomp.runtime.geometry.kinematics import INDEX, Kinematics
+from thermocomp.runtime.geometry.straight import straight_lines
+from thermocomp.runtime.geometry.volumetric import VolumetricModel
+from thermocomp.virtual import datasets as virtual
+from thermocomp.virtual.axes import AXES, TEST_POSITION, TRAVEL
+from thermocomp.virtual.centre import MachiningCentre
+from thermocomp.virtual.experiments import SimulatedTest, simulate
+from thermocomp.virtual.geometry import find_cold_component
+from thermocomp.virtual.probes import NEARER, swing
+from thermocomp.virtual.volume import VolumetricTruth
+from thermocomp.volumetric.models.position import PositionFit
 
 #: points in the work volume, each in a thermal state of its own (C-35)
 POINTS = 1000

@@ -14,7 +14,7 @@ from thermocomp.papers import common
 from thermocomp.papers.chen1996 import setup
 from thermocomp.papers.chen1996.setup import CLOSELY, COMPETITIVE, DRIFTS, TEMPERATURES, drift_samples, recordings
 from thermocomp.papers.study import Claims, FloatArray, Ours
-from thermocomp.recording.samples import Samples
+from thermocomp.recordings.samples import Samples
 
 #: printed: unscreened and screened terms (C-10, C-20), mean absolute errors after training [um] (C-31)
 CANDIDATES = {"x": 20, "y": 35, "z": 20}

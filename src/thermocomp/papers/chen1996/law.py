@@ -15,15 +15,15 @@ import pandas as pd
 from thermocomp.core.machine import Channel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.models.mlp import SigmoidNet
-from thermocomp.models.position import PositionFit, PositionOptions, fit_position
 from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.papers.chen1996 import setup
 from thermocomp.papers.chen1996.setup import EQ6, EQ8, SLOPE_VARIABLES, TEMPERATURES, recordings, with_differences
 from thermocomp.papers.common import rms
 from thermocomp.papers.study import Claims, FloatArray, Ours, StudyTable
-from thermocomp.recording.cycles import make_single_cycle as whole_test
-from thermocomp.recording.profiles import Profiles
-from thermocomp.recording.recording import Recording
+from thermocomp.recordings.cycles import make_single_cycle as whole_test
+from thermocomp.recordings.profiles import Profiles
+from thermocomp.recordings.recording import Recording
+from thermocomp.volumetric.models.position import PositionFit, PositionOptions, fit_position
 
 #: noise of one run of the laser at a position [um], and of one reading of a temperature [degC]
 LASER, SENSOR = 0.3, 0.05

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from thermocomp.core.machine import Channel
-from thermocomp.datasets.virtual import record
 from thermocomp.papers.common import add_derived_channel, rename_channels, stacked
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.samples import Samples
+from thermocomp.virtual.datasets import record
 
 #: Table 1 (C-11): symbol -> channel of the virtual machine
 SENSORS = {

@@ -8,9 +8,7 @@ from typing import Any
 import numpy as np
 from joblib import Parallel, delayed
 
-from thermocomp.files.profiles import from_recording
 from thermocomp.models.mlp import SigmoidNet
-from thermocomp.models.position import PositionFit, PositionOptions, fit_position, slope_samples
 from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.papers import common
 from thermocomp.papers.chen1996 import law, setup
@@ -20,7 +18,9 @@ from thermocomp.papers.chen1996.show import beside, figure
 from thermocomp.papers.common import PAPERS_SUPPORT, Errors, rms
 from thermocomp.papers.pictures import curves
 from thermocomp.papers.study import Claims, Figure, FloatArray, Ours, PlotCurve, StudyTable
-from thermocomp.recording.profiles import Profiles
+from thermocomp.recordings.profiles import Profiles
+from thermocomp.recordings.readers.profiles import from_recording
+from thermocomp.volumetric.models.position import PositionFit, PositionOptions, fit_position, slope_samples
 
 #: sets, unscreened and screened coefficients (C-23)
 SETS, CANDIDATES = 51, 20

@@ -16,7 +16,7 @@ from thermocomp.papers.chen1996.show import figure
 from thermocomp.papers.common import Errors, trained
 from thermocomp.papers.pictures import curves
 from thermocomp.papers.study import Claims, Figure, FloatArray, Ours, StudyTable
-from thermocomp.recording.samples import Samples
+from thermocomp.recordings.samples import Samples
 
 #: C-33, E-C9: level of the noise [degC], and how often it is drawn
 NOISE, DRAWS = 0.4, 20

@@ -9,15 +9,15 @@ from joblib import Parallel, delayed
 from thermocomp.core.components import BY_CODE
 from thermocomp.core.machine import Axis, Machine, Source
 from thermocomp.core.structure import Structure
-from thermocomp.datasets import virtual
-from thermocomp.models.position import PositionFit, PositionOptions, fit_position
 from thermocomp.papers.common import stacked, trained
-from thermocomp.recording.cycles import find_cycles
-from thermocomp.recording.profiles import Profiles
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.tilts import with_tilts
-from thermocomp.simulation.axes import AXES, STATIONS, TEST_BAR, TEST_POSITION, TRAVEL
-from thermocomp.simulation.probes import COMPONENTS, PROBE_DISTANCE
+from thermocomp.recordings.cycles import find_cycles
+from thermocomp.recordings.profiles import Profiles
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.tilts import with_tilts
+from thermocomp.virtual import datasets as virtual
+from thermocomp.virtual.axes import AXES, STATIONS, TEST_BAR, TEST_POSITION, TRAVEL
+from thermocomp.virtual.probes import COMPONENTS, PROBE_DISTANCE
+from thermocomp.volumetric.models.position import PositionFit, PositionOptions, fit_position
 
 STRUCTURE = "w X' b Z Y (C1) t"
 METHOD = "dynamic"

@@ -13,18 +13,18 @@ from typing import Literal
 
 import numpy as np
 
-from thermocomp.assessment.sensitivity import Sensitivity, sensitivity
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.terms import TermTable, Variable
-from thermocomp.datasets.virtual import record
+from thermocomp.judging.sensitivity import Sensitivity, sensitivity
 from thermocomp.models.grouping import CorrelationGrouping
 from thermocomp.models.numerics.leastsquares import effective_sample_size, lstsq
 from thermocomp.models.selection.grouping import Groups, Interval, intervals
 from thermocomp.papers.common import PAPERS_SUPPORT, every, frozen, predict_deviation, rename_channels, stacked, trained
 from thermocomp.papers.study import FloatArray, Progress
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples
-from thermocomp.simulation.kits import HWANG_PLACES
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.samples import Samples
+from thermocomp.virtual.datasets import record
+from thermocomp.virtual.kits import HWANG_PLACES
 
 #: of the temperatures in `HWANG_PLACES` (H-08)
 NAMES = tuple(f"T{k}" for k in range(1, 15))

@@ -7,17 +7,17 @@ from typing import Any
 import numpy as np
 
 from thermocomp.core.model import ErrorModel
-from thermocomp.datasets.virtual import find_experiment, record
 from thermocomp.models.methods import find_method
 from thermocomp.papers.common import fit_and_freeze
 from thermocomp.papers.precompensation import program
 from thermocomp.papers.precompensation.setup import CUTS, LEAST, MILLING, NET, NONE, POSITIONS, SPEED
 from thermocomp.papers.study import FloatArray, Progress
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples
-from thermocomp.simulation.climate import Climate
-from thermocomp.simulation.protocol import Experiment
-from thermocomp.simulation.segments import Feed, Stretch
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.samples import Samples
+from thermocomp.virtual.climate import Climate
+from thermocomp.virtual.datasets import find_experiment, record
+from thermocomp.virtual.protocol import Experiment
+from thermocomp.virtual.segments import Feed, Stretch
 
 HOUR = 3600.0
 #: what a wrong start state is wrong by: the spindle ran for so long [s], at the speed of milling [1/min]

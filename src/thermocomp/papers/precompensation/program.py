@@ -25,7 +25,7 @@ from thermocomp.nc.thermal.start import ThermalStart, begin_cold, carry_over
 from thermocomp.nc.thermal.stations import Station
 from thermocomp.papers.precompensation.setup import INTERVAL, MILLING, POSITIONS, SPEED
 from thermocomp.papers.study import FloatArray
-from thermocomp.recording.recording import Recording
+from thermocomp.recordings.recording import Recording
 
 MINUTE = 60.0
 #: length of the tool; the work coordinate system lies so much lower: words of Z are positions of the axis [mm]

@@ -9,16 +9,16 @@ import numpy as np
 
 from thermocomp.core.correction import Correction, Deviation
 from thermocomp.core.model import ErrorModel
-from thermocomp.datasets.virtual import find_experiment, record
 from thermocomp.models.arx import ARX
 from thermocomp.models.arx_net import NetARX
 from thermocomp.models.selection.orders import Order
 from thermocomp.papers.common import Errors, described, fit_and_freeze, predict_deviation, rms, stacked
 from thermocomp.papers.study import FloatArray, Progress
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples
-from thermocomp.simulation.climate import Climate
-from thermocomp.simulation.protocol import Experiment
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.samples import Samples
+from thermocomp.virtual.climate import Climate
+from thermocomp.virtual.datasets import find_experiment, record
+from thermocomp.virtual.protocol import Experiment
 
 SPEED = "spindle_rpm"
 #: where the drift of Z is modelled (P-04) [mm]

@@ -6,9 +6,8 @@ from functools import cached_property
 import numpy as np
 from scipy import linalg
 
-from thermocomp.assessment.robustness import Robustness, stress
 from thermocomp.core.model import ErrorModel
-from thermocomp.datasets.virtual import record
+from thermocomp.judging.robustness import Robustness, stress
 from thermocomp.models.numerics.leastsquares import effective_sample_size, lstsq
 from thermocomp.models.numerics.stepwise import r_squared_of_f
 from thermocomp.models.partial_f import PartialF
@@ -24,7 +23,8 @@ from thermocomp.papers.common import (
     trained,
 )
 from thermocomp.papers.study import FloatArray, Progress
-from thermocomp.recording.samples import Samples
+from thermocomp.recordings.samples import Samples
+from thermocomp.virtual.datasets import record
 
 TARGET = "x1_um"
 #: F to enter and F to delete (T-03)

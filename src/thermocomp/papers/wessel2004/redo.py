@@ -10,7 +10,7 @@ from thermocomp.papers.study import Progress, Study
 from thermocomp.papers.wessel2004.sets import appendix_b, told
 from thermocomp.papers.wessel2004.spindle import spindle
 from thermocomp.papers.wessel2004.tools import milling_machine, resting_tool
-from thermocomp.simulation.protocol import Physics
+from thermocomp.virtual.protocol import Physics
 
 TITLE = "Wessel et al. 2004: Predicting thermal displacements in modular tool systems"
 

@@ -7,7 +7,6 @@ from functools import cached_property
 
 import numpy as np
 
-from thermocomp.datasets.virtual import record
 from thermocomp.models.selection.equivalents import Equivalents, equivalents
 from thermocomp.models.selection.maximal_correlation import (
     DataSet,
@@ -16,7 +15,8 @@ from thermocomp.models.selection.maximal_correlation import (
     subsets_up_to,
 )
 from thermocomp.papers.study import Claims, FloatArray, Ours, Part, Progress, StudyTable
-from thermocomp.simulation.protocol import Physics
+from thermocomp.virtual.datasets import record
+from thermocomp.virtual.protocol import Physics
 
 #: sets of nine temperatures, models of all and of at most three, and the data sets behind them (W-10)
 PAPER_SETS, PAPER_MODELS, PAPER_SMALL_SETS = 511, 35_259, 129

@@ -6,7 +6,6 @@ from functools import cached_property
 
 import numpy as np
 
-from thermocomp.datasets.virtual import record
 from thermocomp.models.ace import ACE
 from thermocomp.papers.common import rms
 from thermocomp.papers.pictures import curves
@@ -23,8 +22,9 @@ from thermocomp.papers.wessel2004.trial import (
     recorded,
     trial,
 )
-from thermocomp.recording.recording import Recording
-from thermocomp.simulation.protocol import Physics
+from thermocomp.recordings.recording import Recording
+from thermocomp.virtual.datasets import record
+from thermocomp.virtual.protocol import Physics
 
 #: maximal correlation of the reference series, its rows and their interval [s] (W-06)
 PAPER_PSI, PAPER_ROWS, PAPER_INTERVAL = 0.9994, 199, 100.0

@@ -7,7 +7,6 @@ from functools import cached_property
 import numpy as np
 from scipy.stats import spearmanr
 
-from thermocomp.datasets.virtual import record
 from thermocomp.models.ace import ACE
 from thermocomp.papers.common import rms
 from thermocomp.papers.pictures import curves
@@ -26,8 +25,9 @@ from thermocomp.papers.wessel2004.trial import (
     stacked,
     trial,
 )
-from thermocomp.recording.recording import Recording
-from thermocomp.simulation.protocol import Physics
+from thermocomp.recordings.recording import Recording
+from thermocomp.virtual.datasets import record
+from thermocomp.virtual.protocol import Physics
 
 #: RMS in the independent test by multiple linear regression and by ACE: resting tool, milling machine [um] (W-08, W-09)
 PAPER_TOOL, PAPER_MILLING = (5.7, 1.0), (5.0, 2.2)

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from thermocomp.assessment.replay import replay
 from thermocomp.core.inputs import Support
+from thermocomp.judging.replay import replay
 from thermocomp.models.ace import ACE
 from thermocomp.models.ace_monotone import MonotoneACE
 from thermocomp.models.base import ThermalRegressor
@@ -17,8 +17,8 @@ from thermocomp.papers import common
 from thermocomp.papers.common import errors_table, every, fit_and_freeze, predict_deviation, rms
 from thermocomp.papers.pictures import curves
 from thermocomp.papers.study import BoolArray, FloatArray, Panel, StudyTable
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.samples import Samples
 
 ACE_NAME = "ACE"
 MLR_NAME = "multiple linear regression"

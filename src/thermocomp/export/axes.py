@@ -1,0 +1,143 @@
+"""Which axis a correction goes to, and what a controller takes for it: offset, slope, and where that counts from."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.export.block.tables import Tables
+from thermocomp.export.reduction.reduced import find_axis
+from thermocomp.export.st.structuredtext import Unit
+from thermocomp.export.st.ststatements import SCL, Dialect, array, number, quoted, section
+
+
+class Drive(NamedTuple):
+    """An axis that is corrected."""
+
+    letter: str
+    target: int  #: which of the corrections it takes
+    position: float  #: where the slope counts from [mm]
+    travel: tuple[float, float]  #: over which it was measured [mm]; the same twice without a slope
+
+
+def find_drives(tables: Tables, named: Mapping[str, str]) -> list[Drive]:
+    """Return the axes that are corrected.
+
+    Parameters
+    ----------
+    tables : Tables
+        Of the compensator.
+    named : mapping of str to str
+        Axes by target; those of the names, such as z_um, if there are none.
+
+    Raises
+    ------
+    InputError
+        No target has an axis, two have the same, or one is not there.
+    """
+    if unknown := [t for t in named if t not in tables.targets]:
+        raise InputError(f"--axes {unknown[0]}: no such target; there are {', '.join(tables.targets)}")
+    found: dict[str, Drive] = {}
+    for k, target in enumerate(tables.targets):
+        letter = named.get(target, "") if named else find_axis(target, {})
+        if letter in found:
+            other = tables.targets[found[letter].target]
+            raise InputError(
+                f"{other} and {target} are both {letter}: say which one drives it, such as --axes {target}={letter}"
+            )
+        if letter:
+            values = tables.values
+            travel = (values["travel_low"][k], values["travel_high"][k])
+            found[letter] = Drive(letter, k, values["position"][k], travel)
+    if not found:
+        raise InputError(
+            f"no axis is known of {', '.join(tables.targets)}: say it, such as --axes {tables.targets[0]}=Z"
+        )
+    return list(found.values())
+
+
+#: largest of a whole number (DINT)
+WHOLE = 2**31 - 1
+
+
+class Value(NamedTuple):
+    """What a controller takes of an axis."""
+
+    name: str
+    about: str
+    factor: float  #: from um, um/m and mm
+    whole: bool = False  #: a whole number
+
+
+def write_values(
+    name: str, dialect: Dialect, drives: list[Drive], taken: Mapping[str, Value], direction: float
+) -> Unit:
+    """Return a function block that makes what a controller takes of the corrections.
+
+    Parameters
+    ----------
+    name : str
+        Of the block.
+    dialect : {'codesys', 'twincat', 'scl'}
+    drives : list of Drive
+    taken : mapping of str to Value
+        For ``offset``, ``slope`` and ``position``.
+    direction : float
+        1 if the controller adds what it is given to the command, -1 if it takes it off; an input that can be changed.
+
+    Raises
+    ------
+    InputError
+        A reference position is beyond what the controller's whole numbers hold.
+    """
+    scl, n = dialect == "scl", len(drives)
+    _check_whole(drives, taken["position"])
+    mark = "#" if scl else ""
+    most = 1 + max(d.target for d in drives)
+    outputs = {v.name: array("int" if v.whole else "real", n) for v in taken.values()}
+    parts = [
+        f"FUNCTION_BLOCK {quoted(name, scl)}",
+        *(SCL if scl else []),
+        f"(* What the controller takes, by axis: {', '.join(f'{k}: {d.letter}' for k, d in enumerate(drives))} *)",
+        *(f"(* {v.name}: {v.about} *)" for v in taken.values()),
+        "(* direction: 1.0 if the controller adds it to the command, -1.0 if it takes it off. UNCONFIRMED: try it *)",
+        section(
+            "VAR_INPUT",
+            {
+                "correction": array("real", most),
+                "slope": array("real", most),
+                "direction": f"LREAL := {number(direction)}",
+            },
+        ),
+        section("VAR_OUTPUT", outputs),
+    ]
+    lines = []
+    for k, drive in enumerate(drives):
+        signed = {
+            "offset": f"{mark}direction * {mark}correction[{drive.target}]",
+            "slope": f"{mark}direction * {mark}slope[{drive.target}]",
+            "position": number(drive.position) if drive.position >= 0 else f"({number(drive.position)})",
+        }
+        for part, value in taken.items():
+            said = f"{signed[part]} * {number(value.factor)}"
+            place = f"{mark}{value.name}[{k}]"
+            if value.whole:
+                lines += [
+                    f"IF {said} < 0.0 THEN",
+                    f"    {place} := -TRUNC(0.5 - {said});",
+                    "ELSE",
+                    f"    {place} := TRUNC(0.5 + {said});",
+                    "END_IF;",
+                ]
+            else:
+                lines.append(f"{place} := {said};")
+    return Unit(name, "\n".join(parts), "\n".join(lines), "END_FUNCTION_BLOCK")
+
+
+def _check_whole(drives: list[Drive], taken: Value) -> None:
+    """Refuse reference positions that do not fit into a whole number."""
+    for drive in drives:
+        if taken.whole and abs(drive.position * taken.factor) >= WHOLE:
+            raise InputError(
+                f"{drive.letter}: its slope counts from {drive.position:g} mm, and {taken.about} ends at "
+                f"{WHOLE / taken.factor:.0f} mm: record with positions in machine coordinates [mm]"
+            )

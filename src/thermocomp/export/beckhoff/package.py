@@ -1,0 +1,75 @@
+"""TwinCAT CNC (ISG kernel): a compensator as function block, and what the axis parameters take."""
+
+from collections.abc import Mapping
+
+from thermocomp.export.axes import Value, find_drives, write_values
+from thermocomp.export.block.tables import gather
+from thermocomp.export.c99.c99 import identifier
+from thermocomp.export.facts import Facts
+from thermocomp.export.st.package import write_blocks
+from thermocomp.runtime.compensator import Compensator
+
+#: P-AXIS-00273, P-AXIS-00274, P-AXIS-00272
+TAKEN = {
+    "offset": Value("offset_value", "P-AXIS-00273 [0.1 um]", 10.0, whole=True),
+    "slope": Value("coefficient", "P-AXIS-00274 [um/m]", 1.0),
+    "position": Value("position_value", "P-AXIS-00272 [0.1 um]", 1e4, whole=True),
+}
+
+_PAGE = """
+## Into the CNC
+
+ds(T, s) = offset(T) + coefficient(T) (s - s0). The block `{name}_axis` makes these of `correction` and `slope`
+of `{name}`:
+
+| output | axis parameter | unit |
+|---|---|---|
+| | P-AXIS-00271: temperature compensation on | |
+| `position_value[k]` | P-AXIS-00272: s0 | 0.1 um |
+| `offset_value[k]` | P-AXIS-00273: offset | 0.1 um |
+| `coefficient[k]` | P-AXIS-00274: coefficient | um/m |
+
+| k | axis | of |
+|---|---|---|
+{rows}
+
+The PLC writes them over ADS, in a cycle of seconds (`ADSWRITE` of the library Tc2_System). **UNCONFIRMED**: index group
+and offset of these parameters in your version (look them up in the documentation of the CNC), and `direction`, whether
+the CNC adds the value to the command (1) or takes it off (-1). Try it, the spindle standing and an indicator on the
+axis: with P-AXIS-00273 at 200 and all else at 0, the axis moves by 0.02 mm; by minus 0.02 mm if the CNC takes it off.
+
+At power-on the block begins with corrections of 0: write the parameters as 0 before the axes are homed, if the CNC
+keeps them.
+
+The CNC spreads a change over a number of cycles of its own; here a correction changes by at most {rate:g} um/s.
+"""
+
+
+def write_package(
+    compensator: Compensator, name: str, facts: Facts, axes: Mapping[str, str] | None = None
+) -> dict[str, bytes]:
+    """Return all files by their names.
+
+    Parameters
+    ----------
+    compensator : Compensator
+        Made by `Compensator.of`.
+    name : str
+    facts : Facts
+    axes : mapping of str to str, optional
+        Axes by target.
+
+    Raises
+    ------
+    InputError
+        A model has no formula, the models do not go together, or no axis is known.
+    """
+    tables, own = gather(compensator), identifier(name)
+    drives = find_drives(tables, axes or {})
+    more = write_values(f"{own}_axis", "twincat", drives, TAKEN, 1.0)
+    page = _PAGE.format(
+        name=own,
+        rows="\n".join(f"| {k} | {d.letter} | {tables.targets[d.target]} |" for k, d in enumerate(drives)),
+        rate=compensator.limits.rate,
+    )
+    return write_blocks(compensator, name, facts, "twincat", [more], page)

@@ -1,0 +1,21 @@
+"""Variables by name: what the block's functions work on when Python runs them."""
+
+from typing import Any
+
+
+class Names:
+    """A bag of variables; see `thermocomp.export.block.layout`.
+
+    Parameters
+    ----------
+    **values : object
+    """
+
+    def __init__(self, **values: Any) -> None:
+        self.__dict__.update(values)
+
+    def __getattr__(self, name: str) -> Any:
+        raise AttributeError(name)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        self.__dict__[name] = value

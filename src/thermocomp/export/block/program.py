@@ -1,0 +1,170 @@
+"""The block's functions as syntax trees: which there are, without what a compensator does without."""
+
+import ast
+import inspect
+from collections.abc import Mapping
+from functools import cache
+from types import MappingProxyType, ModuleType
+from typing import NamedTuple
+
+from thermocomp.export.block import blaming, clocks, distances, formulas, numbers, steps, watching
+from thermocomp.export.block.layout import STATE, TABLES, WATCH, WATCH_WORK, WORK, Kind, Var
+from thermocomp.export.block.tables import Tables
+
+#: variables by the name of what they are in
+VARIABLES: dict[str, dict[str, Var]] = {"s": STATE | WATCH, "w": WORK | WATCH_WORK, "t": TABLES}
+
+
+class Function(NamedTuple):
+    """A function of the block."""
+
+    name: str
+    tree: ast.FunctionDef
+    constants: Mapping[str, object]  #: of the module it stands in
+
+    @property
+    def parameters(self) -> list[str]:
+        """Those beside the variables."""
+        return [a.arg for a in self.tree.args.args if a.arg not in VARIABLES]
+
+    @property
+    def is_of_numbers(self) -> bool:
+        """Whether it gives a number, and changes nothing."""
+        return not any(a.arg in VARIABLES for a in self.tree.args.args)
+
+    @property
+    def about(self) -> str:
+        """Its docstring."""
+        return ast.get_docstring(self.tree) or ""
+
+
+@cache
+def _all() -> dict[str, Function]:
+    modules: tuple[ModuleType, ...] = (numbers, distances, clocks, blaming, watching, steps)
+    return {
+        node.name: Function(node.name, node, vars(module))
+        for module in modules
+        for node in ast.parse(inspect.getsource(module)).body
+        if isinstance(node, ast.FunctionDef)
+    }
+
+
+def called(node: ast.Call) -> str:
+    """Return the name of the function that a call is of."""
+    return node.func.attr if isinstance(node.func, ast.Attribute) else node.func.id  # type: ignore[attr-defined]
+
+
+def functions(tables: Tables, own: Mapping[str, str] = MappingProxyType({})) -> list[Function]:
+    """Return the functions that a block needs, each behind those that it calls; `step` is the last.
+
+    Parameters
+    ----------
+    tables : Tables
+        Of the compensator: an ``if`` that one of their sizes decides is decided here.
+    own : mapping of str to str
+        Functions of the block that stand for those of a library, by the names of these.
+    """
+    known = _all() | {name: _made(name, text) for name, text in tables.formulas.items()}
+    known |= {name: known[of]._replace(name=name) for name, of in own.items()}
+    found: dict[str, Function] = {}
+
+    def add(name: str) -> None:
+        function = known[name]
+        tree = _Decided(tables.sizes).visit(ast.parse(ast.unparse(function.tree)).body[0])
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Call) and called(node) in known and called(node) not in found:
+                add(called(node))
+        found[name] = function._replace(tree=tree)
+
+    add("step")
+    return list(found.values())
+
+
+def _made(name: str, text: str) -> Function:
+    tree = ast.parse(text).body[0]
+    assert isinstance(tree, ast.FunctionDef)
+    about = ast.Expr(ast.Constant(inspect.getdoc(getattr(formulas, name)) or ""))
+    tree.body.insert(0, about)
+    return Function(name, tree, {})
+
+
+class _Decided(ast.NodeTransformer):
+    """Takes away what a compensator does without."""
+
+    def __init__(self, sizes: Mapping[str, int]) -> None:
+        self._sizes = sizes
+
+    def visit_If(self, node: ast.If) -> ast.AST | list[ast.stmt]:
+        """Take an ``if`` that is decided for what it does."""
+        self.generic_visit(node)
+        match node.test:
+            case ast.Attribute(ast.Name("t"), name) if name in self._sizes:
+                return node.body if self._sizes[name] else node.orelse
+        return node
+
+    def visit_For(self, node: ast.For) -> ast.AST | list[ast.stmt]:
+        """Take away a loop over nothing."""
+        self.generic_visit(node)
+        match node.iter:
+            case ast.Call(args=[ast.Attribute(ast.Name("t"), name)]) if self._sizes[name] == 0:
+                return []
+        return node
+
+
+def kind_of(node: ast.expr, local: Mapping[str, Kind]) -> Kind:  # noqa: PLR0911 - a case for every kind of node
+    """Return what an expression gives: ``time`` where one is in it."""
+    match node:
+        case ast.Compare() | ast.BoolOp() | ast.UnaryOp(ast.Not()):
+            return "bool"
+        case ast.Constant(value):
+            return "bool" if isinstance(value, bool) else "int" if isinstance(value, int) else "real"
+        case ast.Name(name):
+            return local.get(name, "real")
+        case ast.Attribute(ast.Name(owner), name):
+            return VARIABLES[owner][name].kind if name in VARIABLES[owner] else "int"
+        case ast.Subscript(of):
+            return kind_of(of, local)
+        case ast.IfExp(_, body, orelse):
+            parts = [body, orelse]
+        case ast.BinOp(left, _, right):
+            parts = [left, right]
+        case ast.UnaryOp(_, of):
+            parts = [of]
+        case ast.Call(ast.Name("abs"), [of]):
+            parts = [of]
+        case ast.Call():
+            return "real"
+    kinds = {kind_of(part, local) for part in parts}
+    return "time" if "time" in kinds else "real" if "real" in kinds else kinds.pop()
+
+
+def locals_of(tree: ast.FunctionDef, parameters: Mapping[str, Kind]) -> dict[str, Kind]:
+    """Return the kinds of the variables that a function has for itself, in their order."""
+    found: dict[str, Kind] = dict(parameters)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.For) and isinstance(node.target, ast.Name):
+            found[node.target.id] = "int"
+    for node in _in_order(tree):
+        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
+            name, kind = node.targets[0].id, kind_of(node.value, found)
+            if found.get(name, kind) != kind and "time" not in (found[name], kind):
+                kind = "real"
+            found.setdefault(name, kind)
+    return {name: kind for name, kind in found.items() if name not in parameters}
+
+
+def _in_order(node: ast.AST) -> list[ast.AST]:
+    return [inner for child in ast.iter_child_nodes(node) for inner in (child, *_in_order(child))]
+
+
+#: of the parameters of functions
+PARAMETER: dict[str, Kind] = {"int": "int", "float": "real", "bool": "bool"}
+
+
+def parameters_of(function: Function) -> dict[str, Kind]:
+    """Return the kinds of a function's parameters beside the variables."""
+    return {
+        a.arg: PARAMETER[ast.unparse(a.annotation)]
+        for a in function.tree.args.args
+        if a.arg not in VARIABLES and a.annotation
+    }

@@ -1,0 +1,98 @@
+"""What models do beyond their trained range: ``hold`` and ``fade``, as statements of a block and their numbers."""
+
+import math
+from collections.abc import Sequence
+from itertools import accumulate
+from typing import Any
+
+from thermocomp.core.inputs import Input
+from thermocomp.core.joint import JointSupport
+from thermocomp.core.model import ErrorModel
+
+
+class Supports:
+    """Support policies of some models; what several have in common is there once.
+
+    Parameters
+    ----------
+    ranges : sequence of Input
+        Of which the inputs of the models are.
+    """
+
+    def __init__(self, ranges: Sequence[Input]) -> None:
+        self._ranges = ranges
+        self._known: dict[str, int] = {}
+        self._models: list[ErrorModel] = []
+
+    def statements(self, model: ErrorModel, place: int, said: str, worked_out: set[int]) -> list[str]:
+        """Return what becomes of what a model says: they change ``s.deviation[place]``.
+
+        Parameters
+        ----------
+        model : ErrorModel
+        place : int
+            Of the model.
+        said : str
+            What it says.
+        worked_out : set of int
+            Distances that the function has already.
+        """
+        own, policy = f"s.deviation[{place}]", model.support.policy
+        if policy == "clip":
+            return [f"{own} = {said}"]
+        key = repr((model.inputs, *model.bounds, model.joint))
+        k = self._known.setdefault(key, len(self._known))
+        lines = []
+        if k == len(self._models):
+            self._models.append(model)
+        if k not in worked_out:
+            worked_out.add(k)
+            lines = [f"find_distances(s, w, t, {k})", f"excess{k} = w.excess", f"far{k} = w.distance"]
+        if policy == "hold":
+            return [*lines, f"if not (excess{k} > 0.0 or far{k} > 1.0):", f"    {own} = {said}"]
+        most = f"larger((far{k} - 1.0) / {float(model.support.fade_over)!r}, excess{k})"
+        return [*lines, f"{own} = {said} * larger(0.0, 1.0 - {most})"]
+
+    def finish(self) -> tuple[dict[str, int], dict[str, list[Any]]]:
+        """Return the sizes and numbers of `thermocomp.export.block.distances`."""
+        models = self._models
+        bounds = [m.bounds for m in models]
+        joints = [m.joint or JointSupport((), (), (), 1.0, (), (), ()) for m in models]
+        places = [[self._ranges.index(i) for i in m.inputs] for m in models]
+        units = [j.limit * math.sqrt(len(j.columns)) for j in joints]
+        levels = [level for j in joints for level in j.levels]
+        values: dict[str, list[Any]] = {
+            "member_begin": _begins([len(p) for p in places]),
+            "member_range": [r for p in places for r in p],
+            **{
+                f"member_{name}": [float(v) for b in bounds for v in b[k]]
+                for k, name in enumerate(("low", "high", "span"))
+            },
+            "column_begin": _begins([len(j.columns) for j in joints]),
+            "column_range": [p[c] for j, p in zip(joints, places, strict=True) for c in j.columns],
+            "column_weight": [1.0 / (s * unit) for j, unit in zip(joints, units, strict=True) for s in j.scale],
+            "points": [len(j.points) for j in joints],
+            "point_begin": _begins([len(j.points) * len(j.columns) for j in joints]),
+            "point": [v / u for j, u in zip(joints, units, strict=True) for point in j.points for v in point],
+            "speeds_begin": _begins([len(j.speeds) for j in joints]),
+            "speed_range": [p[c] for j, p in zip(joints, places, strict=True) for c in j.speeds],
+            "tolerance": [float(x) for j in joints for x in j.tolerances],
+            "level_begin": _begins([len(level) for level in levels]),
+            "level": [float(v) for level in levels for v in level],
+        }
+        sizes = {
+            "SUPPORTS": len(models),
+            "ENDS_OF_SUPPORTS": len(models) + 1,
+            "SUPPORTED": len(values["member_range"]),
+            "COLUMNS": len(values["column_range"]),
+            "POINTS": len(values["point"]),
+            "LEVELLED": len(levels),
+            "ENDS_OF_LEVELS": len(levels) + 1,
+            "LEVELS": len(values["level"]),
+        }
+        return sizes, values
+
+
+def _begins(sizes: Sequence[int]) -> list[int]:
+    """Return where each of several lists begins in one after the other, and where the last ends."""
+    return list(accumulate(sizes, initial=0))

@@ -1,0 +1,226 @@
+"""The numbers of a compensator, as its block wants them: see `thermocomp.export.block.layout`."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.expression import Clip, Node
+from thermocomp.core.expression import Input as Leaf
+from thermocomp.core.inputs import Input
+from thermocomp.core.model import ErrorModel
+from thermocomp.core.watch import Watch
+from thermocomp.core.zero import MOST
+from thermocomp.export.block.models import Formulas
+from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.gate import MIN_SPAN, PLAUSIBLE, WIDE
+
+#: any number at all, in single precision too
+ANY = (-1e30, 1e30)
+
+
+class Tables(NamedTuple):
+    """What a block is made from."""
+
+    channels: tuple[Input, ...]  #: in the order of the values that it takes
+    ranges: tuple[Input, ...]  #: inputs of the models, each once
+    sensors: tuple[str, ...]  #: temperatures that are watched
+    targets: tuple[str, ...]
+    models: tuple[ErrorModel, ...]
+    sizes: dict[str, int]  #: by the names in the dimensions of the variables, and what the block does without
+    values: dict[str, Any]  #: numbers, or nested lists of them, by the names of `layout.TABLES`
+    formulas: dict[str, str]  #: functions that are made of the models' formulas, in Python
+
+
+def gather(compensator: Compensator) -> Tables:
+    """Return the numbers of a compensator.
+
+    Parameters
+    ----------
+    compensator : Compensator
+        Made by `Compensator.of`.
+
+    Raises
+    ------
+    InputError
+        Its models are watched over, or average their zero, in different ways.
+    """
+    models, watches = compensator.models, compensator.watches
+    zeroings = {m.zeroing for m in models} | {w.zeroing for w in watches}
+    if len(zeroings) > 1 or len(watches) > 1:
+        raise InputError(
+            "models that are watched over, or average their zero, in different ways: export each file alone"
+        )
+    zeroing = zeroings.pop()
+    watch = watches[0] if watches else None
+    ranges = tuple(dict.fromkeys(i for m in models for i in m.inputs))
+    known = [*ranges, *(watch.inputs if watch else ())]
+    if zeroing.speed:
+        known.append(Input(zeroing.speed, "spindle_speed", "1/min", 0.0, False, 0.0, 0.0))
+    by_name = {i.name: i for i in reversed(known)}
+    channels = tuple(by_name[name] for name in dict.fromkeys(i.name for i in known))
+    place = {c.name: k for k, c in enumerate(channels)}
+    sets = list(dict.fromkeys(m.inputs for m in models))
+    sensors = watch.names if watch else ()
+    limits, lines = compensator.limits, compensator.lines
+    values: dict[str, Any] = {
+        **{name: getattr(limits, name) for name in ("magnitude", "rate", "dead_band", "reading_age", "hold", "fade")},
+        "at_rest": zeroing.at_rest,
+        "otherwise": zeroing.otherwise,
+        "speed_channel": place.get(zeroing.speed, 0),
+        **_ranges(ranges, models, place),
+        "set_begin": np.cumsum([0, *(len(s) for s in sets)]).tolist(),
+        "set_range": [ranges.index(i) for s in sets for i in s],
+        "model_rezeroed": [any(i.rezero for i in m.inputs) for m in models],
+        **_lines(compensator),
+        **_judged(models, sensors),
+        **_watch(watch, place),
+    }
+    formulas = Formulas(ranges, values["channel"])
+    for name, waits in (("absolute", False), ("rezeroed", True)):
+        mine = [(k, m) for k, m in enumerate(models) if values["model_rezeroed"][k] == waits]
+        formulas.add(name, [(k, m, formula(m, ranges)) for k, m in mine])
+    own_sizes, own_values = formulas.finish()
+    values |= own_values
+    sizes = {
+        "CHANNELS": len(channels),
+        "RANGES": len(ranges),
+        "SETS": len(sets),
+        "ENDS_OF_SETS": len(sets) + 1,
+        "MEMBERS": len(values["set_range"]),
+        "MODELS": len(models),
+        "TARGETS": len(lines),
+        "ENDS_OF_LINES": len(lines) + 1,
+        "JUDGED": len(values["judged_model"]),
+        "ENDS": 2,
+        "MOST": MOST if max(zeroing.at_rest, zeroing.otherwise) > 0 else 2,
+        "COLUMN": max(MOST, len(ranges)),
+        "has_speed": int(bool(zeroing.speed)),
+        "has_zero": int(any(values["model_rezeroed"])),
+        "has_absolute": int(not all(values["model_rezeroed"])),
+        **_watch_sizes(watch),
+        **own_sizes,
+    }
+    return Tables(channels, ranges, sensors, tuple(lines), models, sizes, values, formulas.functions)
+
+
+def formula(model: ErrorModel, ranges: tuple[Input, ...]) -> Node:
+    """Return what a model computes, its inputs being numbered as the ranges are."""
+    low, high, _ = model.bounds
+    leaves = (Leaf(ranges.index(i), i.name) for i in model.inputs)
+    return model.expression([Clip(*clip) for clip in zip(leaves, low, high, strict=True)])
+
+
+def _ranges(ranges: tuple[Input, ...], models: tuple[ErrorModel, ...], place: dict[str, int]) -> dict[str, Any]:
+    limits = [PLAUSIBLE.get(r.quantity, ANY) for r in ranges]
+    heat = [r.quantity == "temperature" for r in ranges]
+    span = [max(r.high - r.low, MIN_SPAN) for r in ranges]
+    wide = [WIDE * max(r.high - r.low, abs(r.low), abs(r.high), 1.0) for r in ranges]
+    bounds: dict[Input, tuple[float, float]] = {}
+    for m in reversed(models):
+        low, high, _ = m.bounds
+        bounds |= {i: (a, b) for i, a, b in zip(m.inputs, low, high, strict=True)}
+    return {
+        "channel": [place[r.name] for r in ranges],
+        "temperature": heat,
+        "rezero": [r.rezero for r in ranges],
+        "reference": [r.reference for r in ranges],
+        "low": [r.low for r in ranges],
+        "high": [r.high for r in ranges],
+        "room": [s if h else w for h, s, w in zip(heat, span, wide, strict=True)],
+        "applies": [1 if h else 0 if r.quantity in PLAUSIBLE else 2 for h, r in zip(heat, ranges, strict=True)],
+        "least": [low for low, _ in limits],
+        "most": [high for _, high in limits],
+        "span": span,
+        "bound_low": [bounds[r][0] for r in ranges],
+        "bound_high": [bounds[r][1] for r in ranges],
+    }
+
+
+def _lines(compensator: Compensator) -> dict[str, Any]:
+    lines = list(compensator.lines.values())
+    shares = [line.deviation(unit) for line in lines for unit in np.eye(line.models.stop - line.models.start).tolist()]
+    # of one model alone the same at every position
+    travels = [(0.0, 0.0) if line.travel[0] == line.travel[1] else line.travel for line in lines]
+    return {
+        "line_begin": [line.models.start for line in lines] + [len(compensator.models)],
+        "to_offset": [s.offset for s in shares],
+        "to_slope": [s.slope for s in shares],
+        "position": [shares[line.models.start].reference_position for line in lines],
+        "travel_low": [low for low, _ in travels],
+        "travel_high": [high for _, high in travels],
+        "shadow": [t in compensator.shadow for t in compensator.lines],
+    }
+
+
+def _judged(models: tuple[ErrorModel, ...], sensors: tuple[str, ...]) -> dict[str, Any]:
+    """Return without which sensors the models may run; each alone, and several together as they were judged."""
+    judged: list[tuple[int, list[bool]]] = []
+    for k, m in enumerate(models):
+        own = [i.name for i in m.inputs if i.name in sensors]
+        for key in m.honest_error.lost if m.honest_error else ():
+            several = [name for name in own if name in key.split(", ")]
+            if len(several) > 1 and ", ".join(several) == key and m.may_lose(several):
+                judged.append((k, [s in several for s in sensors]))
+    return {
+        "leans_on": [[s in m.sensors for s in sensors] for m in models],
+        "may_lose": [[m.may_lose([s]) for s in sensors] for m in models],
+        "judged_model": [k for k, _ in judged],
+        "judged_without": [which for _, which in judged],
+    }
+
+
+def _watch_sizes(watch: Watch | None) -> dict[str, int]:
+    if watch is None:
+        return {"watched": 0, "SENSORS": 0}
+    n, bank = len(watch.sensors), watch.bank
+    return {
+        "watched": 1,
+        "SENSORS": n,
+        "WATCHED": len(watch.inputs),
+        "SPEEDS": len(watch.speeds),
+        "TAUS": bank.taus,
+        "STATES": len(bank.gain),
+        "LAGGED": bank.taus * n,
+        "MEMORY": len(bank.rates),
+        "PAIRS": len(watch.pairs[0]),
+        "SHAPES": 2,
+        "watch_waits": int(any(i.rezero for i in watch.inputs)),
+    }
+
+
+def _watch(watch: Watch | None, place: dict[str, int]) -> dict[str, Any]:
+    if watch is None:
+        return {}
+    heat, bank = [watch.inputs[s.input] for s in watch.sensors], watch.bank
+    lags = bank.taus * len(heat)
+    low, high, width = (a.tolist() for a in watch.ranges)
+    direct, weight = watch.read_out
+    unseen = watch.limits("unseen")
+    return {
+        "sensor_channel": [place[i.name] for i in heat],
+        "sensor_input": [s.input for s in watch.sensors],
+        "watch_channel": [place[i.name] for i in watch.inputs],
+        "watch_rezero": [i.rezero for i in watch.inputs],
+        "watch_reference": [i.reference for i in watch.inputs],
+        "start_zero": [i.reference if i.rezero else i.reference + i.low for i in heat],
+        "start_span": [max(w, MIN_SPAN) for w in width],
+        "sensor_low": low,
+        "sensor_high": high,
+        "sensor_span": [max(w, MIN_SPAN) for w in width],
+        "speed_input": watch.speeds.tolist(),
+        "top_speed": watch.top_speed,
+        "pace": watch.pace,
+        "tau": list(watch.time_constants),
+        "state_input": bank.speeds.tolist(),
+        "power": bank.powers.tolist(),
+        "resting_rate": bank.rates[lags:].tolist(),
+        "gain": bank.gain.tolist(),
+        "direct": direct.tolist(),
+        "weight": weight.tolist(),
+        **{f"{name}_limit": watch.limits(name).tolist() for name in ("off", "jump", "moved", "still")},
+        "unseen": unseen.tolist(),
+        "shape": (watch.signatures / unseen[:, None]).tolist(),
+        "pair_first": watch.pairs[0].tolist(),
+        "pair_second": watch.pairs[1].tolist(),
+    }

@@ -1,0 +1,219 @@
+"""C99: a compensator as one header and one source, without allocation and without globals."""
+
+import re
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from thermocomp.export.block.tables import Tables
+from thermocomp.export.c99.cstatements import write_functions, write_tables, write_variables
+
+_HEADER = """{facts}#ifndef {guard}
+#define {guard}
+
+#ifndef TC_REAL
+#define TC_REAL
+#ifdef TC_FLOAT
+typedef float tc_real;
+#else
+typedef double tc_real;
+#endif
+#endif
+
+{refused}#ifdef __cplusplus
+extern "C" {{
+#endif
+
+/* readings that the zero is averaged of, at most; fewer take less memory, and then it is known earlier */
+#ifndef TC_ZERO_READINGS
+#define TC_ZERO_READINGS {most}
+#endif
+
+#if TC_ZERO_READINGS < 2
+#error "TC_ZERO_READINGS: at least 2"
+#endif
+
+/* what is compiled with other switches does not link */
+#define TC_PASTE(name, readings) name##readings
+#define TC_NAMED(name, readings) TC_PASTE(name, readings)
+#ifdef TC_FLOAT
+#define {name}_start TC_NAMED({name}_start_float_, TC_ZERO_READINGS)
+#define {name}_step TC_NAMED({name}_step_float_, TC_ZERO_READINGS)
+#else
+#define {name}_start TC_NAMED({name}_start_double_, TC_ZERO_READINGS)
+#define {name}_step TC_NAMED({name}_step_double_, TC_ZERO_READINGS)
+#endif
+
+/* what it takes, in this order */
+enum {{
+{inputs}
+}};
+
+/* what it corrects, in this order */
+enum {{
+{outputs}
+}};
+
+/* what is kept between two calls: read it, change nothing */
+typedef struct {{
+{state}}} {name}_state;
+
+/* Begin: all corrections are zero. */
+void {name}_start({name}_state *s);
+
+/*
+ * Take values in, measured `age` seconds ago, and move the corrections; `dt` is the time since the call before [s].
+ * A value that is missing is given as NAN. Call it at every cycle: with values that are not new it waits, holds and
+ * at last lets the corrections go to zero.
+ */
+void {name}_step({name}_state *s, const tc_real value[{n}], double age, double dt);
+
+#ifdef __cplusplus
+}}
+#endif
+
+#endif
+"""
+
+_REFUSED = """#ifdef TC_FLOAT
+#error "single precision is too coarse for this model: compile without -DTC_FLOAT"
+#endif
+
+"""
+
+_SOURCE = """{facts}#include "{name}.h"
+
+#include <math.h>
+
+#ifdef __FAST_MATH__
+#error "a value that is no number would not be noticed: compile without -ffast-math"
+#endif
+
+#define TC(x) ((tc_real)(x))
+/* TC_ROUNDED: a number, and the next one of single precision that keeps to its bounds */
+#ifdef TC_FLOAT
+#define TC_MATH(name) name##f
+#define TC_ROUNDED(x, single) TC(single)
+#else
+#define TC_MATH(name) name
+#define TC_ROUNDED(x, single) TC(x)
+#endif
+
+/* what is worked out anew in every call */
+typedef struct {{
+{work}}} {name}_work;
+
+{constants}
+{functions}
+void {name}_start({name}_state *s)
+{{
+    static const {name}_state cold = {{0}};
+
+    *s = cold;
+}}
+
+void {name}_step({name}_state *s, const tc_real value[{n}], double age, double dt)
+{{
+    {name}_work w;
+    int k;
+
+    for (k = 0; k < {n}; k++) {{
+        w.value[k] = value[k];
+    }}
+    w.age = age;
+    w.dt = dt;
+    tc_step(s, &w);
+}}
+"""
+
+
+@dataclass(frozen=True)
+class Sources:
+    """A compensator in C.
+
+    Parameters
+    ----------
+    name : str
+        Of the files and of all that is in them.
+    header, source : str
+    """
+
+    name: str
+    header: str
+    source: str
+
+
+def translate(tables: Tables, name: str, facts: Sequence[str] = (), *, double_only: bool = False) -> Sources:
+    """Return a compensator in C99.
+
+    What it does with values is what `Compensator.step` does with a reading.
+
+    Parameters
+    ----------
+    tables : Tables
+        Of the compensator.
+    name : str
+        Of the files and of all that is in them.
+    facts : sequence of str
+        What stands above them.
+    double_only : bool
+        It does not compile in single precision.
+
+    Raises
+    ------
+    InputError
+        A model is of a family that has no formula.
+    """
+    name, n, sizes = identifier(name), len(tables.channels), tables.sizes
+    functions = write_functions(tables, name)
+    above = "".join(f"/* {comment(line)} */\n" for line in facts)
+    source = _SOURCE.format(
+        facts=above,
+        name=name,
+        n=n,
+        work=write_variables(sizes, "w", functions + "w->value w->age w->dt"),
+        constants=write_tables(tables, functions),
+        functions=functions,
+    )
+    header = _HEADER.format(
+        name=name,
+        n=n,
+        facts=above,
+        refused=_REFUSED if double_only else "",
+        guard=f"{name.upper()}_H",
+        most=sizes["MOST"],
+        inputs=_enumerated(name, "IN", [f"{c.name} [{c.unit}]" for c in tables.channels]),
+        outputs=_enumerated(name, "OUT", [f"{t} [um]" for t in tables.targets]),
+        state=write_variables(sizes, "s", functions + "s->status s->correction s->rejected s->fault s->outside"),
+    )
+    return Sources(name, header, "".join(_wrapped(line) for line in source.splitlines(keepends=True)))
+
+
+def _wrapped(line: str) -> str:
+    """Return a long line as several: a compiler need not take more than 4,095 characters."""
+    if len(line) <= 200:
+        return line
+    return textwrap.fill(line, 110, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False) + "\n"
+
+
+def _enumerated(name: str, kind: str, texts: Sequence[str]) -> str:
+    lines = []
+    for k, text in enumerate(texts):
+        word = re.sub(r"[^A-Za-z0-9]+", "_", text.split(" [")[0]).strip("_").upper() or "X"
+        lines.append(
+            f"    {name.upper()}_{kind}_{k}_{word} = {k}{',' if k < len(texts) - 1 else ''} /* {comment(text)} */"
+        )
+    return "\n".join(lines)
+
+
+def identifier(name: str) -> str:
+    """Return a name that C takes, as near to another as it gets."""
+    text = re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_")
+    return f"tc_{text}"
+
+
+def comment(text: str) -> str:
+    """Return a text that ends no comment."""
+    for sign in ("*/", "/*", "??"):
+        text = text.replace(sign, " ".join(sign))
+    return " ".join(text.split())

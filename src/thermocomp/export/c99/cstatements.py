@@ -1,0 +1,163 @@
+"""The block's functions in C99."""
+
+import ast
+import math
+import re
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+
+from thermocomp.core.bounds import round_single, round_within
+from thermocomp.export.block.layout import Kind, Var
+from thermocomp.export.block.program import VARIABLES, Function, called, functions
+from thermocomp.export.block.tables import Tables
+from thermocomp.export.printer import Printer
+
+TYPES: dict[Kind, str] = {"real": "tc_real", "time": "double", "int": "int", "bool": "int"}
+
+
+def write_functions(tables: Tables, state: str) -> str:
+    """Return the functions that a block needs, `step` the last.
+
+    Parameters
+    ----------
+    tables : Tables
+        Of the compensator.
+    state : str
+        Name of the type that keeps its variables.
+    """
+    return "\n".join(_Writer(f, tables.sizes, state).text() for f in functions(tables))
+
+
+class _Writer(Printer):
+    """Writes one function."""
+
+    operators: ClassVar = {
+        ast.Add: "+",
+        ast.Sub: "-",
+        ast.Mult: "*",
+        ast.Div: "/",
+        ast.FloorDiv: "/",
+        ast.Mod: "%",
+        ast.And: "&&",
+        ast.Or: "||",
+        ast.Eq: "==",
+        ast.NotEq: "!=",
+        ast.Lt: "<",
+        ast.LtE: "<=",
+        ast.Gt: ">",
+        ast.GtE: ">=",
+    }
+
+    def __init__(self, function: Function, sizes: Mapping[str, int], state: str) -> None:
+        super().__init__(function, sizes)
+        self._state = state
+
+    def text(self) -> str:
+        f = self.function
+        rest = [f"{TYPES[kind]} {name}" for name, kind in self.parameters.items()]
+        head = f"/* {f.about[0].lower()}{f.about[1:].splitlines()[0].rstrip('.')} */\nstatic "
+        if f.is_of_numbers:
+            head += f"tc_real tc_{f.name}({', '.join(rest)})"
+        else:
+            head += f"void tc_{f.name}({', '.join([f'{self._state}_state *s', f'{self._state}_work *w', *rest])})"
+        lines = self.block(self.statements, 1)
+        declared = [f"    {TYPES[kind]} {name};" for name, kind in self.own.items()]
+        text = "\n".join(lines)
+        passed = [] if f.is_of_numbers or "(s, w" in text else [v for v in "sw" if f"{v}->" not in text]
+        unused = [f"    (void){v};" for v in passed]
+        return f"{head}\n{{\n" + "\n".join([*declared, *([""] if declared else []), *unused, *lines]) + "\n}\n"
+
+    def statement(self, node: ast.stmt, depth: int) -> list[str]:  # noqa: PLR0911 - a case for every kind of node
+        pad, inner = "    " * depth, depth + 1
+        match node:
+            case ast.Assign([target], value):
+                return [f"{pad}{self.value(target)} = {self._as(value, self.kind(target))};"]
+            case ast.Expr(ast.Call() as call):
+                given = [self._as(a, "real" if self.kind(a) == "time" else self.kind(a)) for a in call.args[3:]]
+                return [f"{pad}tc_{called(call)}({', '.join(['s', 'w', *given])});"]
+            case ast.Return(value) if value is not None:
+                return [f"{pad}return {self._as(value, 'real')};"]
+            case ast.If(test, body, orelse):
+                lines = [f"{pad}if ({self.bare(test)}) {{", *self.block(body, inner)]
+                if len(orelse) == 1 and isinstance(orelse[0], ast.If):
+                    chained = self.statement(orelse[0], depth)
+                    return [*lines, f"{pad}}} else {chained[0].lstrip()}", *chained[1:]]
+                other = [f"{pad}}} else {{", *self.block(orelse, inner)] if orelse else []
+                return [*lines, *other, f"{pad}}}"]
+            case ast.For(ast.Name(name), ast.Call(args=bounds), body):
+                begin, end = bounds if len(bounds) == 2 else (ast.Constant(0), bounds[0])
+                head = f"for ({name} = {self.value(begin)}; {name} < {self.value(end)}; {name}++) {{"
+                return [f"{pad}{head}", *self.block(body, inner), f"{pad}}}"]
+            case ast.While(test, body):
+                return [f"{pad}while ({self.bare(test)}) {{", *self.block(body, inner), f"{pad}}}"]
+        raise TypeError(f"{ast.unparse(node)}: no statement of a block")
+
+    def _as(self, node: ast.expr, kind: Kind) -> str:
+        text = self.bare(node, kind)
+        return f"(tc_real)({text})" if kind == "real" and self.kind(node) == "time" else text
+
+    def variable(self, owner: str, name: str) -> str:
+        return "TC_ZERO_READINGS" if name == "MOST" else f"c_{name}" if owner == "t" else f"{owner}->{name}"
+
+    def choice(self, test: str, one: str, other: str) -> str:
+        return f"({test} ? {one} : {other})"
+
+    def negated(self, text: str) -> str:
+        return f"!{text}"
+
+    def call(self, name: str, args: list[ast.expr]) -> str:
+        time = self.kind(args[0]) == "time" and name == "abs"
+        given = ", ".join(self._as(a, "time" if time else "real") for a in args)
+        if name == "abs":
+            return f"fabs({given})" if time else f"TC_MATH(fabs)({given})"
+        return f"TC_MATH({name})({given})" if hasattr(math, name) else f"tc_{name}({given})"
+
+    def constant(self, value: float, kind: Kind) -> str:
+        return _number(value, kind)
+
+
+def _number(value: float, kind: Kind, *, cap: bool = False) -> str:
+    """Return a number as C writes it: exact in double precision, within its bounds in single."""
+    if kind in ("int", "bool"):
+        return str(int(value))
+    if kind == "time":
+        return repr(float(value))
+    text, size = repr(abs(float(value))), abs(value)
+    single = float(round_within(size, 0.0, size) if cap else round_single(size))
+    with np.errstate(over="ignore"):
+        nearest = float(np.float32(size))
+    written = f"TC({text})" if single == nearest else f"TC_ROUNDED({text}, {single!r})"
+    return f"(-{written})" if math.copysign(1.0, value) < 0 else written
+
+
+def write_tables(tables: Tables, used: str) -> str:
+    """Return the numbers that a text uses, as constants."""
+    return "".join(
+        f"/* {var.about} */\nstatic const {TYPES[var.kind]} c_{name}{_dims(var, tables.sizes)} = "
+        f"{_list(tables.values[name], var)};\n"
+        for name, var in _used("t", used, "c_").items()
+    )
+
+
+def _used(owner: str, used: str, before: str) -> dict[str, Var]:
+    return {n: v for n, v in VARIABLES[owner].items() if re.search(rf"\b{before}{n}\b", used)}
+
+
+def _dims(var: Var, sizes: Mapping[str, int]) -> str:
+    return "".join(f"[{'TC_ZERO_READINGS' if d == 'MOST' else max(sizes[d], 1)}]" for d in var.dims)
+
+
+def _list(value: Any, var: Var) -> str:
+    if isinstance(value, list):
+        return f"{{{', '.join(_list(v, var) for v in value) or '0'}}}"
+    return _number(value, var.kind, cap=var.cap)
+
+
+def write_variables(sizes: Mapping[str, int], owner: str, used: str) -> str:
+    """Return the members of the type that keeps variables, those that a text uses."""
+    return "".join(
+        f"    {TYPES[var.kind]} {name}{_dims(var, sizes)}; /* {var.about} */\n"
+        for name, var in _used(owner, used, f"{owner}->").items()
+    )

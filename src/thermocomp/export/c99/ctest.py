@@ -1,0 +1,128 @@
+"""A program that runs the C code of a compensator over its test vectors."""
+
+import math
+from collections.abc import Iterable
+
+from thermocomp.export.block.tables import Tables
+from thermocomp.export.vectors import Answers, Readings
+
+_PROGRAM = """/* runs {name}.c over its test vectors: {name}.md says how */
+#include "{name}.h"
+
+#include <math.h>
+#include <stdio.h>
+
+#ifdef TC_FLOAT
+#define TOLERANCE {single:.0e} /* what rounding of numbers changes, ten times, or 1e-5 */
+#else
+#define TOLERANCE {double:.0e} /* a model that feeds itself makes more of rounding */
+#endif
+
+enum {{ CALLS = {calls}, INPUTS = {inputs}, TARGETS = {targets}, SENSORS = {sensors} }};
+
+/* values, their age [s], time since the call before [s] */
+static const double given[CALLS][INPUTS + 2] = {{
+{given}
+}};
+
+/* corrections [um] and slopes [um/m] by target */
+static const double wanted[CALLS][2 * TARGETS] = {{
+{wanted}
+}};
+
+/* status by target, fault by sensor, and whether the reading was used */
+static const int told[CALLS][TARGETS + SENSORS + 1] = {{
+{told}
+}};
+
+static double worst;
+
+static int off(double value, double want)
+{{
+    const double size = fabs(want) > 1.0 ? fabs(want) : 1.0;
+    const double apart = fabs(value - want) / size;
+
+    worst = apart > worst ? apart : worst;
+    return !(apart <= TOLERANCE);
+}}
+
+int main(void)
+{{
+    static {name}_state s;
+    tc_real value[INPUTS];
+    int k, j, wrong, failed = 0;
+
+    {name}_start(&s);
+    for (k = 0; k < CALLS; k++) {{
+        for (j = 0; j < INPUTS; j++) {{
+            value[j] = (tc_real)given[k][j];
+        }}
+        {name}_step(&s, value, given[k][INPUTS], given[k][INPUTS + 1]);
+        wrong = (s.rejected == 0) != told[k][TARGETS + SENSORS];
+        for (j = 0; j < TARGETS; j++) {{
+            wrong |= off((double)s.correction[j], wanted[k][2 * j]);
+            wrong |= off((double)s.slope[j], wanted[k][2 * j + 1]);
+            wrong |= s.status[j] != told[k][j];
+        }}
+{faults}        if (wrong && failed++ < 10) {{
+            printf("call %d: correction[0] is %.17g um, want %.17g; status %d, want %d; rejected %d\\n",
+                   k, (double)s.correction[0], wanted[k][0], s.status[0], told[k][0], s.rejected);
+        }}
+    }}
+    printf("%d calls, %d wrong; largest difference %.1e of max(1 um, correction), allowed %.0e\\n",
+           CALLS, failed, worst, TOLERANCE);
+    printf("state: %lu bytes\\n", (unsigned long)sizeof s);
+    return failed != 0;
+}}
+"""
+
+_FAULTS = """        for (j = 0; j < SENSORS; j++) {
+            wrong |= s.fault[j] != told[k][TARGETS + j];
+        }
+"""
+
+
+def write_test(name: str, tables: Tables, readings: Readings, answers: Answers, double: float, single: float) -> str:
+    """Return a program that says whether the code does what the compensator did.
+
+    Parameters
+    ----------
+    name : str
+        Of the code.
+    tables : Tables
+    readings : Readings
+    answers : Answers
+        Of the compensator.
+    double, single : float
+        Difference that is allowed in double and in single precision, as a share of a correction, or in um of one below
+        1 um; 0: it is not made for single precision.
+    """
+    calls = range(len(readings.age))
+    return _PROGRAM.format(
+        name=name,
+        double=double,
+        single=single,
+        calls=len(calls),
+        inputs=len(tables.channels),
+        targets=len(tables.targets),
+        sensors=len(tables.sensors),
+        given=_rows([*readings.values[k].tolist(), readings.age[k], readings.dt[k]] for k in calls),
+        wanted=_rows(
+            [x for pair in zip(answers.correction[k], answers.slope[k], strict=True) for x in pair] for k in calls
+        ),
+        told=",\n".join(
+            f"    {{{', '.join(map(str, [*answers.status[k], *answers.fault[k], int(answers.passed[k])]))}}}"
+            for k in calls
+        ),
+        faults=_FAULTS if tables.sensors else "",
+    )
+
+
+def _rows(rows: Iterable[list[float]]) -> str:
+    return ",\n".join(f"    {{{', '.join(map(_number, row))}}}" for row in rows)
+
+
+def _number(value: float) -> str:
+    if math.isnan(value):
+        return "NAN"
+    return repr(float(value)) if math.isfinite(value) else "INFINITY" if value > 0 else "-INFINITY"

@@ -1,0 +1,161 @@
+"""All files of an export to C99: the code, its test, and how to use it."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from thermocomp.core.bounds import round_single
+from thermocomp.core.exceptions import SettingError
+from thermocomp.export.block.tables import Tables, gather
+from thermocomp.export.c99.c99 import translate
+from thermocomp.export.c99.ctest import write_test
+from thermocomp.export.facts import Facts
+from thermocomp.export.pages import describe
+from thermocomp.export.vectors import Answers, FloatArray, Readings, find_tolerance, make_readings, replay, round_all
+from thermocomp.runtime.compensator import Compensator
+
+_README = """{facts}
+
+# {name}: thermal compensation in C99
+
+`{name}.h` and `{name}.c` need nothing but `math.h`: no allocation, no globals. `{name}_test.c` runs them over {calls}
+calls, faults among them, and compares with what thermocomp says.
+
+## Prove it
+
+    cc -std=c99 {name}.c {name}_test.c -lm -o {name}_test && ./{name}_test
+
+It prints how many calls are wrong (none), the largest difference, and how many bytes the state takes; its exit code is
+0 if all is well. {single}; for less memory `-DTC_ZERO_READINGS=60` (at least 2; the zero
+may be known earlier then, and the test does not fit). Compile all files of your program with the same of these:
+otherwise it does not link. Never compile with `-ffast-math`.
+
+## Run it
+
+Call it in a cycle, every ten seconds, with the time since the call before, measured or fixed. (At a shorter cycle the
+one call in which the zero becomes known has more to sort: 300 s / cycle readings of each input.)
+
+    #include "{name}.h"
+    #include <math.h>                          /* NAN */
+
+    static {name}_state state;                 /* zero at power-on */
+    static tc_real value[{inputs}];
+
+    {name}_start(&state);                      /* once */
+    for (;;) {{                                 /* every dt seconds */
+        /* fill value[] as below; NAN for a sensor that says nothing */
+        {name}_step(&state, value, age, dt);   /* age: seconds since the values were measured */
+        /* give state.correction[0] to the controller [um] */
+    }}
+
+| value | what it is | unit |
+|---|---|---|
+{values}
+
+| correction | of | {line} |
+|---|---|---|
+{corrections}
+
+{geometry}{zero} {status}{sensors}
+
+## Try the sign
+
+{sign}
+
+## Switch it off
+
+Do not set the correction to zero at once: the axis would jump. Call `{name}_step` with an age of 1e9: it stays where
+it is for {hold:g} s and then goes to zero, slowly. To begin anew: `{name}_start`, once the correction is zero. The
+controller must not compensate for temperature itself at the same time.
+"""
+
+
+#: last digits by which a difference of two readings is off
+_DIGITS = 2.0
+#: largest share of a correction by which single precision may be off; beyond it is refused
+_COARSE = 1.0
+
+
+def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str, bytes]:
+    """Return all files by their names.
+
+    Parameters
+    ----------
+    compensator : Compensator
+        Made by `Compensator.of`.
+    name : str
+    facts : Facts
+
+    Raises
+    ------
+    InputError
+        A model has no formula, or the models do not go together.
+    """
+    tables, said = gather(compensator), facts.lines(compensator)
+    readings = make_readings(tables)
+    answers = replay(compensator, tables, readings)
+    single = _single(compensator, tables, readings, answers)
+    sources = translate(tables, name, said, double_only=not single)
+    name = sources.name
+    texts = {
+        f"{name}.h": sources.header,
+        f"{name}.c": sources.source,
+        f"{name}_test.c": write_test(
+            name, tables, readings, answers, _double(compensator, tables, readings, answers), single
+        ),
+        f"{name}.md": _README.format(
+            facts="  \n".join(said),
+            name=name,
+            calls=len(readings.age),
+            single="For single precision add `-DTC_FLOAT`"
+            if single
+            else "Single precision (`-DTC_FLOAT`) is too coarse for this model, and does not compile",
+            **describe(compensator, tables, "state."),
+        ),
+    }
+    return {file: text.encode() for file, text in texts.items()}
+
+
+def _double(compensator: Compensator, tables: Tables, readings: Readings, answers: Answers) -> float:
+    """Return how far double precision may be off: large coefficients make more of the last digit of a reading."""
+    rows = [readings._replace(values=_shifted(readings.values, way)) for way in (1, -1)]
+    return max(find_tolerance(tables), *(4.0 * _apart(answers, replay(compensator, tables, r)) for r in rows))
+
+
+def _single(compensator: Compensator, tables: Tables, readings: Readings, answers: Answers) -> float:
+    """Return how far single precision may be off: ten times what rounding of all numbers changes; 0 if too far.
+
+    Where a curve has steps, a reading beside one may get to its other side: so readings are moved to either side, too,
+    by what rounding does to the difference of two.
+    """
+    try:
+        coarse = replace(compensator, models=round_all(compensator.models, round_single))
+    except SettingError:  # a free run that decays in double precision alone
+        return 0.0
+
+    def moved(way: int, rounded: Callable[[FloatArray], FloatArray] | None = None) -> float:
+        rows = readings._replace(values=_shifted(round_single(readings.values), way, np.float32))
+        said = replay(coarse, tables, rows, rounded=rounded)
+        if any((a != b).any() for a, b in ((answers.status, said.status), (answers.fault, said.fault))):
+            return math.inf
+        return _apart(answers, said)
+
+    found = max(1e-5, 10.0 * moved(0, round_single), 2.0 * moved(1), 2.0 * moved(-1))
+    return found if found <= _COARSE else 0.0
+
+
+def _apart(one: Answers, other: Answers) -> float:
+    """Return the largest difference of corrections, as a share of one, or in um of one below 1 um."""
+    pairs = (one.correction, other.correction), (one.slope, other.slope)
+    return max(float((np.abs(a - b) / np.maximum(1.0, np.abs(a))).max(initial=0.0)) for a, b in pairs)
+
+
+def _shifted(values: FloatArray, way: int, kind: type[np.floating[Any]] = np.float64) -> FloatArray:
+    """Return readings moved by their last digits in a precision: one up, the next down, the same always alike."""
+    with np.errstate(invalid="ignore"):
+        last = np.where(np.isfinite(values), np.spacing(values.astype(kind)).astype(np.float64), 0.0)
+        odd = np.where(last != 0.0, values / np.where(last == 0.0, 1.0, last), 0.0) % 2.0 >= 1.0
+    return values + way * _DIGITS * np.where(odd, last, -last)

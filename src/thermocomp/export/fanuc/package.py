@@ -1,0 +1,218 @@
+"""A custom macro for Fanuc controls that puts a linear formula into the external workpiece zero offset."""
+
+import re
+from collections.abc import Iterator, Sequence
+from decimal import Decimal
+
+from thermocomp.core.correction import Limits
+from thermocomp.core.exceptions import InputError
+from thermocomp.export.checkscript import FANUC, write_script
+from thermocomp.export.facts import Facts
+from thermocomp.export.heidenhain.package import find_marks
+from thermocomp.export.reduction.reduced import Reduced, head, in_mm, in_um, shorten, vectors
+from thermocomp.export.reduction.reducedpage import write_page
+from thermocomp.runtime.gate import DAY, MIN_SPAN, PLAUSIBLE
+
+SIGN = (
+    "Sign: the correction, minus the deviation (actual minus commanded), is added to the external workpiece zero offset"
+)
+UNITS = "Units: offsets in mm, temperatures in degC"
+#: what nobody has confirmed, told first and at its place
+UNCONFIRMED = (
+    "UNCONFIRMED: no line of this was tried on a Fanuc control, nor confirmed by its manuals here",
+    "UNCONFIRMED: #5201, #5202, #5203 as external workpiece zero offset of X, Y, Z in mm, which a program may write",
+    "UNCONFIRMED: how the PMC brings temperatures in degC into #501 and on; these numbers stand for yours",
+    "UNCONFIRMED: that IF...THEN is known to your control, and that it waits for a new offset before the next move",
+)
+_OFFSETS = {"X": 5201, "Y": 5202, "Z": 5203}
+#: common variables, kept at power-off: on or off, the first temperature, the corrections in force
+_ON, _FIRST, _FORCE = 500, 501, {"X": 521, "Y": 522, "Z": 523}
+#: sensors that find room between
+_ROOM = _FORCE["X"] - _FIRST
+#: a call at least so often [s]: what the rate allows in it is the largest change of a call
+INTERVAL = 60.0
+
+_ABOUT = """\
+The macro works out the formula of the temperatures in common variables and moves the external workpiece zero offset
+towards it: within {most:g} um of zero and by at most {step:g} um a call, which is {rate:g} um/s at a call every
+{interval:g} s. If a temperature is vacant or beyond what is plausible, the axis keeps the correction that it has.
+
+What counts as zero is fixed: the temperatures in the macro, where the recording began. Set datums with the
+correction in force: they take in what it says then, and only changes count from there on. Nothing else may write
+that offset while it runs; what stands in it before is kept, for the macro adds."""
+
+_INSTALL = """\
+All of this is **UNCONFIRMED** on a control: have the machine builder look at it.
+
+1. Choose free common variables that are kept at power-off in place of #500 to #{last} and, in the macro, put
+   theirs.
+2. Have the PMC write the temperatures in degC: {sensors}. It must write vacant, or leave the value alone, if a
+   sensor fails; a zero within the plausible range is believed.
+3. Load `{name}.nc` under a free number in place of O7701; programs from O8000 on are usually protected.
+4. Call it (`G65 P7701`, which gives it local variables of its own) where the axes are clear and no cutter
+   compensation is active, such as at every start of a part: at least every {interval:g} s for it to keep up, and
+   never more often for the rate to hold.
+5. Try the sign in two minutes with #500 = 0: add 0.1 mm to the external offset of an axis by hand, and go to the
+   same position again: the tool has to stand 0.1 mm further in its plus direction. Take it away again.
+6. `#500 = 1` switches it on. Set the datums anew once it has arrived.
+
+"""
+
+_CHECK = """\
+`{name}_vectors.csv` holds temperatures [degC], the deviation that the formula says ("growth") [mm], the correction
+that the offset has to arrive at [um], and its tolerance: the control rounds to 1 um. Rows beyond the trained range
+and the limit are among them, and some with a temperature that is not plausible: there nothing may move. `python3
+{name}_check.py` (Python alone) runs the macro's own lines until nothing moves, and compares: exit code 0 if all
+agree. On the control: put a row's temperatures into the variables by MDI, #500 = 1, call the macro until nothing
+moves, and read the external offset. Then back to the true ones."""
+
+_OFF = """\
+`#500 = 0`, and go on calling the macro: it takes its correction back by at most {step:g} um a call. When {forces}
+are 0 it has gone, and the calls may go, too. Never clear the external offset by hand while the macro is called."""
+
+
+def write_fanuc(
+    reductions: Sequence[Reduced], limits: Limits, name: str, facts: Facts, *, figure: str = ""
+) -> dict[str, bytes]:
+    """Return all files by their names, the page how to use them the last.
+
+    Parameters
+    ----------
+    reductions : sequence of Reduced
+        One per axis.
+    limits : Limits
+    name : str
+        Of the files.
+    facts : Facts
+    figure : str
+        File of the figure; empty if there is none.
+
+    Raises
+    ------
+    InputError
+        More sensors than variables, or a limit that is 0 in the digits of a control.
+    """
+    marks = find_marks(reductions)
+    if len(marks) > _ROOM:
+        raise InputError(f"{len(marks)} temperatures, and the macro has room for {_ROOM}")
+    place = {sensor: _FIRST + k for k, sensor in enumerate(marks)}
+    most, step = (_cap(limits, option, times) for option, times in (("magnitude", 1.0), ("rate", INTERVAL)))
+    first = [*head(reductions, facts, SIGN, UNITS), *UNCONFIRMED]
+    told = [f"({line})" for line in map(_comment, first)]
+    lines = ["%", f"O7701 {told[0]}", *told[1:]]
+    lines += [f"(#{_ON}: 1 IS ON. ANYTHING ELSE TAKES THE CORRECTION BACK)"]
+    lines += [f"(#{place[s]}: {m.upper()} IN DEGC. UNCONFIRMED: FROM THE PMC)" for s, m in marks.items()]
+    for r in reductions:
+        lines += _axis(r, place, most, step)
+    page = write_page(
+        name,
+        first,
+        reductions,
+        what="a custom macro of a Fanuc control",
+        about=_ABOUT.format(most=most, step=step, rate=limits.rate, interval=INTERVAL),
+        limits=f"at most {most:g} um and {step:g} um a call are in the macro; the errors above are those "
+        "of the formula alone.",
+        failed="one that is vacant or not plausible stops its axes where they are; a wrong one within the "
+        "plausible range moves them.",
+        install=_INSTALL.format(
+            name=name,
+            last=_FORCE["Z"],
+            sensors=", ".join(f"{s} in #{p}" for s, p in place.items()),
+            interval=INTERVAL,
+        ).strip(),
+        check=_CHECK.format(name=name),
+        off=_OFF.format(step=step, forces=", ".join(f"#{_FORCE[r.axis]}" for r in reductions)),
+        figure=figure,
+    )
+    texts = {
+        f"{name}.nc": "\n".join([*lines, "M99", "%"]) + "\n",
+        f"{name}_vectors.csv": _vectors(reductions, marks, most),
+        f"{name}_check.py": write_script(FANUC, name),
+        f"{name}.md": page,
+    }
+    return {file: text.encode() for file, text in texts.items()}
+
+
+def _axis(r: Reduced, place: dict[str, int], most: float, step: float) -> Iterator[str]:
+    """Yield the lines of an axis."""
+    force, label = _FORCE[r.axis], 10 * (1 + "XYZ".index(r.axis))
+    yield f"({_comment(r.model.target)})"
+    yield f"(#{force}: CORRECTION OF {r.axis} IN FORCE IN MM. KEPT AT POWER-OFF)"
+    yield f"IF[#{force}NE#0]GOTO{label + 1}"
+    yield f"#{force}=0.0"
+    yield f"N{label + 1}#1=0.0"
+    yield f"IF[#{_ON}NE1]GOTO{label + 2} (OFF: TAKEN BACK)"
+    for (i, _), (low, high) in zip(r.terms, _plausible(r), strict=True):
+        yield f"IF[#{place[i.name]}EQ#0]GOTO{label + 3} ({_comment(i.name)}: VACANT. NOTHING CHANGES)"
+        yield f"IF[#{place[i.name]}LT{_real(low)}]GOTO{label + 3} (NOT PLAUSIBLE)"
+        yield f"IF[#{place[i.name]}GT{_real(high)}]GOTO{label + 3}"
+    yield f"#1={_real(in_um(0.0 - r.model.intercept))} (WANTED IN UM: A CONTROL TAKES EIGHT DIGITS)"
+    for (i, factor), zero in zip(r.terms, r.zeros, strict=True):
+        yield f"#1=#1-[{_real(in_um(factor))}*[#{place[i.name]}-[{_real(zero)}]]]"
+    yield "#1=#1/1000.0 (IN MM)"
+    yield from _within("#1", most)
+    yield f"N{label + 2}#2=#1-#{force}"
+    yield from _within("#2", step)
+    yield f"#{force}=#{force}+#2"
+    yield f"#{_OFFSETS[r.axis]}=#{_OFFSETS[r.axis]}+#2 (UNCONFIRMED: EXTERNAL OFFSET OF {r.axis} IN MM)"
+    yield f"N{label + 3}"
+
+
+def _within(variable: str, most: float) -> Iterator[str]:
+    limit = _real(in_mm(most))
+    yield f"IF[{variable}GT{limit}]THEN{variable}={limit} (UNCONFIRMED: IF...THEN)"
+    yield f"IF[{variable}LT-{limit}]THEN{variable}=-{limit}"
+
+
+def _cap(limits: Limits, option: str, times: float) -> float:
+    """Return a limit [um] in the digits of a control, so many times: no larger than it was asked for."""
+    asked: float = getattr(limits, option)
+    # the product in decimals: 0.1 um/s is 6 um in a minute, not a digit of double precision more
+    taken = float(Decimal(shorten(in_mm(float(Decimal(repr(asked)) * Decimal(times))), cap=True)).scaleb(3))
+    if not taken:
+        raise InputError(
+            f"--{option} {asked:g}: a Fanuc control takes eight digits, and this is 0 in them: give at least "
+            f"--{option} {1e-4 / times:.2g}"
+        )
+    return taken
+
+
+def _plausible(r: Reduced) -> list[tuple[float, float]]:
+    """Return beyond what a temperature is none; days of another zero included."""
+    least, most = PLAUSIBLE["temperature"]
+    found = []
+    for (i, _), zero in zip(r.terms, r.zeros, strict=True):
+        room = max(i.high - i.low, MIN_SPAN) + DAY
+        found.append((round(max(least, zero + i.low - room), 1), round(min(most, zero + i.high + room), 1)))
+    return found
+
+
+def _vectors(reductions: Sequence[Reduced], marks: dict[str, str], most: float) -> str:
+    """Return test vectors as CSV; a vacant temperature is an empty one."""
+    rows = [",".join(["axis", *(f"{m}_degC" for m in marks.values()), "growth_mm", "correction_um", "tolerance_um"])]
+    for r in reductions:
+        names, ranges = [i.name for i, _ in r.terms], _plausible(r)
+        tried: list[tuple[float | None, ...]] = [*vectors(r)]
+        for k, (low, high) in enumerate(ranges):
+            warm: list[float | None] = [z + 0.5 * i.high for (i, _), z in zip(r.terms, r.zeros, strict=True)]
+            tried += [(*warm[:k], bad, *warm[k + 1 :]) for bad in (None, low - 0.1, high + 0.1, 850.0)]
+        for row in tried:
+            good = [t for t, (low, high) in zip(row, ranges, strict=True) if t is not None and low <= t <= high]
+            said = r.deviation(good) if len(good) == len(row) else 0.0
+            known = dict(zip(names, row, strict=True))
+            values = ["" if known.get(n) is None else f"{known[n]:g}" for n in marks]
+            wanted = min(max(0.0 - said, -most), most)
+            rows.append(",".join([r.axis, *values, f"{said / 1e3:.7f}", f"{wanted:.4f}", "1"]))
+    return "\n".join(rows) + "\n"
+
+
+def _real(number: float | str) -> str:
+    """Return a number of eight digits with a decimal point: without it a control may read other units."""
+    text = shorten(number if isinstance(number, str) else in_um(number))
+    return text if "." in text else f"{text}.0"
+
+
+def _comment(text: str) -> str:
+    """Return what may stand in a comment: no brackets, no small letters, nothing beyond ASCII."""
+    plain = text.upper().encode("ascii", "replace").decode()
+    return re.sub(r"[^-+#*/=:,. 0-9A-Z_]", ".", plain.replace("(", " ").replace(")", " "))

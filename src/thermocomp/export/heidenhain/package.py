@@ -1,0 +1,160 @@
+"""A linear formula of present temperatures for Heidenhain controls: MP7530 / TEMPCOMP, and the words of a TNC 360."""
+
+import math
+from collections.abc import Sequence
+
+from thermocomp.core.correction import Limits
+from thermocomp.export.checkscript import HEIDENHAIN, write_script
+from thermocomp.export.facts import Facts
+from thermocomp.export.reduction.reduced import Reduced, head, in_mm, in_um, mark, vectors
+from thermocomp.export.reduction.reducedpage import write_page
+
+SIGN = (
+    "Sign: a formula is a dimension as it is: present dimension <L> plus the deviation (actual minus commanded) in mm; "
+    "a TNC 360 word is the correction in um, minus the deviation"
+)
+UNITS = "Units: formula in mm, TNC 360 word in whole um, W<...> in degC"
+#: what nobody has confirmed, told first and at its place
+UNCONFIRMED = (
+    "UNCONFIRMED: which way a dimension counts in your kinematics table; the wrong way doubles the error: try it as "
+    "the page says",
+    "UNCONFIRMED: which PLC word holds which temperature, and in which unit; W<...> stands for it",
+    "UNCONFIRMED: which of the words W576 to W582 of a TNC 360 is of which axis",
+    "UNCONFIRMED: whether your software takes as many digits and brackets as the formula has",
+)
+#: of a TNC 360 [um]
+_WORD = 32_767
+
+_ABOUT = """\
+A TNC 426/430 works out a dimension in its kinematics table by a formula (MP7530, TEMPCOMP), such as
+`300+3.45e-3*(W486-20)`: 300 mm, and 3.45e-3 mm more per degC of a PLC word. `{name}.txt` holds one per axis. A TNC
+360 takes words from the PLC, W576 to W582, of up to +-32,767 um, and follows them at 1 um/s; the display does not
+show it. An iTNC 530 (KinematicsComp, .COM tables) is not written for.
+
+What counts as zero is fixed: the temperatures in the formula, where the recording began. Set datums with the
+formula in force: they take in what it says then, and only changes count from there on."""
+
+_INSTALL = """\
+1. Ask the machine builder which dimension of the kinematics table goes along the axis, and which PLC words hold the
+   temperatures {sensors}: **UNCONFIRMED** here. The PLC has to give them in degC; if a word holds tenths of it,
+   `W<...>` is that word divided by 10. Whole degrees are too coarse: {step} um per degC.
+2. Note the old line. Put its dimension for `<L>` and the words for `W<...>`, and enter the formula.
+3. Which way it counts is **UNCONFIRMED**; find out in two minutes: with an indicator at the tool, add 0.1 mm to the
+   dimension alone and have the axis go to the same position again. If the tool stands 0.1 mm further in the
+   **minus** direction of the axis, the formula is right as it is; if in the plus direction, turn every sign behind
+   `<L>`.
+4. Set the datums anew.
+
+TNC 360: the PLC works out `word` of `{name}.txt`, rounds it to whole um, keeps it within +-{most:g} um, and writes
+it every few seconds. Try the sign with +100 um: the axis has to go 0.1 mm in its plus direction."""
+
+_CHECK = """\
+`{name}_vectors.csv` holds temperatures [degC], the growth that the formula has to say beyond `<L>` [mm], the
+correction that comes of it [um], and its tolerance; beyond the trained range, too. `python3 {name}_check.py`
+(Python alone) puts them into the formulas of `{name}.txt` and compares: exit code 0 if all agree. At the control:
+have the PLC write the temperatures of a row into the words, and read the dimension, or the way that the axis goes."""
+
+_OFF = """\
+Move the axes clear, put the old dimension back in place of the formula (TNC 360: let the PLC write 0, which the
+axis follows at 1 um/s), and set the datums anew: a dimension that changes moves the tool at once."""
+
+
+def write_heidenhain(
+    reductions: Sequence[Reduced], limits: Limits, name: str, facts: Facts, *, figure: str = ""
+) -> dict[str, bytes]:
+    """Return all files by their names, the page how to use them the last.
+
+    Parameters
+    ----------
+    reductions : sequence of Reduced
+        One per axis.
+    limits : Limits
+    name : str
+        Of the files.
+    facts : Facts
+    figure : str
+        File of the figure; empty if there is none.
+    """
+    first = [*head(reductions, facts, SIGN, UNITS), *UNCONFIRMED]
+    marks = find_marks(reductions)
+    most = min(math.floor(limits.magnitude), _WORD)  # in whole um
+    lines = [f"; {line}" for line in first]
+    for r in reductions:
+        lines += [
+            "",
+            f"; {r.model.target}: {', '.join(f'W<{marks[i.name]}> is {i.name} [degC]' for i, _ in r.terms)}",
+            "; UNCONFIRMED: the way it counts; <L> is the dimension that stands there now [mm]",
+            f"{r.axis} formula: <L>{formula(r, marks)}",
+            f"; UNCONFIRMED: TNC 360, its word; correction [um], rounded, within +-{most:g}",
+            f"{r.axis} word: {formula(r, marks, word=True)}",
+        ]
+    page = write_page(
+        name,
+        first,
+        reductions,
+        what="a formula of a Heidenhain control",
+        about=_ABOUT.format(name=name),
+        limits="the formula has none: neither magnitude nor rate. A TNC 360 follows at 1 um/s.",
+        failed="the formula takes whatever a word holds: one that reads 0 degC moves the axis by its whole term. Let "
+        "the PLC keep the last good value.",
+        install=_INSTALL.format(
+            name=name,
+            sensors=", ".join(marks),
+            step=f"{max(abs(f) for r in reductions for _, f in r.terms):.1f}",
+            most=most,
+        ),
+        check=_CHECK.format(name=name),
+        off=_OFF,
+        figure=figure,
+    )
+    texts = {
+        f"{name}.txt": "\n".join(lines) + "\n",
+        f"{name}_vectors.csv": write_vectors(reductions, marks),
+        f"{name}_check.py": write_script(HEIDENHAIN, name),
+        f"{name}.md": page,
+    }
+    return {file: text.encode() for file, text in texts.items()}
+
+
+def find_marks(reductions: Sequence[Reduced]) -> dict[str, str]:
+    """Return what stands for the temperatures of several formulas, by their names."""
+    found: dict[str, str] = {}
+    for r in reductions:
+        for i, _ in r.terms:
+            found.setdefault(i.name, mark(i.name, list(found.values())))
+    return found
+
+
+def formula(r: Reduced, marks: dict[str, str], *, word: bool = False) -> str:
+    """Return a formula as it goes on behind a dimension; the correction in um for a `word`."""
+    sign, number = (-1, in_um) if word else (1, in_mm)
+    text = _signed(number(sign * r.model.intercept)) if r.model.intercept else ""
+    for (i, factor), zero in zip(r.terms, r.zeros, strict=True):
+        counted = f"(W<{marks[i.name]}>{_signed(in_um(-zero))})" if zero else f"W<{marks[i.name]}>"
+        text += f"{_signed(number(sign * factor))}*{counted}"
+    return text
+
+
+def write_vectors(reductions: Sequence[Reduced], marks: dict[str, str], tolerance: float = 0.01) -> str:
+    """Return test vectors as CSV.
+
+    Parameters
+    ----------
+    reductions : sequence of Reduced
+    marks : dict of str to str
+        From `find_marks`.
+    tolerance : float
+        [um]
+    """
+    rows = [",".join(["axis", *(f"{m}_degC" for m in marks.values()), "growth_mm", "correction_um", "tolerance_um"])]
+    for r in reductions:
+        names = [i.name for i, _ in r.terms]
+        for temperatures in vectors(r):
+            said, known = r.deviation(temperatures), dict(zip(names, temperatures, strict=True))
+            values = [f"{known[n]:g}" if n in known else "" for n in marks]
+            rows.append(",".join([r.axis, *values, f"{said / 1e3:.7f}", f"{0.0 - said:.4f}", f"{tolerance:g}"]))
+    return "\n".join(rows) + "\n"
+
+
+def _signed(text: str) -> str:
+    return text if text.startswith("-") else f"+{text}"

@@ -1,0 +1,155 @@
+"""Klipper's ``[z_thermal_adjust]``: one temperature, one coefficient, Z alone."""
+
+import math
+from collections.abc import Sequence
+
+from thermocomp.core.correction import Limits
+from thermocomp.core.exceptions import InputError
+from thermocomp.export.checkscript import KLIPPER, write_script
+from thermocomp.export.facts import Facts
+from thermocomp.export.reduction.reduced import Reduced, head, in_mm, vectors
+from thermocomp.export.reduction.reducedpage import write_page
+
+SIGN = (
+    "Sign: Klipper adds -temp_coeff x (temperature - temperature at homing) to the commanded Z: a positive temp_coeff "
+    "lowers Z as it gets warmer. So temp_coeff is plus the deviation (actual minus commanded) per kelvin. Read in "
+    "Klipper's source (z_thermal_adjust.py, calc_adjust), not tried on a printer: try it as the page says"
+)
+UNITS = "Units: temp_coeff in mm/K, temperatures in degC, times in s"
+#: what Klipper lets a coefficient be [mm/K]
+_MOST = 1.0
+#: room for the sensor about what was recorded; Klipper stops the printer beyond [degC]
+_ROOM = 30.0
+#: what Klipper lets `min_temp` be, at least [degC]
+_COLDEST = -273
+
+_SECTION = """{head}
+
+[z_thermal_adjust]
+temp_coeff: {coefficient}
+# of the temperature that the recording calls {sensor}
+max_z_adjustment: {most}
+# mm, in either direction
+smooth_time: 10.0
+# s
+#z_adjust_off_above: 99999
+# mm: above this height the adjustment stays as it is
+
+# FILL IN: the sensor of {sensor}, as for a [temperature_sensor]
+sensor_type: FILL_IN
+sensor_pin: FILL_IN
+min_temp: {low:g}
+max_temp: {high:g}
+# degC. Klipper stops the printer outside: check them
+"""
+
+_ABOUT = """\
+Klipper computes `z_adjust = -temp_coeff * (temperature - temperature_at_homing)` [mm] and adds it to the commanded
+Z of every move in X or Y, not by less than a motor step at a time. What counts as zero is the smoothed temperature
+when Z was homed."""
+
+_INSTALL = """\
+1. Copy `[z_thermal_adjust]` from `{name}.cfg` into `printer.cfg` and fill in `sensor_type`, `sensor_pin`,
+   `min_temp` and `max_temp` of the sensor that the recording calls {sensor}. A `[temperature_sensor]` of the same
+   pin has to go.
+2. No other macro may shift Z by that temperature.
+3. `RESTART`, `G28`. Home again whenever Z is to count from the present temperature.
+4. Once, in two minutes: `SET_Z_THERMAL_ADJUST REF_TEMP=R` with R = the present temperature minus 10, then `G1` by a
+   millimetre in X and `SET_Z_THERMAL_ADJUST` alone: it tells "Applied Z adjustment", which has to be {ten} mm, and
+   the nozzle has to have gone {way}. `G28` ends the trial.
+
+That says that Klipper takes the sign as it is meant here. That the recording counts as it should, you know: its
+deviation is actual minus commanded, positive where a warm nozzle stands further from the bed than it was told to."""
+
+_CHECK = """\
+`{name}_vectors.csv` holds temperatures at homing and now [degC], the adjustment of Z that has to come out [um] and
+its tolerance; beyond the trained range, too. `python3 {name}_check.py` (Python alone) reads `temp_coeff` and
+`max_z_adjustment` out of `{name}.cfg`, or out of the file named behind it (`printer.cfg`), and compares: exit code
+0 if all agree. On the printer: `SET_Z_THERMAL_ADJUST REF_TEMP=` the temperature at homing of a row near the present
+one."""
+
+_OFF = """\
+`SET_Z_THERMAL_ADJUST ENABLE=0`: the adjustment stays as it is, without a jump, and is gone after the next `G28`.
+For good: take the section out of `printer.cfg`, `RESTART`, `G28`."""
+
+
+def write_klipper(
+    reductions: Sequence[Reduced], limits: Limits, name: str, facts: Facts, *, figure: str = ""
+) -> dict[str, bytes]:
+    """Return all files by their names, the page how to use them the last.
+
+    Parameters
+    ----------
+    reductions : sequence of Reduced
+        One, of Z.
+    limits : Limits
+    name : str
+        Of the files.
+    facts : Facts
+    figure : str
+        File of the figure; empty if there is none.
+
+    Raises
+    ------
+    InputError
+        There are several, or the coefficient is beyond what Klipper takes.
+    """
+    if len(reductions) > 1:
+        raise InputError(
+            f"Klipper has one [z_thermal_adjust], and there are {', '.join(r.model.target for r in reductions)}: name "
+            "one with --axes, such as --axes z_um=Z"
+        )
+    (r,) = reductions
+    ((sensor, factor),) = r.terms
+    if abs(factor) > 1e3 * _MOST:
+        raise InputError(
+            f"{r.model.target}: {factor:g} um/K, and Klipper takes at most {_MOST:g} mm/K: check the units of the "
+            "recording, or export to another controller"
+        )
+    first = head(reductions, facts, SIGN, UNITS)
+    zero = r.zeros[0]
+    section = _SECTION.format(
+        head="\n".join(f"# {line}" for line in first),
+        coefficient=in_mm(factor),
+        sensor=sensor.name,
+        most=in_mm(limits.magnitude),
+        low=max(math.floor(zero + sensor.low - _ROOM), _COLDEST),
+        high=math.ceil(zero + sensor.high + _ROOM),
+    )
+    page = write_page(
+        name,
+        first,
+        reductions,
+        what="Klipper's [z_thermal_adjust]",
+        about=_ABOUT,
+        limits=f"at most {limits.magnitude:g} um; no rate: what changes between two moves comes with the next one.",
+        failed="Klipper stops the printer if the temperature is beyond `min_temp` and `max_temp`; a wrong one within "
+        "them moves Z.",
+        install=_INSTALL.format(
+            name=name,
+            sensor=sensor.name,
+            ten=f"{-10 * factor / 1e3:+.4f}",
+            way="down (towards the bed)" if factor > 0 else "up (away from the bed)",
+        ),
+        check=_CHECK.format(name=name),
+        off=_OFF,
+        figure=figure,
+    )
+    texts = {
+        f"{name}.cfg": section,
+        f"{name}_vectors.csv": _vectors(r, limits),
+        f"{name}_check.py": write_script(KLIPPER, name),
+        f"{name}.md": page,
+    }
+    return {file: text.encode() for file, text in texts.items()}
+
+
+def _vectors(r: Reduced, limits: Limits) -> str:
+    ((_, factor),), (zero,) = r.terms, r.zeros
+    rows = ["homing_degC,now_degC,adjustment_um,tolerance_um"]
+    pairs = [(home, now) for home in (zero, round(zero + 7.5, 2)) for (now,) in vectors(r)]
+    far = round(zero + 1.25 * limits.magnitude / abs(factor), 2)  # beyond the limit
+    for home, now in [*pairs, (zero, far), (far, zero)]:
+        said = factor * (home - now)
+        rows.append(f"{home:g},{now:g},{min(max(said, -limits.magnitude), limits.magnitude):.4f},0.01")
+    return "\n".join(rows) + "\n"

@@ -1,0 +1,287 @@
+"""A component of LinuxCNC's HAL around the C99 of a compensator, and the HAL that moves axes with it."""
+
+import textwrap
+from collections.abc import Mapping, Sequence
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.export.block.tables import Tables
+from thermocomp.export.c99.c99 import comment
+
+#: of an external offset: its counts [mm]
+RESOLUTION = 1e-5
+#: characters of a name in HAL, and the longest that comes behind that of the component and a dot
+_LONGEST, _BEHIND = 47, len("motion-enabled")
+
+_COMPONENT = """{facts}component {component} "thermal compensation; {name}.md says how to use it";
+
+pin in float value-#[{inputs}] = NAN;   /* see {name}.md for their order and units */
+pin in bit good-#[{inputs}] = TRUE;     /* FALSE for a sensor that reports a failure */
+pin in u32 reading;              /* counts readings: values are new when it changes, and old if it does not */
+pin in bit enable = TRUE;        /* FALSE: corrections hold, and go to zero after that */
+
+pin in bit motion-enabled;       /* of the controller: an external offset can move only then */
+pin in bit all-homed;
+pin in bit coord-mode;
+pin in bit teleop-mode;
+{axes}
+pin out float correction-#[{targets}];  /* [mm] */
+pin out float slope-#[{targets}];       /* [um/m] */
+pin out s32 status-#[{targets}];        /* 0 starts, 1 active, 2 holding, 3 fading, 4 shadow */
+{faults}pin out s32 rejected;            /* why a reading was not used: 0 it was, 1 its time, 2 a value, 3 no start */
+pin out s32 outside;             /* how many inputs are beyond the trained range */
+pin out float scale = {resolution!r};     /* of the counts of external offsets [machine units] */
+pin out bit engaged;             /* external offsets can move */
+param rw float unit = 1.0;       /* machine units in a millimetre: 1, or 0.0393700787 for inches */
+
+function _ fp;
+option singleton yes;
+license "none";
+include "{name}.c";
+;;
+#undef rejected
+#undef outside
+
+#define SECOND 1000000000LL /* [ns] */
+#define MAGNITUDE {magnitude!r} /* um */
+#define RATE {rate!r} /* um/s */
+#define LARGEST 1e6 /* counts in a period */
+
+enum {{ INPUTS = {inputs}, TARGETS = {targets} }};
+
+/* ends of the travel, from the reference position [mm]; none: the same at every position */
+static const double travel[TARGETS][2] = {{{travel}}};
+
+static {name}_state state; /* all zero: begun */
+static double now[TARGETS][2]; /* the lines in force, at both ends of the travel [um] */
+static double base[TARGETS]; /* an offset that was found [machine units] */
+static long sent[TARGETS]; /* counts since then */
+static int lost[TARGETS];
+static long long since, waited; /* the last reading, the last step [ns] */
+static hal_u32_t heard;
+static int fresh, could;
+
+static double within(double value, double low, double high)
+{{
+    return value < low ? low : value > high ? high : value;
+}}
+
+/* Return the counts by which an external offset lacks what it shall be; ends of the travel from the reference [mm]. */
+static int lacking(int k, const double ends[2], double at, double request, int on, double seconds, double per_mm)
+{{
+    const double count = {resolution!r} * per_mm, most = RATE * seconds;
+    double wanted, order;
+    int j;
+
+    lost[k] = 0;
+    if (!on) {{ /* begin at what is in force */
+        base[k] = isfinite(request) ? request : 0.0;
+        now[k][0] = now[k][1] = 1000.0 * base[k] / per_mm;
+        sent[k] = 0;
+        return 0;
+    }}
+    /* what was asked for has to be there: else another one moves it, or nobody listens */
+    lost[k] = !(fabs(request - (base[k] + (double)sent[k] * count)) < 0.5 * count);
+    if (lost[k]) {{
+        return 0;
+    }}
+    for (j = 0; j < 2; j++) {{
+        wanted = within((double)state.correction[k] + 0.001 * (double)state.slope[k] * ends[j], -MAGNITUDE, MAGNITUDE);
+        now[k][j] += within(wanted - now[k][j], -most, most);
+    }}
+    at = ends[1] > ends[0] ? within((at - ends[0]) / (ends[1] - ends[0]), 0.0, 1.0) : 0.0;
+    order = (0.001 * per_mm * (now[k][0] + at * (now[k][1] - now[k][0])) - request) / count;
+    if (!(fabs(order) < LARGEST)) {{
+        return 0;
+    }}
+    sent[k] += lround(order);
+    return (int)lround(order);
+}}
+
+FUNCTION(_)
+{{
+    const hal_u32_t count = reading;
+    const int can = motion_enabled && all_homed && (coord_mode || teleop_mode) && unit > 0.001 && unit < 1000.0;
+    const int on = can && could; /* in the first period LinuxCNC sets an offset that it has kept to zero */
+    int k;
+
+    since += period;
+    if (count != heard) {{
+        heard = count;
+        since = 0;
+        fresh = 1;
+    }}
+    waited += period;
+    if (waited >= SECOND) {{
+        tc_real given[INPUTS];
+
+        for (k = 0; k < INPUTS; k++) {{
+            given[k] = good(k) ? (tc_real)value(k) : (tc_real)NAN;
+        }}
+        {name}_step(&state, given, fresh && enable ? 1e-9 * (double)since : 1e9, 1e-9 * (double)waited);
+        fresh = 0;
+        waited = 0;
+        for (k = 0; k < TARGETS; k++) {{
+            correction(k) = 0.001 * (double)state.correction[k];
+            slope(k) = (double)state.slope[k];
+            status(k) = state.status[k];
+        }}
+{told}        *__comp_inst->rejected = state.rejected;
+        *__comp_inst->outside = state.outside;
+    }}
+    could = can;
+    engaged = on;
+    scale = {resolution!r} * unit;
+{moves}}}
+"""
+
+_FAULTS = "pin out s32 fault-#[{sensors}];         /* 0 good, 1 missing, 2 stepped, 3 stuck, 4 off, 5 swapped */\n"
+_TOLD = """        for (k = 0; k < {sensors}; k++) {{
+            fault(k) = state.fault[k];
+        }}
+"""
+_MOVE = """    {a}_counts += lacking({k}, travel[{k}], {at}, {a}_request, on, 1e-9 * (double)period, unit);
+    {a}_lost = lost[{k}];
+"""
+
+_HAL = """{facts}
+loadrt {component}
+addf {hal} servo-thread
+
+# 1. Machine units in a millimetre: 0.0393700787 where [TRAJ]LINEAR_UNITS is inch.
+setp {hal}.unit 1.0
+
+# 2. FILL IN where readings come from, and take the first # away. Until then nothing moves.
+#    good-K may be left out. Count reading up with each new set of values: when it stands still, they are old.
+{sources}
+#net {hal}-reading SOURCE => {hal}.reading
+
+# 3. May an external offset move? If your HAL has one of these pins in a signal, use the name of that signal here.
+net {hal}-enabled motion.motion-enabled => {hal}.motion-enabled
+net {hal}-homed motion.is-all-homed => {hal}.all-homed
+net {hal}-coord motion.coord-mode => {hal}.coord-mode
+net {hal}-teleop motion.teleop-mode => {hal}.teleop-mode
+
+# 4. Axes. Each wants OFFSET_AV_RATIO = 0.1 in its [AXIS_...] of the INI: without it nothing moves, and nothing says so.
+{axes}
+"""
+
+
+def name_component(name: str) -> str:
+    """Return the name of the component of a compensator: another one than that of its source.
+
+    Parameters
+    ----------
+    name : str
+        Of the compensator's files.
+
+    Raises
+    ------
+    InputError
+        It is too long for HAL.
+    """
+    component = f"{name}_hal"
+    if (over := len(component) + 1 + _BEHIND - _LONGEST) > 0:
+        raise InputError(f"--name: {over} characters too long: a name in HAL has {_LONGEST} at most")
+    return component
+
+
+def write_component(tables: Tables, name: str, facts: Sequence[str], letters: Mapping[str, str]) -> str:
+    """Return the text of a component, for ``halcompile``.
+
+    Parameters
+    ----------
+    tables : Tables
+        Of the compensator.
+    name : str
+        Of its C99.
+    facts : sequence of str
+        What stands above it.
+    letters : mapping of str to str
+        Axes by target.
+    """
+    pins, moves = list[str](), list[str]()
+    for k, target in enumerate(tables.targets):
+        a, at = letters[target].lower(), "0.0"
+        pins.append(f"\n/* {letters[target]}: {comment(target)} */")
+        pins += [f"pin in float {a}-request;", f"pin out s32 {a}-counts;", f"pin out bit {a}-lost;"]
+        if has_slopes(tables):
+            pins.append(f"pin in float {a}-position;")
+            at = f"{a}_position / unit - {tables.values['position'][k]!r}"
+        moves.append(_MOVE.format(a=a, k=k, at=at))
+    sensors, known = len(tables.sensors), tables.values
+    ends = zip(known["travel_low"], known["travel_high"], known["position"], strict=True)
+    travel = ", ".join(f"{{{low - at!r}, {high - at!r}}}" if low < high else "{0.0, 0.0}" for low, high, at in ends)
+    return _COMPONENT.format(
+        facts="".join(f"/* {comment(line)} */\n" for line in facts),
+        component=name_component(name),
+        name=name,
+        inputs=len(tables.channels),
+        targets=len(tables.targets),
+        axes="\n".join(pins) + "\n",
+        faults=_FAULTS.format(sensors=sensors) if sensors else "",
+        told=_TOLD.format(sensors=sensors) if sensors else "",
+        moves="".join(moves),
+        travel=travel,
+        resolution=RESOLUTION,
+        magnitude=float(tables.values["magnitude"]),
+        rate=float(tables.values["rate"]),
+    )
+
+
+def write_hal(tables: Tables, name: str, facts: Sequence[str], letters: Mapping[str, str]) -> str:
+    """Return the HAL that loads a component and moves axes with it.
+
+    Parameters
+    ----------
+    tables : Tables
+        Of the compensator.
+    name : str
+        Of its C99.
+    facts : sequence of str
+        What stands above it.
+    letters : mapping of str to str
+        Axes by target.
+    """
+    hal = name_component(name).replace("_", "-")
+    sources = [
+        f"#net {hal}-value-{k} SOURCE => {hal}.value-{k}\n#net {hal}-good-{k} SOURCE => {hal}.good-{k}"
+        for k in range(len(tables.channels))
+    ]
+    told = [
+        remark(f"{k}: {c.name} [{c.unit}]{_such_as(c.quantity)}") + source
+        for k, (c, source) in enumerate(zip(tables.channels, sources, strict=True))
+    ]
+    axes = []
+    for target in tables.targets:
+        a = letters[target].lower()
+        axes += [
+            remark(f"{letters[target]}: {target}").rstrip(),
+            f"setp axis.{a}.eoffset-enable 1",
+            f"net {hal}-scale {hal}.scale => axis.{a}.eoffset-scale",
+            f"net {hal}-{a}-counts {hal}.{a}-counts => axis.{a}.eoffset-counts",
+            f"net {hal}-{a}-request axis.{a}.eoffset-request => {hal}.{a}-request",
+        ]
+        if has_slopes(tables):
+            axes.append(f"net {hal}-{a}-position axis.{a}.pos-cmd => {hal}.{a}-position")
+    return _HAL.format(
+        facts="".join(map(remark, facts)),
+        component=name_component(name),
+        hal=hal,
+        sources="\n".join(told),
+        axes="\n".join(axes),
+    )
+
+
+def has_slopes(tables: Tables) -> bool:
+    """Return whether a correction depends on where an axis is."""
+    return any(tables.values["to_slope"])
+
+
+def remark(text: str) -> str:
+    """Return a text as remarks in HAL, whose lines have an end and go on behind a backslash."""
+    lines = textwrap.wrap(comment(text).replace("\\", "/"), 110, break_on_hyphens=False)
+    return "".join(f"# {line}\n" for line in lines or [""])
+
+
+def _such_as(quantity: str) -> str:
+    return ", such as spindle.0.speed-out-abs" if quantity == "spindle_speed" else ""

@@ -1,0 +1,213 @@
+"""Reduction: the best model of a controller's shape, judged on cycles it has not seen, beside the full one."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.inputs import Support
+from thermocomp.core.model import ErrorModel
+from thermocomp.export.reduction.models import LinearReduction
+from thermocomp.export.reduction.reduced import Left, LeftOut, Reduced, Shape
+from thermocomp.judging import metrics
+from thermocomp.judging.compare import compare
+from thermocomp.judging.replay import are_absolute, replay
+from thermocomp.judging.results import Assessment, Comparison, Rules
+from thermocomp.judging.splits import Judging, by_rows, leave_one_cycle_out
+from thermocomp.judging.study import honest_error
+from thermocomp.models.methods import METHODS, NamedEstimator, deployable
+from thermocomp.models.training import train
+from thermocomp.recordings.checks.sound import drop_unsound
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
+from thermocomp.recordings.starts import Start
+
+FloatArray = NDArray[np.float64]
+
+NAME = "reduced"
+#: a controller's formula knows no trained range: it goes on as it is
+UNBOUNDED = Support("clip", margin=1e3)
+#: what of a single cycle is learned from, and what judged: no proof, but a figure
+_SHARES = (0.6, 0.4)
+
+
+@dataclass(frozen=True, eq=False)
+class Reduction:
+    """A reduced model and how it did.
+
+    Parameters
+    ----------
+    reduced : Reduced
+    blocks : tuple of Assessment
+        On each unseen block.
+    full : tuple of Assessment
+        The full model on the same ones; empty if it could not be fitted anew.
+    time : tuple of ndarray
+        Times of each recording's rows [s].
+    """
+
+    reduced: Reduced
+    blocks: tuple[Assessment, ...]
+    full: tuple[Assessment, ...]
+    time: tuple[FloatArray, ...]
+
+
+def reduce_model(
+    model: ErrorModel,
+    axis: str,
+    recordings: Sequence[Recording],
+    shape: Shape,
+    *,
+    sensors: Sequence[str] | None = None,
+    starts: Start | Sequence[Start] | None = None,
+    rules: Rules = Rules(),
+    jobs: int = 1,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Reduction:
+    """Fit the best model of a shape to recordings, and judge it beside the full one.
+
+    Sensors are chosen anew without each unseen cycle, by cycles left out of the others. What is judged says its
+    numbers in the digits that are printed, and knows no range: neither does the controller. The full model is fitted
+    anew without each cycle, too, if its method is known; else its error is that in its file.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        The full one.
+    axis : str
+        That its target goes along.
+    recordings : sequence of Recording
+    shape : Shape
+    sensors : sequence of str, optional
+        Temperatures to choose from; all if not given.
+    starts : Start or sequence of Start, optional
+        How the recordings begin; found out if not given.
+    rules : Rules
+        What is stated before judging.
+    jobs : int
+        Processes to share the work among; -1 takes all cores.
+    progress : callable
+        Called with a line of text after each piece of work.
+
+    Returns
+    -------
+    Reduction
+
+    Raises
+    ------
+    InputError
+        The recordings lack the target or a temperature, or nothing can be fitted to them.
+    """
+    samples = _samples(model, recordings, shape, starts)
+    heat = [c.name for c in samples.inputs if c.quantity == "temperature"]
+    if unknown := [s for s in sensors or () if s not in heat]:
+        raise InputError(f"--sensors {', '.join(unknown)}: no such temperature; there are {', '.join(heat)}")
+    if not heat:
+        raise InputError(f"{recordings[0].name}: no temperature, so there is nothing a controller could go by")
+    judging, known = _judging(samples), samples.only(sensors or heat)
+    taken = {"", model.target, *(c.name for c in known.inputs)}
+    known = replace(known, trouble=tuple(t for t in known.trouble if t[0] in taken))
+    estimator = LinearReduction(max_sensors=shape.sensors, fit_intercept=shape.constant and not samples.rezero)
+    named = NamedEstimator(NAME, estimator)
+    found = compare(known, [named], judging, rules=rules, support=UNBOUNDED, limits=None, jobs=jobs, progress=progress)
+    (overall,) = found.overall()
+    every = np.ones(len(known), dtype=np.bool_)
+    honest = honest_error(overall, judging)
+    written = replace(train(named, known, 0, every, support=UNBOUNDED, joint=False).model, honest_error=honest)
+    method = method_of(model, samples)
+    beside = compare(
+        samples, [method], judging, robustness=False, refit=False, limits=None, jobs=jobs, progress=progress
+    ) if method else None  # fmt: skip
+    if beside is not None and beside.overall()[0].failure:
+        beside = None
+    blocks, full = _blocks(found), _blocks(beside)
+    rows = known.valid & np.isfinite(known.deviations[:, 0]) & (known.cycle >= 0)
+    said, _ = replay(written, known, rows)
+    reduced = Reduced(
+        written,
+        axis,
+        _beside(model, method if full else "", judging),
+        Left(overall.none_metric("rms"), overall.none_metric("max_abs")),
+        _full(model, beside),
+        _left(overall),
+        tuple(_left_outs(blocks, full)),
+        _of(known.deviations[rows, 0] - said),
+        float(max(np.abs(a).max(initial=0.0) for a in (said, *(b.predicted for b in blocks)))),
+    )
+    return Reduction(reduced, blocks, full, tuple(r.time for r in recordings))
+
+
+def method_of(model: ErrorModel, samples: Samples) -> str:
+    """Return the method that a model was fitted by, if it can be fitted so again; else the empty string."""
+    known = model.provenance
+    if known is None or known.method not in METHODS or not deployable(known.method):
+        return ""
+    speeds = [c.name for c in samples.inputs if c.quantity == "spindle_speed"]
+    own = METHODS[known.method].build(speeds).get_params()
+    return known.method if known.parameters == {k: repr(v) for k, v in own.items()} else ""
+
+
+def _samples(
+    model: ErrorModel, recordings: Sequence[Recording], shape: Shape, starts: Start | Sequence[Start] | None
+) -> Samples:
+    """Return all that the full model may need of recordings, and what the reduced one is chosen from."""
+    first = recordings[0]
+    speeds = (first.speed.name,) if first.speed is not None else ()
+    names = dict.fromkeys([*(c.name for c in first.temperatures), *speeds, *(i.name for i in model.inputs)])
+    rezero = not (shape.constant and are_absolute([model]))
+    samples = stack(recordings, [model.target], list(names), rezero=rezero, zeroing=model.zeroing, starts=starts)
+    return drop_unsound(samples, recordings)
+
+
+def _judging(samples: Samples) -> Judging:
+    """Return the thermal cycles, each left out in turn; of a single one the last part."""
+    if len(samples.cycle_names) > 1:
+        return leave_one_cycle_out(samples)
+    return by_rows(samples, *_SHARES)
+
+
+def _blocks(found: Comparison | None) -> tuple[Assessment, ...]:
+    """Return the assessments of single blocks; of one block alone that of all."""
+    if found is None:
+        return ()
+    return tuple(a for a in found.assessments if not a.overall) or found.overall()
+
+
+def _left_outs(blocks: Sequence[Assessment], full: Sequence[Assessment]) -> list[LeftOut]:
+    others = {a.block: a.metric("rms") for a in full}
+    return [
+        LeftOut(a.block, a.frozen, a.none_metric("rms"), others.get(a.block, math.nan), a.metric("rms"))
+        for a in blocks
+        if a.frozen is not None
+    ]
+
+
+def _beside(model: ErrorModel, method: str, judging: Judging) -> str:
+    if method:
+        return f"{method}, fitted anew for this; both are judged alike: {judging.name}"
+    if model.honest_error is None:
+        return "the model's method is not known here, and it was never judged on cycles it has not seen"
+    return (
+        "the model's method is not known here with its settings: its error is that in the model file, on "
+        f"{model.honest_error.protocol}, not on the cycles of these recordings"
+    )
+
+
+def _full(model: ErrorModel, beside: Comparison | None) -> Left:
+    if beside is not None:
+        return _left(beside.overall()[0])
+    found = model.honest_error
+    return Left(math.nan, math.nan) if found is None else Left(found.rms, found.max_abs)
+
+
+def _left(found: Assessment) -> Left:
+    return Left(found.metric("rms"), found.metric("max_abs"))
+
+
+def _of(residual: FloatArray) -> Left:
+    nothing = np.zeros_like(residual)
+    return Left(metrics.METRICS["rms"](residual, nothing), metrics.METRICS["max_abs"](residual, nothing))

@@ -1,0 +1,171 @@
+"""The linear model of a poor controller: a few present temperatures, each times a number that can be printed."""
+
+from itertools import combinations
+from math import comb
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.models.base import FloatArray, IntArray
+from thermocomp.models.linear import TermRegressor
+
+Sets = NDArray[np.intp]
+
+#: a further sensor has to lessen the RMS on the cycles left out by this share
+GAIN = 0.05
+#: a set that does no harm with an input lost may leave so many times what one leaves that does
+DEAR = 2.0
+#: of more sets than this of one size only those are tried that hold the best set of the size before
+_MOST_SETS = 50_000
+#: keeps what depends on itself solvable, beside columns scaled to 1
+_LITTLE = 1e-12
+
+
+class LinearReduction(TermRegressor):
+    """Least squares on the one to `max_sensors` inputs that predict best what they have not seen, in printed digits.
+
+    Every set is fitted without each thermal cycle in turn and looked at on that cycle, whole and with each input lost:
+    nothing at a poor controller notices that, so sets that leave more than no model then are passed over, unless the
+    others are `DEAR`. The smallest set is taken that no larger one beats by `GAIN`; then it is fitted to all cycles,
+    and its numbers are rounded to those that a controller's file has: what is judged is what is printed.
+
+    Parameters
+    ----------
+    max_sensors : int
+    fit_intercept : bool
+        False: the model gives zero in the reference state.
+    digits : int
+        Significant digits of a number.
+
+    Attributes
+    ----------
+    selected_ : tuple of int
+        Features in the model, in rising order.
+    unseen_ : float
+        RMS over the cycles left out [unit of y].
+    chosen_by_ : str
+        What was left out to choose.
+    terms_, coef_, intercept_, r_squared_, adjusted_r_squared_, standard_error_, n_effective_, condition_
+        See `thermocomp.models.linear.TermRegressor`; of the coefficients before they are rounded.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp.export.reduction.models import LinearReduction
+    >>> rng = np.random.default_rng(0)
+    >>> rises = rng.uniform(0, 10, (100, 4))  # of four temperatures, one of which matters [degC]
+    >>> y = 12.3456789 * rises[:, 2] + rng.normal(size=100)
+    >>> model = LinearReduction(digits=4).fit(rises, y, cycle=np.arange(100) // 20)
+    >>> print(model.selected_, model.coef_.tolist())
+    (2,) [12.35]
+    """
+
+    def __init__(self, *, max_sensors: int = 1, fit_intercept: bool = False, digits: int = 5) -> None:
+        self.max_sensors = max_sensors
+        self.fit_intercept = fit_intercept
+        self.digits = digits
+
+    def fit(self, X: ArrayLike, y: ArrayLike, *, cycle: ArrayLike | None = None) -> "LinearReduction":
+        """Choose, fit and round.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+            Temperatures minus their reference.
+        y : array-like of shape (n_rows,)
+            Deviation.
+        cycle : array-like of int of shape (n_rows,), optional
+            Thermal cycle of each row; rows with -1 are not learned from. Without it, five stretches of equal length
+            take the place of the cycles.
+
+        Returns
+        -------
+        LinearReduction
+
+        Raises
+        ------
+        FitError
+            Fewer than two rows to learn from.
+        InputError
+            A setting is out of its range.
+        """
+        if self.max_sensors < 1 or not 1 <= self.digits <= 17:
+            raise InputError(f"max_sensors {self.max_sensors}, digits {self.digits}: want at least 1, and 1 to 17")
+        change, deviation, folds, self.chosen_by_ = self._learned(X, y, cycle)
+        self.selected_, self.unseen_ = self._choose(change, deviation, folds)
+        self._regress(change, deviation, self.selected_)
+        self.coef_ = np.array([self._rounded(c) for c in self.coef_.tolist()])
+        self.intercept_ = self._rounded(self.intercept_)
+        return self
+
+    def _rounded(self, value: float) -> float:
+        return float(f"{value:.{self.digits}g}")
+
+    def _choose(self, X: FloatArray, y: FloatArray, folds: IntArray) -> tuple[tuple[int, ...], float]:
+        """Return the set that leaves least of cycles it has not seen, and the RMS that it leaves."""
+        moving = np.flatnonzero(np.ptp(X, axis=0) > 0)
+        if not moving.size:
+            return (), float(np.sqrt(np.mean(y**2)))
+        scale = np.sqrt((X[:, moving] ** 2).mean(axis=0))
+        table = np.column_stack([X[:, moving] / scale, *([np.ones(len(y))] if self.fit_intercept else []), y])
+        parts = np.stack([table[folds == k].T @ table[folds == k] for k in range(int(folds.max()) + 1)])
+        safe, any_ = (self._best(parts, moving.size, len(y), fragile=fragile) for fragile in (False, True))
+        best, least = safe if safe[1] <= DEAR * any_[1] else any_
+        return tuple(moving[best].tolist()), least
+
+    def _best(self, parts: FloatArray, n: int, rows: int, *, fragile: bool) -> tuple[Sets, float]:
+        """Return the best set of n columns, also of those that do harm with an input lost if `fragile`."""
+        none = float(parts[:, -1, -1].sum())
+        best: Sets = np.empty(0, np.intp)
+        least = np.inf
+        for size in range(1, min(self.max_sensors, n) + 1):
+            sets = _sets(n, size, best)
+            unseen, lost = _unseen(parts, sets, intercept=self.fit_intercept)
+            squares = np.where(fragile | (size == 1) | (lost <= none), np.maximum(unseen, 0.0), np.inf)
+            left = np.sqrt(squares / rows)
+            first = int(np.argmin(left))
+            if size > 1 and not left[first] < (1 - GAIN) * least:
+                break
+            best, least = sets[first], float(left[first])
+        return best, least
+
+
+def _sets(n: int, size: int, best: Sets) -> Sets:
+    """Return sets of some of n columns, (n_sets, size), each in rising order."""
+    if comb(n, size) <= _MOST_SETS:
+        return np.array(list(combinations(range(n), size)), dtype=np.intp)
+    return np.array([sorted([*best.tolist(), j]) for j in range(n) if j not in best], dtype=np.intp)
+
+
+def _unseen(parts: FloatArray, sets: Sets, *, intercept: bool) -> tuple[FloatArray, FloatArray]:
+    """Return the sums of squares that sets leave of parts left out in turn, whole and with their worst input lost.
+
+    Parameters
+    ----------
+    parts : ndarray of shape (n_parts, n_columns + 1, n_columns + 1)
+        Products of the columns with each other and with what they shall predict, per part.
+    sets : ndarray of int of shape (n_sets, size)
+    intercept : bool
+        The last column but one is that of ones, and belongs to every set.
+
+    Returns
+    -------
+    unseen, lost : ndarray of shape (n_sets,)
+    """
+    inputs = sets.shape[1]
+    if intercept:
+        sets = np.hstack([sets, np.full((len(sets), 1), parts.shape[1] - 2, dtype=np.intp)])
+    across, down = sets[:, :, None], sets[:, None, :]
+    whole, found = parts.sum(axis=0), np.zeros((1 + inputs, len(sets)))
+    for part in parts:
+        rest = whole - part if len(parts) > 1 else whole
+        little = _LITTLE * max(float(np.trace(rest[:-1, :-1])), _LITTLE)
+        weights = np.linalg.solve(rest[across, down] + little * np.eye(sets.shape[1]), rest[sets, -1][..., None])
+        for lost in range(1 + inputs):  # the last: none is
+            w = weights[..., 0].copy()
+            if lost < inputs:
+                w[:, lost] = 0.0
+            cross = (w * part[sets, -1]).sum(axis=1)
+            found[lost] += part[-1, -1] - 2 * cross + np.einsum("ij,ijk,ik->i", w, part[across, down], w)
+    return found[-1], found[:-1].max(axis=0)

@@ -1,0 +1,279 @@
+"""What controllers hold that hold less than a model, and a model reduced to that: numbers to be printed."""
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from decimal import ROUND_DOWN, ROUND_HALF_EVEN, Decimal
+from typing import NamedTuple
+
+from thermocomp.core.inputs import Input
+from thermocomp.core.model import ErrorModel
+from thermocomp.core.polynomial import Polynomial
+from thermocomp.export.facts import Facts
+
+#: of eight digits
+_LARGEST = Decimal(99_999_999)
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What a controller's formula may be made of: present temperatures times numbers.
+
+    Parameters
+    ----------
+    sensors : int
+        At most.
+    constant : bool
+        A constant may stand beside them. False: it counts from the temperature at homing.
+    axes : str
+        Letters of the axes that have one.
+    """
+
+    sensors: int
+    constant: bool
+    axes: str
+
+
+#: by target of the export
+SHAPES = {
+    "klipper": Shape(1, False, "Z"),
+    "heidenhain": Shape(3, True, "XYZ"),
+    "fanuc": Shape(3, True, "XYZ"),
+}
+
+
+class Left(NamedTuple):
+    """What is left of a deviation [um]; nan if it is not known."""
+
+    rms: float
+    largest: float
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """What was fitted without a cycle, and how it did there.
+
+    Parameters
+    ----------
+    name : str
+        Of the cycle.
+    model : ErrorModel
+        Reduced.
+    none, full, reduced : float
+        RMS without compensation, with the full model and with this one [um]; nan if it is not known.
+    """
+
+    name: str
+    model: ErrorModel
+    none: float
+    full: float
+    reduced: float
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """A model in the shape of a controller, beside the full one.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        Linear in temperatures, without memory; its honest error is that on unseen cycles.
+    axis : str
+        X, Y or Z.
+    beside : str
+        What the full model is, and on what its error was found.
+    none, full, reduced : Left
+        On unseen cycles: without compensation, with the full model, with this one.
+    cycles : tuple of LeftOut
+        One by one; empty where the model was of that shape already.
+    replayed : Left or None
+        With the model as it is written, over all rows of the recordings that it was fitted to.
+    most : float
+        Largest deviation that was said in all of this [um].
+    """
+
+    model: ErrorModel
+    axis: str
+    beside: str
+    none: Left
+    full: Left
+    reduced: Left
+    cycles: tuple[LeftOut, ...] = ()
+    replayed: Left | None = None
+    most: float = 0.0
+
+    @property
+    def loss(self) -> float:
+        """RMS on unseen cycles over that of the full model; nan if that is not known."""
+        if self.full.rms > 0:
+            return self.reduced.rms / self.full.rms
+        return 1.0 if self.reduced.rms == self.full.rms else math.nan
+
+    @property
+    def loss_in_words(self) -> str:
+        """What is lost, such as ``RMS 2.10 um on unseen cycles, 1.05 um more than the full model: 2.00 times``."""
+        more = self.reduced.rms - self.full.rms
+        way = "more" if more >= 0 else "less"
+        return (
+            f"RMS {self.reduced.rms:.2f} um on unseen cycles, {abs(more):.2f} um {way} than the full model: "
+            f"{self.loss:.2f} times"
+        )
+
+    def why_not(self, most_loss: float) -> str:
+        """Return why it must not be written; empty if it may."""
+        found = self.model.honest_error
+        if found is None:
+            return "it was never judged on cycles it has not seen"
+        if found.word == "refused":
+            return found.why
+        if math.isnan(self.loss):
+            return "the loss cannot be stated: nobody knows what the full model leaves of unseen cycles"
+        if self.loss > most_loss:
+            return f"loses too much: {self.loss_in_words}, at most {most_loss:g} are let pass (--most-loss)"
+        if found.word == "unproven" and not found.taken:
+            return f'unproven: {found.why} (--accept-unproven "NAME, REASON" takes it all the same)'
+        return ""
+
+    @property
+    def terms(self) -> list[tuple[Input, float]]:
+        """The temperatures, and the deviation that each degree makes [um/K]."""
+        factors = linear_factors(self.model)
+        assert factors is not None
+        return [(i, f) for i, f in zip(self.model.inputs, factors, strict=True) if f]
+
+    @property
+    def zeros(self) -> list[float]:
+        """What each of the temperatures counts from in a formula that knows no start [degC]."""
+        return [round(i.reference, 2) if i.rezero else i.reference for i, _ in self.terms]
+
+    def deviation(self, temperatures: Sequence[float]) -> float:
+        """Return what the formula says of the temperatures in `terms` [um]."""
+        parts = zip(self.terms, temperatures, self.zeros, strict=True)
+        return self.model.intercept + sum(f * (t - zero) for (_, f), t, zero in parts)
+
+
+def linear_factors(model: ErrorModel) -> list[float] | None:
+    """Return what a degree of each input makes [um/K]; None if a model is no sum of present temperatures."""
+    if not isinstance(model, Polynomial) or any(len(t) != 1 for t in model.terms):
+        return None
+    if any(i.quantity != "temperature" for i in model.inputs) or model.support.policy != "clip":
+        return None
+    found = [0.0] * len(model.inputs)
+    for (variable,), factor in zip(model.terms, model.coefficients, strict=True):
+        for place, weight in model.variables[variable].weights:
+            found[place] += factor * weight
+    return found
+
+
+def fits(model: ErrorModel, shape: Shape) -> bool:
+    """Return whether a model is of a shape already."""
+    factors = linear_factors(model)
+    if factors is None or not 0 < sum(map(bool, factors)) <= shape.sensors:
+        return False
+    return shape.constant or (model.intercept == 0 and all(i.rezero for i in model.inputs))
+
+
+def as_it_is(model: ErrorModel, axis: str) -> Reduced:
+    """Return a model of that shape in the digits that are printed, without a loss."""
+    found = model.honest_error
+    assert isinstance(model, Polynomial)
+    model = replace(
+        model,
+        inputs=tuple(replace(i, reference=round(i.reference, 4)) for i in model.inputs),
+        coefficients=tuple(float(f"{c:.5g}") for c in model.coefficients),
+        intercept=float(f"{model.intercept:.5g}"),
+    )
+    none = Left(math.nan if found is None else found.none_rms, math.nan)
+    own = Left(*((math.nan, math.nan) if found is None else (found.rms, found.max_abs)))
+    return Reduced(
+        model,
+        axis,
+        "the model is of that shape already, here with five digits; its error is that in the file",
+        none,
+        own,
+        own,
+    )
+
+
+def vectors(reduced: Reduced) -> list[tuple[float, ...]]:
+    """Return temperatures that a formula is tried with, in the order of its terms: each alone, all, far beyond."""
+    inputs, zeros = [i for i, _ in reduced.terms], reduced.zeros
+    rows = [tuple(zeros)]
+    for k, i in enumerate(inputs):
+        for share in (0.0, 0.25, 0.5, 0.75, 1.0):
+            row = list(zeros)
+            row[k] += i.low + share * (i.high - i.low)
+            rows.append(tuple(row))
+    for share in (-1.5, -0.2, 0.3, 0.8, 1.2, 2.5):  # beyond the trained range below 0 and above 1
+        rows.append(tuple(z + i.low + share * (i.high - i.low) for i, z in zip(inputs, zeros, strict=True)))
+    return [tuple(round(t, 2) for t in row) for row in dict.fromkeys(rows)]
+
+
+def find_axis(target: str, named: dict[str, str]) -> str:
+    """Return the letter of the axis that a target goes along, as `named` or by its name; empty if it does not say."""
+    if target in named:
+        return named[target]
+    found = re.fullmatch(r"([xyz])([\d_].*)?", target, re.IGNORECASE)
+    return found[1].upper() if found else ""
+
+
+def in_mm(um: float) -> str:
+    """Return a number of micrometres in millimetres, digit by digit the same."""
+    return _plain(Decimal(repr(um)).scaleb(-3))
+
+
+def in_um(um: float) -> str:
+    """Return a number, digit by digit the same, without an exponent."""
+    return _plain(Decimal(repr(um)))
+
+
+def shorten(text: str, *, cap: bool = False) -> str:
+    """Return a number in eight digits, seven of them behind the point at most: more a Fanuc control does not take.
+
+    Parameters
+    ----------
+    text : str
+        Without an exponent, as `in_mm` and `in_um` write it.
+    cap : bool
+        Nothing may exceed it: round it towards zero.
+    """
+    value = Decimal(text)
+    if abs(value) >= _LARGEST:
+        return _plain(_LARGEST.copy_sign(value))
+    behind = 8 - max(1, value.adjusted() + 1)
+    rounded = value.quantize(Decimal(1).scaleb(-behind), ROUND_DOWN if cap else ROUND_HALF_EVEN)
+    return _plain(min(max(rounded, -_LARGEST), _LARGEST)) if rounded else "0"
+
+
+def _plain(value: Decimal) -> str:
+    text = f"{value:f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def mark(name: str, taken: Sequence[str] = ()) -> str:
+    """Return a name as letters, digits and ``_`` alone, other than those taken, whatever the case."""
+    found = re.sub(r"[^0-9A-Za-z_]", "_", name) or "_"
+    used = {t.upper() for t in taken}
+    return found if found.upper() not in used else f"{found}_{len(taken)}"
+
+
+def head(reductions: Sequence[Reduced], facts: Facts, sign: str, units: str) -> list[str]:
+    """Return what is to be known of an export, the verdict in the first line.
+
+    Parameters
+    ----------
+    reductions : sequence of Reduced
+    facts : Facts
+    sign, units : str
+        As the controller takes them.
+    """
+    words, more = [], []
+    for r in reductions:
+        found = r.model.honest_error
+        taken = found.taken if found is not None else ""
+        words.append(f"{r.model.target}: {'UNPROVEN, taken all the same' if taken else 'accepted on unseen cycles'}")
+        more += [f"{r.model.target}: unproven, taken by {taken}"] if taken else []
+        more += [f"{r.model.target}: {r.loss_in_words}; {r.none.rms:.2f} um without compensation"]
+    kind = "reduced to what the controller holds" if any(r.cycles for r in reductions) else "the model as it is"
+    return [f"{'; '.join(words)}; {kind}", *more, *facts.origin(), sign, units]

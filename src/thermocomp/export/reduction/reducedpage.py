@@ -1,0 +1,127 @@
+"""The page of an export to a poor controller: what it leaves and loses, how to install, check and switch it off."""
+
+from collections.abc import Iterator, Sequence
+
+from thermocomp.export.reduction.reduced import Reduced, linear_factors
+
+_PAGE = """{head}
+
+# {name}: thermal compensation by {what}
+
+{about}
+
+## What it leaves
+
+On cycles that it has not seen:
+
+| [um] | no compensation | full model | reduced |
+|---|---|---|---|
+{errors}
+
+{beside}
+{more}
+## What is lost
+
+{lost}
+
+## Install
+
+{install}
+
+## Check
+
+{check}
+
+## Switch off
+
+{off}
+"""
+
+_LOST = """- **State**: the formula knows the present temperatures alone: no lag, no spindle speed, no history.
+- **Limits**: {limits}
+- **Failed sensors**: {failed}
+- **Range**: nothing is held or faded beyond the trained range: {ranges}.
+"""
+
+
+def write_page(
+    name: str,
+    head: Sequence[str],
+    reductions: Sequence[Reduced],
+    *,
+    what: str,
+    about: str,
+    limits: str,
+    failed: str,
+    install: str,
+    check: str,
+    off: str,
+    figure: str,
+) -> str:
+    """Return the page.
+
+    Parameters
+    ----------
+    name : str
+        Of the files.
+    head : sequence of str
+        The verdict, and what else is to be known first.
+    reductions : sequence of Reduced
+    what, about : str
+        What it is written for, and how that computes.
+    limits, failed : str
+        What becomes of limits and of failed sensors.
+    install, check, off : str
+        What to do.
+    figure : str
+        File of the figure; empty if there is none.
+    """
+    ranges = "; ".join(
+        ", ".join(f"{i.name} {i.low:+.1f} to {i.high:+.1f} degC from its zero" for i, _ in r.terms) for r in reductions
+    )
+    return _PAGE.format(
+        head="  \n".join(head),
+        name=name,
+        what=what,
+        about=about,
+        beside="\n".join(f"The full model of {r.model.target}: {r.beside}.  " for r in reductions).rstrip(),
+        errors="\n".join(line for r in reductions for line in _errors(r)),
+        more="\n".join(["", *_more(reductions, figure)]),
+        lost=_LOST.format(limits=limits, failed=failed, ranges=ranges).strip(),
+        install=install,
+        check=check,
+        off=off,
+    )
+
+
+def _errors(r: Reduced) -> Iterator[str]:
+    rms, largest = ([left[k] for left in (r.none, r.full, r.reduced)] for k in (0, 1))
+    yield f"| {r.model.target}: RMS | {' | '.join(_number(v) for v in rms)} |"
+    yield f"| {r.model.target}: largest | {' | '.join(_number(v) for v in largest)} |"
+    yield f"| {r.model.target}: **loss** (RMS, in um and as a ratio) | | | {rms[2] - rms[1]:+.3f}, {r.loss:.3f} times |"
+
+
+def _more(reductions: Sequence[Reduced], figure: str) -> Iterator[str]:
+    for r in reductions:
+        if r.replayed is not None:
+            yield (
+                f"{r.model.target}: over the recordings that it was fitted to, the numbers as they are written leave "
+                f"RMS {r.replayed.rms:.3f} um, largest {r.replayed.largest:.3f} um. That is no honest error, but "
+                "whoever replays them must find it.\n"
+            )
+        if r.cycles:
+            yield f"{r.model.target}: what was fitted without each cycle, and the RMS [um] that it leaves there:\n"
+            yield "| without | um per K | no compensation | full model | reduced |\n|---|---|---|---|---|"
+            for c in r.cycles:
+                factors = linear_factors(c.model) or []
+                said = ", ".join(f"{i.name} {f!r}" for i, f in zip(c.model.inputs, factors, strict=True) if f)
+                if c.model.intercept:
+                    said += f", constant {c.model.intercept!r} um"
+                yield f"| {c.name} | {said} | {_number(c.none)} | {_number(c.full)} | {_number(c.reduced)} |"
+            yield ""
+    if figure:
+        yield f"![deviation, and what the full and the reduced model leave of it]({figure})\n"
+
+
+def _number(value: float) -> str:
+    return f"{value:.3f}" if value == value else "not known"  # noqa: PLR0124 - nan

@@ -1,0 +1,96 @@
+"""SINUMERIK 840D sl, 828D, ONE: a compensator in SCL, and what its setting data take."""
+
+from collections.abc import Mapping
+
+from thermocomp.export.axes import Drive, Value, find_drives, write_values
+from thermocomp.export.block.tables import gather
+from thermocomp.export.c99.c99 import identifier
+from thermocomp.export.facts import Facts
+from thermocomp.export.st.package import write_blocks
+from thermocomp.runtime.compensator import Compensator
+
+#: SD43900, SD43910, SD43920: K0 [mm], tan beta, P0 [mm]
+TAKEN = {
+    "offset": Value("k0", "SD43900 $SA_TEMP_COMP_ABS_VALUE [mm]", 1e-3),
+    "slope": Value("tan_beta", "SD43910 $SA_TEMP_COMP_SLOPE", 1e-6),
+    "position": Value("p0", "SD43920 $SA_TEMP_COMP_REF_POSITION [mm]", 1.0),
+}
+
+_PAGE = """
+## Into the NC
+
+For a SINUMERIK ONE, whose PLC is an S7-1500. The PLC of an 840D sl (S7-300) knows no LReal, that of an 828D or
+808D no SCL: there another computer has to run the compensator (C99, ONNX or `thermocomp serve`).
+
+dK(T, P) = K0(T) + tan beta(T) (P - P0). The block `{name}_sd` makes these of `correction` and `slope` of `{name}`:
+
+| output | setting data | unit |
+|---|---|---|
+| `k0[k]` | SD43900 `$SA_TEMP_COMP_ABS_VALUE` | mm |
+| `tan_beta[k]` | SD43910 `$SA_TEMP_COMP_SLOPE` | |
+| `p0[k]` | SD43920 `$SA_TEMP_COMP_REF_POSITION` | mm |
+
+k, the axis, what it takes, and its machine data:
+
+| k | axis | of | MD32750 `$MA_TEMP_COMP_TYPE` | MD32760 `$MA_COMP_ADD_VELO_FACTOR`, at least |
+|---|---|---|---|---|
+{rows}
+
+The PLC writes the setting data, in a cycle of seconds to minutes. **UNCONFIRMED**: with which block of your PLC it
+writes NC variables (the builder's manual says so), and `direction`, whether the NC takes the value off the command (-1,
+as the vendor's worked example of a screw that grows has it) or adds it. Try it, MD32750 being
+set, the axis referenced, the spindle standing and an indicator on the axis: with `$SA_TEMP_COMP_ABS_VALUE` of the axis
+at 0.02 and all else at 0, the axis moves by 0.02 mm; by minus 0.02 mm if the NC takes it off.
+
+At power-on the block begins with corrections of 0, and the setting data are still what was written last: write them
+as 0 before the axes are referenced.
+
+The NC moves an axis by a changed value at most with dv = MD32000 x MD32760, spread over cycles; tan beta is limited to
+MD32760. Here a correction changes by at most {rate:g} um/s = {speed:g} mm/min. With MD32760 = 0.01 (the 808D's
+default; at most 0.10 there) and MD32000 = 10000 mm/min, dv is 100 mm/min.
+"""
+
+
+def write_package(
+    compensator: Compensator, name: str, facts: Facts, axes: Mapping[str, str] | None = None
+) -> dict[str, bytes]:
+    """Return all files by their names.
+
+    Parameters
+    ----------
+    compensator : Compensator
+        Made by `Compensator.of`.
+    name : str
+    facts : Facts
+    axes : mapping of str to str, optional
+        Axes by target.
+
+    Raises
+    ------
+    InputError
+        A model has no formula, the models do not go together, or no axis is known.
+    """
+    tables, own = gather(compensator), identifier(name)
+    drives = find_drives(tables, axes or {})
+    more = write_values(f"{own}_sd", "scl", drives, TAKEN, -1.0)
+    limits = compensator.limits
+    page = _PAGE.format(
+        name=own,
+        rows="\n".join(
+            f"| {k} | {d.letter} | {tables.targets[d.target]} | {_type(d)} | {_slope(d, limits.magnitude)} |"
+            for k, d in enumerate(drives)
+        ),
+        rate=limits.rate,
+        speed=limits.rate * 0.06,
+    )
+    return write_blocks(compensator, name, facts, "scl", [more], page)
+
+
+def _type(drive: Drive) -> str:
+    """Return what MD32750 is: bit 0 an offset, bit 1 a slope."""
+    return "3 (bits 0, 1)" if drive.travel[0] < drive.travel[1] else "1 (bit 0)"
+
+
+def _slope(drive: Drive, magnitude: float) -> str:
+    low, high = drive.travel
+    return f"{2e-3 * magnitude / (high - low):.2g} for tan beta" if low < high else "as it is"

@@ -1,0 +1,182 @@
+"""All files of an export to structured text: the blocks, their test, and how to use them."""
+
+from collections.abc import Sequence
+from uuid import NAMESPACE_URL, uuid5
+
+from thermocomp.export.block.tables import Tables, gather
+from thermocomp.export.c99.c99 import identifier
+from thermocomp.export.facts import Facts
+from thermocomp.export.pages import describe
+from thermocomp.export.st.structuredtext import Unit, comment, translate
+from thermocomp.export.st.ststatements import Dialect
+from thermocomp.export.st.sttest import allow, write_test
+from thermocomp.export.vectors import make_readings, replay
+from thermocomp.runtime.compensator import Compensator
+
+_INSTALL: dict[Dialect, str] = {
+    "codesys": """`{name}.st` holds types, functions and the function block `{name}`, in IEC 61131-3 structured text.
+Make an object of each `TYPE`, `FUNCTION` and `FUNCTION_BLOCK` (CODESYS: Add object > DUT or POU; declaration above,
+statements below, without the `END_...` of a POU), and the same with `{name}_test.st`.""",
+    "twincat": """Each `.TcDUT` and `.TcPOU` file is one object. In the PLC project: Add > Existing item, all of
+them.""",
+    "scl": """`{name}.scl` is an external source. TIA Portal: External source files > Add new external file, then
+Generate blocks from source; the same with `{name}_test.scl`. For S7-1500 (LReal, and optimized data: {kilobytes} kB
+for an instance).""",
+}
+
+_README = """{facts}
+
+# {name}: thermal compensation in structured text ({dialect})
+
+{install}
+**Not confirmed:** the text was parsed and run outside the vendor's tools; nobody has compiled it in them
+yet.
+
+## Prove it
+
+Call an instance of `{name}_test` in a task, once per cycle. After {calls} cycles its output `done` is TRUE: `wrong` has
+to be 0 then, and `largest`, the largest difference to thermocomp as a share of a correction (in um below 1 um), below
+{tolerance:.1g}. Faults are among the vectors. Remove the test and its vectors afterwards.
+
+## Run it
+
+Call one instance of `{name}` in a cyclic task of ten seconds. At a shorter cycle the one call in which the zero becomes
+known has more to sort (300 s / cycle readings of each input): mind the watchdog. It needs LREAL.
+
+| input | what it is |
+|---|---|
+| `value[k]` | see below |
+| `good[k]` | FALSE for a sensor that says nothing or reports a failure |
+| `age` | seconds since the values were measured |
+| `elapsed` | seconds since the call before, measured or the cycle time of the task |
+| `restart` | when it becomes TRUE: temperatures count from now on; corrections stay and move from where they are |
+
+| value | what it is | unit |
+|---|---|---|
+{values}
+
+| correction | of | {line} |
+|---|---|---|
+{corrections}
+
+{geometry}{zero} {status}{sensors}
+
+{about}## Try the sign
+
+{sign}
+
+## Switch it off
+
+Do not set the correction to zero at once: the axis would jump. Call the block with an age of 1.0E+9: the correction
+stays where it is for {hold:g} s and then goes to zero, slowly. The controller must not compensate for temperature
+itself at the same time.
+"""
+
+_OBJECT = """<?xml version="1.0" encoding="utf-8"?>
+<TcPlcObject Version="1.1.0.1">
+  <{kind} Name="{name}" Id="{{{guid}}}"{special}>
+    <Declaration><![CDATA[{declaration}
+]]></Declaration>{implementation}
+  </{kind}>
+</TcPlcObject>
+"""
+
+
+def write_package(compensator: Compensator, name: str, facts: Facts, dialect: Dialect = "codesys") -> dict[str, bytes]:
+    """Return all files by their names.
+
+    Parameters
+    ----------
+    compensator : Compensator
+        Made by `Compensator.of`.
+    name : str
+    facts : Facts
+    dialect : {'codesys', 'twincat', 'scl'}
+
+    Raises
+    ------
+    InputError
+        A model has no formula, or the models do not go together.
+    """
+    return write_blocks(compensator, name, facts, dialect)
+
+
+def write_blocks(
+    compensator: Compensator,
+    name: str,
+    facts: Facts,
+    dialect: Dialect,
+    more: Sequence[Unit] = (),
+    about: str = "",
+) -> dict[str, bytes]:
+    """Return all files of a compensator, and of more blocks for a controller.
+
+    Parameters
+    ----------
+    compensator : Compensator
+        Made by `Compensator.of`.
+    name : str
+    facts : Facts
+    dialect : {'codesys', 'twincat', 'scl'}
+    more : sequence of Unit
+        Beside the compensator.
+    about : str
+        What the page says of them.
+
+    Raises
+    ------
+    InputError
+        A model has no formula, or the models do not go together.
+    """
+    tables, said, name = gather(compensator), facts.lines(compensator), identifier(name)
+    readings = make_readings(tables)
+    answers = replay(compensator, tables, readings)
+    units = [*translate(tables, name, dialect), *more]
+    tests = write_test(tables, name, dialect, readings, answers)
+    head = "".join(f"(* {comment(line)} *)\n" for line in said)
+    page = _README.format(
+        facts="  \n".join(said),
+        name=name,
+        dialect={"codesys": "CODESYS", "twincat": "TwinCAT 3", "scl": "Siemens SCL"}[dialect],
+        install=_INSTALL[dialect].format(name=name, kilobytes=_kilobytes(tables)),
+        about=f"{about.lstrip()}\n" if about else "",
+        calls=len(readings.age),
+        tolerance=allow(tables),
+        **describe(compensator, tables),
+    )
+    if dialect == "twincat":
+        files = dict(_object(unit, head) for unit in [*units, *tests])
+    else:
+        suffix = "scl" if dialect == "scl" else "st"
+        files = {
+            f"{name}.{suffix}": _joined(units, head, dialect),
+            f"{name}_test.{suffix}": _joined(tests, head, dialect),
+        }
+    return {file: text.encode() for file, text in {**files, f"{name}.md": page}.items()}
+
+
+def _kilobytes(tables: Tables) -> int:
+    """Return about how much an instance takes, readings of the zero above all."""
+    sizes = tables.sizes
+    readings = sizes["MOST"] * (sizes["CHANNELS"] + sizes.get("WATCHED", 0) + 2)
+    return 10 + (8 * (readings + sizes.get("MEMORY", 0) * (sizes["SENSORS"] + 1) + sizes["POINTS"])) // 1000
+
+
+def _joined(units: Sequence[Unit], head: str, dialect: Dialect) -> str:
+    return "\n".join([head, *(unit.text(dialect) for unit in units)])
+
+
+def _object(unit: Unit, head: str) -> tuple[str, str]:
+    """Return name and text of a file of TwinCAT 3."""
+    body = f"\n    <Implementation><ST><![CDATA[{unit.statements}]]></ST></Implementation>" if unit.end else ""
+    kind = "POU" if unit.end else "DUT"
+    first, rest = unit.declaration.split("\n", 1)
+    text = _OBJECT.format(
+        kind=kind,
+        name=unit.name,
+        guid=uuid5(NAMESPACE_URL, f"thermocomp/{unit.name}"),
+        special=' SpecialFunc="None"' if unit.end else "",
+        declaration=f"{first}\n{head}{rest}",
+        implementation=body,
+    )
+    return f"{unit.name}.Tc{kind}", text

@@ -1,0 +1,185 @@
+"""IEC 61131-3: a compensator as a function block with its functions and types."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from thermocomp.export.block.layout import Kind
+from thermocomp.export.block.tables import Tables
+from thermocomp.export.st.ststatements import (
+    BAGS,
+    SCL,
+    TYPES,
+    Dialect,
+    array,
+    number,
+    quoted,
+    safe,
+    section,
+    size_of,
+    used_in,
+    wrapped,
+    write_functions,
+    write_type,
+)
+
+#: no number at all: a controller may stop at a NaN
+NOTHING = 1e31
+
+#: what a caller sees, and how many there are
+OUTPUTS: dict[str, str] = {
+    "correction": "TARGETS",
+    "slope": "TARGETS",
+    "status": "TARGETS",
+    "fault": "SENSORS",
+    "rejected": "",
+    "outside": "",
+}
+
+_BODY = """IF {restart} AND NOT {restarted} THEN
+    {start}({s});
+END_IF;
+{restarted} := {restart};
+FOR {k} := 0 TO {last} DO
+    {w}.value[{k}] := {value}[{k}];
+    IF NOT {good}[{k}] THEN
+        {w}.value[{k}] := {nothing};
+    END_IF;
+END_FOR;
+{w}.age := {age};
+{w}.{w_dt} := {elapsed};
+{step}({bags});
+"""
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A block or a type.
+
+    Parameters
+    ----------
+    name : str
+    declaration, statements : str
+        A type has no statements.
+    end : str
+        Last line of a block.
+    """
+
+    name: str
+    declaration: str
+    statements: str = ""
+    end: str = ""
+
+    def text(self, dialect: Dialect) -> str:
+        """Return all of it."""
+        if not self.end:
+            return self.declaration + "\n"
+        begin = ["BEGIN"] if dialect == "scl" else []
+        return "\n".join([self.declaration, *begin, self.statements.rstrip("\n"), self.end]) + "\n"
+
+
+def translate(tables: Tables, name: str, dialect: Dialect) -> list[Unit]:
+    """Return a compensator in structured text, each part behind those that it uses.
+
+    What it does with values is what `Compensator.step` does with a reading.
+
+    Parameters
+    ----------
+    tables : Tables
+        Of the compensator.
+    name : str
+        Of the function block, and before all other names.
+    dialect : {'codesys', 'twincat', 'scl'}
+
+    Raises
+    ------
+    InputError
+        A model is of a family that has no formula.
+    """
+    scl = dialect == "scl"
+    functions = write_functions(tables, name, dialect)
+    used = "\n".join(statements for _, statements in functions.values())
+    used += " ".join([*(f" s.{safe(n)}" for n in OUTPUTS), f"w.value w.age w.{safe('dt')} t.rate"])
+    if scl:
+        used = used.replace("#", "")
+    units = [Unit(f"{name}_{word}", write_type(tables, name, bag, used, dialect)) for bag, word in BAGS.items()]
+    units += [Unit(n, head, body, "END_FUNCTION") for n, (head, body) in functions.items()]
+    return [*units, _start(tables, name, used, scl), _block(tables, name, scl)]
+
+
+def _start(tables: Tables, name: str, used: str, scl: bool) -> Unit:
+    """Return the function that begins anew; the corrections in force stay, and move from there."""
+    mark = "#" if scl else ""
+    lines = []
+    for n, var in used_in("s", used).items():
+        if n in ("correction", "slope"):
+            continue
+        zero = number(0, var.kind)
+        if var.dims:
+            last = size_of(var, tables.sizes) - 1
+            lines += [f"FOR {mark}k := 0 TO {last} DO", f"    {mark}s.{safe(n)}[{mark}k] := {zero};", "END_FOR;"]
+        else:
+            lines.append(f"{mark}s.{safe(n)} := {zero};")
+    own = quoted(f"{name}_start", scl)
+    parts = [f"FUNCTION {own} : {'Void' if scl else 'BOOL'}", *(SCL if scl else [])]
+    parts += ["(* Begin anew: temperatures count from now on; corrections stay, and move from where they are. *)"]
+    parts += [section("VAR_IN_OUT", {"s": quoted(f"{name}_state", scl)})]
+    parts += [section("VAR_TEMP" if scl else "VAR", {"k": "DINT"})]
+    return Unit(f"{name}_start", "\n".join(parts), "\n".join(lines), "END_FUNCTION")
+
+
+def _block(tables: Tables, name: str, scl: bool) -> Unit:
+    """Return the function block."""
+    mark, n = "#" if scl else "", len(tables.channels)
+    outputs = {o: (tables.sizes[size] if size else 0) for o, size in OUTPUTS.items() if o != "fault" or tables.sensors}
+    kinds: Mapping[str, Kind] = {"correction": "real", "slope": "real"}
+    numbered = [f"{k}: {c.name} [{c.unit}]" for k, c in enumerate(tables.channels)]
+    parts = [f"FUNCTION_BLOCK {quoted(name, scl)}", *(SCL if scl else [])]
+    parts += [wrapped(f"(* Thermal compensation. value, by number: {comment('; '.join(numbered))} *)")]
+    parts += [wrapped(f"(* correction [um], by number: {comment(_listed(tables.targets))} *)")]
+    parts += [
+        section(
+            "VAR_INPUT",
+            {
+                "value": array("real", n),
+                "good": f"{array('bool', n)} := [{', '.join(['TRUE'] * n)}]",
+                "age": "LREAL",
+                "elapsed": "LREAL",
+                "restart": "BOOL",
+            },
+        ),
+        section(
+            "VAR_OUTPUT",
+            {o: array(kinds.get(o, "int"), size) if size else TYPES["int"] for o, size in outputs.items()},
+        ),
+        section("VAR", {**{bag: quoted(f"{name}_{word}", scl) for bag, word in BAGS.items()}, "restarted": "BOOL"}),
+        section("VAR_TEMP" if scl else "VAR", {"k": "DINT"}),
+    ]
+    names = ("s", "w", "k", "value", "good", "age", "elapsed", "restart", "restarted")
+    body = _BODY.format(
+        **{v: f"{mark}{v}" for v in names if v != "s"},
+        s=f"s := {mark}s",
+        start=quoted(f"{name}_start", scl),
+        step=quoted(f"{name}_step", scl),
+        w_dt=safe("dt"),
+        last=n - 1,
+        nothing=number(NOTHING),
+        bags=", ".join(f"{b} := {mark}{b}" for b in BAGS),
+    )
+    for o, size in outputs.items():
+        if size:
+            body += f"FOR {mark}k := 0 TO {size - 1} DO\n    {mark}{o}[{mark}k] := {mark}s.{safe(o)}[{mark}k];\n"
+            body += "END_FOR;\n"
+        else:
+            body += f"{mark}{o} := {mark}s.{safe(o)};\n"
+    return Unit(name, "\n".join(parts), body, "END_FUNCTION_BLOCK")
+
+
+def _listed(names: Sequence[str]) -> str:
+    return "; ".join(f"{k}: {n}" for k, n in enumerate(names))
+
+
+def comment(text: str) -> str:
+    """Return a text that ends no comment."""
+    for sign in ("*)", "(*", "]]>"):
+        text = text.replace(sign, " ".join(sign))
+    return " ".join(text.split())

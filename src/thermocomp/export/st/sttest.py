@@ -1,0 +1,129 @@
+"""A function block that runs the structured text of a compensator over its test vectors, a call per cycle."""
+
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from thermocomp.export.block.layout import Kind
+from thermocomp.export.block.tables import Tables
+from thermocomp.export.st.structuredtext import NOTHING, Unit
+from thermocomp.export.st.ststatements import SCL, Dialect, array, number, quoted, section, values, wrapped
+from thermocomp.export.vectors import Answers, Readings, find_tolerance
+
+#: difference that is allowed at least, as a share of a correction, or in um of one below 1 um
+_TOLERANCE = 1e-9
+
+_BODY = """IF NOT {_}done THEN
+    FOR {_}j := 0 TO {last} DO
+        {_}value[{_}j] := {_}v.given[{_}row * {width} + {_}j];
+        {_}good[{_}j] := {_}value[{_}j] < 1.0E+30;
+    END_FOR;
+    {_}tested(value := {_}value, good := {_}good, age := {_}v.given[{_}row * {width} + {inputs}],
+        elapsed := {_}v.given[{_}row * {width} + {inputs} + 1], restart := FALSE);
+    {_}off := (({_}tested.rejected = 0) <> {_}v.used[{_}row]);
+    FOR {_}j := 0 TO {last_target} DO
+        {_}want := {_}v.wanted[{_}row * {targets} + {_}j];
+        {_}size := ABS({_}want);
+        IF {_}size < 1.0 THEN
+            {_}size := 1.0;
+        END_IF;
+        {_}apart := ABS({_}tested.correction[{_}j] - {_}want) / {_}size;
+        IF {_}apart > {_}largest THEN
+            {_}largest := {_}apart;
+        END_IF;
+        IF NOT ({_}apart <= {tolerance}) OR ({_}tested.status[{_}j] <> {_}v.told[{_}row * {targets} + {_}j]) THEN
+            {_}off := TRUE;
+        END_IF;
+    END_FOR;
+{faults}    IF {_}off THEN
+        {_}wrong := {_}wrong + 1;
+    END_IF;
+    {_}row := {_}row + 1;
+    {_}done := {_}row >= {calls};
+END_IF;
+"""
+
+_FAULTS = """    FOR {_}j := 0 TO {last_sensor} DO
+        IF {_}tested.fault[{_}j] <> {_}v.found[{_}row * {sensors} + {_}j] THEN
+            {_}off := TRUE;
+        END_IF;
+    END_FOR;
+"""
+
+
+def write_test(tables: Tables, name: str, dialect: Dialect, readings: Readings, answers: Answers) -> list[Unit]:
+    """Return the type that holds the vectors, and the block that runs them.
+
+    Parameters
+    ----------
+    tables : Tables
+    name : str
+        Of the function block that is tested.
+    dialect : {'codesys', 'twincat', 'scl'}
+    readings : Readings
+    answers : Answers
+        Of the compensator.
+    """
+    scl, inputs, calls = dialect == "scl", len(tables.channels), len(readings.age)
+    targets, sensors = len(tables.targets), len(tables.sensors)
+    mark = "#" if scl else ""
+    held: dict[str, tuple[Kind, Sequence[float]]] = {
+        "given": ("real", _finite(np.column_stack([readings.values, readings.age, readings.dt]).ravel())),
+        "wanted": ("real", answers.correction.ravel().tolist()),
+        "told": ("int", answers.status.ravel().tolist()),
+        "used": ("bool", answers.passed.tolist()),
+    }
+    if sensors:
+        held["found"] = ("int", answers.fault.ravel().tolist())
+    lines = [
+        f"TYPE {quoted(f'{name}_vectors', scl)}{'' if scl else ' :'}",
+        *(SCL if scl else []),
+        "STRUCT",
+    ]
+    lines += [wrapped(f"    {n} : {array(k, len(v))} := {values(v, k)};") for n, (k, v) in held.items()]
+    vectors = Unit(f"{name}_vectors", "\n".join([*lines, f"END_STRUCT{';' if scl else ''}", "END_TYPE"]))
+    parts = [
+        f"FUNCTION_BLOCK {quoted(f'{name}_test', scl)}",
+        *(SCL if scl else []),
+        f"(* Runs {name} over its test vectors, one in each cycle: done after {calls}; wrong has to be 0 then. *)",
+        section("VAR_OUTPUT", {"row": "DINT", "wrong": "DINT", "largest": "LREAL", "done": "BOOL"}),
+        section(
+            "VAR",
+            {
+                "tested": quoted(name, scl),
+                "v": quoted(f"{name}_vectors", scl),
+                "value": array("real", inputs),
+                "good": array("bool", inputs),
+                "j": "DINT",
+                "want": "LREAL",
+                "size": "LREAL",
+                "apart": "LREAL",
+                "off": "BOOL",
+            },
+        ),
+    ]
+    sizes = {
+        "_": mark,
+        "inputs": inputs,
+        "width": inputs + 2,
+        "last": inputs - 1,
+        "targets": targets,
+        "last_target": targets - 1,
+        "calls": calls,
+        "tolerance": number(allow(tables)),
+        "sensors": sensors,
+        "last_sensor": sensors - 1,
+    }
+    body = _BODY.format(**sizes, faults=_FAULTS.format(**sizes) if sensors else "")
+    return [vectors, Unit(f"{name}_test", "\n".join(parts), body, "END_FUNCTION_BLOCK")]
+
+
+def allow(tables: Tables) -> float:
+    """Return the difference that is allowed, as a share of a correction, or in um of one below 1 um."""
+    return max(_TOLERANCE, find_tolerance(tables))
+
+
+def _finite(given: Iterable[float]) -> list[float]:
+    """Return numbers as a controller can hold them."""
+    return [float(v) if math.isfinite(v) else NOTHING for v in given]

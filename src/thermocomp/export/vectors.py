@@ -1,0 +1,221 @@
+"""Test vectors: readings, faults among them, and what the compensator itself makes of each."""
+
+import math
+from collections.abc import Callable
+from dataclasses import fields, is_dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.autoregressive import Autoregressive, find_largest_root
+from thermocomp.core.band import Band
+from thermocomp.core.bounds import GAP
+from thermocomp.core.provenance import HonestError, Provenance
+from thermocomp.core.reading import Reading
+from thermocomp.core.validity import Validity
+from thermocomp.core.zero import Zeroing
+from thermocomp.export.block.tables import Tables
+from thermocomp.export.warming import Warming
+from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.state import CompensatorState
+from thermocomp.runtime.watch import RETURN, WORDS
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+#: words of `thermocomp.runtime.state.Status`, as the block counts them
+STATUS = ("restarting", "active", "holding", "fading", "shadow")
+
+
+class Readings(NamedTuple):
+    """What a block is called with."""
+
+    values: FloatArray  #: (n_calls, n_channels), in the order of `Tables.channels`
+    age: FloatArray  #: (n_calls,), of the values [s]
+    dt: FloatArray  #: (n_calls,), since the call before [s]
+
+
+class Answers(NamedTuple):
+    """What it says."""
+
+    correction: FloatArray  #: (n_calls, n_targets), at the reference position [um]
+    slope: FloatArray  #: (n_calls, n_targets) [um/m]
+    status: IntArray  #: (n_calls, n_targets), by `STATUS`
+    deviation: FloatArray  #: (n_calls, n_models)
+    fault: IntArray  #: (n_calls, n_sensors), by `thermocomp.runtime.watch.WORDS`
+    passed: NDArray[np.bool_]  #: (n_calls,), the reading was used
+
+
+def replay(
+    compensator: Compensator,
+    tables: Tables,
+    readings: Readings,
+    start: CompensatorState | None = None,
+    *,
+    rounded: Callable[[FloatArray], FloatArray] | None = None,
+) -> Answers:
+    """Return what a compensator says of readings, from its start.
+
+    Parameters
+    ----------
+    compensator : Compensator
+    tables : Tables
+        Of it.
+    readings : Readings
+    start : CompensatorState, optional
+        Another one than that of `Compensator.start`.
+    rounded : callable, optional
+        What becomes of all numbers that are kept between two calls.
+    """
+    names, targets = [c.name for c in tables.channels], tables.targets
+    state, clock, begun, rows = start or compensator.start(), 0.0, False, []
+    for values, age, dt in zip(*(a.tolist() for a in readings), strict=True):
+        good = 0.0 <= dt <= GAP
+        clock, begun = clock + dt if good and begun else clock, begun or good
+        tick = clock if good else math.nan  # a clock that says nothing moves nothing
+        state, said = compensator.step(state, Reading(tick - age, dict(zip(names, values, strict=True))), tick)
+        if rounded is not None:
+            corrections = {t: round_all(c, rounded) for t, c in state.corrections.items()}
+            state = state._replace(models=round_all(state.models, rounded), corrections=corrections)
+        rows.append(
+            (
+                [said.corrections[t].offset for t in targets],
+                [said.corrections[t].slope for t in targets],
+                [STATUS.index(said.states[t].word) for t in targets],
+                [float(s.deviation) for s in state.models],
+                [WORDS.index(said.failed.get(s, WORDS[0])) for s in tables.sensors],
+                not said.rejected,
+            )
+        )
+
+    def table(k: int) -> FloatArray:
+        return np.array([r[k] for r in rows], dtype=np.float64).reshape(len(rows), -1)
+
+    passed = np.array([r[5] for r in rows], dtype=np.bool_)
+    return Answers(table(0), table(1), table(2).astype(int), table(3), table(4).astype(int), passed)
+
+
+#: of a model, what is in no code: how it was judged decides what it may do, and must not be rounded
+_UNWRITTEN = (Band, HonestError, Provenance, Validity, Zeroing)
+
+
+def round_all(value: Any, rounded: Callable[[FloatArray], FloatArray]) -> Any:
+    """Return a value in which all numbers that a code holds are rounded, unless whole; a row of them at once."""
+    if isinstance(value, float):
+        return float(rounded(np.array(value)))
+    if isinstance(value, np.ndarray) and value.dtype == np.float64:
+        return rounded(value)
+    if type(value) is tuple and value and all(isinstance(v, float) for v in value):
+        return tuple(rounded(np.array(value)).tolist())
+    if isinstance(value, tuple):
+        parts = [round_all(v, rounded) for v in value]
+        return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
+    if is_dataclass(value) and not isinstance(value, (type, *_UNWRITTEN)):
+        return replace(value, **{f.name: round_all(getattr(value, f.name), rounded) for f in fields(value)})
+    return value
+
+
+def find_tolerance(tables: Tables) -> float:
+    """Return how far another code of double precision may be off: what feeds itself makes more of rounding.
+
+    Parameters
+    ----------
+    tables : Tables
+        Of the compensator.
+
+    Returns
+    -------
+    float
+        As a share of a correction, or in um of one below 1 um.
+    """
+    # what the last digit makes of a sum that decays, and of many ticks at once
+    slow = [(1.0 - sum(m.a)) * (1.0 - find_largest_root(m.a)) for m in tables.models if isinstance(m, Autoregressive)]
+    most = 10.0 * float(np.finfo(np.float64).eps) / min(slow, default=1.0)
+    return max(most, 1e-11 if tables.sizes["CLOCKS"] else 1e-12)
+
+
+def make_readings(tables: Tables) -> Readings:
+    """Return readings that take a compensator through all that it does.
+
+    A start at rest and a warm-up at changing speeds; each value missing, wild or impossible for a while; readings that
+    are late, old or out of order; a source that falls silent until corrections have gone to zero, and a return; sensors
+    that stick, jump and drift one after the other; values beyond the trained range.
+
+    Parameters
+    ----------
+    tables : Tables
+    """
+    machine = Warming(tables)
+    age, hold, fade = (tables.values[n] for n in ("reading_age", "hold", "fade"))
+    rng = np.random.default_rng(0)
+    rows: list[tuple[FloatArray, float, float]] = []
+
+    def add(values: FloatArray, dt: float, old: float = 0.0) -> None:
+        noise = np.where(machine.heat, 0.002 * rng.standard_normal(len(values)), 0.0)
+        rows.append((np.round(values + noise, 4), old, dt))
+
+    for _ in range(45):
+        add(machine.run(0.0, 10.0), 10.0, 0.5)
+    for k in range(120):
+        dt = 60.0 if k % 3 else 12.0
+        add(machine.run(_share(k), dt), dt, 0.25)
+    for c in range(len(machine.rest)):
+        for wild in (math.nan, math.inf, -127.0, 85.0, 1e9):
+            values = machine.run(0.8, 15.0)
+            values[c] = wild
+            add(values, 15.0)
+        for _ in range(4):  # until it is believed again
+            add(machine.run(0.8, RETURN / 3), RETURN / 3)
+    _turn(machine, add, 30)
+    warm = machine.run(0.8, 10.0)
+    for old in (age + 1.0, -2.0, 30.0, 5.0, math.nan):
+        add(warm, 10.0, old)
+    for dt in (math.nan, -1.0, 0.0):
+        add(warm, dt)
+    # silence: just before and just behind the end of the hold, then until all has faded
+    held = math.ceil(min(max(hold / age, 1.0), 200.0))
+    waits = [0.998 * hold / held] * held + [0.004 * hold] + [age] * math.ceil(min(3.0 * fade / age, 200.0))
+    for dt in waits:
+        rows.append((rows[-1][0], rows[-1][1] + dt + age, dt))
+        machine.run(0.0, dt)
+    for share, dt in _THERE_AND_BACK:
+        add(machine.run(share, dt), dt)
+    _fail(tables, machine, add)
+    for k in range(24):
+        add(machine.run(0.5, 20.0) + 1.3 * (machine.high - machine.low) * math.sin(k / 4), 20.0)
+    add(machine.rest, 1e6)
+    _turn(machine, add, 20)
+    values, ages, steps = (np.array([r[k] for r in rows], dtype=np.float64) for k in range(3))
+    return Readings(values, ages, steps)
+
+
+#: as fast as a correction may
+_THERE_AND_BACK = [(1.0, 7.0)] * 8 + [(1.0, 600.0)] * 8 + [(0.0, 4 * 3600.0)] + [(0.0, 7.0)] * 8
+
+
+def _share(k: int) -> float:
+    """Return the share of top speed in a step of a test."""
+    return (0.0, 1.0, 0.4, 0.8)[k // 10 % 4]
+
+
+def _turn(machine: Warming, add: Callable[[FloatArray, float], None], minutes: int) -> None:
+    for k in range(minutes):
+        add(machine.run(_share(k), 60.0), 60.0)
+
+
+def _fail(tables: Tables, machine: Warming, add: Callable[[FloatArray, float], None]) -> None:
+    """Let sensors fail while the machine warms up: first one that may be lost, then others."""
+    sensors = np.array(tables.values["sensor_channel"] if tables.sensors else np.flatnonzero(machine.heat))
+    if not len(sensors):
+        return
+    may = np.all(tables.values["may_lose"], axis=0) if tables.sensors else np.zeros(len(sensors), np.bool_)
+    moves = (machine.high - machine.low)[sensors]
+    stuck, stepped, drifting = (int(sensors[k]) for k in np.resize(np.lexsort((-moves, ~may)), 3))
+    before = machine.run(0.0, 60.0)[stuck]
+    for k in range(60):
+        values = machine.run(_share(k + 10), 60.0)
+        values[stuck] = before
+        values[stepped] += 6.0 * (k >= 25)
+        values[drifting] += 0.3 * max(k - 40, 0)
+        add(values, 60.0)

@@ -1,0 +1,339 @@
+"""The sensor budget: what each further sensor buys on thermal cycles that were not seen, for all targets at once."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import FitError, InputError
+from thermocomp.judging.choice import Progress
+from thermocomp.judging.diagnostics import collinearity
+from thermocomp.judging.metrics import rms
+from thermocomp.judging.pieces import work_through
+from thermocomp.judging.replay import replay_compensated
+from thermocomp.judging.sensorsets import PERCENT, choose_sets, weigh_targets
+from thermocomp.judging.splits import Judging, Split
+from thermocomp.models.methods import expand
+from thermocomp.models.selection.standins import Answer, SensorSets
+from thermocomp.models.training import train
+from thermocomp.recordings.samples import Samples
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+#: more sensors have to gain so much to be worth their cables [um, urad] ...
+WORTH = 0.5
+#: ... or this share of the error without compensation, where that is less, or targets have different units
+SHARE = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Budget:
+    """Error on unseen blocks against the number of temperature sensors, which are the same for all targets.
+
+    Parameters
+    ----------
+    targets : tuple of str
+    unit : str
+        What they are counted in together, see `thermocomp.judging.sensorsets.weigh_targets`.
+    scales : ndarray of shape (n_targets,)
+        One such unit, in that of each target.
+    candidates : tuple of str
+        The temperatures there are.
+    sensors : tuple of tuple of str
+        For 1, 2, ... sensors: the set chosen in all rows, each with all of the one before; at the end all temperatures.
+    models : tuple of str
+    blocks : tuple of str
+        Unseen blocks.
+    rms : ndarray of shape (n_models, n_sizes, n_targets, n_blocks)
+        Of the residual, sensors and model chosen without the block [unit of the target]; nan where it could not be
+        fitted.
+    none : ndarray of shape (n_targets, n_blocks)
+        RMS without compensation [unit of the target].
+    frequency : ndarray of shape (n_sizes, n_candidates)
+        Share of the blocks without which a sensor is among the best.
+    condition : ndarray of shape (n_sizes,)
+        Condition number of the correlation matrix of `sensors`.
+    answer : Answer
+        Of `averaged` with all temperatures and rows, for what can stand in for what; targets in `unit`.
+    failures : mapping of str to str
+        Why a model could not be judged somewhere, by model.
+    """
+
+    targets: tuple[str, ...]
+    unit: str
+    scales: FloatArray
+    candidates: tuple[str, ...]
+    sensors: tuple[tuple[str, ...], ...]
+    models: tuple[str, ...]
+    blocks: tuple[str, ...]
+    rms: FloatArray
+    none: FloatArray
+    frequency: FloatArray
+    condition: FloatArray
+    answer: Answer
+    failures: Mapping[str, str] = field(default_factory=dict)
+
+    def of_blocks(self) -> FloatArray:
+        """Return the RMS on each unseen block, mean over the targets, (n_models, n_sizes, n_blocks) [`unit`]."""
+        return np.asarray((self.rms / self.scales[:, None]).mean(axis=2))
+
+    def none_of_blocks(self) -> FloatArray:
+        """Return the RMS on each unseen block without compensation, mean over the targets, (n_blocks,) [`unit`]."""
+        return np.asarray((self.none / self.scales[:, None]).mean(axis=0))
+
+    def of_targets(self) -> FloatArray:
+        """Return the mean RMS over the unseen blocks, (n_models, n_sizes, n_targets) [unit of the target]."""
+        return np.asarray(self.rms.mean(axis=3))
+
+    def none_of_targets(self) -> FloatArray:
+        """Return the same without compensation, (n_targets,) [unit of the target]."""
+        return np.asarray(self.none.mean(axis=1))
+
+    def mean(self) -> FloatArray:
+        """Return what sets and models are compared by: mean over blocks and targets, (n_models, n_sizes) [`unit`]."""
+        return np.asarray(self.of_blocks().mean(axis=2))
+
+    def none_mean(self) -> float:
+        """Return the same without compensation [`unit`]."""
+        return float(self.none_of_blocks().mean())
+
+    def gains(self, model: str) -> tuple[FloatArray, FloatArray]:
+        """Return what the next sensor gains after each number but the last [`unit`].
+
+        Returns
+        -------
+        gain : ndarray of shape (n_sizes - 1,)
+            Mean over the unseen blocks.
+        of_blocks : ndarray of shape (n_sizes - 1, n_blocks)
+            On each.
+        """
+        found = -np.diff(self.of_blocks()[self.models.index(model)], axis=0)
+        return np.asarray(found.mean(axis=1)), found
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """Numbers of sensors."""
+        return tuple(len(s) for s in self.sensors)
+
+    def enough(self, model: str) -> int | None:
+        """Return the smallest number of sensors whose mean RMS over the blocks is within `margin` of the smallest one.
+
+        None if the model could not be fitted in one of the blocks, or no number is better than no compensation.
+        """
+        found = self._fewest([self.models.index(model)])
+        return None if found is None else self.sizes[found[1]]
+
+    def recommended(self) -> tuple[str, int] | None:
+        """Return the model, and the place in `sensors`, with the fewest sensors that are enough among all models.
+
+        What is not better than no compensation is not enough: in its mean over the blocks it gains less than a sensor
+        has to gain to be worth it, or no more than one standard error of that gain between the blocks.
+
+        Returns
+        -------
+        model : str
+        place : int
+            None if no model could be fitted in all blocks, or no set is better than no compensation.
+        """
+        found = self._fewest(range(len(self.models)))
+        return None if found is None else (self.models[found[0]], found[1])
+
+    def margin(self) -> tuple[float, float, float] | None:
+        """Return what the mean RMS over the blocks may be above the smallest one, and where that comes from [`unit`].
+
+        The larger of one standard error of the smallest between the blocks (Breiman 1984, Classification and Regression
+        Trees, section 3.4.3), and of `WORTH`, but of no more than `SHARE` of what there is without compensation.
+
+        Returns
+        -------
+        margin, standard_error, least : float
+            None if no model could be fitted in all blocks.
+        """
+        fitted = self._fitted(range(len(self.models)))
+        return self._margin(fitted) if fitted else None
+
+    def _fitted(self, models: Sequence[int]) -> list[int]:
+        return [m for m in models if np.isfinite(self.rms[m]).all()]
+
+    def _margin(self, models: Sequence[int]) -> tuple[float, float, float]:
+        errors = self.of_blocks()[models].reshape(-1, len(self.blocks))
+        error = float(_standard_error(errors[int(np.argmin(errors.mean(axis=1)))]))
+        share = SHARE * self.none_mean()
+        least = share if self.unit == PERCENT else min(WORTH, share)
+        return max(error, least), error, least
+
+    def _fewest(self, models: Sequence[int]) -> tuple[int, int] | None:
+        fitted = self._fitted(models)
+        if not fitted:
+            return None
+        mean, (margin, _, least) = self.mean()[fitted], self._margin(fitted)
+        gain = self.none_of_blocks() - self.of_blocks()[fitted]
+        better = gain.mean(axis=2) >= np.maximum(_standard_error(gain), least)
+        near = np.argwhere(better & (mean <= mean.min() + margin)).tolist()
+        _, _, m, k = min(((self.sizes[k], mean[m, k], m, k) for m, k in near), default=(0, 0.0, -1, -1))
+        return (fitted[m], k) if near else None
+
+
+def _standard_error(of_blocks: FloatArray) -> FloatArray:
+    """Return the standard error of the mean over the last axis; 0 with one block, of which none is known."""
+    n = of_blocks.shape[-1]
+    return np.asarray(of_blocks.std(axis=-1, ddof=1) / np.sqrt(n) if n > 1 else np.zeros(of_blocks.shape[:-1]))
+
+
+def budget(
+    samples: Samples,
+    judging: Judging,
+    models: Sequence[str],
+    *,
+    max_sensors: int = 6,
+    jobs: int = 1,
+    progress: Progress = lambda _, steps=1: None,  # noqa: ARG005
+) -> Budget:
+    """Judge one set of temperatures of each number on unseen blocks.
+
+    In each split the sets are chosen by the rows that may be learned from
+    (`thermocomp.models.selection.standins.reduce_sensors`), the same for all targets; every model is then trained on
+    these sensors, and on the spindle speed if it has a use for it. A block without a number of one of the targets is
+    left out.
+
+    Parameters
+    ----------
+    samples : Samples
+    judging : Judging
+    models : sequence of str
+        Methods that are trained on the chosen sensors.
+    max_sensors : int
+    jobs : int
+        Processes to share the work among; -1 takes all cores.
+    progress : callable
+        Called with a line of text after each piece of work; there are `n_pieces` of them.
+
+    Returns
+    -------
+    Budget
+
+    Raises
+    ------
+    InputError
+        `max_sensors` is below 1, or there is no temperature.
+    FitError
+        There is no block with numbers of all targets, or too few rows to choose sensors by.
+    """
+    names, targets = expand(models), samples.targets
+    temperatures = [c.name for c in samples.inputs if c.quantity == "temperature"]
+    if max_sensors < 1 or not temperatures:
+        raise InputError(f"a sensor budget of {max_sensors} among {len(temperatures)} temperatures: want at least 1")
+    numbers = np.array([judged_blocks(samples, t, judging) for t in range(len(targets))])
+    splits = [split for split, known in zip(judging.splits, numbers.T, strict=True) if known.all()]
+    if not splits:
+        called = ", ".join(c.name for c in targets)
+        raise FitError(f"no block to judge by has a number of each of {called}; choose for fewer targets at once")
+    samples = samples.only([c.name for c in samples.inputs if c.quantity in ("temperature", "spindle_speed")])
+    chosen = []
+    learned = [samples.cycle >= 0, *(split.learn for split in splits)]
+    for sets in work_through(partial(choose_sets, samples, max_sensors), learned, _no_sets, jobs=jobs):
+        if isinstance(sets, str):
+            raise FitError(sets)
+        progress("sensors chosen")
+        chosen.append(sets)
+    sensors = [[tuple(temperatures[j] for j in places) for places in sets.sets] for sets in chosen]
+    pieces = [
+        (split, subset, name)
+        for split, subsets in zip(splits, sensors[1:], strict=True)
+        for name in names
+        for subset in subsets
+    ]
+    found = []
+    failures: dict[str, str] = {}
+    for piece, value in zip(pieces, work_through(partial(_unseen_rms, samples), pieces, _why, jobs=jobs), strict=True):
+        progress(f"{piece[2]} with {len(piece[1])} sensors: judged")
+        found.append(np.full(len(targets), np.nan) if isinstance(value, str) else value)
+        if isinstance(value, str):
+            failures.setdefault(piece[2], value)
+    unseen = np.reshape(found, (len(splits), len(names), len(sensors[0]), len(targets)))
+    judged = [[split.judge & np.isfinite(samples.deviations[:, t]) for split in splits] for t in range(len(targets))]
+    none = np.array(
+        [[rms(samples.deviations[r, t], np.zeros(r.sum())) for r in blocks] for t, blocks in enumerate(judged)]
+    )
+    unit, scales = weigh_targets(samples, np.any([split.judge for split in splits], axis=0))
+    if unit == PERCENT:  # of what is compared: the mean over the blocks
+        scales = np.where(none.any(axis=1), none.mean(axis=1) / 100, 1.0)
+    return Budget(
+        targets=tuple(c.name for c in targets),
+        unit=unit,
+        scales=scales,
+        candidates=tuple(temperatures),
+        sensors=tuple(sensors[0]),
+        models=tuple(names),
+        blocks=tuple(split.block for split in splits),
+        rms=np.moveaxis(unseen, 0, -1),
+        none=none,
+        frequency=np.mean([[[n in s for n in temperatures] for s in subsets] for subsets in sensors[1:]], axis=0),
+        condition=_conditions(samples, sensors[0]),
+        answer=chosen[0].answer,
+        failures=failures,
+    )
+
+
+def judged_blocks(samples: Samples, target: int, judging: Judging) -> BoolArray:
+    """Return the blocks in which a target has a number to judge by, (n_splits,).
+
+    Raises
+    ------
+    FitError
+        There is none.
+    """
+    found = np.array([np.isfinite(samples.deviations[split.judge, target]).any() for split in judging.splits])
+    if not found.any():
+        raise FitError(f"{samples.targets[target].name} has no number in any of the blocks to judge by")
+    return found
+
+
+def n_pieces(samples: Samples, judging: Judging, models: Sequence[str], max_sensors: int) -> int:
+    """Return the number of pieces of work of `budget`, at most.
+
+    Parameters
+    ----------
+    samples : Samples
+    judging : Judging
+    models : sequence of str
+    max_sensors : int
+
+    Returns
+    -------
+    int
+    """
+    temperatures, blocks = sum(c.quantity == "temperature" for c in samples.inputs), len(judging.splits)
+    return 1 + blocks + blocks * len(expand(models)) * min(max_sensors + 1, temperatures)
+
+
+def _conditions(samples: Samples, sets: Sequence[Sequence[str]]) -> FloatArray:
+    """Return the condition number of each set of temperatures."""
+    values, columns = samples.change()[samples.valid], [c.name for c in samples.inputs]
+    return np.array(
+        [collinearity(values[:, [columns.index(s) for s in names]], tuple(names)).condition_number for names in sets]
+    )
+
+
+def _unseen_rms(samples: Samples, piece: tuple[Split, Sequence[str], str]) -> FloatArray | str:
+    """Return what a model leaves of each target, (n_targets,)."""
+    split, sensors, name = piece
+    speeds = [c.name for c in samples.inputs if c.quantity == "spindle_speed"]
+    reduced = samples.only([*sensors, *speeds])
+    left = []
+    for target in range(len(samples.targets)):
+        model = train(name, reduced, target, split.learn, joint=False).model
+        rows = split.judge & np.isfinite(samples.deviations[:, target])
+        left.append(rms(samples.deviations[rows, target], replay_compensated(model, reduced, rows).compensated))
+    return np.array(left)
+
+
+def _no_sets(_: BoolArray, why: str) -> SensorSets | str:
+    return why
+
+
+def _why(_: tuple[Split, Sequence[str], str], why: str) -> FloatArray | str:
+    return why

@@ -1,0 +1,75 @@
+"""What sensors are chosen from."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import FitError, InputError
+from thermocomp.judging.choice import Table
+from thermocomp.judging.diagnostics import diagnose
+from thermocomp.recordings.samples import Samples
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """The temperatures a selector may choose from, and what they shall predict.
+
+    Parameters
+    ----------
+    target : str
+    X : DataFrame of shape (n_rows, n_temperatures)
+        Temperatures minus their reference.
+    y : ndarray of shape (n_rows,)
+        Deviation [um].
+    cycle : ndarray of int of shape (n_rows,)
+    """
+
+    target: str
+    X: pd.DataFrame
+    y: FloatArray
+    cycle: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, samples: Samples, target: int) -> "Candidates":
+        """Take the temperatures and one target of the complete rows."""
+        temperatures = [j for j, c in enumerate(samples.inputs) if c.quantity == "temperature"]
+        name = samples.targets[target].name
+        if not temperatures:
+            raise InputError(f"{name}: there is no temperature to choose from")
+        rows = samples.valid & np.isfinite(samples.deviations[:, target])
+        if rows.sum() < 3:
+            raise FitError(f"{name}: {int(rows.sum())} complete rows to choose sensors by; at least 3 are needed")
+        if np.ptp(samples.deviations[rows, target]) == 0:
+            raise FitError(f"{name} does not move: there is nothing to choose sensors by")
+        X = samples.frame().iloc[rows, temperatures].reset_index(drop=True)
+        if not (np.ptp(X.to_numpy(), axis=0) > 0).any():
+            raise FitError(f"{name}: no temperature changes: there is nothing to choose from")
+        return cls(name, X, samples.deviations[rows, target], samples.cycle[rows])
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the temperatures."""
+        return [str(n) for n in self.X.columns]
+
+    def called(self, columns: Sequence[int]) -> tuple[str, ...]:
+        """Return the names of some of them."""
+        return tuple(self.names[j] for j in columns)
+
+    def repeats(self, sensors: Sequence[str]) -> Table:
+        """Return how far some of the sensors repeat each other."""
+        values = self.X[list(sensors)].to_numpy()
+        found = diagnose(values, self.y, tuple(sensors))
+        raw = found.spectrum
+        rows = tuple(zip(found.names, found.contributions, found.vif, strict=True))
+        caption = (
+            f"X'X of their changes: smallest eigenvalue {raw.smallest:.3g}, sum of inverse eigenvalues "
+            f"{raw.sum_inverse:.3g}, condition number {raw.condition_number:.3g}. A variance inflation factor (VIF) "
+            "above 10 means that the others say almost the same."
+        )
+        title = "How far the chosen sensors repeat each other"
+        return Table(title, ("sensor", "correlation with the error", "VIF"), rows, None, caption)

@@ -1,0 +1,331 @@
+"""Compare methods on unseen blocks: train, replay, judge."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.correction import Limits
+from thermocomp.core.inputs import Support
+from thermocomp.judging import do_no_harm
+from thermocomp.judging.diagnostics import Collinearity, collinearity
+from thermocomp.judging.guards import Guard, find_guard
+from thermocomp.judging.judge import cap_alike_units, drop_unreadable, judge, refuse_method
+from thermocomp.judging.leaks import refuse_leaks
+from thermocomp.judging.pieces import work_through
+from thermocomp.judging.recommend import Inner, Recommendation, correct_verdicts, inner_splits, recommend, score
+from thermocomp.judging.refit import refit_accepted
+from thermocomp.judging.results import Assessment, Comparison, Rules
+from thermocomp.judging.robustness import pool_robustness
+from thermocomp.judging.splits import MIN_ROWS, Judging, Split, join_short_cycles
+from thermocomp.models.methods import deployable, expand
+from thermocomp.models.numerics.leastsquares import effective_sample_size
+from thermocomp.models.training import train
+from thermocomp.recordings.samples import Samples
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.intp]
+
+#: name of the block that holds all unseen cycles together
+ALL = "all unseen cycles"
+
+
+def compare(
+    samples: Samples,
+    methods: Sequence[Any],
+    judging: Judging,
+    *,
+    rules: Rules = Rules(),
+    support: Support = Support(),
+    robustness: bool = True,
+    refit: bool = True,
+    limits: Limits | None = Limits(),
+    watched: Sequence[str] | None = None,
+    jobs: int = 1,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Comparison:
+    """Train every method for every target and judge it on what it has not seen.
+
+    Stopped by the keyboard, it returns the methods that were judged on all blocks, and how many were not.
+
+    Parameters
+    ----------
+    samples : Samples
+    methods : sequence of str or estimator
+        ``all`` stands for all of them; see `thermocomp.models.methods.expand`.
+    judging : Judging
+        What is learned from and what is judged.
+    rules : Rules
+        What is stated before judging.
+    support : Support
+        What the models do outside their trained range.
+    robustness : bool
+        Also replay with noise and lost sensors.
+    refit : bool
+        With `robustness`: also try what is accepted as it would be written, fitted to all rows.
+    limits : Limits or None
+        Of the compensator that is judged; None: the models alone are judged, as they are compared in papers, and
+        nothing watches over their sensors.
+    watched : sequence of str, optional
+        Inputs that a watch is made of; all if not given.
+    jobs : int
+        Processes to share the work among; -1 takes all cores.
+    progress : callable
+        Called with a line of text after each piece of work; there are `n_pieces` of them.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    InputError
+        A method is unknown, or the primary one is not among them.
+        Rows stand in the samples twice and would be learned from and judged on at once.
+    """
+    refuse_leaks(samples, judging)
+    names = expand(methods)
+    rules.check(names)
+    by_target = [drop_unreadable(samples, k, judging) for k in range(len(samples.targets))]
+    pieces = [(k, name, split) for k, own in enumerate(by_target) for name in names for split in own.splits]
+    done: list[Assessment] = []
+    guards = _guards(samples, by_target, watched, jobs) if robustness and limits is not None else {}
+    work = partial(_assess_method, samples, rules, support, robustness, limits, guards)
+    scores: dict[int, dict[str, list[list[float]]]] = {}
+    inners = [_inners(names, own, rules) for own in by_target]
+    try:
+        for a in work_through(work, pieces, partial(_refused, samples), jobs=jobs):
+            progress(f"{a.target} {a.model} {a.block}")
+            done.append(a)
+        scores = _scores(samples, names, by_target, inners, jobs, progress)
+    except KeyboardInterrupt:
+        if len(done) < len(by_target[0].splits):
+            raise
+    capped = cap_alike_units(samples, judging)
+    found: list[Assessment] = []
+    recommended: list[Recommendation] = []
+    finished = 0
+    for k, target in enumerate(samples.targets):
+        parts = [(name, a) for (of, name, _), a in zip(pieces, done, strict=False) if of == k]
+        if not (mine := _complete(parts, len(by_target[k].splits))):
+            continue
+        finished += len(mine)
+        verdicts = {name: [a.verdict for a in p] for name, p in mine.items()}
+        best = recommend(target.name, list(scores[k]), verdicts, scores[k], inners[k]) if k in scores else None
+        recommended += [best] if best else []
+        found += _concluded(mine, verdicts, rules, best, capped)
+    if robustness and refit:
+        found = refit_accepted(found, samples, support, watch=limits is not None, jobs=jobs)
+    return Comparison(
+        judging,
+        tuple(found),
+        _heat(samples),
+        left=len(names) * len(by_target) - finished,
+        recommended=tuple(recommended),
+        starts=tuple(zip(samples.test_names, samples.starts, strict=False)),
+    )
+
+
+def _guards(
+    samples: Samples, by_target: Sequence[Judging], watched: Sequence[str] | None, jobs: int
+) -> dict[str, Guard | None]:
+    """Return what a watch lets through in each block, made of what may be learned from there."""
+    splits = {split.name: split for own in by_target for split in own.splits}
+    known = samples if watched is None else samples.only(watched)
+    found = work_through(partial(_guard, known), list(splits.values()), _unwatched, jobs=jobs)
+    names = [c.name for c in samples.inputs]
+    place = [names.index(c.name) for c in known.inputs]
+    return {name: g and g.among(place) for name, g in zip(splits, found, strict=True)}
+
+
+def _guard(samples: Samples, split: Split) -> Guard | None:
+    return find_guard(samples, split.learn, split.judge)
+
+
+def _unwatched(_split: Split, _why: str) -> None:
+    return None
+
+
+def _complete(parts: Iterable[tuple[str, Assessment]], blocks: int) -> dict[str, list[Assessment]]:
+    """Return the assessments by model; a method that was judged on some of the blocks only is left out."""
+    found: dict[str, list[Assessment]] = {}
+    for name, a in parts:
+        found.setdefault(name, []).append(a)
+    return {p[0].model: p for p in found.values() if len(p) == blocks}
+
+
+def _concluded(
+    parts: dict[str, list[Assessment]],
+    verdicts: dict[str, list[do_no_harm.Verdict]],
+    rules: Rules,
+    best: Recommendation | None,
+    caps: tuple[str, ...],
+) -> list[Assessment]:
+    """Return what was found for one target: each method in each block, and over all of them with its verdict."""
+    whole = {name: do_no_harm.join_verdicts(v, caps=caps) for name, v in verdicts.items()}
+    after = correct_verdicts(whole, rules.primary, best)
+    found = []
+    for name, p in parts.items():
+        found += p if len(p) > 1 else []
+        found.append(replace(_together(p), verdict=after[name]))
+    return found
+
+
+def _heat(samples: Samples) -> Collinearity:
+    """Return how far the temperatures repeat each other."""
+    temperatures = [j for j, c in enumerate(samples.inputs) if c.quantity == "temperature"]
+    values = samples.change()[samples.valid][:, temperatures]
+    return collinearity(values, tuple(samples.inputs[j].name for j in temperatures))
+
+
+def _inners(names: Sequence[str], judging: Judging, rules: Rules) -> list[Inner]:
+    """Return the training parts that a recommendation needs; none if there is nothing to choose."""
+    choices = sum(deployable(name) for name in names)
+    return inner_splits(judging) if choices > 1 and rules.primary is None else []
+
+
+def _scores(
+    samples: Samples,
+    names: Sequence[str],
+    by_target: Sequence[Judging],
+    inners: Sequence[Sequence[Inner]],
+    jobs: int,
+    progress: Callable[[str], None],
+) -> dict[int, dict[str, list[list[float]]]]:
+    """Return the inner scores per target and method that may be chosen."""
+    kept = [name for name in names if deployable(name)]
+    pieces = [(k, name, inner) for k, own in enumerate(inners) for name in kept for inner in own]
+    found: dict[int, dict[str, list[list[float]]]] = {
+        k: {name: [] for name in kept} for k, own in enumerate(inners) if own
+    }
+    results = work_through(partial(_score, samples, by_target), pieces, _no_score, jobs=jobs)
+    for (k, name, inner), values in zip(pieces, results, strict=True):
+        progress(f"{samples.targets[k].name} {name} without {inner.split.block}")
+        found[k][name].append(values)
+    return found
+
+
+def n_pieces(samples: Samples, methods: Sequence[Any], judging: Judging, rules: Rules = Rules()) -> int:
+    """Return the number of pieces of work of `compare`.
+
+    Parameters
+    ----------
+    samples, methods, judging, rules
+        Of `compare`.
+
+    Returns
+    -------
+    int
+    """
+    names = expand(methods)
+    by_target = [drop_unreadable(samples, k, judging) for k in range(len(samples.targets))]
+    choices = sum(deployable(name) for name in names)
+    return sum(len(names) * len(own.splits) + choices * len(_inners(names, own, rules)) for own in by_target)
+
+
+def split_by_cycle(whole: Assessment) -> list[Assessment]:
+    """Cut an assessment into its thermal cycles; what needs a replay of its own (robustness) stays with the whole."""
+    found = []
+    blocks = [b for b in join_short_cycles(whole.cycle, whole.test) if np.isin(whole.cycle, b).sum() >= MIN_ROWS]
+    for unit, block in zip(whole.verdict.units, blocks, strict=True):
+        rows = np.isin(whole.cycle, block)
+        measured, predicted = whole.measured[rows], whole.predicted[rows]
+        half_widths = None if whole.half_widths is None else whole.half_widths[rows]
+        found.append(
+            replace(
+                whole,
+                block=f"cycle {unit.name}",
+                measured=measured,
+                predicted=predicted,
+                alone=None if whole.alone is None else whole.alone[rows],
+                half_widths=half_widths,
+                band=whole.band if half_widths is not None and np.isfinite(half_widths).any() else "",
+                probed=whole.probed and whole.probed.take(rows),
+                row=whole.row[rows],
+                test=whole.test[rows],
+                cycle=whole.cycle[rows],
+                verdict=replace(whole.verdict, units=(unit,)),
+                n_effective=effective_sample_size(measured - predicted),
+                robustness=None,
+                overall=False,
+            )
+        )
+    return found
+
+
+def _assess_method(
+    samples: Samples,
+    rules: Rules,
+    support: Support,
+    robustness: bool,
+    limits: Limits | None,
+    guards: dict[str, Guard | None],
+    piece: tuple[int, str, Split],
+) -> Assessment:
+    target, name, split = piece
+    told = robustness or support.policy != "clip"
+    trained = train(name, samples, target, split.learn, support=support, joint=told)
+    first = int(np.argmax(split.judge))
+    return judge(
+        name,
+        trained.model,
+        samples,
+        split,
+        learned=samples.learned(target, split.learn & samples.valid, before=first),
+        rules=rules,
+        fit_s=trained.seconds,
+        robustness=robustness,
+        limits=limits,
+        guard=guards.get(split.name),
+    )
+
+
+def _refused(samples: Samples, piece: tuple[int, str, Split], why: str) -> Assessment:
+    """Return the assessment of a method that failed, in its fit or on what noise makes of its inputs."""
+    target, name, split = piece
+    return refuse_method(samples, name, target, split, why)
+
+
+def _score(samples: Samples, by_target: Sequence[Judging], piece: tuple[int, str, Inner]) -> list[float]:
+    target, name, inner = piece
+    return score(samples, name, target, by_target[target], inner)
+
+
+def _no_score(piece: tuple[int, str, Inner], _: str) -> list[float]:
+    return [np.inf] * len(piece[2].scores)
+
+
+def _together(parts: Sequence[Assessment]) -> Assessment:
+    if len(parts) == 1:
+        return replace(parts[0], overall=True)
+    first = parts[0]
+    failures = [a.failure for a in parts if a.failure]
+    return replace(
+        first,
+        block=ALL,
+        measured=np.concatenate([a.measured for a in parts]),
+        predicted=np.concatenate([a.predicted for a in parts]),
+        row=np.concatenate([a.row for a in parts]),
+        test=np.concatenate([a.test for a in parts]),
+        cycle=np.concatenate([a.cycle for a in parts]),
+        verdict=do_no_harm.join_verdicts([a.verdict for a in parts]),
+        sensors=tuple(dict.fromkeys(s for a in parts for s in a.sensors)),
+        n_sensors=(min(a.n_sensors[0] for a in parts), max(a.n_sensors[1] for a in parts)),
+        fit_s=sum(a.fit_s for a in parts),
+        n_effective=sum(a.n_effective for a in parts),
+        robustness=pool_robustness([(a.robustness, len(a.measured)) for a in parts]),
+        alone=np.concatenate([a.predicted if a.alone is None else a.alone for a in parts]),
+        rejected=sum(a.rejected for a in parts),
+        turned_away=next((a.turned_away for a in parts if a.turned_away), ""),
+        half_widths=np.concatenate(
+            [np.full(len(a.measured), np.nan) if a.half_widths is None else a.half_widths for a in parts]
+        ),
+        band="; ".join(dict.fromkeys(a.band for a in parts if a.band)),
+        frozen=None,
+        failure=failures[0] if failures else "",
+        overall=True,
+    )

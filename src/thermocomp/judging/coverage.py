@@ -1,0 +1,189 @@
+"""What the judged units covered, and how alike they are: for which conditions an honest error speaks.
+
+Alike: each unit's inputs (as recorded, so that the room counts) are averaged over `PLACES` parts of its time. The
+squared distance of two units is the mean square difference over these parts, summed over the inputs of a quantity and
+divided by their summed variance over all judged rows, averaged over the quantities; and the squared logarithm of the
+ratio of their durations. So a sensor counts as much as it moves: one that stands idle in its noise makes no two units
+different. Two units below `ALIKE` are alike: a copy of a unit, or the same program on the same kind of day, tells
+nothing new. Alike units count once (single linkage).
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.validity import Validity
+from thermocomp.judging.choice import Cell, Table
+from thermocomp.judging.splits import Judging
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.samples import Samples
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+#: distance below which two units are alike [standard deviations of the inputs]
+ALIKE = 0.1
+#: times at which two units are compared
+PLACES = 32
+#: speeds nearer than this share of the largest are one
+_SAME_SPEED = 0.02
+
+
+def find_validity(samples: Samples, judging: Judging, recordings: Sequence[Recording] = ()) -> Validity:
+    """Return what the units of a judgement covered.
+
+    Parameters
+    ----------
+    samples : Samples
+    judging : Judging
+        Its blocks are the units.
+    recordings : sequence of Recording
+        The tests of `samples`, in their order: for the surroundings.
+
+    Returns
+    -------
+    Validity
+    """
+    blocks = [rows for split in judging.splits if (rows := split.judge & samples.valid).any()]
+    judged = np.any(blocks, axis=0) if blocks else np.zeros(len(samples), dtype=np.bool_)
+    distances = unit_distances(samples, blocks)
+    temperatures = [j for j, c in enumerate(samples.inputs) if c.quantity == "temperature"]
+    starts = [float(samples.values[np.flatnonzero(rows)[0], temperatures].mean()) for rows in blocks if temperatures]
+    days = samples.days()[judged]
+    name, ambient = _ambient(samples, judged, recordings)
+    return Validity(
+        units=len(blocks),
+        independent=_groups(distances < ALIKE),
+        nearest=float(distances[np.triu_indices(len(blocks), 1)].min()) if len(blocks) > 1 else None,
+        speeds=_speeds(samples, judged, recordings),
+        ambient=ambient,
+        ambient_channel=name,
+        start=(min(starts), max(starts)) if starts else None,
+        days=int(np.unique(days[~np.isnat(days)]).size),
+        hours=float(np.where(np.isfinite(samples.dt()), samples.dt(), 0.0)[judged].sum() / 3600.0),
+    )
+
+
+def unit_distances(samples: Samples, blocks: Sequence[BoolArray]) -> FloatArray:
+    """Return the distance of every two units, (n_units, n_units); see the rule above.
+
+    Parameters
+    ----------
+    samples : Samples
+    blocks : sequence of ndarray of bool of shape (n_rows,)
+        Rows of each unit, in which every input is a number.
+
+    Returns
+    -------
+    ndarray of shape (n_units, n_units)
+    """
+    if not blocks:
+        return np.empty((0, 0))
+    judged = np.any(blocks, axis=0)
+    steps = np.where(np.isfinite(samples.dt()), samples.dt(), 0.0)
+    durations = np.log([max(float(steps[rows].sum()), 1e-9) for rows in blocks])
+    square = (durations[:, None] - durations[None]) ** 2
+    moving = []
+    for quantity in dict.fromkeys(c.quantity for c in samples.inputs):
+        own = [j for j, c in enumerate(samples.inputs) if c.quantity == quantity]
+        variance = float(samples.values[judged][:, own].var(axis=0).sum())
+        if variance > (1e-9 * np.abs(samples.values[judged][:, own]).max()) ** 2:
+            curves = np.array([_curve(samples.values[rows][:, own], steps[rows]) for rows in blocks])
+            apart = ((curves[:, None] - curves[None]) ** 2).mean(axis=2).sum(axis=-1)
+            moving.append(apart / variance)
+    return np.asarray(np.sqrt(square + np.mean(moving, axis=0)) if moving else np.sqrt(square))
+
+
+def _curve(values: FloatArray, steps: FloatArray) -> FloatArray:
+    """Return the means of a unit's inputs in `PLACES` parts of its time, (n_places, n_inputs)."""
+    time = np.cumsum(steps)
+    part = np.minimum((PLACES * time / max(time[-1], 1e-9)).astype(np.intp), PLACES - 1)
+    known, at = np.unique(part, return_inverse=True)
+    count = np.bincount(at)
+    means = np.stack([np.bincount(at, v) / count for v in values.T], axis=1)
+    return np.stack([np.interp(np.arange(PLACES), known, v) for v in means.T], axis=1)
+
+
+def _groups(alike: BoolArray) -> int:
+    """Return how many groups there are if whatever is alike belongs together."""
+    left, found = set(range(len(alike))), 0
+    while left:
+        found += 1
+        reached = [left.pop()]
+        while reached:
+            near = {k for k in left if alike[reached[-1], k]}
+            reached.pop()
+            left -= near
+            reached += sorted(near)
+    return found
+
+
+def _speeds(samples: Samples, judged: BoolArray, recordings: Sequence[Recording]) -> tuple[float, ...]:
+    columns = [j for j, c in enumerate(samples.inputs) if c.quantity == "spindle_speed"]
+    measured = [samples.values[judged][:, columns].ravel()]
+    for k, recording in enumerate(recordings):  # a model may do without the speed that it was judged at
+        if recording.speed is not None:
+            measured.append(recording.values([recording.speed])[samples.row[judged & (samples.test == k)], 0])
+    known = np.concatenate(measured)
+    values = np.unique(np.round(known[np.isfinite(known)], 1))
+    found: list[float] = []
+    for v in values.tolist():
+        if not found or v - found[-1] > _SAME_SPEED * float(np.abs(values).max()):
+            found.append(v)
+    return tuple(found)
+
+
+def _ambient(
+    samples: Samples, judged: BoolArray, recordings: Sequence[Recording]
+) -> tuple[str, tuple[float, float] | None]:
+    named, values = "", []
+    for k, recording in enumerate(recordings):
+        air = recording.ambient
+        if air is not None:
+            rows = samples.row[judged & (samples.test == k)]
+            values.append(recording.table[air.name].to_numpy(dtype=np.float64)[rows])
+            named = named or air.name
+    known = np.concatenate(values) if values else np.empty(0)
+    known = known[np.isfinite(known)]
+    return (named, (float(known.min()), float(known.max()))) if known.size else ("", None)
+
+
+def table(named: dict[str, Validity]) -> Table:
+    """Return what was covered as a short table: one column for each judgement.
+
+    Parameters
+    ----------
+    named : dict of str to Validity
+        What each is to be called; at least one.
+
+    Returns
+    -------
+    Table
+    """
+    columns = [_cells(v) for v in named.values()]
+    rows: list[tuple[Cell, ...]] = [(heading, *(c[heading] for c in columns)) for heading in columns[0]]
+    caption = f"Alike: inputs less than {ALIKE:g} of their spread apart all the way; copies count once."
+    return Table("What the judged units covered", ("", *named), tuple(rows), None, caption)
+
+
+def _cells(v: Validity) -> dict[str, str]:
+    days = f", {v.days} day{'s' if v.days > 1 else ''}" if v.days else ""
+    return {
+        "units judged": f"{v.units}, {v.independent} of them not alike" if v.units > 1 else f"{v.units}",
+        "most alike two": "" if v.nearest is None else f"{v.nearest:.2f} of the inputs' spread apart",
+        "hours, days": f"{v.hours:.1f} h{days}",
+        "spindle speeds [1/min]": _listed(v.speeds) or "not recorded",
+        "surroundings [degC]": f"{_range(v.ambient)} ({v.ambient_channel})" if v.ambient else "not named",
+        "mean temperature at the start [degC]": _range(v.start) if v.start else "",
+    }
+
+
+def _range(values: tuple[float, float]) -> str:
+    return f"{values[0]:.1f} to {values[1]:.1f}"
+
+
+def _listed(speeds: Sequence[float]) -> str:
+    if len(speeds) > 12:
+        return f"{speeds[0]:.0f} to {speeds[-1]:.0f}, {len(speeds)} of them"
+    return ", ".join(f"{v:.0f}" for v in speeds)

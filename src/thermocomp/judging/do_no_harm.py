@@ -1,0 +1,364 @@
+"""The do-no-harm gate: accepted, unproven or refused, by independent units.
+
+A unit is a thermal cycle or a file that the model has not seen: rows of a drift depend on each other, units do not. A
+model is better if the logarithm of its error over that of every baseline is below zero by a one-sided t-test over
+units; it is harmful if it does much worse than none in a single one. ``docs/decisions/0020-verdict.md`` says why.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from thermocomp.core.learned import Learned
+from thermocomp.judging.splits import MIN_ROWS
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+Word = Literal["accepted", "unproven", "refused"]
+
+#: units below which nothing is shown: two of them agree too easily
+MIN_UNITS = 3
+#: noise that a probe has at least [um]
+NO_NOISE = 1e-3
+#: of the one-sided test
+LEVEL = 0.05
+#: what a model is held against
+BASELINES = ("no compensation", "the learned mean", "the last learned value")
+#: a fourth one, where one stretch is judged: both are counted from its first rows, so many of them
+NAMES = (*BASELINES, "none, both re-zeroed where the block begins")
+REZERO_ROWS = 5
+#: harm that is let pass at most, unless the user states another [um], [urad]: 10 urad are 2 um at 200 mm
+MOST_MARGIN = {"um": 2.0, "urad": 10.0}
+#: a margin is so many times the probe's noise, and such a share of the largest drift learned
+TIMES_NOISE, SHARE = 3.0, 0.05
+#: caps what would be accepted where noise and lost sensors were left out
+UNTRIED = "noise and lost sensors were not tried: compare with robustness=True"
+#: a unit that moves by less than this share of the largest drift learned shows nothing
+MOVES = 0.1
+
+
+@dataclass(frozen=True)
+class JudgedUnit:
+    """What was found in one unseen cycle or file.
+
+    Parameters
+    ----------
+    name : str
+    rows : int
+    rms, largest : float
+        Of the residual [um].
+    baselines : tuple of float
+        RMS left by each of `BASELINES` [um].
+    none_largest : float
+        Largest deviation without compensation [um].
+    noise : float
+        Of the probe: smaller errors are taken as being of this size [um].
+    margin : float
+        Harm that is let pass [um].
+    moves : bool
+        The deviation changes enough to tell a model from a constant.
+    rezeroed : tuple of (float, float) or None
+        RMS with and without the model, both counted from where the unit begins [um].
+    """
+
+    name: str
+    rows: int
+    rms: float
+    largest: float
+    baselines: tuple[float, ...]
+    none_largest: float
+    noise: float
+    margin: float
+    moves: bool
+    rezeroed: tuple[float, float] | None = None
+
+    @property
+    def none_rms(self) -> float:
+        """RMS without compensation [um]."""
+        return self.baselines[0]
+
+    @property
+    def harm(self) -> float:
+        """By how much RMS or largest error are above those without compensation, whichever is more [um]."""
+        return max(self.rms - self.none_rms, self.largest - self.none_largest)
+
+    @property
+    def harmful(self) -> bool:
+        """True if that is more than the margin."""
+        return self.harm > self.margin
+
+    @property
+    def log_ratios(self) -> tuple[float, ...]:
+        """Logarithm of the error over that of each baseline; what lies below the noise counts as noise."""
+        least = max(self.noise, NO_NOISE)
+        pairs = [(self.rms, b) for b in self.baselines] + ([self.rezeroed] if self.rezeroed else [])
+        return tuple(float(np.log(max(model, least) / max(other, least))) for model, other in pairs)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The gate's decision over several units.
+
+    Parameters
+    ----------
+    units : tuple of JudgedUnit
+    unit : str
+        Of the deviations.
+    caps : tuple of str
+        What keeps the model from being accepted, whatever the figures say: one stretch, trouble in the data.
+    refusal : str
+        What refuses it, whatever the figures say: no sensor.
+    tried : int
+        Methods that were tried for this target.
+    p : float or None
+        Of the test, corrected for their number; that of the units if None.
+    about : str
+        Why it is not corrected for that number, if it is not.
+    names : tuple of str
+        Of the baselines.
+    stated : float or None
+        Harm that is let pass, as the user stated it before judging; None: by rule.
+    """
+
+    units: tuple[JudgedUnit, ...]
+    unit: str = "um"
+    caps: tuple[str, ...] = ()
+    refusal: str = ""
+    tried: int = 1
+    p: float | None = None
+    about: str = ""
+    names: tuple[str, ...] = NAMES
+    stated: float | None = None
+
+    @cached_property
+    def p_values(self) -> tuple[float, ...]:
+        """One-sided p-value beside each baseline; 1 with fewer than `MIN_UNITS` units."""
+        if len(self.units) < MIN_UNITS:
+            return (1.0,) * len(self.names)
+        ratios = np.array([u.log_ratios for u in self.units])
+        mean, error = ratios.mean(axis=0), stats.sem(ratios, axis=0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            t = np.where(error > 0, mean / error, np.sign(mean) * np.inf)
+        found = np.where(mean == 0, 1.0, stats.t.cdf(t, len(self.units) - 1))
+        return tuple(found.tolist())
+
+    @property
+    def worst(self) -> int:
+        """Index of the baseline that is hardest to beat."""
+        return int(np.argmax(self.p_values)) if len(self.units) >= MIN_UNITS else int(np.argmax(self._mean_ratios))
+
+    @property
+    def p_value(self) -> float:
+        """The p-value that decides."""
+        return self.p_values[self.worst] if self.p is None else self.p
+
+    @property
+    def _mean_ratios(self) -> FloatArray:
+        found: FloatArray = np.array([u.log_ratios for u in self.units]).mean(axis=0)
+        return found
+
+    @cached_property
+    def word(self) -> Word:
+        """Whether the model may run, may run in shadow only, or may not."""
+        if self.refusal or any(u.harmful for u in self.units):
+            return "refused"
+        if not self.units or not self._moving:
+            return "unproven"
+        if (self._mean_ratios >= 0).any():
+            return "refused"
+        enough = len(self.units) >= MIN_UNITS and self._moving >= MIN_UNITS - 1
+        return "accepted" if enough and not self.caps and self.p_value <= LEVEL else "unproven"
+
+    @property
+    def accepted(self) -> bool:
+        """True if the model may run."""
+        return self.word == "accepted"
+
+    @property
+    def _moving(self) -> int:
+        return sum(u.moves for u in self.units)
+
+    @property
+    def reason(self) -> str:
+        """Why, in one sentence, by the unit or baseline that decided."""
+        if self.refusal or not self.units:
+            return self.refusal or f"fewer than {MIN_ROWS} rows of any cycle to judge on"
+        stated = "" if self.stated is None else f"; the harm margin of {self.stated:g} {self.unit} was stated"
+        return self._by_units() + stated
+
+    def _by_units(self) -> str:
+        if any(u.harmful for u in self.units):
+            worst = max(self.units, key=lambda u: u.harm - u.margin)
+            return f"does harm in {worst.name}: {self._figures(worst)} (margin {worst.margin:.2g} {self.unit})"
+        if self._moving and (self._mean_ratios >= 0).any():
+            k = int(np.argmax(self._mean_ratios))
+            return f"no better than {self.names[k]}: {self._pooled(k)}"
+        return self._why_accepted() if self.accepted else self._why_unproven()
+
+    def _why_accepted(self) -> str:
+        least = max(self.units, key=lambda u: u.harm)
+        others = f"better than {self.names[self.worst]} and the other baselines"
+        return f"{others}, {self._tested()}; least in {least.name}: {self._figures(least)}"
+
+    def _why_unproven(self) -> str:
+        n, moving = len(self.units), self._moving
+        if not moving:
+            return f"the judged part does not move: {self._figures(self.units[0])} in {self.units[0].name}"
+        if self.caps:
+            return "; ".join(self.caps)
+        if n < MIN_UNITS:
+            return f"judged on {_count(n, 'unit')}, at least {MIN_UNITS} are needed"
+        if moving < MIN_UNITS - 1:
+            return f"only {moving} of {n} units move"
+        return f"not shown to be better than {self.names[self.worst]}: {self._pooled(self.worst)}, {self._tested()}"
+
+    def _tested(self) -> str:
+        tried = f", {self.tried} methods tried" if self.tried > 1 else ""
+        return f"p = {self.p_value:.2g} over {len(self.units)} units{tried}{', ' if self.about else ''}{self.about}"
+
+    @property
+    def told(self) -> str:
+        """Return the reason, and for what is unproven which test would decide it."""
+        return f"{self.reason}; {self.advice}" if self.advice else self.reason
+
+    @property
+    def advice(self) -> str:
+        """Which test would decide an unproven verdict; empty for the other words."""
+        if self.word != "unproven" or self.caps == (UNTRIED,):  # which says it itself
+            return ""
+        if any("not alike" in cap for cap in self.caps):
+            return "record cycles at other speeds or on other days"
+        if self.caps:
+            by_stretch = any("one stretch" in cap for cap in self.caps)
+            way = "by leave-one-cycle-out or leave-one-file-out" if by_stretch else "on recordings without that"
+            return f"judge it {way}"
+        n = len(self.units)
+        if n < MIN_UNITS:
+            return f"record {_count(MIN_UNITS - n, 'more thermal cycle')}, at other speeds or on other days"
+        if self._moving < MIN_UNITS - 1:
+            return "record cycles with a warm-up or a change of speed"
+        more = self._units_for(LEVEL if self.p is None else LEVEL / max(self.tried, 1))
+        return f"about {more} cycles or files in all would decide" if more else "many more cycles would be needed"
+
+    def _units_for(self, level: float) -> int | None:
+        """Return how many units of this kind would show it; None if there are over 50."""
+        ratios = np.array([u.log_ratios[self.worst] for u in self.units])
+        effect = -ratios.mean() / max(ratios.std(ddof=1), 1e-9)
+        for n in range(len(ratios) + 1, 51):
+            if stats.t.sf(effect * np.sqrt(n), n - 1) <= level / 2:  # half the level: they must not just touch it
+                return n
+        return None
+
+    def _figures(self, u: JudgedUnit) -> str:
+        text = f"RMS {u.rms:.2f} {self.unit}, {u.none_rms:.2f} {self.unit} without compensation"
+        if u.rms - u.none_rms < u.harm:
+            text += f", largest {u.largest:.2f} and {u.none_largest:.2f} {self.unit}"
+        return text
+
+    def _pooled(self, k: int) -> str:
+        pairs = [(u.rms, u.baselines[k]) if k < len(u.baselines) else u.rezeroed or (0, 0) for u in self.units]
+        mine, other = np.sqrt(np.mean(np.square(pairs), axis=0))
+        return f"RMS {mine:.2f} {self.unit} beside {other:.2f} {self.unit} over the units"
+
+
+def measure(
+    name: str,
+    measured: FloatArray,
+    predicted: FloatArray,
+    learned: Learned,
+    *,
+    unit: str = "um",
+    margin: float | None = None,
+    stretch: bool = False,
+) -> JudgedUnit:
+    """Measure one unit.
+
+    Parameters
+    ----------
+    name : str
+    measured, predicted : ndarray of shape (n_rows,)
+        Deviations of one unseen cycle or file [um].
+    learned : Learned
+        What the training part showed.
+    unit : str
+        Of the deviations.
+    margin : float, optional
+        Harm that is let pass [um], stated before judging; see `margin_of`.
+    stretch : bool
+        It goes on from what was learned: compare also with both re-zeroed where it begins.
+
+    Returns
+    -------
+    JudgedUnit
+    """
+    residual = measured - predicted
+    allowed = margin_of(learned, unit) if margin is None else margin
+    baselines = (0.0, learned.mean, learned.last)
+    span = float(np.ptp(measured)) - 4 * learned.noise  # what noise alone would span
+    return JudgedUnit(
+        name=name,
+        rows=len(measured),
+        rms=_rms(residual),
+        largest=float(np.abs(residual).max()),
+        baselines=tuple(_rms(measured - b) for b in baselines),
+        none_largest=float(np.abs(measured).max()),
+        noise=learned.noise,
+        margin=allowed,
+        moves=span > max(TIMES_NOISE * learned.noise, MOVES * learned.largest),
+        rezeroed=(_rms(residual - _start(residual)), _rms(measured - _start(measured))) if stretch else None,
+    )
+
+
+def join_verdicts(parts: Sequence[Verdict], about: str = "", caps: tuple[str, ...] = ()) -> Verdict:
+    """Return the verdict over the units of several: what refuses or caps one of them, refuses or caps the whole."""
+    return Verdict(
+        units=tuple(u for v in parts for u in v.units),
+        unit=parts[0].unit,
+        caps=tuple(dict.fromkeys([*caps, *(c for v in parts for c in v.caps)])),
+        refusal=next((v.refusal for v in parts if v.refusal), ""),
+        about=about,
+        stated=parts[0].stated,
+    )
+
+
+def margin_of(learned: Learned, unit: str = "um") -> float:
+    """Return the harm in a single unit that is let pass, unless the user states another [unit]."""
+    return min(max(TIMES_NOISE * learned.noise, SHARE * learned.largest), MOST_MARGIN.get(unit, np.inf))
+
+
+def holm(verdicts: Sequence[Verdict]) -> list[Verdict]:
+    """Correct the verdicts on several methods for their number (Holm 1979).
+
+    Parameters
+    ----------
+    verdicts : sequence of Verdict
+        Of every method that was tried for one target.
+
+    Returns
+    -------
+    list of Verdict
+        With their corrected p-values.
+    """
+    n = len(verdicts)
+    raw = np.array([v.p_values[v.worst] if v.units else 1.0 for v in verdicts])
+    order = np.argsort(raw, kind="stable")
+    corrected = np.empty(n)
+    corrected[order] = np.minimum(np.maximum.accumulate(raw[order] * (n - np.arange(n))), 1.0)
+    return [replace(v, p=float(p), tried=n) for v, p in zip(verdicts, corrected, strict=True)]
+
+
+def _start(x: FloatArray) -> float:
+    return float(x[:REZERO_ROWS].mean())
+
+
+def _rms(x: FloatArray) -> float:
+    return float(np.sqrt(np.mean(x**2)))
+
+
+def _count(n: int, what: str) -> str:
+    return f"{n} {what}{'' if n == 1 else 's'}"

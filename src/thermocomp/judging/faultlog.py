@@ -1,0 +1,191 @@
+"""Which temperatures fell out in recordings, what stood in for them, and what that cost: a replay of the watch."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.model import ErrorModel
+from thermocomp.core.watch import Watch
+from thermocomp.judging.metrics import rms
+from thermocomp.judging.replay import can_look, look_through, stack_watched
+from thermocomp.judging.results import Assessment
+from thermocomp.judging.study import Judged
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.samples import Samples
+from thermocomp.runtime.watch import GOOD, MISSING, WORDS
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int8]
+
+
+class Fault(NamedTuple):
+    """A temperature that was not believed for a while."""
+
+    sensor: str
+    word: str  #: missing, stepped, stuck or off
+    begin: float  #: when it was found, on the clock of its recording [s]
+    end: float  #: when it was believed again, or the recording ends [s]
+    returned: bool  #: it was believed again
+    beside: float  #: mean of its reading minus what stood in; nan where it was missing [degC]
+
+
+@dataclass(frozen=True, eq=False)
+class FaultLog:
+    """What a watch found in a recording.
+
+    Parameters
+    ----------
+    recording : int
+        Its place among the recordings.
+    name : str
+    time : ndarray of shape (n_rows,)
+        [s]
+    watch : Watch
+        That found it.
+    fault : ndarray of int of shape (n_rows, n_sensors)
+        See `thermocomp.runtime.watch.WORDS`.
+    read, stood_in : ndarray of shape (n_rows, n_sensors)
+        What was recorded, and what stood in; nan where nothing was, or a sensor was believed [degC].
+    faults : tuple of Fault
+        In the order in which they were found.
+    """
+
+    recording: int
+    name: str
+    time: FloatArray
+    watch: Watch
+    fault: IntArray
+    read: FloatArray
+    stood_in: FloatArray
+    faults: tuple[Fault, ...]
+
+    @property
+    def failed(self) -> tuple[str, ...]:
+        """Names of the sensors that failed, the first one first."""
+        return tuple(dict.fromkeys(f.sensor for f in self.faults))
+
+
+class Cost(NamedTuple):
+    """What a model left while the same of its sensors had failed."""
+
+    failed: tuple[str, ...]  #: of the model's sensors; none: all were good
+    hours: float  #: judged rows of that, in all [h]
+    rms: float  #: of what would have run [unit of the model]
+    none_rms: float  #: without compensation, in these rows [unit of the model]
+    honest: float | None  #: on unseen cycles with these lost [unit of the model]; None: never judged
+    runs_on: bool  #: with what stands in; otherwise the correction is held, then fades
+
+
+def find_faults(judged: Judged, recordings: Sequence[Recording]) -> tuple[FaultLog, ...]:
+    """Let the watch of models go through the recordings they were judged on, as the machine would have read them.
+
+    What `thermocomp.recordings.checks.quality.check` finds, long after, is not left out: at the machine nobody had.
+
+    Parameters
+    ----------
+    judged : Judged
+    recordings : sequence of Recording
+        On which the models were judged, in their order.
+
+    Returns
+    -------
+    tuple of FaultLog
+        One per recording, and per watch if the models have several; none without a watch, or without its speeds.
+    """
+    watches = list[Watch]()
+    for m in judged.models:
+        if m.watch is not None and m.watch not in watches:
+            watches.append(m.watch)
+    return tuple(log for watch in watches for log in _logs(watch, judged, recordings))
+
+
+def find_costs(model: ErrorModel, assessment: Assessment, logs: Sequence[FaultLog]) -> tuple[Cost, ...]:
+    """Return what a model left before its sensors failed and from then on, by which of them had.
+
+    Parameters
+    ----------
+    model : ErrorModel
+    assessment : Assessment
+        Of it, over all that was judged.
+    logs : sequence of FaultLog
+        Of these recordings; those of other watches are passed over.
+
+    Returns
+    -------
+    tuple of Cost
+        In the order in which they came up; a single one if none of its sensors failed.
+    """
+    own = {log.recording: log for log in logs if log.watch == model.watch}
+    if assessment.failure or not own:
+        return ()
+    places = list(zip(assessment.test.tolist(), assessment.row.tolist(), strict=True))
+    lost = {k: _lost(model, log) for k, log in own.items()}
+    failed = [lost[k][row] for k, row in places]
+    driven = {names: not names or model.may_lose(names) for names in dict.fromkeys(failed)}
+    steps = {k: np.diff(log.time, prepend=log.time[0]) for k, log in own.items()}
+    hours = np.array([steps[k][row] for k, row in places]) / 3600
+    known, found = model.honest_error, list[Cost]()
+    for names, runs_on in driven.items():
+        rows = np.array([f == names for f in failed], dtype=np.bool_)
+        honest = None if known is None else known.lost.get(", ".join(names)) if names else known.rms
+        measured = assessment.measured[rows]
+        left, none = rms(measured, assessment.predicted[rows]), rms(measured, np.zeros_like(measured))
+        found.append(Cost(names, float(hours[rows].sum()), left, none, honest, runs_on))
+    return tuple(found)
+
+
+def _logs(watch: Watch, judged: Judged, recordings: Sequence[Recording]) -> Iterator[FaultLog]:
+    target = next(a.target for a in judged.overall() if not a.failure)
+    samples = stack_watched(watch, target, recordings, [start for _, start in judged.starts])
+    if samples is not None and can_look(watch, samples):
+        for k, recording in enumerate(recordings):
+            yield _log(watch, samples, k, recording)
+
+
+def _log(watch: Watch, samples: Samples, test: int, recording: Recording) -> FaultLog:
+    heat = watch.bank.temperatures
+    names = [c.name for c in samples.inputs]
+    read = np.full((len(recording), len(heat)), np.nan)
+    for j, name in enumerate(watch.names):
+        if name in names:
+            read[:, j] = samples.values[(samples.test == test) & (samples.row >= 0), names.index(name)]
+    fault, stood_in = np.zeros(read.shape, np.int8), np.full(read.shape, np.nan)
+    for row, state, let in look_through(watch, samples, test):
+        if (own := int(samples.row[row])) >= 0:  # not of a file that it goes on from
+            fault[own] = state.fault
+            stood_in[own] = np.where(state.fault != GOOD, let[heat], np.nan)
+    found = [
+        Fault(
+            name,
+            WORDS[fault[a, j]],
+            float(recording.time[a]),
+            float(recording.time[min(b, len(recording) - 1)]),
+            b < len(recording) and fault[b, j] == GOOD,
+            float("nan") if fault[a, j] == MISSING else float(np.nanmean(read[a:b, j] - stood_in[a:b, j])),
+        )
+        for j, name in enumerate(watch.names)
+        for a, b in _runs(fault[:, j])
+    ]
+    ordered = tuple(sorted(found, key=lambda f: f.begin))
+    return FaultLog(test, samples.test_names[test], recording.time, watch, fault, read, stood_in, ordered)
+
+
+def _runs(fault: IntArray) -> Iterator[tuple[int, int]]:
+    """Yield first row and row after the last of each stretch of the same fault."""
+    edges = [0, *(np.flatnonzero(np.diff(fault)) + 1).tolist(), len(fault)]
+    for a, b in pairwise(edges):
+        if fault[a] != GOOD:
+            yield a, b
+
+
+def _lost(model: ErrorModel, log: FaultLog) -> list[tuple[str, ...]]:
+    """Return which of a model's sensors had failed in each row, in the order of its inputs."""
+    own = [i.name for i in model.inputs if i.name in model.sensors and i.name in log.watch.names]
+    lost = log.fault[:, [log.watch.names.index(n) for n in own]] != GOOD
+    cases, which = np.unique(lost, axis=0, return_inverse=True)
+    named = [tuple(n for n, gone in zip(own, case, strict=True) if gone) for case in cases.tolist()]
+    return [named[k] for k in which.ravel().tolist()]

@@ -1,0 +1,111 @@
+"""What models are given while a sensor fails and a watch is there: the readings that it lets through."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.watch import Watch
+from thermocomp.judging.replay import given_zero
+from thermocomp.models.watching import find_watch
+from thermocomp.recordings.samples import Samples
+from thermocomp.runtime.watch import begin, look
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+#: temperatures up to which every two that fail together are tried
+FEW = 6
+
+
+@dataclass(frozen=True)
+class Guard:
+    """Readings that a watch lets through while sensors read as their zero from the start on (C-34).
+
+    Parameters
+    ----------
+    watch : Watch
+    readings : dict of (tuple of str) to dict of int to ndarray of shape (n_rows,)
+        By the sensors that fail: columns of the samples in which what is let through is not what was recorded.
+    """
+
+    watch: Watch
+    readings: dict[tuple[str, ...], dict[int, FloatArray]]
+
+    def among(self, place: Sequence[int]) -> "Guard":
+        """Return the same for samples with more inputs, where each column is in its `place`."""
+        moved = {lost: {place[c]: v for c, v in of.items()} for lost, of in self.readings.items()}
+        return Guard(self.watch, moved)
+
+
+def find_guard(samples: Samples, learn: BoolArray, rows: BoolArray) -> Guard | None:
+    """Let each temperature fail in turn, and every two of few; see what a watch makes of it.
+
+    Parameters
+    ----------
+    samples : Samples
+    learn : ndarray of bool of shape (n_rows,)
+        Rows that the watch may learn from.
+    rows : ndarray of bool of shape (n_rows,)
+        Rows that are judged: their tests are gone through.
+
+    Returns
+    -------
+    Guard or None
+        None if nothing can be watched; see `thermocomp.models.watching.find_watch`.
+    """
+    watch = find_watch(samples, learn)
+    return None if watch is None else let_fail(watch, samples, rows)
+
+
+def let_fail(watch: Watch, samples: Samples, rows: BoolArray) -> Guard:
+    """Let each temperature fail in turn, and every two of few; see what a watch makes of it.
+
+    Parameters
+    ----------
+    watch : Watch
+    samples : Samples
+        With all its inputs.
+    rows : ndarray of bool of shape (n_rows,)
+        Rows that are judged: their tests are gone through.
+
+    Returns
+    -------
+    Guard
+    """
+    together = combinations(watch.names, 2) if len(watch.names) <= FEW else ()
+    failing = [*((name,) for name in watch.names), *together]
+    names = [c.name for c in samples.inputs]
+    columns = [names.index(i.name) for i in watch.inputs]
+    cut = np.array([[names[c] in lost for c in columns] for lost in failing])
+    found = np.broadcast_to(samples.values[:, columns], (len(failing), len(samples), len(columns))).copy()
+    for test in np.unique(samples.test[rows]).tolist():
+        mine = np.flatnonzero((samples.test == test) & samples.valid)
+        _go_through(watch, samples, mine, columns, cut, found)
+    changed = found != samples.values[:, columns]
+    changed &= ~np.isnan(found)
+    return Guard(
+        watch,
+        {
+            lost: {columns[c]: found[k, :, c].copy() for c in range(len(columns)) if changed[k, :, c].any()}
+            for k, lost in enumerate(failing)
+        },
+    )
+
+
+def _go_through(
+    watch: Watch,
+    samples: Samples,
+    mine: NDArray[np.intp],
+    columns: Sequence[int],
+    cut: BoolArray,
+    found: FloatArray,
+) -> None:
+    """Go through a test, the sensors of each row of `cut` reading as their zero; put what is let through in place."""
+    zero = samples.reference()[samples.test[mine[0]]][columns] if mine.size else np.empty(0)
+    state = begin(watch, given_zero(samples, columns, samples.test[mine[0]]) if mine.size else None, (len(cut),))
+    for row in mine.tolist():
+        values = np.where(cut, zero, samples.values[row, columns])
+        state, found[:, row] = look(watch, state, float(samples.time[row]), values, resting=bool(samples.stands[row]))

@@ -1,0 +1,254 @@
+"""Judge one model on one block that it has not seen: what it leaves, and whether it may run."""
+
+from collections.abc import Collection, Iterable, Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.correction import Limits
+from thermocomp.core.learned import Learned
+from thermocomp.core.model import ErrorModel
+from thermocomp.judging import do_no_harm, metrics
+from thermocomp.judging.coverage import find_validity
+from thermocomp.judging.guards import Guard
+from thermocomp.judging.probing import Probings
+from thermocomp.judging.replay import replay_compensated
+from thermocomp.judging.results import Assessment, Rules
+from thermocomp.judging.robustness import stress
+from thermocomp.judging.splits import MIN_ROWS, Judging, Split, join_short_cycles, name_cycles
+from thermocomp.models.numerics.leastsquares import effective_sample_size
+from thermocomp.recordings.samples import Samples
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+
+def drop_unreadable(samples: Samples, target: int, judging: Judging) -> Judging:
+    """Return a judgement without the blocks in which a target has too few readings to say anything.
+
+    Parameters
+    ----------
+    samples : Samples
+    target : int
+        Index into ``samples.targets``.
+    judging : Judging
+
+    Returns
+    -------
+    Judging
+        With all blocks if there are too few readings in each of them.
+    """
+    known = np.isfinite(samples.deviations[:, target])
+    kept = tuple(s for s in judging.splits if np.count_nonzero(s.judge & known) >= MIN_ROWS)
+    return replace(judging, splits=kept) if kept else judging
+
+
+def judge(
+    name: str,
+    model: ErrorModel,
+    samples: Samples,
+    split: Split,
+    *,
+    learned: Learned | None = None,
+    rules: Rules = Rules(),
+    fit_s: float = 0.0,
+    robustness: bool = True,
+    limits: Limits | None = Limits(),
+    guard: Guard | None = None,
+    probings: Probings | None = None,
+    widening: FloatArray | None = None,
+    watched: Collection[str] = (),
+) -> Assessment:
+    """Judge a frozen model on a block: what a compensator with it would have left there.
+
+    The verdict is taken, in each part that is judged, on the worse of what would run and the model alone: a model does
+    not pass because limits clip what it says.
+
+    Parameters
+    ----------
+    name : str
+        What to call the model.
+    model : ErrorModel
+    samples : Samples
+        With all of the model's inputs, and its target.
+    split : Split
+        Only its block is looked at.
+    learned : Learned, optional
+        What the model is held against; what it learned itself if not given.
+    rules : Rules
+        What was stated before judging.
+    fit_s : float
+        The fit took [s].
+    robustness : bool
+        Also replay with noise and lost sensors.
+    limits : Limits or None
+        Of the compensator; None: the model alone is judged.
+    guard : Guard, optional
+        What a watch that knows nothing of the block lets through while sensors fail; without it nothing notices.
+    probings : Probings, optional
+        Made in the block.
+    widening : ndarray of shape (n_rows,), optional
+        See `replay_compensated`.
+    watched : collection of str
+        Temperatures that a watch has looked after in these samples.
+
+    Returns
+    -------
+    Assessment
+
+    """
+    target = [c.name for c in samples.targets].index(model.target)
+    rows = split.judge & np.isfinite(samples.deviations[:, target])
+    if not rows.any():
+        return refuse_method(
+            samples, name, target, split, f"{model.target} has no number in {split.block} to judge against"
+        )
+    measured = samples.deviations[rows, target]
+    if learned is None and model.provenance is not None:
+        learned = model.provenance.learned
+    ran = replay_compensated(model, samples, rows, limits or Limits(), probings, widening)
+    stressed = stress(model, samples, measured, rows, guard=guard) if robustness else None
+    predicted = ran.deviation if limits is None else ran.compensated
+    if not np.isfinite(metrics.rms(measured, ran.deviation)):
+        return refuse_method(samples, name, target, split, f"the residual of {model.target} is beyond all numbers")
+    return Assessment(
+        model=name,
+        target=model.target,
+        block=split.block,
+        measured=measured,
+        predicted=predicted,
+        row=samples.row[rows],
+        test=samples.test[rows],
+        cycle=samples.cycle[rows],
+        verdict=_verdict(model, samples, split, learned, rules, rows, measured, (predicted, ran.deviation), watched),
+        sensors=model.sensors,
+        n_sensors=(len(model.sensors), len(model.sensors)),
+        fit_s=fit_s,
+        n_effective=effective_sample_size(measured - predicted),
+        robustness=stressed.robustness if stressed else None,
+        frozen=model,
+        alone=ran.deviation,
+        limits=None if limits is None else ran.limits,
+        rejected=0 if limits is None else int(ran.rejected.sum()),
+        turned_away="" if limits is None else ran.why,
+        half_widths=None if model.band is None else ran.half_width,
+        band=model.band.words if model.band is not None and np.isfinite(ran.half_width).any() else "",
+        probed=ran.probed,
+    )
+
+
+def _verdict(
+    model: ErrorModel,
+    samples: Samples,
+    split: Split,
+    learned: Learned | None,
+    rules: Rules,
+    rows: BoolArray,
+    measured: FloatArray,
+    both: tuple[FloatArray, FloatArray],
+    watched: Collection[str],
+) -> do_no_harm.Verdict:
+    """Return the verdict on `rows`, by the worse of what would run and the model alone, in each part that is judged."""
+    target = [c.name for c in samples.targets].index(model.target)
+    segments = [(split.name, rows[rows])] if split.whole else list(_segments(samples, rows))
+    against = learned or samples.learned(target, rows)
+    return do_no_harm.Verdict(
+        units=tuple(
+            _worse(
+                do_no_harm.measure(
+                    unit,
+                    measured[mine],
+                    run_or_alone[mine],
+                    against,
+                    unit=model.unit,
+                    margin=rules.margin,
+                    stretch=split.stretch,
+                )
+                for run_or_alone in both
+            )
+            for unit, mine in segments
+            if mine.sum() >= MIN_ROWS
+        ),
+        unit=model.unit,
+        caps=_caps(split, learned, samples, target, watched),
+        refusal="" if model.sensors else "a model without a sensor is a constant, not a compensation",
+        stated=rules.margin,
+    )
+
+
+def _worse(both: Iterable[do_no_harm.JudgedUnit]) -> do_no_harm.JudgedUnit:
+    """Return what is worse of a unit, by what would run or by the model alone: limits make no model pass."""
+    ran, alone = both
+    rezeroed = max((u.rezeroed for u in (ran, alone) if u.rezeroed), default=None)
+    return replace(ran, rms=max(ran.rms, alone.rms), largest=max(ran.largest, alone.largest), rezeroed=rezeroed)
+
+
+def cap_alike_units(samples: Samples, judging: Judging) -> tuple[str, ...]:
+    """Return that the units are too alike to count as several, if they are."""
+    covered = find_validity(samples, judging)
+    needed = do_no_harm.MIN_UNITS
+    if covered.independent >= needed or covered.units < needed:
+        return ()
+    return (f"only {covered.independent} of {covered.units} units are not alike, at least {needed} are needed",)
+
+
+def _caps(
+    split: Split, learned: Learned | None, samples: Samples, target: int, watched: Collection[str]
+) -> tuple[str, ...]:
+    """Return what keeps a model from being accepted, whatever its errors.
+
+    What is wrong with temperatures that a watch looks after (`watched`) is judged with what stood in for them.
+    """
+    others = {c.name for k, c in enumerate(samples.targets) if k != target} | set(watched)
+    found = [text for channel, text in samples.trouble if channel not in others]
+    if split.stretch:
+        found.append("judged on one stretch that goes on from what was learned")
+    if learned is None:
+        found.append("the model does not say what it learned, so that it cannot be held against that")
+    return tuple(found)
+
+
+def refuse_method(samples: Samples, name: str, target: int, split: Split, why: str) -> Assessment:
+    """Return the assessment of a method that gave no prediction: refused.
+
+    Parameters
+    ----------
+    samples : Samples
+    name : str
+        Of the method.
+    target : int
+        Index into ``samples.targets``.
+    split : Split
+    why : str
+        What is told.
+
+    Returns
+    -------
+    Assessment
+    """
+    rows = split.judge & np.isfinite(samples.deviations[:, target])
+    measured = samples.deviations[rows, target]
+    return Assessment(
+        model=name,
+        target=samples.targets[target].name,
+        block=split.block,
+        measured=measured,
+        predicted=np.zeros_like(measured),
+        row=samples.row[rows],
+        test=samples.test[rows],
+        cycle=samples.cycle[rows],
+        verdict=do_no_harm.Verdict((), refusal=why),
+        sensors=(),
+        fit_s=0.0,
+        n_effective=float("nan"),
+        failure=why,
+    )
+
+
+def _segments(samples: Samples, rows: BoolArray) -> Iterator[tuple[str, BoolArray]]:
+    cycle = samples.cycle[rows]
+    for block in join_short_cycles(cycle, samples.test[rows]):
+        mine, name = np.isin(cycle, block), name_cycles(samples, block)
+        whole = mine.sum() == np.isin(samples.cycle, block).sum()
+        yield name if whole else f"part of {name}", mine

@@ -1,0 +1,84 @@
+"""Rows that are learned from and judged on at once: found, left out of a judgement, or refused."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.model import ErrorModel
+from thermocomp.judging.splits import Judging
+from thermocomp.recordings.fingerprints import overlap, repeats
+from thermocomp.recordings.samples import Samples
+
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.intp]
+
+#: a test of which less than this share is new is no test
+LEAST_NEW = 0.05
+
+
+def find_learned_rows(model: ErrorModel, samples: Samples, target: int = 0) -> BoolArray:
+    """Return the rows that a model has learned from.
+
+    Parameters
+    ----------
+    model : ErrorModel
+    samples : Samples
+        With the model's inputs, and its target.
+    target : int
+        Index into ``samples.targets`` of the model's.
+
+    Returns
+    -------
+    ndarray of bool of shape (n_rows,)
+        All rows of a test whose hash is in the model's provenance, rows that its fingerprints know, and what little is
+        left of a test then.
+    """
+    known = np.zeros(len(samples), dtype=np.bool_)
+    if model.provenance is None:
+        return known
+    known |= np.isin(samples.hashes, model.provenance.data_sha256)[samples.test]
+    if model.provenance.prints is not None:
+        known |= overlap(model.provenance.prints, samples, target) >= 0
+    judged = np.isfinite(samples.deviations[:, target])
+    for test in np.unique(samples.test[known]):
+        mine = samples.test == test
+        if np.count_nonzero(mine & judged & ~known) < LEAST_NEW * np.count_nonzero(mine & judged):
+            known |= mine
+    return known
+
+
+def refuse_leaks(samples: Samples, judging: Judging) -> None:
+    """Refuse rows that stand in the data twice if one of them is learned from and the other judged on.
+
+    Parameters
+    ----------
+    samples : Samples
+    judging : Judging
+
+    Raises
+    ------
+    InputError
+        There are such rows: which files, which rows, and what to do.
+    """
+    for target in range(len(samples.targets)):
+        source = repeats(samples, target)
+        copies = np.flatnonzero(source >= 0)
+        for split in judging.splits:
+            learn, judge = split.learn[copies], split.judge[copies]
+            origin = source[copies]
+            leaked = (judge & split.learn[origin]) | (learn & split.judge[origin])
+            if leaked.any():
+                raise InputError(_told(samples, copies, origin, int(np.argmax(leaked)), split.block))
+
+
+def _told(samples: Samples, copies: IntArray, origin: IntArray, k: int, block: str) -> str:
+    # one stretch: rows one after the other that repeat rows one after the other
+    breaks = np.flatnonzero((np.diff(copies) > 1) | (np.abs(np.diff(origin)) > 100)) + 1
+    a = int(breaks[breaks <= k].max(initial=0))
+    b = int(breaks[breaks > k].min(initial=len(copies))) - 1
+    later, earlier = (samples.test_names[samples.test[rows[k]]] for rows in (copies, origin))
+    return (
+        f"{later}: rows {samples.row[copies[a]]}-{samples.row[copies[b]]} repeat rows "
+        f"{samples.row[origin[a]]}-{samples.row[origin[b]]} of {'it' if later == earlier else earlier}, about: with "
+        f"{block} left out they would be learned from and judged on at once. Leave them out of one of them"
+    )

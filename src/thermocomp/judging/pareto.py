@@ -1,0 +1,319 @@
+"""Choice by the sensor budget: the fewest sensors that are enough, what each next one gains, and what stands in."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from thermocomp.core.exceptions import FitError
+from thermocomp.judging.budget import SHARE, WORTH, Budget, budget
+from thermocomp.judging.candidates import Candidates
+from thermocomp.judging.choice import Cell, Choice, Progress, Settings, Table
+from thermocomp.judging.sensorsets import PERCENT
+from thermocomp.judging.splits import Judging
+from thermocomp.recordings.samples import Samples
+
+#: of a temperature that is made up: a sensor that has less part in it is not named
+PART = 0.2
+
+
+def choose(samples: Samples, judging: Judging, settings: Settings, *, jobs: int, progress: Progress) -> Choice:
+    """Choose for all targets at once by the error on unseen blocks against the number of sensors.
+
+    Parameters
+    ----------
+    samples : Samples
+    judging : Judging
+    settings : Settings
+    jobs : int
+        Processes to share the work among; -1 takes all cores.
+    progress : callable
+        Called with a line of text after each piece of work; there are `thermocomp.judging.budget.n_pieces` of them.
+
+    Returns
+    -------
+    Choice
+
+    Raises
+    ------
+    FitError
+        None of the models could be judged in every block.
+
+    Notes
+    -----
+    Where no set is better than no compensation it is a choice without sensors, with `Choice.failure`.
+    """
+    candidates = [Candidates.of(samples, t) for t in range(len(samples.targets))]
+    most = settings.most("pareto")
+    found = budget(samples, judging, settings.models, max_sensors=most, jobs=jobs, progress=progress)
+    targets = ", ".join(found.targets)
+    if found.margin() is None:
+        raise FitError(f"{targets}: none of the models could be judged in every block: {_failed(found)}")
+    notes = [_rule(found)]
+    if found.failures:
+        notes.append(f"Not judged with some numbers of sensors: {_failed(found)}")
+    if len(found.blocks) < len(judging.splits):
+        several = "one of the targets" if len(found.targets) > 1 else "the target"
+        notes.append(f"{len(judging.splits) - len(found.blocks)} block(s) without a number of {several} were left out.")
+    recommended = found.recommended()
+    m, best = np.unravel_index(int(np.nanargmin(found.mean())), found.mean().shape)
+    model, place = recommended or (found.models[int(m)], int(best))
+    sensors, error = found.sensors[place], float(found.mean()[found.models.index(model), place])
+    told = f"{model} with {len(sensors)} of {len(found.candidates)} temperatures leaves {error:.2f} {_rms(found)} on "
+    told += f"unseen cycles{_mean(found)}, instead of {found.none_mean():.2f} {found.unit}"
+    errors = [
+        _errors(found, judging, model, place if recommended else None),
+        *([_by_target(found, model, place)] if len(found.targets) > 1 else []),
+    ]
+    if recommended is None:
+        why = f"no set of temperatures is clearly better than no compensation; the smallest error: {told}"
+        return Choice("pareto", targets, (), why, tuple(errors), tuple(notes), found, failure=why)
+    notes[1:1] = [
+        next_to_buy(found, model, place),
+        "Sensors of each number are those whose loss `averaged` feels least when they are made up from the others, "
+        "the same for all displacements, whatever model is then trained on them. Their number was chosen by the errors "
+        "shown, so they flatter it a little.",
+    ]
+    left = found.of_targets()[found.models.index(model), place]
+    if idle := [t for t, e, none in zip(found.targets, left, found.none_of_targets(), strict=True) if e >= none]:
+        notes.insert(
+            1, f"These sensors are no better than no compensation for {', '.join(idle)}: choose for it by itself."
+        )
+    tables = [
+        *errors,
+        *([_next(found, model, place)] if len(found.sensors) > 1 else []),
+        _frequency(found, place),
+        *([_stand_ins(found, place)] if len(found.candidates) > 1 else []),
+        _repeats(candidates, sensors),
+    ]
+    reason = f"{told}; {trade_off(found, model, place)}"
+    return Choice("pareto", targets, sensors, reason, tuple(tables), tuple(notes), found)
+
+
+def _failed(found: Budget) -> str:
+    return "; ".join(f"{model}: {why}" for model, why in found.failures.items())
+
+
+def _rms(found: Budget) -> str:
+    """Name what is compared: a block's RMS, mean over the blocks."""
+    if len(found.blocks) == 1:
+        return "% of the RMS without compensation" if found.unit == PERCENT else f"{found.unit} RMS"
+    return "% of the mean RMS without compensation" if found.unit == PERCENT else f"{found.unit} mean RMS"
+
+
+def _mean(found: Budget) -> str:
+    return f" (mean of {len(found.targets)} displacements)" if len(found.targets) > 1 else ""
+
+
+def _errors(found: Budget, judging: Judging, model: str, place: int | None) -> Table:
+    mean, gains = found.mean(), [*found.gains(model)[0].tolist(), None]
+    rows = tuple(
+        (size, *(float(v) for v in mean[:, k]), gains[k], float(found.condition[k]), " ".join(found.sensors[k]))
+        for k, size in enumerate(found.sizes)
+    )
+    headings = [f"{m} mean RMS [{found.unit}]" for m in found.models]
+    return Table(
+        f"Error on unseen blocks: {judging.name}",
+        ("sensors", *headings, f"next gains [{found.unit}]", "condition", "chosen in all rows"),
+        rows,
+        place,
+        f"RMS on each unseen block, mean over the blocks{_mean(found)}; without compensation {found.none_mean():.2f} "
+        f"{found.unit}. Next gains: what {model} gains by the sensors of the next row. Enough, each model by itself: "
+        + ", ".join(f"{found.enough(m) or 'none'} for {m}" for m in found.models)
+        + ".",
+    )
+
+
+def _by_target(found: Budget, model: str, place: int) -> Table:
+    errors = found.of_targets()[found.models.index(model)]
+    rows = (
+        (0, *found.none_of_targets().tolist()),
+        *((n, *e) for n, e in zip(found.sizes, errors.tolist(), strict=True)),
+    )
+    more = (errors[place] - errors[-1]) / found.scales
+    worst = int(np.argmax(more))
+    return Table(
+        f"Error on unseen blocks for each displacement: {model}",
+        ("sensors", *(f"{t} mean RMS" for t in found.targets)),
+        rows,
+        1 + place,
+        "In the unit of each; 0 sensors: without compensation."
+        + (
+            f" {found.targets[worst]} is hit most: {more[worst]:.2f} {found.unit} more than with all."
+            if place + 1 < len(errors)
+            else ""
+        ),
+    )
+
+
+def _next(found: Budget, model: str, place: int) -> Table:
+    """Tell what the next sensor gains after each number of them, and how far that holds from block to block."""
+    gains, blocks = found.gains(model)
+    unit = found.unit
+    return Table(
+        "What to buy next",
+        ("sensors", "next", f"gains [{unit}]", f"in the worst block [{unit}]", f"in the best block [{unit}]"),
+        tuple(
+            (found.sizes[k], _joins(found, k), float(gains[k]), float(blocks[k].min()), float(blocks[k].max()))
+            for k in range(len(gains))
+        ),
+        place if place < len(gains) else None,
+        f"By {model}; below zero it is worse with the sensor than without it. In each block the sensors are those that "
+        "were chosen without it.",
+    )
+
+
+def _joins(found: Budget, place: int) -> str:
+    """Return the name of the sensor that joins next; from the largest set to all, how many do."""
+    new = [s for s in found.sensors[place + 1] if s not in found.sensors[place]]
+    return new[0] if len(new) == 1 else f"all {len(new)} others"
+
+
+def next_to_buy(found: Budget, model: str, place: int) -> str:
+    """Say which sensor to buy next, and whether it is worth it.
+
+    Parameters
+    ----------
+    found : Budget
+    model : str
+    place : int
+        Place in ``found.sensors`` of what there is.
+
+    Returns
+    -------
+    str
+    """
+    margins = found.margin()
+    assert margins is not None
+    margin, _, least = margins
+    if place == len(found.sensors) - 1:
+        return "Next to buy: all temperatures are in use, of others nothing is known."
+    gains, blocks = found.gains(model)
+    own, unit = blocks[place], found.unit
+    spread = f" ({own.min():.2f} to {own.max():.2f} {unit} from block to block)" if len(own) > 1 else ""
+    would = f"{_joins(found, place)} would gain {gains[place]:.2f} {unit}{spread}"
+    none = f"{would}; {least:.2f} {unit} is what a further sensor has to gain."
+    # what one does not bring, several may
+    for k, gain in enumerate(np.cumsum(gains[place:]).tolist(), start=place + 1):
+        new = [s for s in found.sensors[k] if s not in found.sensors[place]]
+        if gain > len(new) * least:
+            surely = (
+                "." if gain > margin else ", which is less than the blocks differ by: more thermal cycles would tell."
+            )
+            if k == place + 1:
+                return f"Next to buy: {would}{surely}"
+            both = " and ".join(new) if len(new) == 2 else f"{len(new)} ({', '.join(new)})"
+            return (
+                f"Next to buy: no single one is worth it. {none} {both} together would gain {gain:.2f} {unit}{surely}"
+            )
+    return f"Next to buy: none is worth it. {none}"
+
+
+def _frequency(found: Budget, place: int) -> Table:
+    order = np.argsort(-found.frequency[place], kind="stable")
+    return Table(
+        f"How surely a sensor is among the best {len(found.sensors[place])}",
+        ("sensor", "share of the blocks [%]"),
+        tuple(
+            (found.candidates[j], float(100 * found.frequency[place, j]))
+            for j in order
+            if found.frequency[place, j] > 0
+        ),
+        None,
+        "Chosen anew without each block: a sensor far below 100 % was a matter of luck.",
+    )
+
+
+def _stand_ins(found: Budget, place: int) -> Table:
+    """Tell what each temperature is made up from, and what that costs."""
+    names, kept = found.candidates, [found.candidates.index(s) for s in found.sensors[place]]
+    made = found.answer.stand_ins(kept)
+    own = np.sqrt(np.diag(found.answer.temperatures))
+
+    def parts(j: int) -> str:
+        shares = np.abs(made.weights[:, j]) * own
+        named = [k for k in np.argsort(-shares, kind="stable").tolist() if shares[k] > PART * own[j]]
+        return ", ".join(f"{made.weights[k, j]:.2f} {names[k]}" for k in named) or "none"
+
+    rows: tuple[tuple[Cell, ...], ...] = tuple(
+        (
+            name,
+            names[made.single[j]],
+            float(made.single_residual[j]),
+            parts(j),
+            float(made.residual[j]),
+            float(made.loss[j].mean()),
+        )
+        for j, name in enumerate(names)
+    )
+    return Table(
+        "What stands in for what",
+        ("sensor", "nearest other", "its miss [degC]", "of the chosen", "their miss [degC]", f"loses [{found.unit}]"),
+        rows,
+        None,
+        "Each is made up from the one other that misses it least, and from the chosen sensors (a chosen one from the "
+        f"others of them, as if it failed), with {found.answer.noise:g} degC of noise in use. Miss: RMS of what is "
+        "left of it. Loses: what the answer of `averaged` with all temperatures changes by if this one alone is made "
+        f"up from the chosen{_mean(found)}. Those with less than {100 * PART:g} % part in it are not named.",
+    )
+
+
+def _repeats(candidates: Sequence[Candidates], sensors: Sequence[str]) -> Table:
+    """Return how far the chosen sensors repeat each other, with the correlation to each target."""
+    tables = [c.repeats(sensors) for c in candidates]
+    if len(tables) == 1:
+        return tables[0]
+    rows = zip(*(t.rows for t in tables), strict=True)
+    return replace(
+        tables[0],
+        columns=("sensor", *(f"correlation with {c.target}" for c in candidates), "VIF"),
+        rows=tuple((row[0][0], *(cells[1] for cells in row), row[0][2]) for row in rows),
+    )
+
+
+def trade_off(found: Budget, model: str, place: int) -> str:
+    """Say what the sensors that were saved cost, beside the best of the table and beside all sensors.
+
+    Parameters
+    ----------
+    found : Budget
+    model : str
+    place : int
+        Place in ``found.sensors`` of what was chosen.
+
+    Returns
+    -------
+    str
+    """
+    mean = found.mean()
+    m, n = found.models.index(model), found.sizes[place]
+    best = np.unravel_index(int(np.nanargmin(mean)), mean.shape)
+    others = {(int(best[0]), int(best[1])): ", the best of the table"}
+    others.setdefault((m, len(found.sizes) - 1), "")
+    said = []
+    for (k, j), what in others.items():
+        cost = float(mean[m, place] - mean[k, j])
+        if (k, j) != (m, place):
+            by = f" by {found.models[k]}" if k != m else ""
+            other = f"{found.sizes[j]}{by}" if j != place else f"as many{by}"
+            said.append(f"{abs(cost):.2g} {found.unit} {'more' if cost >= 0 else 'less'} than {other}{what}")
+    if not said:
+        return "fewer cost more than the rule allows" if n > 1 else "there is no other set to choose from"
+    return f"{n} sensor{'s' if n > 1 else ''} cost{'s' if n == 1 else ''} {' and '.join(said)}"
+
+
+def _rule(found: Budget) -> str:
+    """Say by what rule the number of sensors was chosen, in numbers."""
+    margins = found.margin()
+    assert margins is not None
+    margin, error, least = margins
+    what = "what a further sensor has to gain to be worth it"
+    if found.unit == PERCENT or least < WORTH:
+        what = f"{100 * SHARE:g} % of what there is without compensation, {what}"
+    unit = found.unit
+    return (
+        "Rule: the fewest sensors that are better than no compensation and whose mean RMS over the unseen blocks, that "
+        f"of the table, is within {margin:.2f} {unit} of the smallest: the larger of one standard error between the "
+        f"blocks (Breiman 1984), {error:.2f} {unit}, and of "
+        f"{least:.2f} {unit}, {what}."
+    )

@@ -1,0 +1,208 @@
+"""How much test is enough: the error on unseen thermal cycles over how many cycles, and speeds, were learned from."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import FitError
+from thermocomp.judging.budget import SHARE, WORTH
+from thermocomp.judging.choice import Progress
+from thermocomp.judging.metrics import rms
+from thermocomp.judging.pieces import work_through
+from thermocomp.judging.replay import replay_compensated
+from thermocomp.judging.splits import Judging
+from thermocomp.models.training import train
+from thermocomp.recordings.samples import Samples
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+#: draws of cycles to learn from, of each number and for each unseen one
+DRAWS = 2
+#: numbers of cycles that are tried, at most
+MOST_SIZES = 6
+#: speeds nearer than this share of the highest are one
+_SAME_SPEED = 0.05
+
+
+class Point(NamedTuple):
+    """One model, learned from some cycles and judged on one that it had not seen."""
+
+    learned: int  #: cycles
+    speeds: int  #: different speeds in them, 0 where none was recorded
+    unseen: int  #: which block was judged
+    rms: float  #: mean over the targets [um]; nan: it could not be fitted
+
+
+class Level(NamedTuple):
+    """All models that learned from so much."""
+
+    learned: int  #: cycles, or speeds
+    rms: float  #: mean over the unseen blocks [um]
+    error: float  #: standard error of that between the blocks [um]; nan with one
+
+
+@dataclass(frozen=True, eq=False)
+class LearningCurve:
+    """Error on unseen thermal cycles over what was learned from.
+
+    Parameters
+    ----------
+    model : str
+    points : tuple of Point
+    none : float
+        RMS without compensation, mean over blocks and targets [um].
+    """
+
+    model: str
+    points: tuple[Point, ...]
+    none: float
+
+    def by_cycles(self) -> tuple[Level, ...]:
+        """Return the error over the number of cycles learned from."""
+        return self._levels([p.learned for p in self.points])
+
+    def by_speeds(self) -> tuple[Level, ...]:
+        """Return the error over the number of speeds learned from; the cycles of a model differ in it by chance."""
+        return self._levels([p.speeds for p in self.points])
+
+    def _levels(self, of: Sequence[int]) -> tuple[Level, ...]:
+        found = []
+        for number in sorted(set(of)):
+            mine = [p for p, n in zip(self.points, of, strict=True) if n == number and np.isfinite(p.rms)]
+            blocks = [float(np.mean([p.rms for p in mine if p.unseen == b])) for b in sorted({p.unseen for p in mine})]
+            if blocks:
+                spread = float(np.std(blocks, ddof=1) / np.sqrt(len(blocks))) if len(blocks) > 1 else float("nan")
+                found.append(Level(number, float(np.mean(blocks)), spread))
+        return tuple(found)
+
+    @property
+    def last_gain(self) -> float:
+        """What each of the last cycles has taken from the error [um]: the slope over the upper half of the numbers."""
+        levels = self.by_cycles()
+        upper = levels[(len(levels) - 1) // 2 :]
+        return -float(np.polyfit([x.learned for x in upper], [x.rms for x in upper], 1)[0]) if len(upper) > 1 else 0.0
+
+    @property
+    def worth(self) -> float:
+        """What a further cycle has to gain to be worth its time [um]: as of a sensor, see `assessment.budget`."""
+        return min(WORTH, SHARE * self.none)
+
+    @property
+    def enough(self) -> bool:
+        """A further cycle of the kind that is there is not worth its time."""
+        return self.last_gain <= self.worth
+
+    @property
+    def words(self) -> str:
+        """Say what the curve says."""
+        levels = self.by_cycles()
+        first, last = levels[0], levels[-1]
+        of = f"{first.rms:.2f} um after {first.learned} cycle(s), {last.rms:.2f} after {last.learned}"
+        slope = f"each of the last took {self.last_gain:.2f} um off"
+        if last.rms >= self.none:
+            return f"{of}, {self.none:.2f} without compensation: the model has learned nothing that holds elsewhere"
+        if self.enough:
+            return (
+                f"{of}; {slope}: more cycles of the same kind are not worth their time (less than {self.worth:.2f} um)"
+            )
+        return f"{of}; {slope}: it still falls, more cycles of the same kind help"
+
+
+def learning_curve(
+    samples: Samples,
+    judging: Judging,
+    model: str = "averaged",
+    *,
+    jobs: int = 1,
+    seed: int = 0,
+    progress: Progress = lambda _, steps=1: None,  # noqa: ARG005
+) -> LearningCurve:
+    """Train on some of the cycles and judge on others: for each unseen one, on 1, 2, ... of those that are left.
+
+    Parameters
+    ----------
+    samples : Samples
+    judging : Judging
+        Its blocks are left out in turn, and what is learned from is drawn of the others.
+    model : str
+        A method.
+    jobs : int
+        Processes to share the work among; -1 takes all cores.
+    seed : int
+        Of the draw.
+    progress : callable
+        Called with a line of text after each piece of work; there are `n_pieces` of them.
+
+    Returns
+    -------
+    LearningCurve
+
+    Raises
+    ------
+    FitError
+        There are fewer than three blocks, or no model could be fitted.
+    """
+    blocks = [split.judge for split in judging.splits]
+    if len(blocks) < 3:
+        raise FitError(f"a learning curve needs at least three thermal cycles or files; there are {len(blocks)}")
+    rng = np.random.default_rng(seed)
+    pieces: list[tuple[int, list[int]]] = []
+    for unseen in range(len(blocks)):
+        others = np.delete(np.arange(len(blocks)), unseen)
+        for size in _sizes(len(blocks)):
+            drawn = [sorted(rng.choice(others, size, replace=False).tolist()) for _ in range(DRAWS)]
+            pieces += [(unseen, own) for k, own in enumerate(drawn) if own not in drawn[:k]]
+    points = []
+    work = partial(_judged, samples, blocks, model)
+    errors: list[str] = []
+    for (unseen, own), found in zip(pieces, work_through(work, pieces, _why, jobs=jobs), strict=True):
+        progress(f"{model} from {len(own)} cycle(s)")
+        errors += [found] if isinstance(found, str) else []
+        speeds = _n_speeds(samples, np.any([blocks[k] for k in own], axis=0))
+        points.append(Point(len(own), speeds, unseen, float("nan") if isinstance(found, str) else found))
+    if len(errors) == len(points):
+        raise FitError(f"a learning curve of {model}: {errors[0]}")
+    return LearningCurve(model, tuple(points), float(np.mean([_none(samples, b) for b in blocks])))
+
+
+def n_pieces(judging: Judging) -> int:
+    """Return the number of pieces of work of `learning_curve`, at most."""
+    n = len(judging.splits)
+    return n * len(_sizes(n)) * DRAWS
+
+
+def _sizes(blocks: int) -> list[int]:
+    """Return the numbers of blocks to learn from: from one to all but one."""
+    return sorted({round(x) for x in np.linspace(1, blocks - 1, min(MOST_SIZES, blocks - 1))})
+
+
+def _judged(samples: Samples, blocks: Sequence[BoolArray], model: str, piece: tuple[int, list[int]]) -> float:
+    unseen, own = piece
+    learn = np.any([blocks[k] for k in own], axis=0)
+    left = []
+    for target in range(len(samples.targets)):
+        rows = blocks[unseen] & np.isfinite(samples.deviations[:, target])
+        frozen = train(model, samples, target, learn, joint=False).model
+        left.append(rms(samples.deviations[rows, target], replay_compensated(frozen, samples, rows).compensated))
+    return float(np.mean(left))
+
+
+def _why(_: tuple[int, list[int]], why: str) -> float | str:
+    return why
+
+
+def _none(samples: Samples, rows: BoolArray) -> float:
+    of = [y[np.isfinite(y)] for y in samples.deviations[rows].T]
+    return float(np.mean([rms(y, np.zeros(len(y))) for y in of if y.size]))
+
+
+def _n_speeds(samples: Samples, rows: BoolArray) -> int:
+    columns = [j for j, c in enumerate(samples.inputs) if c.quantity == "spindle_speed"]
+    values = np.abs(samples.values[rows][:, columns])
+    values = np.unique(values[np.isfinite(values) & (values > 0)])
+    return int(np.count_nonzero(np.diff(values) > _SAME_SPEED * values[-1]) + 1) if values.size else 0

@@ -1,0 +1,246 @@
+"""Which test next: what each of a grid of tests is expected to take from the error on what was not seen."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.judging.planning.trial import Kind, Trial
+from thermocomp.models.doubt import Doubt, find_doubt
+from thermocomp.recordings.recording import AMBIENT
+from thermocomp.recordings.samples import Samples
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+#: shares of the top speed that are tried
+SPEEDS = (0.2, 0.4, 0.6, 0.8, 1.0)
+#: what is done with each
+KINDS: tuple[Kind, ...] = ("repeated", "stop", "run")
+#: the stop before the start, in which the zero is taken, and a run or stop of a repeated test [s]
+REST, SHORT = 900.0, 1800.0
+#: of what the room does to a part of the machine [s]
+LAG = 7200.0
+#: rows of a test that is foretold [s]
+_STEP = 60.0
+#: of them those that are counted
+_EVERY = 5
+#: speeds nearer than this share of the top speed are one
+SAME = 0.1
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A test, and what it would bring.
+
+    Parameters
+    ----------
+    trial : Trial
+    doubt : float
+        Error that is expected in the test itself, mean over the targets [um].
+    gain : float
+        What it is expected to take from the error over all tests of the grid, mean over the targets [um].
+    news : str
+        What in it was not there so far; empty if nothing.
+    """
+
+    trial: Trial
+    doubt: float
+    gain: float
+    news: str
+
+
+@dataclass(frozen=True)
+class Covered:
+    """What was recorded so far.
+
+    Parameters
+    ----------
+    runs : tuple of (float, float, float)
+        Mean speed [1/min] and length [s] of each run, and length of the stop after it [s]; 0 without one.
+    rooms : tuple of float
+        How far the room's temperature changed within each test [degC]; none: it is not known.
+    """
+
+    runs: tuple[tuple[float, float, float], ...]
+    rooms: tuple[float, ...]
+
+    @classmethod
+    def of(cls, samples: Samples, column: int) -> "Covered":
+        """Return what some samples cover; their spindle speed is in a column."""
+        runs: list[tuple[float, float, float]] = []
+        ranges = []
+        air = [j for j, c in enumerate(samples.inputs) if AMBIENT.search(c.name) and c.quantity == "temperature"]
+        for test in range(len(samples.test_names)):
+            mine = np.flatnonzero((samples.test == test) & samples.valid)
+            speed, dt = np.abs(samples.values[mine, column]), samples.take(mine).dt()
+            dt[~np.isfinite(dt)] = 0.0
+            level = np.round(speed / max(float(speed.max(initial=0.0)), 1.0) / 0.05)
+            edges = [0, *(np.flatnonzero(np.diff(level)) + 1).tolist(), len(mine)]
+            parts = [(float(speed[a:b].mean()), float(dt[a:b].sum())) for a, b in pairwise(edges)]
+            for (v, length), after in zip(parts, [*parts[1:], (np.inf, 0.0)], strict=True):
+                if v > 0 and length > 0:
+                    runs.append((v, length, after[1] if after[0] == 0 else 0.0))
+            ranges += [float(np.ptp(samples.values[mine][:, j])) for j in air[:1] if mine.size]
+        return cls(tuple(runs), tuple(ranges))
+
+    def news(self, trial: Trial, top_speed: float, swing: float) -> str:
+        """Say what in a test was not there so far; its speeds, lengths and stops, each by itself."""
+        if trial.kind == "room" and not self.rooms:
+            return "no temperature of the room was recorded"
+        if trial.kind == "room":
+            most = max(self.rooms)
+            return f"the room changed by {most:.1f} degC at most" if most < 0.5 * swing else ""
+        fastest = max((v for v, _, _ in self.runs), default=0.0)
+        near = [run for run in self.runs if abs(run[0] - trial.speed) <= SAME * top_speed]
+        if not near:
+            faster = trial.speed > fastest
+            return f"no run faster than {fastest:,.0f} 1/min" if faster else "no run at about this speed"
+        _, (_, length), *_ = trial.steps
+        longest, stop = max(own for _, own, _ in near), max(after for _, _, after in near)
+        found = ""
+        if longest < 0.5 * length:
+            found = f"no run at about this speed longer than {longest / 3600:.1f} h"
+        elif trial.kind == "stop" and stop < 0.5 * length:
+            found = f"no stop longer than {stop / 3600:.1f} h after such a run" if stop else "no stop after such a run"
+        return found
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Tests that could be run next, the one that would bring most first.
+
+    Parameters
+    ----------
+    candidates : tuple of Candidate
+    expected : float
+        Error over all tests of the grid as things are, mean over the targets [um]. Of the same calculation as the
+        gains; an order of size, no judged error.
+    top_speed, hours, swing : float
+        What the grid was made with [1/min], [h], [degC].
+    covered : Covered
+        What was recorded so far.
+    """
+
+    candidates: tuple[Candidate, ...]
+    expected: float
+    top_speed: float
+    hours: float
+    swing: float
+    covered: Covered
+
+
+def make_grid(top_speed: float, hours: float) -> tuple[Trial, ...]:
+    """Return the tests that are compared: all of one length.
+
+    Parameters
+    ----------
+    top_speed : float
+        Of the machine [1/min].
+    hours : float
+        Each lasts so long, after a stop of 15 min [h].
+
+    Returns
+    -------
+    tuple of Trial
+
+    Raises
+    ------
+    InputError
+        No such speed, or less than two hours.
+    """
+    if not 0 < top_speed < np.inf:
+        raise InputError(f"top speed {top_speed:g} 1/min: want the machine's highest, above 0")
+    if not 2 <= hours <= 72:
+        raise InputError(f"a test of {hours:g} h: want 2 to 72")
+    length = hours * 3600.0
+    times = round(length / (2 * SHORT))
+    found = []
+    for speed in [float(round(share * top_speed)) for share in SPEEDS]:
+        steps: dict[Kind, tuple[tuple[float, float], ...]] = {
+            "repeated": ((speed, SHORT), (0.0, SHORT)) * times,
+            "stop": ((speed, length / 2), (0.0, length / 2)),
+            "run": ((speed, length),),
+        }
+        found += [Trial(kind, speed, ((0.0, REST), *steps[kind])) for kind in KINDS]
+    return (*found, Trial("room", 0.0, ((0.0, REST), (0.0, length))))
+
+
+def plan(samples: Samples, top_speed: float | None = None, *, hours: float = 12.0, swing: float = 5.0) -> Plan:
+    """Return which test would bring most.
+
+    What is expected to be wrong follows from the covariance of the weights of `averaged` (`thermocomp.models.doubt`),
+    over all tests of the grid, the room changing in each of them. A test takes from the covariance what regression on
+    its rows would: its spindle speed is known exactly, its temperatures are foretold from the speed, and the room
+    reaches the machine with a lag of 2 h.
+
+    Parameters
+    ----------
+    samples : Samples
+        Of the recordings so far.
+    top_speed : float, optional
+        Of the machine [1/min]; the highest recorded one if not given.
+    hours : float
+        Length of a test [h].
+    swing : float
+        How far the room's temperature changes within so long where the machine stands [degC]; 0: it never does, and no
+        test of it is proposed.
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    InputError
+        A setting is no such number, there is no spindle speed or no temperature, or the spindle never turned.
+    FitError
+        Too few rows are complete.
+    """
+    if not 0 <= swing <= 50:
+        raise InputError(f"a room that changes by {swing:g} degC: want 0 to 50")
+    doubt = find_doubt(samples)
+    recorded = float(np.nanmax(np.abs(samples.values[:, doubt.speed])))
+    if not recorded:
+        raise InputError("the spindle never turned in these recordings: record a run and a stop first, at any speed")
+    top_speed = recorded if top_speed is None else top_speed
+    grid = [t for t in make_grid(top_speed, hours) if swing or t.kind != "room"]
+    ambient = [AMBIENT.search(samples.inputs[j].name) is not None for j in doubt.features.temperatures]
+    tables = [_foretell(t, doubt, swing, np.array(ambient)) for t in grid]
+    use = _all_that_is_done(grid, tables)
+    before = doubt.spread(use)
+    gains = [float((before - doubt.after(f, t.duration).spread(use)).mean()) for t, f in zip(grid, tables, strict=True)]
+    covered = Covered.of(samples, doubt.speed)
+    found = [
+        Candidate(t, float(doubt.spread(f).mean()), gain, covered.news(t, top_speed, swing))
+        for t, f, gain in zip(grid, tables, gains, strict=True)
+    ]
+    best = sorted(found, key=lambda c: -c.gain)
+    return Plan(tuple(best), float(before.mean()), top_speed, hours, swing, covered)
+
+
+def _all_that_is_done(grid: Sequence[Trial], tables: Sequence[FloatArray]) -> FloatArray:
+    """Return rows whose mean square is that of every spindle test of the grid with the room changing in it.
+
+    The room rises as often as it falls, so that its share adds in the square.
+    """
+    spindle = [f for t, f in zip(grid, tables, strict=True) if t.kind != "room"]
+    room = [f for t, f in zip(grid, tables, strict=True) if t.kind == "room"]
+    rows = sum(map(len, spindle))
+    weighed = [f * np.sqrt(rows / len(f)) for f in room]
+    both = np.vstack([*spindle, *weighed])
+    return np.asarray(both * np.sqrt(len(both) / rows))
+
+
+def _foretell(trial: Trial, doubt: Doubt, swing: float, ambient: BoolArray) -> FloatArray:
+    """Return the features of a test that was not run."""
+    speed = np.concatenate([np.full(round(d / _STEP), v) for v, d in trial.steps])
+    if trial.kind != "room":
+        return doubt.table(speed, _STEP)[::_EVERY]
+    time = np.maximum(_STEP * np.arange(len(speed)) - REST, 0.0)
+    rate = swing / float(time[-1])
+    air, parts = rate * time, rate * (time - LAG * -np.expm1(-time / LAG))
+    return doubt.table(speed, _STEP, np.where(ambient, air[:, None], parts[:, None]))[::_EVERY]

@@ -1,0 +1,230 @@
+"""A thermal test as an NC program, and the sheet on which is written down what is measured."""
+
+import csv
+import io
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.machine import Channel
+from thermocomp.files.draft import drafts
+from thermocomp.judging.planning.trial import Trial
+from thermocomp.recordings.readers.tables import defuse
+
+Dialect = Literal["linuxcnc", "fanuc"]
+
+#: a dwell is never longer, so that the controller shows how far the test is [s]
+LONGEST = 1800.0
+#: of a program; no control has a slower or faster dwell in question
+_SHORTEST = 60.0
+
+
+class Stretch(NamedTuple):
+    """A time in which nothing changes."""
+
+    start: float  #: since the start of the test [s]
+    duration: float  #: [s]
+    speed: float  #: of the spindle [1/min]
+    first: bool  #: the speed is another one than before
+
+
+def stretches(trial: Trial, every: float = 0.0) -> Iterator[Stretch]:
+    """Cut a test into stretches without a change and without a measurement.
+
+    Parameters
+    ----------
+    trial : Trial
+    every : float
+        Time between two measurements [s]; 0: none, and what lasts long is cut into half hours.
+
+    Yields
+    ------
+    Stretch
+    """
+    start = 0.0
+    for speed, duration in trial.steps:
+        done = 0.0
+        while done < duration - 1e-6:
+            part = min(every or LONGEST, LONGEST, duration - done)
+            yield Stretch(start + done, part, speed, done == 0)
+            done += part
+        start += duration
+
+
+def write_program(trial: Trial, dialect: Dialect, every: float = 0.0) -> str:
+    """Return a test as an NC program.
+
+    It turns the spindle, stops it and waits; it moves no axis. Where it is to be measured the spindle stands, and a
+    routine is called that does nothing until it is filled in.
+
+    Parameters
+    ----------
+    trial : Trial
+    dialect : {'linuxcnc', 'fanuc'}
+    every : float
+        Time between two measurements with a touch probe [s]; 0: a logger measures all the time.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    InputError
+        The time between two measurements is none, or the speed is no whole number.
+    """
+    if every and not _SHORTEST <= every <= LONGEST:
+        raise InputError(f"a measurement every {every / 60:g} min: want 1 to {LONGEST / 60:g}, or 0 for a logger")
+    if trial.speed != round(trial.speed):
+        raise InputError(f"spindle speed {trial.speed:g} 1/min: a program has a whole number")
+    lines = [*_head(trial, dialect, every)]
+    running = 0.0
+    for part in stretches(trial, every):
+        if part.first:
+            what = f"{part.speed:.0f} 1/min" if part.speed else "the spindle stands"
+            lines.append(_comment(f"{clock(part.start)} {what} for {_length(trial, part)}", dialect))
+        if every:
+            lines += ["M5"] * (running > 0) + _measure(dialect)
+            running = 0.0
+        if part.speed != running:
+            lines.append(f"S{part.speed:.0f} M3" if part.speed else "M5")
+            running = part.speed
+        lines.append(f"G4 P{part.duration:.0f}" if dialect == "linuxcnc" else f"G04 P{1000 * part.duration:.0f}")
+    lines += [_comment(f"{clock(trial.duration)} end", dialect), "M5", *(_measure(dialect) if every else []), "M30"]
+    return "\n".join([*lines, *(["%"] if dialect == "fanuc" else []), ""])
+
+
+def write_sheet(trial: Trial, channels: Sequence[Channel], every: float = 0.0) -> str:
+    """Return the sheet of a test: when to write down what, as a CSV file that is a recording once it is filled in.
+
+    Parameters
+    ----------
+    trial : Trial
+    channels : sequence of Channel
+        Temperatures and displacements that are to be written down.
+    every : float
+        Time between two measurements [s]; 0: half an hour.
+
+    Returns
+    -------
+    str
+    """
+    text = io.StringIO()
+    sheet = csv.writer(text, lineterminator="\n")
+    names = [c.name for c in channels if c.quantity != "spindle_speed"]
+    sheet.writerow(["time_min", "spindle_rpm", *map(defuse, names), "what to do"])
+    parts = list(stretches(trial, every))
+    before = 0.0
+    for part in parts:
+        do = "write down all"
+        if part.first and part.start:
+            do += f", then {f'run at {part.speed:.0f} 1/min' if part.speed else 'stop the spindle'}"
+        if trial.kind == "room" and part.first and part.start:
+            do = "write down all, then let the room change: heating, gates, night"
+        # a row tells what led to it
+        sheet.writerow([f"{part.start / 60:g}", f"{before:g}", *[""] * len(names), do])
+        before = part.speed
+    sheet.writerow([f"{trial.duration / 60:g}", f"{before:g}", *[""] * len(names), "write down all: the end"])
+    return text.getvalue()
+
+
+def write_test(
+    trial: Trial,
+    program: Path,
+    channels: Sequence[Channel],
+    *,
+    dialect: Dialect = "linuxcnc",
+    every: float = 0.0,
+    picture: bytes = b"",
+    overwrite: bool = False,
+) -> Path:
+    """Write a test: its NC program, and beside it the sheet, and a picture of why it is run.
+
+    Parameters
+    ----------
+    trial : Trial
+    program : Path
+    channels : sequence of Channel
+        Of `write_sheet`.
+    dialect, every
+        Of `write_program`.
+    picture : bytes
+        PNG; empty: there is none.
+    overwrite : bool
+
+    Returns
+    -------
+    Path
+        Of the sheet.
+
+    Raises
+    ------
+    InputError
+        The test cannot be written, or a file cannot be there: see `thermocomp.files.draft.drafts`.
+    """
+    sheet = sheet_of(program)
+    contents = {
+        sheet: write_sheet(trial, channels, every).encode("utf-8"),
+        program: write_program(trial, dialect, every).encode("ascii"),
+    }
+    if picture:
+        contents = {picture_of(program): picture} | contents
+    with drafts(list(contents), overwrite=overwrite) as started:
+        for target, content in contents.items():
+            started[target].write_bytes(content)
+        started.publish()
+    return sheet
+
+
+def sheet_of(program: Path) -> Path:
+    """Return where the sheet of a program stands."""
+    return program.with_suffix(".csv")
+
+
+def picture_of(program: Path) -> Path:
+    """Return where the picture of a program stands."""
+    return program.with_suffix(".png")
+
+
+def clock(seconds: float) -> str:
+    """Return a time as hours and minutes, such as 6:15."""
+    minutes = round(seconds / 60)
+    return f"{minutes // 60}:{minutes % 60:02d}"
+
+
+def _length(trial: Trial, part: Stretch) -> str:
+    """Return how long it is until the speed changes."""
+    end, own = 0.0, 0.0
+    for _, duration in trial.steps:
+        if end <= part.start + 1e-6:
+            own = duration
+        end += duration
+    return f"{own / 60:g} min" if own < 3600 else f"{own / 3600:g} h"
+
+
+def _head(trial: Trial, dialect: Dialect, every: float) -> Iterator[str]:
+    if dialect == "fanuc":
+        yield "%"
+        yield "O1001 (THERMAL TEST)"
+    yield _comment("thermal test, planned by thermocomp", dialect)
+    yield _comment(trial.words.replace(",", ""), dialect)
+    yield _comment(f"in all {clock(trial.duration)} h, no axis moves", dialect)
+    yield _comment("before the start: machine rested, spindle free, door shut", dialect)
+    if trial.kind == "room":
+        yield _comment("the temperature of the room has to change meanwhile", dialect)
+    if every and dialect == "linuxcnc":
+        yield "o<probe> sub"
+        yield _comment("fill in: approach, G38.2, write down, retract; as it is nothing moves", dialect)
+        yield "o<probe> endsub"
+    yield "G97"
+    yield "M5"
+
+
+def _measure(dialect: Dialect) -> list[str]:
+    """Return the lines that measure, the spindle standing."""
+    return ["o<probe> call"] if dialect == "linuxcnc" else ["(FILL IN: G65 P9810 X Y Z F, YOUR PROBING CYCLE)"]
+
+
+def _comment(text: str, dialect: Dialect) -> str:
+    return f"({text.upper() if dialect == 'fanuc' else text})"

@@ -1,0 +1,208 @@
+"""Which method to take: chosen inside the training part of every left-out unit, so that the choosing is judged too.
+
+The error of a choice among methods is not the error of the method that comes out best: the best of twenty is partly
+luck. So the choice is made anew for every left-out unit, by the error on units left out of the rest (nested
+cross-validation, Varma and Simon 2006), and what was chosen then is judged on the left-out unit.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.judging import do_no_harm
+from thermocomp.judging.splits import Judging, Split
+from thermocomp.models.training import fit_method
+from thermocomp.recordings.samples import Samples
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.intp]
+
+#: up to so many units every pair is left out; with more, the others go out in `GROUPS` groups for each unit
+PAIRS = 8
+GROUPS = 3
+#: units without which nothing is left to choose by
+LEAST = 3
+
+
+@dataclass(frozen=True)
+class Inner:
+    """A training part inside others: what is left out of it, and for which units it counts.
+
+    Parameters
+    ----------
+    split : Split
+        Its `judge` is what was left out of some unit's training part, and that unit itself for a pair.
+    scores : tuple of (int, int)
+        (left-out unit, unit to choose by) for which it tells an error.
+    """
+
+    split: Split
+    scores: tuple[tuple[int, int], ...]
+
+
+def inner_splits(judging: Judging) -> list[Inner]:
+    """Return the training parts that a choice inside each unit's training part needs.
+
+    Parameters
+    ----------
+    judging : Judging
+
+    Returns
+    -------
+    list of Inner
+        None with fewer than 3 units.
+    """
+    splits = judging.splits
+    n = len(splits)
+    if n < LEAST:
+        return []
+    if n <= PAIRS:
+        pairs = [(u, v) for u in range(n) for v in range(u + 1, n)]
+        return [_inner(splits, (u, v), ((u, v), (v, u))) for u, v in pairs]
+    found = []
+    for u in range(n):
+        others = [v for v in range(n) if v != u]
+        for k in range(GROUPS):
+            group = others[k::GROUPS]
+            found.append(_inner(splits, (u, *group), tuple((u, v) for v in group)))
+    return found
+
+
+def _inner(splits: Sequence[Split], out: Sequence[int], scores: tuple[tuple[int, int], ...]) -> Inner:
+    learn = np.logical_and.reduce([splits[u].learn for u in out])
+    judge = np.logical_or.reduce([splits[u].judge for u in out])
+    return Inner(Split(" and ".join(splits[u].block for u in out), learn, judge), scores)
+
+
+def score(samples: Samples, name: str, target: int, judging: Judging, inner: Inner) -> list[float]:
+    """Return a method's RMS for each of an inner training part's scores.
+
+    Parameters
+    ----------
+    samples : Samples
+    name : str
+        Of the method.
+    target : int
+        Index into ``samples.targets``.
+    judging : Judging
+        The units.
+    inner : Inner
+
+    Returns
+    -------
+    list of float
+        [um]
+
+    Raises
+    ------
+    FitError
+        It cannot be fitted.
+    """
+    predicted = fit_method(name, samples, target, inner.split.learn).predicted
+    found = []
+    for _, v in inner.scores:
+        residual = (samples.deviations[:, target] - predicted)[judging.splits[v].judge]
+        residual = residual[np.isfinite(residual)]
+        found.append(float(np.sqrt(np.mean(residual**2))) if residual.size else np.inf)
+    return found
+
+
+@dataclass(frozen=True)
+class Recommendation:
+    """The method that comes out best for a target, and what the way of choosing it is worth.
+
+    Parameters
+    ----------
+    target, method : str
+    chosen : tuple of str
+        What was chosen without each unit.
+    verdict : Verdict
+        On the choosing: each unit is predicted by what was chosen without it.
+    """
+
+    target: str
+    method: str
+    chosen: tuple[str, ...]
+    verdict: do_no_harm.Verdict
+
+
+def recommend(
+    target: str,
+    methods: Sequence[str],
+    parts: Mapping[str, Sequence[do_no_harm.Verdict]],
+    inner: Mapping[str, Sequence[Sequence[float]]],
+    inners: Sequence[Inner],
+) -> Recommendation | None:
+    """Choose a method for a target.
+
+    Parameters
+    ----------
+    target : str
+    methods : sequence of str
+        That may be chosen.
+    parts : mapping of str to sequence of Verdict
+        Per method, on each left-out unit.
+    inner : mapping of str to sequence of sequence of float
+        Per method, from `score` for each of `inners`; infinite where it failed.
+    inners : sequence of Inner
+        From `inner_splits`.
+
+    Returns
+    -------
+    Recommendation or None
+        None if there is nothing to choose by, or nothing to choose.
+    """
+    if not inners or not methods:
+        return None
+    n = len(parts[methods[0]])
+    logs = np.full((len(methods), n, n), np.nan)  # method, left-out unit, unit to choose by
+    for k, name in enumerate(methods):
+        for found, values in zip(inners, inner[name], strict=True):
+            for (u, v), rms in zip(found.scores, values, strict=True):
+                logs[k, u, v] = np.log(max(rms, do_no_harm.NO_NOISE))
+    best = np.nanmean(logs, axis=2).argmin(axis=0)
+    chosen = tuple(methods[k] for k in best)
+    judged = [parts[name][u] for u, name in enumerate(chosen)]
+    outer = [np.nanmean([_log(v) for v in parts[name]]) for name in methods]
+    return Recommendation(
+        target, methods[int(np.argmin(outer))], chosen, do_no_harm.join_verdicts(judged, about="the choice")
+    )
+
+
+def _log(verdict: do_no_harm.Verdict) -> float:
+    """Return a method's logarithm of the error on a unit; infinite if it failed, nan if there was too little to see."""
+    if not verdict.units:
+        return np.inf if verdict.refusal else np.nan
+    return float(np.mean([np.log(max(u.rms, do_no_harm.NO_NOISE)) for u in verdict.units]))
+
+
+def correct_verdicts(
+    verdicts: Mapping[str, do_no_harm.Verdict], primary: str | None, found: Recommendation | None
+) -> dict[str, do_no_harm.Verdict]:
+    """Correct the verdicts on the methods that were tried for one target for their number.
+
+    Parameters
+    ----------
+    verdicts : mapping of str to Verdict
+        Per method, over all units.
+    primary : str or None
+        Method that was named before judging: it is judged as if it were the only one.
+    found : Recommendation or None
+        Judged as a whole: if the choosing is accepted, so is what it comes out with, unless that does harm itself.
+
+    Returns
+    -------
+    dict of str to Verdict
+    """
+    after = dict(zip(verdicts, do_no_harm.holm(list(verdicts.values())), strict=True))
+    if primary is not None:
+        after[primary] = replace(after[primary], p=None, about="named beforehand")
+    elif found is not None and found.verdict.accepted:
+        mine = after[found.method]
+        better = min(found.verdict.p_value, mine.p_value)
+        after[found.method] = replace(
+            mine, p=better, about="chosen anew without each unit, and judged with the choosing"
+        )
+    return after

@@ -1,0 +1,85 @@
+"""What would be written: a method fitted to all rows, tried with noise and lost sensors.
+
+It has seen more than the models that were judged, and may lean on a sensor as they did not.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from thermocomp.core.inputs import Support
+from thermocomp.core.model import ErrorModel
+from thermocomp.judging.guards import Guard, find_guard
+from thermocomp.judging.pieces import work_through
+from thermocomp.judging.results import Assessment
+from thermocomp.judging.robustness import stress, worse
+from thermocomp.models.methods import deployable
+from thermocomp.models.training import train
+from thermocomp.recordings.samples import Samples
+
+
+def stress_written(judged: Assessment, model: ErrorModel, samples: Samples, guard: Guard | None = None) -> Assessment:
+    """Return an assessment with the robustness of the model that is written, where that is worse.
+
+    Parameters
+    ----------
+    judged : Assessment
+        Over all blocks.
+    model : ErrorModel
+        Fitted to all rows.
+    samples : Samples
+    guard : Guard, optional
+        What a watch, made of all rows, lets through while sensors fail.
+
+    Returns
+    -------
+    Assessment
+        The same if noise and lost sensors were not tried.
+    """
+    if judged.robustness is None:
+        return judged
+    k = [t.name for t in samples.targets].index(model.target)
+    rows = samples.valid & np.isfinite(samples.deviations[:, k])
+    own = stress(model, samples, samples.deviations[rows, k], rows, guard=guard).robustness
+    return replace(judged, robustness=worse(judged.robustness, own))
+
+
+def refit_accepted(
+    judged: Sequence[Assessment], samples: Samples, support: Support, *, watch: bool, jobs: int
+) -> list[Assessment]:
+    """Fit what is accepted to all rows, as `thermocomp.judging.study.fit` does, and try that as well.
+
+    Parameters
+    ----------
+    judged : sequence of Assessment
+    samples : Samples
+    support : Support
+        For the models.
+    watch : bool
+        A watch is there to notice lost sensors.
+    jobs : int
+        Processes to share the work among; -1 takes all cores.
+
+    Returns
+    -------
+    list of Assessment
+        The same, less sure of what noise or a lost sensor would make worse than none.
+    """
+    wanted = [a for a in judged if a.overall and a.accepted and deployable(a.model)]
+    everything = np.ones(len(samples), dtype=np.bool_)
+    guard = find_guard(samples, everything, everything) if watch and wanted else None
+    found = work_through(partial(_refit, samples, support, guard), wanted, _not_refitted, jobs=jobs)
+    tried = {(a.target, a.model): a for a in found}
+    return [tried.get((a.target, a.model), a) if a.overall else a for a in judged]
+
+
+def _refit(samples: Samples, support: Support, guard: Guard | None, judged: Assessment) -> Assessment:
+    k = [t.name for t in samples.targets].index(judged.target)
+    written = train(judged.model, samples, k, np.ones(len(samples), dtype=np.bool_), support=support)
+    return stress_written(judged, written.model, samples, guard)
+
+
+def _not_refitted(judged: Assessment, why: str) -> Assessment:
+    return replace(judged, verdict=replace(judged.verdict, caps=(f"cannot be fitted to all rows: {why}",)))

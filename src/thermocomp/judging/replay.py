@@ -1,0 +1,375 @@
+"""Replay: what is judged comes out of `ErrorModel.step` and the compensator around it, as it would live."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.correction import Limits
+from thermocomp.core.model import ErrorModel, State
+from thermocomp.core.watch import Watch
+from thermocomp.core.zero import first_rows, robust_mean
+from thermocomp.judging.probing import Probed, Probings
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
+from thermocomp.recordings.starts import Start
+from thermocomp.runtime import batch
+from thermocomp.runtime.watch import WatchState, begin, look
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+#: turns one reading (n_inputs,) into a batch of disturbed ones (n_variants, n_inputs); gets its row and the test's
+#: reference too
+Disturb = Callable[[int, FloatArray, FloatArray], FloatArray]
+
+
+@dataclass(frozen=True, eq=False)
+class Replayed:
+    """What would have run in the rows that are judged.
+
+    Parameters
+    ----------
+    deviation : ndarray of shape (n_wanted,)
+        What the model alone says: no gate but for missing values, no limits [its unit].
+    compensated : ndarray of shape (n_wanted,)
+        Minus the correction that the compensator had in force: gate, model, limits [its unit].
+    outside : ndarray of bool of shape (n_wanted,)
+        An input was outside the trained range.
+    rejected : ndarray of bool of shape (n_wanted,)
+        The gate turned the reading away, though it was complete.
+    why : str
+        The first reading it turned away; empty if none.
+    limits : Limits or None
+        None: they were not applied, because the model does not predict micrometres.
+    half_width : ndarray of shape (n_wanted,)
+        Of the band about `deviation` [its unit]; nan where there is none.
+    probed : Probed or None
+        What probings did; None: there were none.
+    """
+
+    deviation: FloatArray
+    compensated: FloatArray
+    outside: BoolArray
+    rejected: BoolArray
+    why: str
+    limits: Limits | None
+    half_width: FloatArray
+    probed: Probed | None = None
+
+
+def replay_compensated(
+    model: ErrorModel,
+    samples: Samples,
+    rows: BoolArray,
+    limits: Limits = Limits(),
+    probings: Probings | None = None,
+    widening: FloatArray | None = None,
+) -> Replayed:
+    """Replay a model and a compensator with it over the tests that hold `rows`, from the start of each test.
+
+    A live compensator gets its readings more often than every `Limits.reading_age`, however slowly a test was recorded:
+    rows that lie further apart count as so many readings on time, so the rate limit has the whole time between them.
+
+    Parameters
+    ----------
+    model : ErrorModel
+    samples : Samples
+    rows : ndarray of bool of shape (n_rows,)
+        Rows that are judged.
+    limits : Limits
+        Of the corrections [um]; a model of another unit runs without them, behind the gate.
+    probings : Probings, optional
+        Made in the rows that are judged, from the first of each test on: the only displacements that are used, each
+        from the next row on.
+    widening : ndarray of shape (n_rows,), optional
+        The samples are what a watch lets through, and this is what came with them: see `believe`. Without it the
+        model's own watch looks at them first.
+
+    Returns
+    -------
+    Replayed
+    """
+    columns, within = _columns(model, samples), limits if model.unit == "um" else None
+    if widening is None:
+        samples, widening = believe(model, samples, rows)
+    n, why = len(samples), ""
+    deviation, compensated, half_width = np.zeros(n), np.zeros(n), np.full(n, np.nan)
+    outside, rejected = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
+    deviations = samples.deviations[:, [c.name for c in samples.targets].index(model.target)] if probings else None
+    at, shift, without, refused = np.zeros(n, dtype=np.bool_), np.zeros(n), np.zeros(n), list[str]()
+    for test in np.unique(samples.test[rows]):
+        mine = _until(samples, rows, test, model, columns)
+        time, anew = samples.time[mine], samples.anew(test)
+        step = float(np.median(np.diff(time))) if len(mine) > 1 else 0.0
+        probed = None
+        if probings is not None and deviations is not None:
+            made = probings.find_rows(time, rows[mine] & np.isfinite(deviations[mine]))
+            probed, at[mine[made]] = np.full(len(mine), np.nan), True
+            probed[made] = deviations[mine[made]]
+        found = batch.run(
+            model,
+            within and replace(within, reading_age=max(within.reading_age, step)),
+            time,
+            samples.values[mine][:, columns],
+            reference=given_zero(samples, columns, test),
+            resting=samples.stands[mine],
+            anew=None if anew is None else int(np.flatnonzero(mine == anew)[0]),
+            undriven=np.isinf(widening[mine]),
+            probed=probed,
+            repeatability=probings.repeatability if probings else 0.0,
+        )
+        shift[mine], without[mine] = found.shift, found.without
+        refused += [f"{samples.test_names[test]}: {why}" for why in found.refused]
+        deviation[mine], compensated[mine] = found.deviation, found.compensated
+        outside[mine], rejected[mine] = found.outside, found.rejected
+        # how wrong the model is where it must not run was never judged: no band
+        half_width[mine] = found.half_width * np.where(np.isinf(widening[mine]), np.nan, widening[mine])
+        if found.why and not why:
+            why = f"{samples.test_names[test]}: {found.why}"
+    seen = Probed(probings, at[rows], shift[rows], without[rows], tuple(refused)) if probings else None
+    return Replayed(
+        deviation[rows], compensated[rows], outside[rows], rejected[rows], why, within, half_width[rows], seen
+    )
+
+
+def believe(
+    model: ErrorModel, samples: Samples, rows: BoolArray, watched: Samples | None = None
+) -> tuple[Samples, FloatArray]:
+    """Return samples as a model's watch lets them through, and what that does to its band, in the tests of `rows`.
+
+    They are the same, and it stays as it is, without a watch or its speeds. Rows without a speed are passed on as they
+    are.
+
+    Parameters
+    ----------
+    model : ErrorModel
+    samples : Samples
+    rows : ndarray of bool of shape (n_rows,)
+    watched : Samples, optional
+        The same rows with all inputs of the model's watch, as they were recorded: see `stack_watched`. What the watch
+        finds failed is replaced.
+
+    Returns
+    -------
+    samples : Samples
+    widening : ndarray of shape (n_rows,)
+        See `ErrorModel.widening`; infinite where the model must not run, and its correction is held.
+    """
+    widening, watch, seen = np.ones(len(samples)), model.watch, watched or samples
+    if watch is None or not can_look(watch, seen):
+        return samples, widening
+    names, values = [c.name for c in samples.inputs], samples.values.copy()
+    known = [i.name in names for i in watch.inputs]
+    places = [names.index(i.name) for i in watch.inputs if i.name in names]
+    fault, wider = np.zeros(len(watch.names), dtype=np.int8), 1.0
+    for test in np.unique(samples.test[rows]).tolist():
+        for row, state, let in look_through(watch, seen, test):
+            values[row, places] = let[known]
+            if (state.fault != fault).any():
+                fault = state.fault
+                failed = [n for n, f in zip(watch.names, fault.tolist(), strict=True) if f and n in model.sensors]
+                wider = 1.0
+                if failed:
+                    wider = model.widening(failed) if model.may_lose(failed) else np.inf
+            widening[row] = wider
+        fault, wider = np.zeros_like(fault), 1.0
+    return replace(samples, values=values), widening
+
+
+def stack_watched(
+    watch: Watch, target: str, recordings: Sequence[Recording], starts: Sequence[Start] | Start | None
+) -> Samples | None:
+    """Return all rows of recordings with the inputs of a watch, as they were recorded; None if none has any.
+
+    Parameters
+    ----------
+    watch : Watch
+    target : str
+        A displacement channel: samples have one.
+    recordings : sequence of Recording
+    starts : Start or sequence of Start or None
+        How each begins.
+    """
+    known = [i.name for i in watch.inputs if all(r.has(i.name) for r in recordings)]
+    if not known:
+        return None
+    rezero = any(i.rezero for i in watch.inputs)
+    samples = stack(recordings, [target], known, rezero=rezero, zeroing=watch.zeroing, starts=starts)
+    called = zip(samples.inputs, known, strict=True)
+    return replace(samples, inputs=tuple(replace(channel, name=own) for channel, own in called))
+
+
+def can_look(watch: Watch, samples: Samples) -> bool:
+    """Return whether samples have the speeds of a watch, without which it says nothing."""
+    names = [c.name for c in samples.inputs]
+    return all(i.name in names for i in watch.inputs if i.quantity != "temperature")
+
+
+def look_through(watch: Watch, samples: Samples, test: int) -> Iterator[tuple[int, WatchState, FloatArray]]:
+    """Go through a test with a watch; an input of it that the samples have not got is missing to it.
+
+    Parameters
+    ----------
+    watch : Watch
+    samples : Samples
+        With its speeds.
+    test : int
+
+    Yields
+    ------
+    row : int
+    state : WatchState
+        After the reading.
+    let : ndarray of shape (n_inputs,)
+        What it lets through, in the order of its inputs.
+    """
+    names = [c.name for c in samples.inputs]
+    known = [i.name in names for i in watch.inputs]
+    places = [names.index(i.name) for i in watch.inputs if i.name in names]
+    state = begin(watch, given_zero(samples, places, test) if all(known) else None)
+    for row in np.flatnonzero(samples.test == test).tolist():
+        given = np.full(len(watch.inputs), np.nan)
+        given[known] = samples.values[row, places]
+        state, let = look(watch, state, float(samples.time[row]), given, resting=bool(samples.stands[row]))
+        yield row, state, let
+
+
+def replay(model: ErrorModel, samples: Samples, rows: BoolArray) -> tuple[FloatArray, BoolArray]:
+    """Replay a model over the tests that hold `rows`, from the start of each test.
+
+    Parameters
+    ----------
+    model : ErrorModel
+    samples : Samples
+    rows : ndarray of bool of shape (n_rows,)
+        Rows whose prediction is wanted.
+
+    Returns
+    -------
+    deviation : ndarray of shape (n_wanted,)
+        Predicted deviation at the wanted rows.
+    outside : ndarray of bool of shape (n_wanted,)
+        An input was outside the trained range.
+    """
+    wanted = int(rows.sum())
+    predicted, beyond = np.empty(wanted), np.empty(wanted, dtype=np.bool_)
+    for k, state in enumerate(walk(model, samples, rows)):
+        predicted[k], beyond[k] = state.deviation, state.outside.any()
+    return predicted, beyond
+
+
+def walk(model: ErrorModel, samples: Samples, rows: BoolArray, disturb: Disturb | None = None) -> Iterator[State]:
+    """Step a model through the tests that hold `rows`; yield its state at each wanted row, in their order.
+
+    The model runs without a break from the start of a test, or of the files that it goes on from, as it would on the
+    machine; its only inputs are those of `samples`, never a displacement. A row with a missing input is what the gate
+    turns away live: the last deviation is held. A test that counts anew is told minus what the model says there.
+
+    Parameters
+    ----------
+    model : ErrorModel
+    samples : Samples
+    rows : ndarray of bool of shape (n_rows,)
+        Rows whose state is wanted.
+    disturb : callable, optional
+        Makes several variants of each reading; see `Disturb`.
+
+    Yields
+    ------
+    State
+    """
+    columns = _columns(model, samples)
+    values, reference = samples.values[:, columns], samples.reference()[:, columns]
+    usable = np.all(np.isfinite(values), axis=1)
+    for test in np.unique(samples.test[rows]):
+        mine = _until(samples, rows, test, model, columns)
+        own = mine[mine >= anew] if (anew := samples.anew(test)) is not None else mine[:0]
+        window = _window(model, samples, own[usable[own]])
+
+        def read(k: int, zero: FloatArray = reference[test]) -> FloatArray:
+            return values[k] if disturb is None else disturb(k, values[k], zero)
+
+        state, head = _begun(model, samples, mine[usable[mine]], given_zero(samples, columns, test), read)
+        last, waiting, there = samples.time[mine[0]], list[State](), list[FloatArray]()
+        shift: FloatArray | float | None = None if window.size else 0.0
+        for k, needed in zip(
+            mine.tolist(), _needed(model, usable[mine], rows[mine] | np.isin(mine, window)), strict=True
+        ):
+            if needed:
+                state, _ = model.step(state, head.pop(k) if k in head else read(k), float(samples.time[k] - last))
+                last = samples.time[k]
+            if shift is None and k in window:
+                there.append(state.deviation)
+                shift = np.mean(there, axis=0) if k == window[-1] else None
+            if rows[k]:
+                waiting.append(state)
+            if shift is not None:
+                yield from (s._replace(deviation=s.deviation - shift) for s in waiting)
+                waiting.clear()
+
+
+def are_absolute(models: Sequence[ErrorModel]) -> bool:
+    """Return whether models take temperatures as they are, so that the zero of a recording does not matter to them."""
+    heat = [i for m in models for i in m.inputs if i.quantity == "temperature"]
+    return bool(heat) and not any(i.rezero for i in heat)
+
+
+def _begun(
+    model: ErrorModel,
+    samples: Samples,
+    readings: NDArray[np.intp],
+    reference: FloatArray | None,
+    read: Callable[[int], FloatArray],
+) -> tuple[State, dict[int, FloatArray]]:
+    """Return the state that a test begins in, its zero being known, and the readings of that, which say its mean."""
+    state = model.init(reference)
+    if not np.isnan(state.reference).any():
+        return state, {}
+    head = {int(k): read(int(k)) for k in _window(model, samples, readings)}
+    if head:
+        mean = robust_mean(list(head.values()))
+        state = state._replace(reference=np.where(np.isnan(state.reference), mean, state.reference))
+        head = dict.fromkeys(head, mean)
+    return state, head
+
+
+def _window(model: ErrorModel, samples: Samples, readings: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return the first of some readings: those that a zero is taken of."""
+    return readings[: first_rows(model.zeroing, samples.time[readings], samples.stands[readings])[0]]
+
+
+def _columns(model: ErrorModel, samples: Samples) -> list[int]:
+    names = [c.name for c in samples.inputs]
+    return [names.index(i.name) for i in model.inputs]
+
+
+def _until(samples: Samples, rows: BoolArray, test: int, model: ErrorModel, columns: list[int]) -> NDArray[np.intp]:
+    """Return the rows of a test up to the last wanted one, at least those in which its zero is known."""
+    mine = np.flatnonzero(samples.test == test)
+    stop = int(np.flatnonzero(rows[mine]).max()) + 1
+    usable = np.flatnonzero(np.isfinite(samples.values[mine][:, columns]).all(axis=1))
+    begins = [usable, usable[mine[usable] >= anew]] if (anew := samples.anew(test)) is not None else [usable]
+    for own in begins:
+        _, known = first_rows(model.zeroing, samples.time[mine[own]], samples.stands[mine[own]])
+        stop = max(stop, int(own[min(known, len(own) - 1)]) + 1) if len(own) else stop
+    return mine[:stop]
+
+
+def given_zero(samples: Samples, columns: Sequence[int], test: int) -> FloatArray | None:
+    """Return what counts as zero in a test, if that is given; without it the first readings decide."""
+    given = samples.zero is not None and not np.isnan(samples.zero[test]).any()
+    return samples.reference()[test, columns] if given else None
+
+
+def _needed(model: ErrorModel, usable: BoolArray, wanted: BoolArray) -> BoolArray:
+    """Return the rows of a test that have to be stepped through to know the wanted ones."""
+    if model.remembers or model.support.policy == "hold" or not usable.any():
+        return usable
+    # A model without memory needs the wanted readings, and for a wanted row without one the reading before.
+    needed = usable & wanted
+    before = np.maximum.accumulate(np.where(usable, np.arange(len(usable)), 0))
+    needed[before[wanted]] = True
+    return needed & usable

@@ -1,0 +1,249 @@
+"""What judging needs to be told, and what it comes out as."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.correction import Limits
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.model import ErrorModel
+from thermocomp.judging import do_no_harm, metrics
+from thermocomp.judging.diagnostics import Collinearity
+from thermocomp.judging.probing import Probed
+from thermocomp.judging.recommend import Recommendation
+from thermocomp.judging.robustness import Robustness
+from thermocomp.judging.splits import Judging
+from thermocomp.models.methods import deployable
+from thermocomp.recordings.starts import Start
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What is stated before judging.
+
+    Parameters
+    ----------
+    margin : float or None
+        Harm in a single unit that is let pass [unit of the target]; None takes that of `do_no_harm.margin_of`.
+    primary : str or None
+        Method that the judging is about: it is not corrected for the number of methods, all others are.
+    """
+
+    margin: float | None = None
+    primary: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.margin is not None and not 0 <= self.margin < np.inf:
+            raise InputError(f"margin {self.margin}: state a finite number that is not negative")
+
+    def check(self, names: Sequence[str]) -> None:
+        """Raise `InputError` if the primary method is not among those compared."""
+        if self.primary is not None and self.primary not in names:
+            raise InputError(f"primary method {self.primary!r} is not compared; compared are {', '.join(names)}")
+
+
+@dataclass(frozen=True, eq=False)
+class Assessment:
+    """How one model did for one target on one unseen block.
+
+    Parameters
+    ----------
+    model, target, block : str
+    measured, predicted : ndarray of shape (n_judged,)
+        Deviations [um].
+    row, test, cycle : ndarray of int of shape (n_judged,)
+        Where the rows stand in their file, which file, which thermal cycle.
+    verdict : Verdict
+        Of the do-no-harm gate.
+    sensors : tuple of str
+        Inputs with an influence; those of all models, if several were trained.
+    fit_s : float
+        The fits took [s].
+    n_effective : float
+        Independent rows the residual is worth.
+    robustness : Robustness or None
+    frozen : ErrorModel or None
+        The model that was replayed; None for several blocks together, or if it could not be fitted.
+    failure : str
+        Why the method could not be fitted; empty if it could.
+    caveat : str
+        Why this is no honest test, whatever the figures say; empty if it is one.
+    overall : bool
+        It is the last word on this model and target: all that was judged, not one cycle of it.
+    n_sensors : tuple of (int, int)
+        Fewest and most inputs with an influence in one model.
+    learned : int
+        Rows that the model had learned from: left out, unless there are no others (see `caveat`).
+    alone : ndarray of shape (n_judged,), optional
+        What the model alone predicts, without gate and limits; `predicted` is what would run, with them [um].
+    limits : Limits or None
+        That `predicted` keeps to; None: there are none, and it is the model behind the gate, or alone.
+    rejected : int
+        Judged readings that the gate turned away though they were complete.
+    turned_away : str
+        The first reading that it turned away, and why.
+    half_widths : ndarray of shape (n_judged,), optional
+        Of the band about what the model alone predicts, by the rows it has learned from alone; nan in rows without one
+        [um].
+    band : str
+        What the band is called; empty if no row has one.
+    probed : Probed or None
+        What probings did; None: there were none, the model ran on its readings alone.
+    """
+
+    model: str
+    target: str
+    block: str
+    measured: FloatArray
+    predicted: FloatArray
+    row: IntArray
+    test: IntArray
+    cycle: IntArray
+    verdict: do_no_harm.Verdict
+    sensors: tuple[str, ...]
+    fit_s: float
+    n_effective: float
+    robustness: Robustness | None = None
+    frozen: ErrorModel | None = None
+    failure: str = ""
+    caveat: str = ""
+    overall: bool = False
+    n_sensors: tuple[int, int] = (0, 0)
+    learned: int = 0
+    alone: FloatArray | None = None
+    limits: Limits | None = None
+    rejected: int = 0
+    turned_away: str = ""
+    half_widths: FloatArray | None = None
+    band: str = ""
+    probed: Probed | None = None
+
+    @property
+    def coverage(self) -> float:
+        """Share of the judged rows that the band holds; nan without a band."""
+        known = self._banded
+        alone = self.predicted if self.alone is None else self.alone
+        if self.half_widths is None or not known.any():
+            return float("nan")
+        return float((np.abs(self.measured - alone) <= self.half_widths)[known].mean())
+
+    @property
+    def half_width(self) -> float:
+        """Mean half-width of the band over the judged rows [um]; nan without a band."""
+        known = self._banded
+        return float(self.half_widths[known].mean()) if self.half_widths is not None and known.any() else float("nan")
+
+    @property
+    def _banded(self) -> NDArray[np.bool_]:
+        """Judged rows with a band."""
+        return np.zeros(0, np.bool_) if self.half_widths is None else np.isfinite(self.half_widths)
+
+    def metric(self, name: str) -> float:
+        """Return a metric of `thermocomp.judging.metrics`; nan if the method could not be fitted."""
+        return float("nan") if self.failure else metrics.METRICS[name](self.measured, self.predicted)
+
+    def alone_metric(self, name: str) -> float:
+        """Return the metric of the model alone, without gate and limits."""
+        alone = self.predicted if self.alone is None else self.alone
+        return float("nan") if self.failure else metrics.METRICS[name](self.measured, alone)
+
+    def unprobed_metric(self, name: str) -> float:
+        """Return the metric of what would run without probings."""
+        return metrics.METRICS[name](self.measured, self.predicted if self.probed is None else self.probed.without)
+
+    @property
+    def undisturbed(self) -> float:
+        """RMS that noise and lost sensors are compared with: of the model alone, without probings."""
+        if self.probed is not None or self.alone is None:
+            return self.unprobed_metric("rms")
+        return metrics.METRICS["rms"](self.measured, self.alone)
+
+    def held_metric(self, name: str) -> float:
+        """Return the metric of probings without a model, each held until the next; without one, that of nothing."""
+        held = np.zeros_like(self.measured) if self.probed is None else self.probed.held(self.measured, self.test)
+        return metrics.METRICS[name](self.measured, held)
+
+    def none_metric(self, name: str) -> float:
+        """Return the metric without compensation."""
+        return (
+            metrics.METRICS[name](self.measured, np.zeros_like(self.measured)) if self.measured.size else float("nan")
+        )
+
+    @property
+    def accepted(self) -> bool:
+        """True if the model may run."""
+        return self.word == "accepted"
+
+    @property
+    def word(self) -> do_no_harm.Word:
+        """``accepted``, ``unproven`` or ``refused``."""
+        if self.failure or self.caveat:
+            return "refused"
+        return "unproven" if self._fragile else self.verdict.word
+
+    @property
+    def _fragile(self) -> str:
+        """What noise or a lost sensor does to a model that is good without them; empty if they do no harm."""
+        if self.robustness is None or self.verdict.word != "accepted":
+            return ""
+        margin = max(u.margin for u in self.verdict.units)  # one that was stated is for what was judged, not for this
+        most = do_no_harm.MOST_MARGIN.get(self.verdict.unit, np.inf)
+        return self.robustness.harm_beyond(min(margin, most))
+
+    @property
+    def reason(self) -> str:
+        """Why, and for what is unproven which test would decide it."""
+        if self.failure:
+            return f"could not be judged: {self.failure}"
+        fragile = (
+            f"{self._fragile}; take fewer sensors (thermocomp select) or filter the readings" if self._fragile else ""
+        )
+        told = self.caveat or fragile or self.verdict.told
+        if self.caveat or not self.learned:
+            return told
+        return f"{told}; {self.learned:,} of {len(self.measured) + self.learned:,} rows were learned from: left out"
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Several methods on the same unseen blocks.
+
+    Parameters
+    ----------
+    judging : Judging
+    assessments : tuple of Assessment
+        Per target, method and block; with several blocks also one for all of them together.
+    collinearity : Collinearity
+        Of the temperatures.
+    left : int
+        Pairs of method and target that were not judged, because the work was stopped.
+    recommended : tuple of Recommendation
+        Per target, where there was something to choose.
+    starts : tuple of (str, Start)
+        Names of the recordings, and how each begins.
+    """
+
+    judging: Judging
+    assessments: tuple[Assessment, ...]
+    collinearity: Collinearity
+    left: int = 0
+    recommended: tuple[Recommendation, ...] = ()
+    starts: tuple[tuple[str, Start], ...] = ()
+
+    def overall(self) -> tuple[Assessment, ...]:
+        """Return one assessment per target and method: over all its blocks."""
+        return tuple(a for a in self.assessments if a.overall)
+
+    def best(self, target: str) -> Assessment | None:
+        """Return the assessment of the method to take for a target: the recommended one if it was accepted.
+
+        Without one it is the accepted one with the smallest RMS, of the methods that can be deployed.
+        """
+        fit = [a for a in self.overall() if a.target == target and a.accepted and deployable(a.model)]
+        first = {r.method for r in self.recommended if r.target == target}
+        return min(fit, key=lambda a: (a.model not in first, a.metric("rms")), default=None)

@@ -1,0 +1,270 @@
+"""What noise and a lost sensor do to a model."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.model import ErrorModel
+from thermocomp.judging.guards import Guard
+from thermocomp.judging.replay import walk
+from thermocomp.recordings.samples import Samples
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Robustness:
+    """Errors of a model that is replayed with disturbed readings.
+
+    Parameters
+    ----------
+    noise : float
+        Noise on every temperature [degC].
+    noise_rms : dict of str to tuple of float
+        Per noise law: mean and largest RMS over the draws [um].
+    lost_rms : dict of str to float
+        RMS with one sensor cut off [um].
+    outside : float
+        Share of rows with an input outside the trained range.
+    outside_rms : float
+        RMS in these rows [um]; nan without any.
+    none_rms : float
+        RMS without compensation in all rows [um].
+    unlike : float
+        Share of rows outside the joint support: inputs together unlike all that was trained, or a speed that was not.
+    unlike_rms : float
+        RMS in these rows [um]; nan without any.
+    together_rms : dict of str to float
+        RMS with several sensors cut off at once (``t1_C, t2_C``), of which nothing depends but what may run then [um].
+    """
+
+    noise: float
+    noise_rms: dict[str, tuple[float, float]]
+    lost_rms: dict[str, float]
+    outside: float
+    outside_rms: float
+    none_rms: float
+    unlike: float = 0.0
+    unlike_rms: float = float("nan")
+    together_rms: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def worse_than_none(self) -> tuple[str, ...]:
+        """The disturbances under which the model leaves more than no compensation: it does harm then.
+
+        Such as ``noise of 0.4 degC`` (the mean over the draws of one of its laws) and ``loss of t3_C``.
+        """
+        return tuple(self._above(self.none_rms))
+
+    @property
+    def harm(self) -> str:
+        """What makes it worse than no compensation, and how much worse, in words; empty if nothing does."""
+        return self.harm_beyond(0.0)
+
+    def harm_beyond(self, margin: float) -> str:
+        """Return what makes it worse than no compensation by more than a margin [um], in words; empty if nothing."""
+        told = [f"{what} ({rms:.2f} um)" for what, rms in self._above(self.none_rms + margin).items()]
+        more = f" and {len(told) - 4} more" if len(told) > 4 else ""
+        return f"worse than none ({self.none_rms:.2f} um RMS) with {', '.join(told[:4])}{more}" if told else ""
+
+    def _above(self, limit: float) -> dict[str, float]:
+        """Return the disturbances that leave more than a limit, and what [um]: noise, then losses, the worst first."""
+        loud = max((mean for mean, _ in self.noise_rms.values()), default=0.0)
+        lost = sorted(self.lost_rms.items(), key=lambda item: -item[1])
+        found = {f"noise of {self.noise:g} degC": loud} | {f"loss of {name}": rms for name, rms in lost}
+        return {what: rms for what, rms in found.items() if rms > limit}
+
+    @property
+    def worst_lost(self) -> tuple[str, float]:
+        """The sensor whose loss hurts most, and the RMS without it [um]."""
+        return max(self.lost_rms.items(), key=lambda item: item[1], default=("", float("nan")))
+
+
+def worse(one: Robustness, other: Robustness) -> Robustness:
+    """Return one, with noise and lost sensors of whichever of the two leaves more.
+
+    Parameters
+    ----------
+    one, other : Robustness
+        Of the same rows.
+
+    Returns
+    -------
+    Robustness
+    """
+    noise = {
+        law: (max(mean, other.noise_rms[law][0]), max(largest, other.noise_rms[law][1]))
+        for law, (mean, largest) in one.noise_rms.items()
+    }
+    lost, together = (
+        {n: max(a.get(n, 0.0), b.get(n, 0.0)) for n in dict.fromkeys((*a, *b))}
+        for a, b in ((one.lost_rms, other.lost_rms), (one.together_rms, other.together_rms))
+    )
+    return replace(one, noise_rms=noise, lost_rms=lost, together_rms=together)
+
+
+def pool_robustness(parts: Sequence[tuple[Robustness | None, int]]) -> Robustness | None:
+    """Pool several blocks, each with its number of rows; None if one of them was not stressed.
+
+    RMS values are pooled as the root of the mean square; the largest over the draws stays the largest.
+    """
+    known = [(r, n) for r, n in parts if r is not None]
+    if not known or len(known) < len(parts):
+        return None
+
+    def mean_square(values: Sequence[float], weights: Sequence[float]) -> float:
+        total = sum(weights)
+        return float(np.sqrt(sum(w * v**2 for v, w in zip(values, weights, strict=True)) / total)) if total else np.nan
+
+    def by_name(parts: Sequence[tuple[dict[str, float], int]]) -> dict[str, float]:
+        names = dict.fromkeys(name for of, _ in parts for name in of)
+        return {
+            name: mean_square([of[name] for of, _ in parts if name in of], [n for of, n in parts if name in of])
+            for name in names
+        }
+
+    rows = [n for _, n in known]
+    first = known[0][0]
+    beyond = [(r.outside_rms, r.outside * n) for r, n in known if r.outside > 0]
+    unlike = [(r.unlike_rms, r.unlike * n) for r, n in known if r.unlike > 0]
+    return Robustness(
+        noise=first.noise,
+        noise_rms={
+            law: (
+                mean_square([r.noise_rms[law][0] for r, _ in known], rows),
+                max(r.noise_rms[law][1] for r, _ in known),
+            )
+            for law in first.noise_rms
+        },
+        lost_rms=by_name([(r.lost_rms, n) for r, n in known]),
+        together_rms=by_name([(r.together_rms, n) for r, n in known]),
+        outside=sum(r.outside * n for r, n in known) / sum(rows),
+        outside_rms=mean_square([v for v, _ in beyond], [w for _, w in beyond]),
+        none_rms=mean_square([r.none_rms for r, _ in known], rows),
+        unlike=sum(r.unlike * n for r, n in known) / sum(rows),
+        unlike_rms=mean_square([v for v, _ in unlike], [w for _, w in unlike]),
+    )
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """A clean prediction and what disturbances make of it."""
+
+    predicted: FloatArray
+    outside: BoolArray
+    robustness: Robustness
+
+
+def stress(
+    model: ErrorModel,
+    samples: Samples,
+    measured: FloatArray,
+    rows: BoolArray,
+    *,
+    noise: float = 0.4,
+    draws: int = 100,
+    seed: int = 0,
+    guard: Guard | None = None,
+) -> Replayed:
+    """Replay a model once, clean and disturbed side by side.
+
+    - Noise on every temperature, independent from row to row (C-33). The paper gives a level and no law (E-C9), so both
+      are drawn: uniform within +-`noise`, and normal with `noise` as standard deviation.
+    - Each sensor cut off: its change reads zero from the start on (C-34), the worst way to fail. With a guard a watch
+      has to notice it; without one nothing does.
+
+    Parameters
+    ----------
+    model : ErrorModel
+    samples : Samples
+    measured : ndarray of shape (n_wanted,)
+        Deviations in `rows` [um].
+    rows : ndarray of bool of shape (n_rows,)
+        Rows to judge.
+    noise : float
+        [degC]
+    draws : int
+        Number of noise draws of each law.
+    seed : int
+        Of the noise.
+    guard : Guard, optional
+        What is let through while sensors fail, also several at once.
+
+    Returns
+    -------
+    Replayed
+    """
+    temperatures = np.array([i.quantity == "temperature" for i in model.inputs], dtype=np.bool_)
+    lost: list[tuple[str, ...]] = [(i.name,) for i in model.inputs if i.name in model.sensors]
+    lost += [names for names in (guard.readings if guard else ()) if len(names) > 1 and {*names} <= {*model.sensors}]
+    cut = [[k for k, i in enumerate(model.inputs) if i.name in names] for names in lost]
+    known = [c.name for c in samples.inputs]
+    columns = {known.index(i.name): k for k, i in enumerate(model.inputs)}
+    let = [
+        {columns[c]: v for c, v in guard.readings.get(names, {}).items() if c in columns} if guard else {}
+        for names in lost
+    ]
+    rng = np.random.default_rng(seed)
+    n_inputs = len(model.inputs)
+
+    def disturb(row: int, reading: FloatArray, reference: FloatArray) -> FloatArray:
+        batch = np.broadcast_to(reading, (1 + 2 * draws + len(lost), n_inputs)).copy()
+        batch[1 : 1 + draws, temperatures] += rng.uniform(-noise, noise, (draws, temperatures.sum()))
+        batch[1 + draws : 1 + 2 * draws, temperatures] += rng.normal(0.0, noise, (draws, temperatures.sum()))
+        for variant, (places, through) in enumerate(zip(cut, let, strict=True), start=1 + 2 * draws):
+            if guard and lost[variant - 1 - 2 * draws] in guard.readings:
+                for k, values in through.items():
+                    batch[variant, k] = values[row]
+            else:
+                batch[variant, places] = reference[places]
+        return batch
+
+    # sums, not a table: a long recording times two hundred variants would not fit into memory
+    predicted, beyond = np.empty(len(measured)), np.empty(len(measured), dtype=np.bool_)
+    squares = np.zeros(1 + 2 * draws + len(lost))
+    for k, state in enumerate(walk(model, samples, rows, disturb)):
+        deviation = np.broadcast_to(state.deviation, squares.shape)
+        squares += (measured[k] - deviation) ** 2
+        predicted[k] = deviation[0]
+        beyond[k] = np.atleast_2d(state.outside)[0].any()
+    rms = np.sqrt(squares / len(measured))
+    laws = {"uniform": rms[1 : 1 + draws], "normal": rms[1 + draws : 1 + 2 * draws]}
+    unlike = unlike_rows(model, samples, rows)
+    robustness = Robustness(
+        noise=noise,
+        noise_rms={law: (float(v.mean()), float(v.max())) for law, v in laws.items() if v.size},
+        lost_rms={names[0]: float(v) for names, v in zip(lost, rms[1 + 2 * draws :], strict=True) if len(names) == 1},
+        together_rms={", ".join(n): float(v) for n, v in zip(lost, rms[1 + 2 * draws :], strict=True) if len(n) > 1},
+        outside=float(beyond.mean()),
+        outside_rms=_rms((measured - predicted)[beyond]),
+        none_rms=_rms(measured),
+        unlike=float(unlike.mean()),
+        unlike_rms=_rms((measured - predicted)[unlike]),
+    )
+    return Replayed(predicted, beyond, robustness)
+
+
+def unlike_rows(model: ErrorModel, samples: Samples, rows: BoolArray) -> BoolArray:
+    """Return which of some rows are outside the joint support of a model; rows with a missing input are not.
+
+    Parameters
+    ----------
+    model : ErrorModel
+    samples : Samples
+    rows : ndarray of bool of shape (n_rows,)
+
+    Returns
+    -------
+    ndarray of bool of shape (n_wanted,)
+    """
+    if model.joint is None:
+        return np.zeros(int(rows.sum()), dtype=np.bool_)
+    columns = [[c.name for c in samples.inputs].index(i.name) for i in model.inputs]
+    return np.asarray(model.joint.distance(samples.change()[rows][:, columns]) > 1.0)
+
+
+def _rms(residual: FloatArray) -> float:
+    return float(np.sqrt(np.mean(residual**2))) if residual.size else float("nan")

@@ -1,0 +1,396 @@
+"""Selection of sensors by each method, brought to one form: the sensors, why, and the tables behind it."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+from joblib import effective_n_jobs
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import FitError, InputError
+from thermocomp.judging import budget, pareto
+from thermocomp.judging.candidates import Candidates
+from thermocomp.judging.choice import Choice, Progress, Settings, Table
+from thermocomp.judging.leaks import refuse_leaks
+from thermocomp.judging.pieces import elsewhere, explain, work_through
+from thermocomp.judging.splits import Judging
+from thermocomp.models.grouping import CorrelationGrouping
+from thermocomp.models.numerics.leastsquares import join_columns, triangle
+from thermocomp.models.numerics.stepwise import Step
+from thermocomp.models.partial_f import PartialF
+from thermocomp.models.second_order import SecondOrderRegression
+from thermocomp.models.selection import grouping
+from thermocomp.models.selection.equivalents import Equivalents, equivalents
+from thermocomp.models.selection.maximal_correlation import (
+    DataSet,
+    MaximalCorrelations,
+    maximal_correlations,
+    subsets_up_to,
+)
+from thermocomp.models.subsets import BestSubset
+from thermocomp.recordings.samples import Samples
+
+FloatArray = NDArray[np.float64]
+#: N of the boxcar of maximal correlation (W-04)
+HALF_WINDOW = 10
+
+#: Psi from which on more sensors are not worth having (W-12)
+ENOUGH_PSI = 0.99
+
+#: methods whose work the workers of a cluster can share
+SHARED = ("pareto", "ace")
+
+
+def n_pieces(method: str, samples: Samples, judging: Judging, settings: Settings) -> int:
+    """Return the number of pieces of work of `select`, at most.
+
+    Parameters
+    ----------
+    method : str
+    samples : Samples
+    judging : Judging
+    settings : Settings
+
+    Returns
+    -------
+    int
+    """
+    if method == "pareto":
+        return budget.n_pieces(samples, judging, settings.models, settings.most("pareto"))
+    if method == "ace":
+        return len(samples.targets) * len(samples.cycle_names)
+    return len(samples.targets)
+
+
+def select(
+    method: str,
+    samples: Samples,
+    judging: Judging,
+    settings: Settings,
+    *,
+    jobs: int = 1,
+    progress: Progress = lambda _, steps=1: None,  # noqa: ARG005
+) -> tuple[Choice, ...]:
+    """Choose sensors for every target.
+
+    Parameters
+    ----------
+    method : str
+        grouping, partial-f, stepwise, subsets, ace or pareto.
+    samples : Samples
+    judging : Judging
+        Unseen blocks; only ``pareto`` has a use for them.
+    settings : Settings
+    jobs : int
+        Processes (or threads) to share the work among; -1 takes all cores.
+    progress : callable
+        Called with a line of text after each piece of work, of which there are `n_pieces`; and with ``steps=0`` about
+        once a second during a long search.
+
+    Returns
+    -------
+    tuple of Choice
+        One per target; for ``pareto`` and ``ace`` one for all targets together. Where a method fails for a target it is
+        one without sensors, with `Choice.failure`.
+
+    Raises
+    ------
+    InputError
+        Rows stand in the samples twice and would be learned from and judged on at once (``pareto``).
+        A cluster shall do the work of another method than ``pareto`` and ``ace``.
+    Exception
+        What the method fails with, if it does for all targets.
+    """
+    if elsewhere.get() is not None and method not in SHARED:
+        raise InputError(
+            f"{method} is one search, on this machine: a scheduler is for {' and '.join(SHARED)}; leave it out"
+        )
+    if method == "pareto":
+        refuse_leaks(samples, judging)
+    if method == "ace":
+        return (_by_maximal_correlation(samples, settings, jobs=jobs, progress=progress),)
+    choosers: dict[str, Callable[[Candidates], Choice]] = {
+        "grouping": lambda c: _by_grouping(c, settings),
+        "subsets": lambda c: _by_subsets(c, settings, jobs=jobs, progress=progress),
+        "partial-f": lambda c: _by_steps(c, "partial-f"),
+        "stepwise": lambda c: _by_steps(c, "stepwise"),
+    }
+    found: list[Choice] = []
+    errors: list[Exception] = []
+    together: list[int] = []
+    for k, target in enumerate(samples.targets):
+        try:
+            candidates = Candidates.of(samples, k)
+            if method == "pareto":
+                budget.judged_blocks(samples, k, judging)
+                together.append(k)
+            else:
+                found.append(choosers[method](candidates))
+                progress(f"{target.name}: chosen")
+        except Exception as e:  # noqa: BLE001 - whatever fails for one target, the others have their choice
+            errors.append(e)
+            why = explain(e)
+            found.append(Choice(method, target.name, (), f"could not be chosen: {why}", (), failure=why))
+    if together:
+        few = tuple(samples.targets[k] for k in together)
+        samples = replace(samples, targets=few, deviations=samples.deviations[:, together])
+        found.append(pareto.choose(samples, judging, settings, jobs=jobs, progress=progress))
+    if len(errors) == len(found):
+        raise errors[0]
+    return tuple(found)
+
+
+def _by_grouping(candidates: Candidates, settings: Settings) -> Choice:
+    """Choose by correlation grouping and successive regression (H-01 to H-06)."""
+    found = CorrelationGrouping(
+        threshold=settings.threshold, absolute=settings.unsigned, reference=settings.reference
+    ).fit(candidates.X, candidates.y)
+    taking = {features: k in found.participating_ for k, features in enumerate(found.groups_)}
+    own = [next(i for i in g if i in found.representatives_) for g in found.groups_]
+    groups = Table(
+        f"Groups of correlation above {settings.threshold:g}",
+        ("group", "sensors", "representative", "takes part"),
+        tuple(
+            (k, " ".join(candidates.called(g)), candidates.names[r], "yes" if taking[g] else "")
+            for k, (g, r) in enumerate(zip(found.groups_, own, strict=True), start=1)
+        ),
+    )
+    curve = Table(
+        "Best subset of the representatives",
+        ("number", "MSE_p [um^2]", "sensors"),
+        tuple((len(s.columns), s.mse, " ".join(candidates.called(s.columns))) for s in found.curve_),
+        int(np.argmin([s.mse for s in found.curve_])),
+        f"{found.searched_[0]} subsets of representatives, then {found.searched_[1]} combinations of members.",
+    )
+    sensors = candidates.called(found.selected_)
+    needed = (*sensors, *((settings.reference,) if settings.reference else ()))
+    return Choice(
+        "grouping",
+        candidates.target,
+        needed,
+        f"smallest residual mean square, {found.mse_:.4g} um^2, among the members of {len(found.participating_)} of "
+        f"{len(found.groups_)} groups",
+        (groups, curve, candidates.repeats(sensors), _other_thresholds(candidates, found, settings)),
+        _dependence(found.n_effective_, len(candidates.y)),
+        found,
+    )
+
+
+def _other_thresholds(candidates: Candidates, found: CorrelationGrouping, settings: Settings) -> Table:
+    X = candidates.X.to_numpy()
+    zero = candidates.names.index(settings.reference) if settings.reference is not None else None
+    values = X if zero is None else X - X[:, [zero]]
+    kept = list(found.candidates_)
+    tri = triangle(join_columns(values[:, kept], candidates.y), intercept=True)
+    swept = grouping.sweep(X[:, kept], tri, absolute=settings.unsigned)
+    # thresholds that change the groups but not what is chosen from them are one row
+    alike = [
+        list(part)
+        for _, part in groupby(swept, lambda s: (len(s.interval.groups), s.choice.selected if s.choice else s.failure))
+    ]
+    return Table(
+        "What other thresholds give",
+        ("from", "to below", "groups", "sensors", "MSE_p [um^2]", "sum 1/eigenvalue [1/degC^2]"),
+        tuple(
+            (
+                part[0].interval.low,
+                part[-1].interval.high,
+                len(part[0].interval.groups),
+                " ".join(candidates.called([kept[k] for k in part[0].choice.selected]))
+                if part[0].choice
+                else part[0].failure,
+                part[0].choice.members.best.mse if part[0].choice else None,
+                part[0].spectrum.sum_inverse if part[0].spectrum else None,
+            )
+            for part in alike
+        ),
+        next(
+            (k for k, part in enumerate(alike) if part[0].interval.low <= settings.threshold < part[-1].interval.high),
+            None,
+        ),
+    )
+
+
+def _by_steps(candidates: Candidates, method: str) -> Choice:
+    """Choose by stepwise regression: ``partial-f`` (T-02 to T-06) or ``stepwise``, Chen's second-order one (C-15)."""
+    estimator: PartialF | SecondOrderRegression = PartialF() if method == "partial-f" else SecondOrderRegression()
+    found = estimator.fit(candidates.X, candidates.y)
+    log: tuple[Step, ...] = found.log_
+    steps = Table(
+        "Steps",
+        ("step", "action", "term", "partial F", "R2", "gain in R2"),
+        tuple((s.number, s.action, s.term, s.f, s.r_squared, s.r_squared_step) for s in log),
+    )
+    sensors = found.freeze(target=candidates.target).sensors
+    rule = (
+        "F 100 to enter, 50 to delete" if method == "partial-f" else "alpha .001 to enter, .015 to remove, second order"
+    )
+    return Choice(
+        method,
+        candidates.target,
+        sensors,
+        f"{len(found.terms_)} terms by partial F ({rule}), R2 {found.r_squared_:.4f} {found.r_squared_kind_}",
+        (steps, candidates.repeats(sensors)),
+        _dependence(found.n_effective_, len(candidates.y)),
+        found,
+    )
+
+
+def _by_subsets(candidates: Candidates, settings: Settings, *, jobs: int, progress: Progress) -> Choice:
+    """Choose the exact best subset of every size (H-05), and a size."""
+    most = min(settings.most("subsets"), len(candidates.names))
+    found = BestSubset(
+        criterion=settings.criterion,
+        max_size=most,
+        jobs=effective_n_jobs(jobs),
+        seconds=settings.seconds,
+        progress=partial(progress, steps=0),
+    )
+    found.fit(candidates.X, candidates.y, cycle=candidates.cycle)
+    headings = {"mse": "MSE_p [um^2]", "adjr2": "adjusted R2", "cp": "Cp", "bic": "BIC", "cycles": "RMS left out [um]"}
+    shown = [k for k in headings if k in found.scores_]
+    best = found.subsets_.best
+    table = Table(
+        "Best subset of every size",
+        ("sensors", *(headings[k] for k in shown), "certificate", "which"),
+        tuple(
+            (
+                len(s.columns),
+                *(float(found.scores_[k][row]) for k in shown),
+                "proven" if s.proven else "not proven",
+                " ".join(candidates.called(s.columns)),
+            )
+            for row, s in enumerate(best)
+        ),
+        next((row for row, s in enumerate(best) if s.columns == found.selected_), None),
+        f"{found.subsets_.nodes} of {found.subsets_.possible:.3g} sets were looked at"
+        + ("; the others cannot be better." if found.subsets_.proven else "."),
+    )
+    notes = _dependence(found.n_effective_, len(candidates.y))
+    if found.subsets_.stopped:
+        notes = (f"The search was stopped ({found.subsets_.stopped}): what is not proven may not be the best.", *notes)
+    if found.subsets_.left_out:
+        left = ", ".join(candidates.called(found.subsets_.left_out))
+        notes = (f"Constant, or a copy of another: {left} had no part in it.", *notes)
+    sensors = candidates.called(found.selected_)
+    what = found.chosen_by_ or headings[found.criterion_]
+    return Choice(
+        "subsets",
+        candidates.target,
+        sensors,
+        f"best {len(sensors)} of {len(candidates.names)}, {'proven' if found.proven_ else 'not proven'}; "
+        f"the number by {what}",
+        (table, candidates.repeats(sensors)),
+        notes,
+        found,
+    )
+
+
+def _by_maximal_correlation(samples: Samples, settings: Settings, *, jobs: int, progress: Progress) -> Choice:
+    """Choose for all targets together by maximal correlation (W-10 to W-12); every thermal cycle is a data set."""
+    temperatures = [j for j, c in enumerate(samples.inputs) if c.quantity == "temperature"]
+    names = [samples.inputs[j].name for j in temperatures]
+    targets = tuple(c.name for c in samples.targets)
+    rows = samples.valid & np.isfinite(samples.deviations).all(axis=1)
+    sets = [
+        DataSet(samples.cycle_names[k], samples.change()[mine][:, temperatures], samples.deviations[mine])
+        for k in range(len(samples.cycle_names))
+        if (mine := rows & (samples.cycle == k)).sum() > 2 * HALF_WINDOW
+    ]
+    if not temperatures or not sets:
+        raise FitError(f"maximal correlation: no thermal cycle has more than {2 * HALF_WINDOW} complete rows")
+    subsets = subsets_up_to(len(names), settings.most("ace"))
+    share = None if elsewhere.get() is None else _share
+    psi = maximal_correlations(sets, subsets, half_window=HALF_WINDOW, jobs=jobs, share=share, progress=progress)
+    done = np.isfinite(psi.psi).all(axis=(0, 1))
+    if not done.any():
+        raise FitError("stopped before the first thermal cycle was done")
+    same = equivalents(list(psi.psi[:, :, done]), psi.subsets, level=settings.level, holm=settings.holm)
+
+    total = dict(zip(same.subsets, same.summed.sum(axis=0).tolist(), strict=True))
+    enough = psi.least_size(ENOUGH_PSI)
+    equals = same.common or tuple(dict.fromkeys(same.subsets[k] for k in same.best))
+    least = max(enough or settings.most("ace"), min(len(s) for s in equals))
+    small = [s for s in equals if len(s) <= least]
+    chosen = max(small, key=lambda s: total[s])
+    notes = list(dict.fromkeys(n.partition(": ")[2] for n in same.notes))
+    number = enough or f"more than {settings.most('ace')}"
+    notes.append(f"A mean Psi of {ENOUGH_PSI:g} for every displacement takes {number} sensor(s), no more are chosen.")
+    notes.append("Psi is a fit within each cycle, not an error on unseen ones: judge the set with 'compare --inputs'.")
+    if not same.common:
+        notes.append("No set is as good as the best for all displacements: the one shown is the best for one of them.")
+    if not psi.complete:
+        notes.append(f"Stopped: {int(done.sum())} of {len(sets)} thermal cycles were done.")
+    return Choice(
+        "ace",
+        ", ".join(targets),
+        tuple(names[j] for j in chosen),
+        f"greatest sum of Psi among the sets of up to {max(map(len, small))} sensors that are as good as the best for "
+        f"all displacements ({len(same.common)} sets are)",
+        (_best_sets(psi, same, names, targets), _listed_sets(psi, same, names, targets, chosen)),
+        tuple(notes),
+        same,
+    )
+
+
+def _share(work: Callable[[Any], FloatArray], pieces: Sequence[Any]) -> Iterator[FloatArray]:
+    for found in work_through(work, pieces, _why, jobs=1):
+        if isinstance(found, str):
+            raise FitError(found)
+        yield found
+
+
+def _why(_: Any, why: str) -> FloatArray | str:
+    return why
+
+
+def _best_sets(psi: MaximalCorrelations, same: Equivalents, names: Sequence[str], targets: Sequence[str]) -> Table:
+    done = int(np.isfinite(psi.psi).all(axis=(0, 1)).sum())
+    return Table(
+        "Best set for each displacement",
+        ("displacement", "best set", "mean Psi", "sets that are as good"),
+        tuple(
+            (
+                t,
+                " ".join(names[j] for j in same.subsets[k]),
+                float(same.summed[d, k] / done),
+                int(same.equivalent[d].sum()),
+            )
+            for d, (t, k) in enumerate(zip(targets, same.best, strict=True))
+        ),
+        None,
+        f"{len(psi.subsets)} sets, {done} thermal cycles, {len(targets)} displacements: "
+        f"{len(psi.subsets) * done * len(targets)} models.",
+    )
+
+
+def _listed_sets(
+    psi: MaximalCorrelations, same: Equivalents, names: Sequence[str], targets: Sequence[str], chosen: Sequence[int]
+) -> Table:
+    done = int(np.isfinite(psi.psi).all(axis=(0, 1)).sum())
+    shown = same.table()[:30]
+    return Table(
+        "Sets by the number of displacements for which they are as good as the best",
+        ("set", *(f"mean Psi {t}" for t in targets), "smallest p", "as good for"),
+        tuple(
+            (
+                " ".join(names[j] for j in row.subset),
+                *(float(v / done) for v in row.summed),
+                min(row.p_values),
+                "all" if len(row.equivalent) == len(targets) else " ".join(targets[d] for d in row.equivalent),
+            )
+            for row in shown
+        ),
+        next((k for k, row in enumerate(shown) if row.subset == chosen), None),
+        f"The first {len(shown)} of {len(psi.subsets)}.",
+    )
+
+
+def _dependence(effective: float, rows: int) -> tuple[str, ...]:
+    return (
+        f"The {rows} rows of this time series are worth about {effective:.0f} independent ones: criteria that take "
+        "rows as independent choose too many sensors. See --method pareto for the error on unseen cycles.",
+    )

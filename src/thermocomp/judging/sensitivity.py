@@ -1,0 +1,141 @@
+"""What random sensor error does to the R2 of models as they are (Hwang, section 3.2.4 and Fig. 6; H-18)."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import FitError, InputError
+from thermocomp.core.model import ErrorModel
+from thermocomp.judging.replay import walk
+from thermocomp.recordings.samples import Samples
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivity:
+    """R2 of one model under random sensor error.
+
+    Parameters
+    ----------
+    r_squared : float
+        Without the error, about the mean.
+    draws : ndarray of shape (n_draws,)
+        With it, draw by draw.
+    """
+
+    r_squared: float
+    draws: FloatArray
+
+    @property
+    def mean(self) -> float:
+        """Mean R2 over the draws."""
+        return float(self.draws.mean())
+
+    @property
+    def std(self) -> float:
+        """Standard deviation of R2 over the draws: the smaller, the more robust."""
+        return float(self.draws.std(ddof=1))
+
+
+def sensitivity(
+    models: Mapping[str, ErrorModel],
+    samples: Samples,
+    rows: BoolArray,
+    *,
+    size: float = 0.4,
+    law: Literal["uniform", "normal"] = "uniform",
+    draws: int = 100,
+    seed: int = 0,
+) -> dict[str, Sensitivity]:
+    """Replay models with random error on every temperature, the same error for all of them.
+
+    Nothing is fitted again. The error is independent from sensor to sensor and from row to row, and also on the reading
+    that counts as zero. The paper gives neither its law nor its size (E-H8): the size here is that of C-33.
+
+    Parameters
+    ----------
+    models : mapping of str to ErrorModel
+        Of the same target.
+    samples : Samples
+        With the inputs of all models.
+    rows : ndarray of bool of shape (n_rows,)
+        Rows to judge; those without a measured deviation are passed over.
+    size : float
+        Uniform: within +-size; normal: standard deviation [degC].
+    law : {'uniform', 'normal'}
+    draws : int
+        At least 2; the paper made 100.
+    seed : int
+        Of the error.
+
+    Returns
+    -------
+    dict of str to Sensitivity
+
+    Raises
+    ------
+    InputError
+        Models of different targets or none, or a bad size, law or number of draws.
+    FitError
+        The deviation in these rows is constant, and R2 not defined.
+    """
+    targets = {m.target for m in models.values()}
+    if len(targets) != 1:
+        raise InputError(f"want models of one target, found those of {', '.join(sorted(targets)) or 'none'}")
+    if not 0 <= size < np.inf or draws < 2 or law not in ("uniform", "normal"):
+        raise InputError(
+            f"sensor error {law!r} of {size} degC, {draws} draws: want uniform or normal, >= 0, >= 2 draws"
+        )
+    (target,) = targets
+    names = [c.name for c in samples.targets]
+    if target not in names:
+        raise InputError(f"{target} was not recorded; there are {', '.join(names)}")
+    measured = samples.deviations[:, names.index(target)]
+    judged = rows & np.isfinite(measured)
+    total = float(np.sum((measured[judged] - measured[judged].mean()) ** 2)) if judged.any() else 0.0
+    if not total > 0:
+        raise FitError(f"{target} does not change in the {int(judged.sum())} rows to judge: R2 is not defined")
+    found = {}
+    for name, model in models.items():
+        squares = _squares(model, samples, judged, measured, size, law, draws, seed)
+        r_squared = 1 - squares / total
+        found[name] = Sensitivity(float(r_squared[0]), r_squared[1:])
+    return found
+
+
+def _squares(
+    model: ErrorModel,
+    samples: Samples,
+    judged: BoolArray,
+    measured: FloatArray,
+    size: float,
+    law: str,
+    draws: int,
+    seed: int,
+) -> FloatArray:
+    """Return the residual sum of squares without error, then with each draw of it; shape (1 + draws,)."""
+    columns = [[c.name for c in samples.inputs].index(i.name) for i in model.inputs]
+    temperatures = np.array([c.quantity == "temperature" for c in samples.inputs], dtype=np.bool_)
+    # each row has its own error, whatever the model asks for
+    walked = np.isin(samples.test, samples.test[judged])
+    order = np.argsort(samples.test[walked], kind="stable")
+    row_numbers = np.flatnonzero(walked)[order]
+
+    def disturb(row: int, reading: FloatArray, _: FloatArray) -> FloatArray:
+        rng = np.random.default_rng((seed, row))
+        shape = (draws, len(samples.inputs))
+        error = rng.uniform(-size, size, shape) if law == "uniform" else rng.normal(0.0, size, shape)
+        batch = np.repeat(reading[None], 1 + draws, axis=0)
+        batch[1:] += (error * temperatures)[:, columns]
+        return batch
+
+    squares = np.zeros(1 + draws)
+    for row, state in zip(row_numbers, walk(model, samples, walked, disturb), strict=True):
+        if judged[row]:
+            squares += (measured[row] - state.deviation) ** 2
+    return squares

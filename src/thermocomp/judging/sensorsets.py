@@ -1,0 +1,85 @@
+"""Sets of 1, 2, ... temperatures for all targets at once, by the rows that may be learned from."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import FitError
+from thermocomp.judging.splits import MIN_ROWS
+from thermocomp.models.averaged import AveragedDynamic
+from thermocomp.models.numerics.folds import number_folds
+from thermocomp.models.selection.standins import SensorSets, reduce_sensors
+from thermocomp.recordings.samples import Samples
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+#: what targets of different units are counted in: the share of what there is without compensation
+PERCENT = "%"
+
+
+def weigh_targets(samples: Samples, rows: BoolArray) -> tuple[str, FloatArray]:
+    """Return the unit that all targets are counted in, and what one of it is in each target's own, (n_targets,).
+
+    Parameters
+    ----------
+    samples : Samples
+    rows : ndarray of bool of shape (n_rows,)
+        Without compensation the targets' root mean square is that of these.
+
+    Returns
+    -------
+    unit : str
+        Of the targets; `PERCENT` of the error without compensation where they have several.
+    scales : ndarray of shape (n_targets,)
+        1 in the first case. A target without a number, or that does not move, counts in its own unit.
+    """
+    units = {c.unit for c in samples.targets}
+    if len(units) == 1:
+        return units.pop(), np.ones(len(samples.targets))
+    found = np.where(np.isfinite(samples.deviations[rows]), samples.deviations[rows], 0.0)
+    count = np.isfinite(samples.deviations[rows]).sum(axis=0)
+    scales = np.sqrt((found**2).sum(axis=0) / np.maximum(count, 1)) / 100
+    return PERCENT, np.where(scales > 0, scales, 1.0)
+
+
+def choose_sets(samples: Samples, most: int, learn: BoolArray) -> SensorSets:
+    """Choose sets of temperatures by what the model `averaged` loses without the others.
+
+    Parameters
+    ----------
+    samples : Samples
+        The inputs are temperatures and spindle speeds.
+    most : int
+        Largest set, beside that of all.
+    learn : ndarray of bool of shape (n_rows,)
+        Rows whose deviations may be seen.
+
+    Returns
+    -------
+    SensorSets
+        Places among the temperatures, in the order of the inputs; errors and losses in the unit of `weigh_targets`.
+
+    Raises
+    ------
+    FitError
+        Too few rows with a number in every input and target.
+    """
+    seen = learn & samples.valid & np.isfinite(samples.deviations).all(axis=1)
+    if seen.sum() < MIN_ROWS:
+        names = ", ".join(c.name for c in samples.targets)
+        several = "; choose for fewer targets at once" if len(samples.targets) > 1 else ""
+        raise FitError(
+            f"{int(seen.sum())} rows have a number in each of {names} and of the {len(samples.inputs)} inputs: "
+            f"at least {MIN_ROWS} are needed to choose sensors by{several}"
+        )
+    _, scales = weigh_targets(samples, seen)
+    # a model with a memory also gets what the machine went through between the rows it learns from
+    rows = samples.valid & np.isin(samples.test, samples.test[seen])
+    driven, change, learned = samples.take(rows), samples.change()[rows], seen[rows]
+    speeds = [j for j, c in enumerate(samples.inputs) if c.quantity == "spindle_speed"]
+    how, step = AveragedDynamic(), driven.dt()
+    folds, _ = number_folds(np.where(learned, driven.cycle, -1), len(driven))
+    features, parts, _ = how.lay_out(change, step, folds, speeds)
+    targets = np.where(learned[:, None], driven.deviations / scales, 0.0)
+    moments = features.moments(change, targets, step, parts, how.noise)
+    return reduce_sensors(features, moments, how.noise, most, structures=how.structures, random_state=how.random_state)

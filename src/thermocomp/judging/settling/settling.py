@@ -1,0 +1,302 @@
+"""Time constants: how fast each channel settles after the drives start or stop.
+
+Three answers to one question, so that they check each other: the times to 63 % and 90 % are read from the curve itself,
+without a model; then one and two exponentials are fitted. None of it is prescribed by ISO 230-3: all symbols are ours.
+The curve is averaged over minutes first (`thermocomp.judging.settling.averaging`): no single row decides anything.
+"""
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.judging.settling.averaging import WINDOW, AveragedCurve, K, Noise, average_test
+from thermocomp.judging.settling.exponentials import ExponentialFit, fit
+from thermocomp.recordings.recording import Recording
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+Kind = Literal["warm-up", "cool-down"]
+#: a shorter stop does not end a warm-up (the speed spectrum of a spindle test has some), a shorter run starts none [s]
+INTERRUPTION = 1200.0
+#: a curve is settled if it stays this near to its last value over the last quarter, as a share of its whole change
+SETTLED = 0.05
+#: a channel has to change by so many times its standard uncertainty before its times are told
+CLEAR = 10.0
+#: a curve overshoots if it goes beyond its last value by more than this share of its whole change: the band of t90
+OVERSHOOT = 0.1
+_ROWS = 8  # fewer are not fitted
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A warm-up or a cool-down.
+
+    Parameters
+    ----------
+    kind : {'warm-up', 'cool-down'}
+    number : int
+        Of its kind, from 1.
+    start, end : int
+        Row of the state it begins in, and its last row.
+    """
+
+    kind: Kind
+    number: int
+    start: int
+    end: int
+
+
+@dataclass(frozen=True)
+class Settling:
+    """How a channel goes from one state to the next in a phase.
+
+    Parameters
+    ----------
+    channel, unit : str
+    phase : Phase
+    change : float
+        Value at the end minus that at the start, both averaged [unit].
+    uncertainty : float
+        Of `change`, expanded (k = 2) [unit].
+    noise : float
+        Standard deviation from row to row [unit].
+    moves : bool
+        Its averages differ by more than their noise; see `thermocomp.judging.settling.averaging.Noise`.
+    clear : bool
+        They differ by at least `CLEAR` times the standard uncertainty of `change`; if not, there is no time to be read
+        and nothing is fitted.
+    returns : bool
+        It ends nearer to its start than to its extreme: there is no one time that describes it.
+    overshoots : bool
+        It goes beyond its last value by more than a tenth of its change, and then settles back: when it first passed
+        90 % says nothing of when it settled, so that no times are told.
+    settled : bool
+        Over the last quarter of the phase it stays within `SETTLED` of its change from its last value, and a straight
+        line through it rises by no more; noise is allowed for. An exponential is settled by this rule from 3.3 time
+        constants on, 4 % before its final value.
+    t63, t90 : float
+        When 63.2 % and 90 % of the change were first reached, since the start [s]. Of the change up to the end: if the
+        channel has not settled, the true ones are later; nan if it is not clear, returns or overshoots.
+    one, two : ExponentialFit or None
+        None if it could not be fitted; `two` also if a second exponential is not called for.
+    """
+
+    channel: str
+    unit: str
+    phase: Phase
+    change: float
+    uncertainty: float
+    noise: float
+    moves: bool
+    clear: bool
+    returns: bool
+    overshoots: bool
+    settled: bool
+    t63: float
+    t90: float
+    one: ExponentialFit | None
+    two: ExponentialFit | None
+
+    @property
+    def words(self) -> str:
+        """Say what a reader must know of it; empty if there is nothing."""
+        if not self.moves:
+            return "does not move"
+        if not self.clear:
+            return "moves too little for a time"
+        if self.returns:
+            return "comes back"
+        if self.overshoots:
+            return "overshoots" if self.settled else "overshoots, not settled"
+        return "" if self.settled else "not settled"
+
+
+def find_driven_rows(recording: Recording) -> BoolArray | None:
+    """Return the rows in which the spindle turns or an axis moves, (n_rows,); None if nothing was recorded of it.
+
+    On is: above 2 % of the highest speed or feed. A row without a value counts as the one before it.
+    """
+    channels = (*recording.of_quantity("spindle_speed"), *recording.of_quantity("feed"))
+    if not channels:
+        return None
+    on = np.zeros(len(recording), dtype=np.bool_)
+    for values in np.abs(recording.values(channels)).T:
+        known = np.isfinite(values)
+        if known.any():
+            last = np.maximum.accumulate(np.where(known, np.arange(len(values)), 0))
+            filled = np.nan_to_num(values[last])
+            on |= filled > 0.02 * filled.max()
+    return on
+
+
+def find_phases(recording: Recording, interruption: float = INTERRUPTION) -> tuple[Phase, ...]:
+    """Split a recording into warm-ups and cool-downs.
+
+    A row tells what led to it: a phase begins in the row before the drives start or stop. What comes before the first
+    start belongs to no phase. Shorter stops than `interruption` do not end a warm-up, shorter runs do not start one.
+
+    Parameters
+    ----------
+    recording : Recording
+    interruption : float
+        [s]
+
+    Returns
+    -------
+    tuple of Phase
+        Empty if the drives never run, or nothing was recorded of them.
+    """
+    on = find_driven_rows(recording)
+    if on is None or not on.any():
+        return ()
+    time = recording.time
+    for state in (False, True):  # short stops first: a spectrum of speeds is one warm-up
+        edges = [0, *(np.flatnonzero(np.diff(on)) + 1).tolist(), len(on)]
+        for k in range(1 if state is False else 0, len(edges) - 1):
+            a, b = edges[k], edges[k + 1]
+            inside = state or b < len(on)  # the stop at the end is a cool-down, however short
+            if on[a] == state and inside and time[b - 1] - time[max(a - 1, 0)] < interruption:
+                on[a:b] = not state
+    edges = [0, *(np.flatnonzero(np.diff(on)) + 1).tolist(), len(on)]
+    found: list[Phase] = []
+    for a, b in pairwise(edges):
+        kind: Kind = "warm-up" if on[a] else "cool-down"
+        if kind == "warm-up" or found:
+            number = 1 + sum(p.kind == kind for p in found)
+            found.append(Phase(kind, number, max(a - 1, 0), b - 1))
+    return tuple(found)
+
+
+def time_constants(
+    recording: Recording, phases: tuple[Phase, ...] | None = None, leave_out: Collection[str] = ()
+) -> tuple[Settling, ...]:
+    """Read and fit the time constants of every temperature, displacement and angle in every phase.
+
+    Parameters
+    ----------
+    recording : Recording
+    phases : tuple of Phase, optional
+        Those of `find_phases` if not given.
+    leave_out : collection of str
+        Channels that are not asked for.
+
+    Returns
+    -------
+    tuple of Settling
+        Phase by phase, channel by channel.
+    """
+    phases = find_phases(recording) if phases is None else phases
+    channels = [
+        c
+        for c in recording.channels
+        if c.quantity in ("temperature", "displacement", "angle") and c.name not in leave_out
+    ]
+    values = recording.values(channels)
+    found = []
+    for number, p in enumerate(phases):
+        # the phase before may have left the machine moving; before the first one it has rested
+        earliest = phases[number - 1].start if number else 0
+        begin = earliest + int(np.searchsorted(recording.time[earliest : p.start], recording.time[p.start] - WINDOW))
+        rows, lead = slice(begin, p.end + 1), p.start - begin
+        for k, c in enumerate(channels):
+            found.append(settle(recording.time[rows], values[rows, k], c.name, c.unit, p, lead=lead, rests=number == 0))
+    return tuple(found)
+
+
+def settle(
+    time: FloatArray,
+    values: FloatArray,
+    channel: str,
+    unit: str,
+    phase: Phase,
+    *,
+    lead: int = 0,
+    rests: bool = True,
+) -> Settling:
+    """Read and fit the time constants of one channel in one phase.
+
+    Parameters
+    ----------
+    time : ndarray of shape (n_rows,)
+        [s]
+    values : ndarray of shape (n_rows,)
+        nan where missing; such rows are passed over.
+    channel, unit : str
+    phase : Phase
+    lead : int
+        So many rows come before the phase: what it starts from is averaged over them.
+    rests : bool
+        The machine has rested in these rows.
+
+    Returns
+    -------
+    Settling
+    """
+    there = np.isfinite(values)
+    lead, (t, y) = int(there[:lead].sum()), (time[there], values[there])
+    nan = float("nan")
+    if len(y) - lead < _ROWS:
+        return Settling(channel, unit, phase, nan, nan, nan, False, False, False, False, False, nan, nan, None, None)
+    c = average_test(t, y, lead, len(y) - 1, rests=rests)
+    t, y, curve = t[lead:] - time[min(np.flatnonzero(there)[lead], len(time) - 1)], y[lead:] - c.zero.value, c.values
+    change, span = float(curve[-1]), float(np.ptp(curve))
+    u = float(np.hypot(c.u[-1], c.zero.u))
+    moves = c.noise.moves
+    clear = bool(moves and span >= CLEAR * u)
+    returns = clear and abs(change) < 0.5 * span
+    beyond = float((np.sign(change) * (curve - change)).max())
+    overshoots = clear and not returns and beyond > max(OVERSHOOT * abs(change), 3.0 * u)
+    last = t >= 0.75 * t[-1]
+    settled = clear and _rests(t[last], y[last], curve[last], SETTLED * abs(change), c.noise)
+    reads = clear and not returns and not overshoots
+    return Settling(
+        channel,
+        unit,
+        phase,
+        change,
+        K * u,
+        c.noise.sigma,
+        moves,
+        clear,
+        returns,
+        overshoots,
+        settled,
+        _reached(t, y, c, 1.0 - np.exp(-1.0)) if reads else nan,
+        _reached(t, y, c, 0.9) if reads else nan,
+        *(fit(t, y + c.zero.value) if clear else (None, None)),
+    )
+
+
+def _rests(t: FloatArray, y: FloatArray, curve: FloatArray, limit: float, noise: Noise) -> bool:
+    """Return whether a curve neither leaves its last value nor creeps on, by more than a limit."""
+    if len(t) < 2:
+        return False
+    rise = float(np.polyfit(t - t.mean(), y, 1)[0] * (t[-1] - t[0]))
+    creeps = abs(rise) > max(limit, np.sqrt(12.0) * K * float(noise.of_mean(len(t))))
+    # the line at the end is twice as unsure as a mean
+    width = limit + 3.0 * np.sqrt(5.0) * float(noise.of_mean(np.mean(np.abs(t - t[-1]) <= noise.window) * len(t)))
+    return bool(not creeps and np.abs(curve - curve[-1]).max() <= width)
+
+
+def _reached(t: FloatArray, y: FloatArray, c: AveragedCurve, share: float) -> float:
+    """Return when the average first reached a share of its change [s]; a parabola through the rows nearby tells it."""
+    level = share * c.values[-1]
+    done = c.values / c.values[-1]
+    k = int(np.argmax(done >= share))
+    if k == 0:
+        return 0.0
+    crossed = float(t[k - 1] + (share - done[k - 1]) / (done[k] - done[k - 1]) * (t[k] - t[k - 1]))
+    half = min(0.5 * c.noise.window, crossed, float(t[-1]) - crossed)
+    near = np.abs(t - crossed) <= half
+    if near.sum() < 5:
+        return crossed
+    a, b, constant = np.polyfit((t[near] - crossed) / half, y[near], 2)
+    roots = np.roots([a, b, constant - level])
+    real = roots[np.isreal(roots)].real
+    real = real[np.abs(real) <= 1.0]
+    return crossed + half * float(real[np.argmin(np.abs(real))]) if real.size else crossed

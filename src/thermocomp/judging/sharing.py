@@ -1,0 +1,38 @@
+"""Who does the work in pieces: this machine's processes, or a cluster."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from thermocomp.core.exceptions import MissingExtraError
+from thermocomp.judging.pieces import elsewhere
+
+
+@contextmanager
+def shared_among(scheduler: str | None) -> Iterator[None]:
+    """Have `thermocomp.judging.pieces.work_through` share its work among the workers of a Dask cluster.
+
+    Parameters
+    ----------
+    scheduler : str or None
+        Address of the scheduler, such as ``tcp://192.168.1.20:8786``; None: the work stays on this machine.
+
+    Raises
+    ------
+    ClusterError
+        The cluster cannot be used, or is lost later on; see `thermocomp.judging.cluster.connect`.
+    MissingExtraError
+        Dask is not installed.
+    """
+    if scheduler is None:
+        yield
+        return
+    try:
+        from thermocomp.judging.cluster import connect
+    except ModuleNotFoundError as e:
+        raise MissingExtraError("dask", e.name or "distributed") from e
+    with connect(scheduler) as cluster:
+        token = elsewhere.set(cluster.share)
+        try:
+            yield
+        finally:
+            elsewhere.reset(token)

@@ -1,0 +1,256 @@
+"""What is learned from and what is judged: rows, spans of time, thermal cycles, days or files, never at random."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.recordings.samples import Samples
+
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.intp]
+
+
+#: [s]
+DAY = 86400.0
+#: rows below which a stretch says nothing about a cycle
+MIN_ROWS = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Split:
+    """One training and the unseen block it is judged on.
+
+    Parameters
+    ----------
+    block : str
+        Name of the unseen block.
+    learn, judge : ndarray of bool of shape (n_rows,)
+    whole : bool
+        The gate judges the block as one; without it, each thermal cycle in it.
+    stretch : bool
+        It goes on from what was learned: its cycles are not independent of that.
+    """
+
+    block: str
+    learn: BoolArray
+    judge: BoolArray
+    whole: bool = False
+    stretch: bool = False
+
+    @property
+    def name(self) -> str:
+        """What was left out, without the word for what it is."""
+        return self.block.partition(" ")[2]
+
+
+@dataclass(frozen=True)
+class Judging:
+    """How models are judged: one split or several.
+
+    Parameters
+    ----------
+    name : str
+        In words, for tables and reports.
+    splits : tuple of Split
+    """
+
+    name: str
+    splits: tuple[Split, ...]
+
+
+def by_rows(samples: Samples, train: float, test: float) -> Judging:
+    """Learn from the first share of the rows, judge on the next.
+
+    Parameters
+    ----------
+    samples : Samples
+    train, test : float
+        Shares of all rows, such as 0.75 and 0.25.
+
+    Raises
+    ------
+    InputError
+        A share is not between 0 and 1, or their sum is above 1.
+    """
+    if not (0 < train < 1 and 0 < test < 1 and train + test <= 1 + 1e-9):
+        raise InputError(f"split {train:g}/{test:g}: want two shares between 0 and 1 whose sum is at most 1")
+    own = np.flatnonzero(samples.cycle >= 0)  # not those of earlier files, which tests go on from
+    n = len(own)
+    ends = [*own.tolist(), len(samples)]
+    first, stop = ends[round(n * train)], ends[min(n, round(n * (train + test)))]
+    name = f"first {train:.0%} of the rows to learn, next {test:.0%} unseen"
+    return _consecutive(name, len(samples), first, stop)
+
+
+def by_time(samples: Samples, train_s: float, test_s: float) -> Judging:
+    """Learn from the first seconds of the recordings, judge on the next.
+
+    Time runs through the tests one after the other, without the breaks between them.
+
+    Parameters
+    ----------
+    samples : Samples
+    train_s, test_s : float
+        [s]
+    """
+    steps = samples.dt()
+    earlier = samples.cycle < 0  # a file that the test goes on from, and the break after it
+    steps[np.isinf(steps) | earlier | np.roll(earlier, 1)] = 0.0
+    elapsed = np.cumsum(steps)
+    first, stop = (int(np.searchsorted(elapsed, t)) for t in (train_s, train_s + test_s))
+    if not 0 < first < stop:
+        raise InputError(
+            f"split {train_s / 3600:g} h/{test_s / 3600:g} h: the recordings last {elapsed[-1] / 3600:.2f} h in all"
+        )
+    name = f"first {train_s / 3600:g} h to learn, next {test_s / 3600:g} h unseen"
+    return _consecutive(name, len(samples), first, stop)
+
+
+def join_short_cycles(cycle: IntArray, test: IntArray, least: int = MIN_ROWS) -> list[IntArray]:
+    """Return the thermal cycles to judge by: those too short to say anything join the one before them in their test.
+
+    Parameters
+    ----------
+    cycle, test : ndarray of int of shape (n_rows,)
+        Of each row, in the order of time.
+    least : int
+        Rows that say something.
+
+    Returns
+    -------
+    list of ndarray of int
+        Cycles of each stretch. The first of a test joins the next; a test that is too short as a whole stays one.
+    """
+    found: list[IntArray] = []
+    for k in np.unique(test):
+        mine: list[list[int]] = []
+        short = True  # what came before is
+        for c in np.unique(cycle[(test == k) & (cycle >= 0)]).tolist():
+            n = int((cycle == c).sum())
+            if mine and (short or n < least):
+                mine[-1].append(c)
+            else:
+                mine.append([c])
+            short = int(np.isin(cycle, mine[-1]).sum()) < least
+        found += [np.array(m) for m in mine]
+    return found
+
+
+def name_cycles(samples: Samples, block: IntArray) -> str:
+    """Return the name of a cycle, or of several one after the other."""
+    first, last = (samples.cycle_names[c] for c in (block[0], block[-1]))
+    return first if len(block) == 1 else f"{first} to {last}"
+
+
+def leave_one_cycle_out(samples: Samples) -> Judging:
+    """Judge on each thermal cycle in turn, learn from all others; see `join_short_cycles`.
+
+    Raises
+    ------
+    InputError
+        There are fewer than two cycles.
+    """
+    n = len(samples.cycle_names)
+    if n < 2:
+        raise InputError(
+            "only one thermal cycle was found: leaving one out needs at least two. Give a spindle speed, a 'cycle' "
+            "column or several files; or judge by time with --split 0.75/0.25"
+        )
+    blocks = join_short_cycles(samples.cycle, samples.test)
+    joined = f", {n - len(blocks)} of them too short: out with the one before" if 1 < len(blocks) < n else ""
+    if len(blocks) == 1:  # all together: there would be nothing to learn from
+        blocks = [np.array([k]) for k in range(n)]
+    splits = []
+    for block in blocks:
+        mine = np.isin(samples.cycle, block)
+        splits.append(Split(f"cycle {name_cycles(samples, block)}", ~mine, mine))
+    return Judging(f"leave one thermal cycle out ({n} cycles{joined})", tuple(splits))
+
+
+def leave_one_file_out(samples: Samples) -> Judging:
+    """Judge on each file in turn, learn from all others; what a day of several jobs leaves is judged as one.
+
+    Raises
+    ------
+    InputError
+        There is only one file.
+    """
+    n = len(samples.test_names)
+    if n < 2:
+        raise InputError("leaving one file out needs at least two recordings")
+    splits = [
+        Split(f"file {samples.test_names[k]}", samples.test != k, samples.test == k, whole=True) for k in range(n)
+    ]
+    return Judging(f"leave one file out ({n} files)", tuple(splits))
+
+
+def leave_one_day_out(samples: Samples) -> Judging:
+    """Judge on each day in turn, learn from all others; one with too few rows goes with the day before.
+
+    A thermal cycle belongs to the day on which it begins, unless it is longer than a day: then midnight cuts it.
+
+    Raises
+    ------
+    InputError
+        A recording has no time stamps, or there is only one day.
+    """
+    days = samples.days()
+    unknown = np.isnat(days)
+    if unknown.any():
+        name = samples.test_names[samples.test[int(np.argmax(unknown))]]
+        raise InputError(
+            f"leaving one day out: {name} has no time stamps, so nobody knows its days; write date and time into its "
+            "time column, or leave out cycles or files"
+        )
+    own = samples.cycle >= 0  # not those of earlier files, which tests go on from
+    for k in np.unique(samples.cycle[own]):
+        rows = np.flatnonzero(samples.cycle == k)
+        if samples.time[rows[-1]] - samples.time[rows[0]] <= DAY:
+            days[rows] = days[rows[0]]
+    names, day = np.unique(days, return_inverse=True)
+    blocks = join_short_cycles(np.where(own, day, -1), np.zeros(len(samples), dtype=np.intp))
+    if len(blocks) < 2:
+        raise InputError("leaving one day out needs at least two days with recordings")
+    splits = []
+    for block in blocks:
+        mine = np.isin(day, block) & own
+        more = f" and {len(block) - 1} more" if len(block) > 1 else ""
+        splits.append(Split(f"day {names[block[0]]}{more}", ~mine, mine, whole=True))
+    return Judging(f"leave one day out ({len(blocks)} days)", tuple(splits))
+
+
+def parse(text: str, samples: Samples) -> Judging:
+    """Understand a split as written on the command line.
+
+    Parameters
+    ----------
+    text : str
+        Shares of the rows (``0.75/0.25``) or hours (``20h/8h``).
+    samples : Samples
+
+    Raises
+    ------
+    InputError
+        It is neither.
+    """
+    parts = text.split("/")
+    try:
+        if len(parts) == 2 and all(p.strip().endswith("h") for p in parts):
+            hours = [float(p.strip().removesuffix("h")) for p in parts]
+            return by_time(samples, hours[0] * 3600, hours[1] * 3600)
+        if len(parts) == 2:
+            return by_rows(samples, float(parts[0]), float(parts[1]))
+    except ValueError:
+        pass
+    raise InputError(f"split {text!r}: write two shares of the rows such as 0.75/0.25, or hours such as 20h/8h")
+
+
+def _consecutive(name: str, n: int, first: int, stop: int) -> Judging:
+    rows = np.arange(n)
+    if first < 1 or stop <= first:
+        raise InputError(f"{name}: leaves no row to learn from or none to judge on ({n} rows in all)")
+    return Judging(
+        name, (Split(f"rows {first}-{stop - 1}", rows < first, (rows >= first) & (rows < stop), stretch=True),)
+    )

@@ -1,0 +1,433 @@
+"""Whole jobs: fit one method with its honest error, judge model files on recordings."""
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.correction import Limits
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.inputs import Support
+from thermocomp.core.machine import Channel
+from thermocomp.core.model import ErrorModel
+from thermocomp.core.provenance import RULES, HonestError
+from thermocomp.core.validity import Validity
+from thermocomp.judging import coverage
+from thermocomp.judging.compare import compare, split_by_cycle
+from thermocomp.judging.do_no_harm import Verdict
+from thermocomp.judging.guards import Guard, find_guard, let_fail
+from thermocomp.judging.judge import cap_alike_units, judge
+from thermocomp.judging.leaks import find_learned_rows
+from thermocomp.judging.pieces import explain
+from thermocomp.judging.probing import Probings
+from thermocomp.judging.refit import stress_written
+from thermocomp.judging.replay import are_absolute, believe, can_look, stack_watched
+from thermocomp.judging.results import Assessment, Comparison, Rules
+from thermocomp.judging.splits import Judging, Split, join_short_cycles, name_cycles
+from thermocomp.models.base import ThermalRegressor
+from thermocomp.models.methods import deployable, expand
+from thermocomp.models.training import train
+from thermocomp.recordings.checks.sound import drop_unsound
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
+from thermocomp.recordings.starts import Start, find_starts
+
+BoolArray = NDArray[np.bool_]
+FloatArray = NDArray[np.float64]
+
+
+def _silent(_: str) -> None:
+    pass
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A method fitted to everything, with its error on what it had not seen.
+
+    Parameters
+    ----------
+    models : tuple of ErrorModel
+        One per target.
+    estimators : tuple of ThermalRegressor
+        The same before freezing.
+    r_squared : tuple of float
+        In-sample, about the mean: what a fit promises, not what it keeps.
+    comparison : Comparison
+        The method on the unseen blocks.
+    """
+
+    models: tuple[ErrorModel, ...]
+    estimators: tuple[ThermalRegressor, ...]
+    r_squared: tuple[float, ...]
+    comparison: Comparison
+
+
+def fit(
+    samples: Samples,
+    method: Any,
+    judging: Judging,
+    *,
+    rules: Rules = Rules(),
+    support: Support = Support(),
+    recordings: Sequence[Recording] = (),
+    limits: Limits = Limits(),
+    jobs: int = 1,
+    progress: Callable[[str], None] = _silent,
+) -> Fitted:
+    """Judge a method on unseen blocks, then fit it to all rows.
+
+    Parameters
+    ----------
+    samples : Samples
+    method : str or estimator
+        See `thermocomp.models.methods.expand`.
+    judging : Judging
+    rules : Rules
+        What is stated before judging.
+    support : Support
+        For the models.
+    recordings : sequence of Recording
+        The tests of `samples`, in their order: for the surroundings and the days in the models' validity.
+    limits : Limits
+        Of the compensator that is judged with them.
+    jobs : int
+        Processes to share the work among; -1 takes all cores.
+    progress : callable
+        Called with a line of text after each piece of work: ``n_pieces`` of them and one per target.
+
+    Returns
+    -------
+    Fitted
+
+    Raises
+    ------
+    InputError
+        The method is unknown, or cannot be frozen, so there would be no model.
+    """
+    (method,) = expand([method])
+    if not deployable(method):
+        raise InputError(f"{method} cannot be frozen to plain numbers: judge it with 'compare', fit another method")
+    everything = np.ones(len(samples), dtype=np.bool_)
+    written = [train(method, samples, k, everything, support=support, prints=True) for k in range(len(samples.targets))]
+    speeds = [c.name for c in samples.inputs if c.quantity == "spindle_speed"]
+    watched = list(dict.fromkeys([*(i.name for w in written for i in w.model.inputs), *speeds]))
+    comparison = compare(
+        samples,
+        [method],
+        judging,
+        rules=rules,
+        support=support,
+        refit=False,
+        limits=limits,
+        watched=watched,
+        jobs=jobs,
+        progress=progress,
+    )
+    known = samples.only(watched)
+    names = [c.name for c in samples.inputs]
+    guard = find_guard(known, everything, everything)
+    let = guard and guard.among([names.index(c.name) for c in known.inputs])
+    covered = coverage.find_validity(samples, judging, recordings)
+    models, tried = list[ErrorModel](), dict[str, Assessment]()
+    for overall, trained in zip(comparison.overall(), written, strict=True):
+        progress(f"{overall.target} {method} all rows")
+        tried[overall.target] = stress_written(overall, trained.model, samples, let)
+        honest = honest_error(tried[overall.target], judging)
+        models.append(
+            replace(trained.model, honest_error=honest, validity=covered, watch=guard.watch if guard else None)
+        )
+    judged = tuple(tried[a.target] if a.overall else a for a in comparison.assessments)
+    return Fitted(
+        tuple(models),
+        tuple(w.estimator for w in written),
+        tuple(w.r_squared for w in written),
+        replace(comparison, assessments=judged),
+    )
+
+
+def honest_error(overall: Assessment, judging: Judging) -> HonestError:
+    """Summarise an assessment for the model file.
+
+    Raises
+    ------
+    InputError
+        The method could not be fitted in one of the splits, so there is no error to state.
+    """
+    if overall.failure:
+        raise InputError(f"{overall.target}: cannot be judged: {overall.failure}")
+    rms, none = overall.metric("rms"), overall.none_metric("rms")
+    word, reason = overall.word, overall.reason
+    if word == "accepted" and rms > none:  # one long cycle, within the margin, against many short ones
+        word, reason = "unproven", f"{reason}; over all rows RMS {rms:.2f}, {none:.2f} without compensation"
+    return HonestError(
+        protocol=judging.name,
+        mae=overall.metric("mae"),
+        rms=rms,
+        max_abs=overall.metric("max_abs"),
+        none_mae=overall.none_metric("mae"),
+        none_rms=none,
+        cycles={u.name: u.rms for u in overall.verdict.units},
+        verdict=word,
+        reason=reason,
+        units=len(overall.verdict.units),
+        tried=overall.verdict.tried,
+        rules=RULES,
+        harm_margin=overall.verdict.stated,
+        lost={**tried.lost_rms, **tried.together_rms} if (tried := overall.robustness) else {},
+    )
+
+
+@dataclass(frozen=True)
+class Judged:
+    """Model files judged on recordings.
+
+    Parameters
+    ----------
+    models : tuple of ErrorModel
+    assessments : tuple of Assessment
+        Per model and cycle, and per model over all cycles.
+    seen : tuple of str
+        Names of recordings that a model was fitted to, as they are: they are not judged on if there is another.
+    validity : Validity or None
+        What the thermal cycles of these recordings cover.
+    starts : tuple of (str, Start)
+        Names of the recordings, and how each begins.
+    """
+
+    models: tuple[ErrorModel, ...]
+    assessments: tuple[Assessment, ...]
+    seen: tuple[str, ...]
+    validity: Validity | None = None
+    starts: tuple[tuple[str, Start], ...] = ()
+
+    def overall(self) -> tuple[Assessment, ...]:
+        """Return one assessment per model, over all cycles."""
+        return tuple(a for a in self.assessments if a.overall)
+
+
+def assess(
+    models: Sequence[ErrorModel],
+    recordings: Sequence[Recording],
+    *,
+    rules: Rules = Rules(),
+    limits: Limits = Limits(),
+    starts: Start | Sequence[Start] | None = None,
+    probings: Probings | None = None,
+    progress: Callable[[str], None] = _silent,
+) -> Judged:
+    """Judge frozen models on recordings: per cycle, with noise, with lost sensors, outside the trained range.
+
+    Rows that a model has learned from are left out and counted, whatever file they stand in; if no others are there,
+    the model is refused: see `thermocomp.recordings.fingerprints`.
+
+    Parameters
+    ----------
+    models : sequence of ErrorModel
+    recordings : sequence of Recording
+        With the models' inputs and targets.
+    rules : Rules
+        What is stated before judging.
+    limits : Limits
+        Of the compensator that is judged with them.
+    starts : Start or sequence of Start, optional
+        How each recording begins, or all of them; found out if not given.
+    probings : Probings, optional
+        Made in the rows that are judged: see `thermocomp.runtime.adaptation`.
+    progress : callable
+        Called with a line of text per model.
+
+    Returns
+    -------
+    Judged
+
+    Raises
+    ------
+    InputError
+        There is no model, one that is to be probed was never judged, a channel that all models need is not in the
+        recordings, or it cannot be told how one of these begins. A model that fails where others do not is refused.
+    """
+    if not models:
+        raise InputError("no model given: name a model file, or give at least one model")
+    if probings and (unknown := [m.target for m in models if m.honest_error is None]):
+        raise InputError(
+            f"model of {', '.join(unknown)} was never judged on cycles it has not seen: how much a probing says beside "
+            "it is not known; 'thermocomp fit' judges what it fits"
+        )
+    found: list[Assessment] = []
+    covered = None
+    hashes = {h for m in models for h in _hashes(m)}
+    seen = tuple(r.name for r in recordings if r.fingerprint in hashes)
+    if starts is None:
+        starts = find_starts(
+            recordings,
+            _known_targets(models, recordings),
+            zeroing=models[0].zeroing,
+            absolute=are_absolute(models),
+        )
+    told: tuple[tuple[str, Start], ...] = ()
+    guards: list[Guard] = []
+    errors: list[Exception] = []
+    for model in models:
+        progress(f"{model.target} {model.family}")
+        try:
+            samples = _stacked(model, recordings, starts)
+            watched = None if model.watch is None else stack_watched(model.watch, model.target, recordings, starts)
+            samples = _called_as_in(model, samples)
+            known, every = find_learned_rows(model, samples), np.ones(len(samples), np.bool_)
+            samples, widening = believe(model, samples, every, watched)
+            guard = _guard(model, samples, watched, guards)
+            looked = model.watch is not None and can_look(model.watch, watched or samples)
+            names = model.watch.names if model.watch is not None and looked else ()
+            overall, judged = _assess(model, samples, known, rules, limits, probings, widening, guard, names)
+            covered = covered or coverage.find_validity(samples, judged, recordings)
+            cut = [replace(a, learned=0) for a in split_by_cycle(overall)]
+        except Exception as e:  # noqa: BLE001 - whatever fails for one model, the others have their results
+            errors.append(e)
+            found.append(_refused(model, explain(e)))
+            continue
+        told = tuple(zip(samples.test_names, samples.starts, strict=True))
+        found += [*cut, overall] if len(cut) > 1 else [overall]
+    if len(errors) == len(models):
+        raise errors[0]
+    return Judged(tuple(models), tuple(found), seen, covered, told)
+
+
+def _known_targets(models: Sequence[ErrorModel], recordings: Sequence[Recording]) -> list[Channel]:
+    """Return the targets that the first recording has; it must have one."""
+    found = []
+    for recording in recordings[:1]:
+        for model in models:
+            with suppress(InputError):
+                found.append(recording.channel(model.target))
+        if not found:
+            recording.channel(models[0].target)
+    return found
+
+
+def _stacked(model: ErrorModel, recordings: Sequence[Recording], starts: Start | Sequence[Start]) -> Samples:
+    """Return what a model needs of recordings, without rows in trouble."""
+    samples = stack(
+        recordings,
+        [model.target],
+        [i.name for i in model.inputs],
+        rezero=any(i.rezero for i in model.inputs),
+        zeroing=model.zeroing,
+        starts=starts,
+    )
+    return drop_unsound(samples, recordings)
+
+
+def _refused(model: ErrorModel, why: str) -> Assessment:
+    """Return the assessment of a model for which there was nothing to judge it on."""
+    nothing, nowhere = np.empty(0), np.empty(0, np.intp)
+    return Assessment(
+        model=_name(model),
+        target=model.target,
+        block="all cycles",
+        measured=nothing,
+        predicted=nothing,
+        row=nowhere,
+        test=nowhere,
+        cycle=nowhere,
+        verdict=Verdict((), refusal=why),
+        sensors=(),
+        fit_s=0.0,
+        n_effective=float("nan"),
+        failure=why,
+        overall=True,
+    )
+
+
+def _name(model: ErrorModel) -> str:
+    return model.provenance.method if model.provenance else model.family
+
+
+def _called_as_in(model: ErrorModel, samples: Samples) -> Samples:
+    """Return samples whose channels have the names of the model: a file may have others for them."""
+    (target,) = samples.targets
+    inputs = zip(samples.inputs, model.inputs, strict=True)
+    return replace(
+        samples,
+        targets=(replace(target, name=model.target),),
+        inputs=tuple(replace(channel, name=own.name) for channel, own in inputs),
+    )
+
+
+def _hashes(model: ErrorModel) -> tuple[str, ...]:
+    return model.provenance.data_sha256 if model.provenance else ()
+
+
+def _assess(
+    model: ErrorModel,
+    samples: Samples,
+    known: BoolArray,
+    rules: Rules,
+    limits: Limits,
+    probings: Probings | None,
+    widening: FloatArray,
+    guard: Guard | None,
+    looked_after: Sequence[str],
+) -> tuple[Assessment, Judging]:
+    """Judge a model on what it has not learned from (`known` rows); on everything if there is nothing else, and say so.
+
+    Returns
+    -------
+    Assessment
+    Judging
+        Its units.
+    """
+    judged = np.isfinite(samples.deviations[:, 0])
+    n, of = int((known & judged).sum()), int(judged.sum())
+    caveat = ""
+    if 0 < n == of:
+        seen = [name for k, name in enumerate(samples.test_names) if samples.hashes[k] in _hashes(model)]
+        why = (
+            f"fitted to {', '.join(seen)}"
+            if len(seen) == len(samples.test_names)
+            else f"{n:,} of {of:,} rows were learned from"
+        )
+        caveat, known = f"no honest test: {why}; judge it on another recording", np.zeros_like(known)
+    split = Split("all cycles", np.zeros(len(samples), np.bool_), ~known, stretch=_goes_on(model, samples, known))
+    found = judge(
+        _name(model), model, samples, split,
+        rules=rules, limits=limits, guard=guard, probings=probings, widening=widening, watched=looked_after,
+    )  # fmt: skip
+    judging = units(samples, ~known)
+    caps = (*found.verdict.caps, *cap_alike_units(samples, judging))
+    return replace(found, verdict=replace(found.verdict, caps=caps), overall=True, caveat=caveat, learned=n), judging
+
+
+def _guard(model: ErrorModel, samples: Samples, watched: Samples | None, known: list[Guard]) -> Guard | None:
+    """Return what a model's watch lets through while sensors fail; models of one file share it (`known`)."""
+    watch = model.watch
+    if watch is None or watched is None or not can_look(watch, watched):
+        return None
+    have = [c.name for c in watched.inputs]
+    if any(i.name not in have for i in watch.inputs):
+        return None
+    guard = next((g for g in known if g.watch is watch or g.watch == watch), None)
+    if guard is None:
+        every = np.ones(len(watched), np.bool_)
+        guard = let_fail(watch, believe(model, watched, every)[0], every)
+        known.append(guard)
+    own = [c.name for c in samples.inputs]
+    return guard.among([own.index(name) if name in own else -1 for name in have])
+
+
+def _goes_on(model: ErrorModel, samples: Samples, known: BoolArray) -> bool:
+    """Return whether what is judged goes on from what was learned: its level is that of the learned part."""
+    judged = np.unique(samples.test[~known & np.isfinite(samples.deviations[:, 0])])
+    earlier = {r.fingerprint for k in judged for r in (samples.starts[k].earlier if samples.starts else ())}
+    return bool(np.isin(samples.test[known], judged).any() or not earlier.isdisjoint(_hashes(model)))
+
+
+def units(samples: Samples, rows: BoolArray | None = None) -> Judging:
+    """Return the thermal cycles of recordings, or of some of their rows, as units; see `join_short_cycles`."""
+    none = np.zeros(len(samples), dtype=np.bool_)
+    cycle = samples.cycle if rows is None else np.where(rows, samples.cycle, -1)
+    blocks = join_short_cycles(cycle, samples.test)
+    return Judging("all cycles", tuple(Split(name_cycles(samples, b), none, np.isin(cycle, b)) for b in blocks))

@@ -1,0 +1,229 @@
+"""The HAL of a machine that is corrected: what is added to its configuration, and what has to be changed by hand."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+from thermocomp.core.exceptions import InputError, SettingError
+from thermocomp.files.draft import drafts
+from thermocomp.live.adapters.linuxcnc import haltext
+from thermocomp.live.adapters.linuxcnc.haltext import HalAxis
+from thermocomp.nc.linuxcnc.machineini import HalFiles, Ini, read_hal, read_ini
+
+Pattern = Literal["offset", "drive"]
+
+HAL_NAME, COMPONENT_NAME, SOCKET_NAME = "thermocomp.hal", "thermocomp_hal.py", "thermocomp.sock"
+#: share of the axis' speed and acceleration that a correction on the drive side may take
+SHARE = 0.1
+#: bytes of a path that a socket can have
+LONGEST = 107
+
+
+@dataclass(frozen=True, kw_only=True)
+class HalSettings:
+    """What a correction may do inside LinuxCNC, whatever the service says.
+
+    Parameters
+    ----------
+    pattern : {'offset', 'drive'}
+        Through external offsets, or between the controller and the drive.
+    axes : str
+        Letters of the axes that are corrected.
+    magnitude : float
+        Largest correction [um].
+    rate : float
+        Fastest change of the correction [um/s].
+    timeout : float
+        The service is lost when it says nothing for so long [s].
+    hold : float
+        So long the correction then stays where it is [s].
+    fade : float
+        How fast it goes to zero after that [um/s].
+    group : str
+        Whose members may connect; without one only the user that runs LinuxCNC may.
+    """
+
+    pattern: Pattern = "offset"
+    axes: str = "Z"
+    magnitude: float = 500.0
+    rate: float = 0.5
+    timeout: float = 2.0
+    hold: float = 1800.0
+    fade: float = 0.1
+    group: str = ""
+
+    def __post_init__(self) -> None:
+        for name in ("magnitude", "rate", "timeout", "hold", "fade"):
+            if not 0.0 < getattr(self, name) < float("inf"):
+                raise SettingError(f"{name} = {getattr(self, name)}: must be positive and finite")
+        if not self.axes or set(self.axes.upper()) - set("XYZUVW") or len(set(self.axes.upper())) != len(self.axes):
+            raise SettingError(f"axes = {self.axes!r}: want letters of straight axes, each once, such as XZ")
+        if self.group:
+            import grp  # not on every system
+
+            try:
+                grp.getgrnam(self.group)
+            except KeyError as e:
+                raise SettingError(f"group = {self.group!r}: there is no such group on this computer") from e
+
+
+class Prepared(NamedTuple):
+    """What `prepare` returns."""
+
+    hal: str  #: text of the HAL file
+    component: str  #: text of the component
+    todo: tuple[str, ...]  #: what is to be changed by hand, in words
+    socket: Path  #: where the service connects
+    files: tuple[Path, ...]  #: what is written
+
+
+def prepare(path: Path, folder: Path, settings: HalSettings) -> Prepared:
+    """Return what corrects a machine; nothing is written.
+
+    Parameters
+    ----------
+    path : Path
+        INI file of the machine.
+    folder : Path
+        Where HAL file, component and socket will be.
+    settings : HalSettings
+
+    Raises
+    ------
+    InputError
+        The machine cannot be corrected like this; it is told why, and what to do.
+    """
+    ini = read_ini(path)
+    files = read_hal(ini, HAL_NAME)
+    axes = [_axis(ini, letter, settings.pattern) for letter in settings.axes.upper()]
+    _check_free(ini, files, axes, settings.pattern)
+    folder = folder.resolve()
+    socket = folder / SOCKET_NAME
+    if len(str(socket).encode()) > LONGEST or any(c.isspace() or c in "\"'#[]$()" for c in str(socket)):
+        raise InputError(f"{folder}: HAL and a socket want a short path without spaces: choose another folder with -o")
+    todo: list[str] = []
+    joints = round(ini.number("KINS", "JOINTS"))
+    lines = ["# written by thermocomp linuxcnc setup; write it anew rather than change it"]
+    lines += haltext.load_modules(axes, joints, settings.pattern, files, todo)
+    lines += haltext.make_gate(joints, settings.pattern, files)
+    inch = ini.get("TRAJ", "LINEAR_UNITS", "mm").lower() in ("in", "inch", "imperial")
+    micron = 1e-3 / 25.4 if inch else 1e-3
+    for axis in axes:
+        lines += haltext.make_line(axis, files, settings.magnitude, micron)
+        lines += (
+            haltext.make_offset(axis, files, micron)
+            if settings.pattern == "offset"
+            else haltext.make_drive(axis, files)
+        )
+    ends = " ".join(f"--axis {a.letter},{a.low!r},{a.high!r}" for a in axes)
+    numbers = " ".join(f"--{n} {getattr(settings, n)!r}" for n in ("magnitude", "rate", "timeout", "hold", "fade"))
+    lines.append(
+        f"loadusr -Wn thermocomp /usr/bin/python3 {folder / COMPONENT_NAME} --pattern {settings.pattern} {ends} "
+        f"--unit {'inch' if inch else 'mm'} {numbers} --socket {socket}"
+        + (f" --group {settings.group}" if settings.group else "")
+    )
+    ours = [Path(name.split()[0]).name for name in ini.sections.get("HAL", {}).get("HALFILE", [])]
+    if HAL_NAME not in ours:
+        todo.insert(0, f"{path}: add to [HAL], after the other HALFILE lines: HALFILE = {_named(folder, path)}")
+    for name in files.unread:
+        todo.append(
+            f"{name}: cannot be seen through; a pin that it uses, or a module that it loads, can be used once only"
+        )
+    component = Path(__file__).with_name("_hal_component.py").read_text(encoding="utf-8")
+    return Prepared(
+        "\n".join(lines) + "\n", component, tuple(todo), socket, (folder / COMPONENT_NAME, folder / HAL_NAME)
+    )
+
+
+def set_up(path: Path, folder: Path, settings: HalSettings, *, overwrite: bool = False) -> Prepared:
+    """Write what corrects a machine: a HAL file and the component that it starts.
+
+    Parameters
+    ----------
+    path, folder, settings
+        See `prepare`.
+    overwrite : bool
+        Over files that are there.
+
+    Returns
+    -------
+    Prepared
+        The INI and the machine's own HAL are left alone: what is to be done there is told.
+
+    Raises
+    ------
+    InputError
+        See `prepare`, or a file is there already.
+    """
+    prepared = prepare(path, folder, settings)
+    with drafts(prepared.files, overwrite=overwrite) as started:
+        for draft, text in zip(started.values(), (prepared.component, prepared.hal), strict=True):
+            draft.write_text(text, encoding="utf-8", newline="\n")
+        started.publish()
+    return prepared
+
+
+def _named(folder: Path, ini: Path) -> str:
+    here = ini.resolve().parent
+    return HAL_NAME if folder == here else str(folder / HAL_NAME)
+
+
+def _axis(ini: Ini, letter: str, pattern: Pattern) -> HalAxis:
+    section = f"AXIS_{letter}"
+    if section not in ini.sections:
+        known = ", ".join(s for s in ini.sections if s.startswith("AXIS_"))
+        raise InputError(f"{ini.path}: there is no [{section}]; there are {known or 'no axes'}")
+    low, high = ini.number(section, "MIN_LIMIT"), ini.number(section, "MAX_LIMIT")
+    if not low < high:
+        raise InputError(f"{ini.path}: [{section}] MIN_LIMIT = {low:g} must be below MAX_LIMIT = {high:g}")
+    joint = -1
+    if pattern == "offset":
+        if not 0.0 < ini.number(section, "OFFSET_AV_RATIO", 0.0) <= 0.9:
+            raise InputError(
+                f"{ini.path}: [{section}] has no OFFSET_AV_RATIO from 0 to 0.9, and without it LinuxCNC takes external "
+                f"offsets and does nothing; add OFFSET_AV_RATIO = 0.1 to [{section}] (the correction's share of the "
+                "axis' speed and acceleration, the rest is for programs), or use --pattern drive"
+            )
+    else:
+        joint = _joint(ini, letter)
+    speed, acceleration = ini.number(section, "MAX_VELOCITY"), ini.number(section, "MAX_ACCELERATION")
+    return HalAxis(letter.lower(), joint, low, high, SHARE * speed, SHARE * acceleration)
+
+
+def _joint(ini: Ini, letter: str) -> int:
+    """Return the joint that an axis is."""
+    name, *rest = ini.get("KINS", "KINEMATICS").split()
+    if name != "trivkins":
+        raise InputError(f"{ini.path}: [KINS] {name}: on the drive side an axis must be a joint (trivkins)")
+    given = [word.partition("=")[2] for word in rest if word.startswith("coordinates=")]
+    letters = (given[0] if given else "XYZABCUVW").upper()
+    if letters.count(letter) != 1:
+        raise InputError(
+            f"{ini.path}: [KINS] coordinates={letters}: axis {letter} has {letters.count(letter)} joints, want one; "
+            "use --pattern offset"
+        )
+    return letters.index(letter)
+
+
+def _check_free(ini: Ini, files: HalFiles, axes: Sequence[HalAxis], pattern: Pattern) -> None:
+    if pattern == "drive":
+        if files.unread:
+            raise InputError(
+                f"{ini.path}: HAL in {files.unread[0]} cannot be seen through (Tcl, or old commands); on the drive "
+                "side it must be known what hangs on the drive: use --pattern offset"
+            )
+        if not {"motion-command-handler", "motion-controller"} <= set(files.functions):
+            raise InputError(f"{ini.path}: no HAL file adds motion-command-handler and motion-controller to a thread")
+        for axis in axes:
+            for end in ("cmd", "fb"):
+                if f"joint.{axis.joint}.motor-pos-{end}" not in files.signals:
+                    raise InputError(f"{ini.path}: no HAL file nets joint.{axis.joint}.motor-pos-{end}: no drive found")
+        return
+    for axis in axes:
+        for pin in ("counts", "enable", "scale", "clear"):
+            if (name := f"axis.{axis.letter}.eoffset-{pin}") in files.signals:
+                raise InputError(
+                    f"{ini.path}: {name} is used already (signal {files.signals[name]}): LinuxCNC has one external "
+                    "offset per axis; use --pattern drive"
+                )

@@ -1,0 +1,211 @@
+"""Corrections to a LinuxCNC: what talks with the HAL component that ``thermocomp linuxcnc setup`` puts there."""
+
+import asyncio
+import contextlib
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from thermocomp.core.correction import Correction
+from thermocomp.core.exceptions import SettingError, ThermocompError
+from thermocomp.core.ports import Status
+from thermocomp.core.shown import escape
+from thermocomp.live.adapters.connection import Connection
+
+#: between two signs of life, at most [s], and as a share of the time after which the component drops who is silent
+BEAT, SHARE = 0.5, 0.25
+#: it answers within so long, or it is lost [s]
+ANSWER = 2.0
+#: a correction further from what is demanded is told as it is measured [um]
+ASIDE = 1.0
+
+
+class AxisReport(NamedTuple):
+    """What is in force at an axis."""
+
+    correction: Correction
+    in_force: float  #: where the axis stands [um]
+    position: float  #: as commanded [mm]
+    alarm: str  #: why it is not where it shall be; empty if it is
+
+
+@dataclass(kw_only=True)
+class LinuxCncSink:
+    """Corrections to a LinuxCNC on this computer.
+
+    Parameters
+    ----------
+    path : Path
+        Socket of the HAL component.
+    axes : dict of str to str
+        Letter of the axis by target, such as ``{"z_um": "Z"}``; other targets are left out.
+    magnitude : float or None
+        Largest correction [um], where that is less than the component was set up with.
+    rate : float or None
+        Fastest change [um/s], the same.
+
+    Raises
+    ------
+    SettingError
+        No axes, or two targets with the same.
+    """
+
+    path: Path
+    axes: dict[str, str]
+    magnitude: float | None = None
+    rate: float | None = None
+    ticks: int = field(default=-1, init=False)  #: of the component: it goes on while that is alive
+    _connection: Connection = field(default_factory=Connection, init=False, repr=False)
+    _streams: tuple[asyncio.StreamReader, asyncio.StreamWriter] | None = field(default=None, init=False, repr=False)
+    _beating: asyncio.Task[None] | None = field(default=None, init=False, repr=False)
+    _lock: asyncio.Lock = field(default_factory=asyncio.Lock, init=False, repr=False)
+    _beat: int = field(default=0, init=False, repr=False)
+    _timeout: float = field(default=math.inf, init=False, repr=False)
+    _why: str = field(default="", init=False, repr=False)
+    _still: bool = field(default=False, init=False, repr=False)
+    _reports: dict[str, AxisReport] = field(default_factory=dict, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        letters = [a.upper() for a in self.axes.values()]
+        if not letters or set(letters) - set("XYZUVW") or len(set(letters)) < len(letters):
+            raise SettingError(f'axes = {self.axes}: want a straight axis per target, such as {{"z_um": "Z"}}')
+
+    async def connect(self, timeout: float) -> None:
+        """Connect within so long [s], or raise `ThermocompError` with the reason."""
+        await self.close()
+        self._connection.to("connecting")
+        try:
+            async with asyncio.timeout(timeout):
+                self._streams = await asyncio.open_unix_connection(self.path, limit=1 << 20)
+        except FileNotFoundError as e:
+            raise self._fail(
+                "there is no socket: does LinuxCNC run, with what 'thermocomp linuxcnc setup' wrote?"
+            ) from e
+        except PermissionError as e:
+            raise self._fail("this user may not connect: set it up with --group, and be a member of that") from e
+        except (OSError, TimeoutError, ValueError) as e:
+            raise self._fail(str(e) or "no answer") from e
+        self._beat = 0
+        await self._hear(b"")
+        if missing := {a.upper() for a in self.axes.values()} - self._reports.keys():
+            await self._hang_up()
+            raise self._fail(f"axis {', '.join(sorted(missing))} is not corrected there; set it up with --axes")
+        self._connection.to("connected")
+        self._beating = asyncio.create_task(self._live())
+
+    async def apply(self, corrections: Mapping[str, Correction]) -> None:
+        """Hand corrections to the component, or raise `ThermocompError` with the reason."""
+        lines = {
+            self.axes[target].upper(): (c.offset, c.slope, c.reference_position)
+            for target, c in corrections.items()
+            if target in self.axes
+        }
+        await self._ask({"axes": lines})
+
+    async def confirmed(self) -> dict[str, Correction] | None:
+        """Return what is in force, by target; None if it is not known."""
+        try:
+            await self._ask({})
+        except ThermocompError:
+            return None
+        if self._still:
+            return None
+        return {target: self._reports[letter.upper()].correction for target, letter in self.axes.items()}
+
+    def status(self) -> Status:
+        """Return how the connection is, at once."""
+        return self._connection.now
+
+    def suspended(self) -> dict[str, str]:
+        """Return targets that the controller has no correction in force of, and why, as it said last."""
+        return dict.fromkeys(self.axes, f"the controller is {self._why}") if self._why else {}
+
+    def alarms(self) -> dict[str, str]:
+        """Return targets whose correction is not in force as it shall be, and why, as was said last."""
+        if self._still:
+            return dict.fromkeys(self.axes, "the controller stands still")
+        found = {t: self._reports[a.upper()].alarm for t, a in self.axes.items() if a.upper() in self._reports}
+        return {t: f"axis {self.axes[t].upper()} {alarm}" for t, alarm in found.items() if alarm}
+
+    def reports(self) -> dict[str, AxisReport]:
+        """Return what was said last of each axis, by its letter."""
+        return dict(self._reports)
+
+    async def close(self) -> None:
+        """Give back what was taken; a second time does nothing. What was applied stays in force."""
+        beating, self._beating = self._beating, None
+        if beating is not None and beating is not asyncio.current_task():
+            beating.cancel()
+            await asyncio.gather(beating, return_exceptions=True)
+        await self._hang_up()
+        self._connection.to("closed")
+
+    # -- inside --------------------------------------------------------------------------------------------------------
+
+    async def _hang_up(self) -> None:
+        streams, self._streams = self._streams, None
+        if streams is not None:
+            streams[1].close()
+            with contextlib.suppress(OSError):  # it was lost before
+                await streams[1].wait_closed()
+
+    def _fail(self, why: str) -> ThermocompError:
+        reason = f"LinuxCNC at {self.path}: {why}"
+        self._connection.to("failed", reason)
+        return ThermocompError(reason)
+
+    async def _live(self) -> None:
+        """Give signs of life while the connection is there."""
+        with contextlib.suppress(ThermocompError):
+            while True:
+                await asyncio.sleep(min(BEAT, SHARE * self._timeout))
+                await self._ask({})
+
+    async def _ask(self, message: dict[str, Any]) -> None:
+        """Say something, and take in what is answered."""
+        async with self._lock:
+            self._beat += 1
+            limits = {n: v for n in ("magnitude", "rate") if (v := getattr(self, n)) is not None}
+            await self._hear(json.dumps({"beat": self._beat, **limits, **message}).encode() + b"\n")
+
+    async def _hear(self, line: bytes) -> None:
+        """Say a line, and take in the answer: only a connection that answers in turn is kept."""
+        if self._streams is None:
+            raise self._fail("not connected")
+        reader, writer = self._streams
+        heard = False
+        try:
+            async with asyncio.timeout(ANSWER):
+                writer.write(line)
+                await writer.drain()
+                answer = json.loads(await reader.readline() or b'{"error": "lost"}')
+            if answer.get("beat") != self._beat:
+                raise ValueError(_text(answer.get("error", "not the answer")))
+            self._why, self.ticks = _text(answer["suspended"]), int(answer["ticks"])
+            self._still = bool(answer["still"])
+            self._timeout = float(answer["timeout"])
+            axes = answer["axes"]
+            self._reports = {letter: _read(axes[letter]) for letter in "XYZUVW" if letter in axes}
+            heard = True
+        except (OSError, TimeoutError, ValueError, LookupError, AttributeError, TypeError, OverflowError) as e:
+            raise self._fail(str(e) or "no answer") from e
+        except (RecursionError, ThermocompError) as e:
+            raise self._fail(f"not the answer: {e}") from e
+        finally:  # also if it is cancelled: the answer would be taken for that of the next question
+            if not heard:
+                await self._hang_up()
+
+
+def _read(one: Mapping[str, Any]) -> AxisReport:
+    demand, in_force, alarm = float(one["demand"]), float(one["in_force"]), _text(one["alarm"])
+    aside = in_force - demand if abs(in_force - demand) > ASIDE or alarm else 0.0
+    correction = Correction(float(one["offset"]) + aside, float(one["slope"]), float(one["reference"]))
+    return AxisReport(correction, in_force, float(one["position"]), alarm)
+
+
+def _text(found: object) -> str:
+    """Return a text of the component, fit to be shown."""
+    return escape(found, 200)

@@ -1,0 +1,119 @@
+"""MQTT: readings in, corrections out, as plain JSON."""
+
+import asyncio
+import time
+from collections.abc import AsyncIterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+
+import aiomqtt
+
+from thermocomp.core.correction import Correction
+from thermocomp.core.exceptions import ReadingError, ThermocompError
+from thermocomp.core.ports import Status
+from thermocomp.core.reading import Reading
+from thermocomp.core.shown import escape
+from thermocomp.live.adapters.connection import Connection
+from thermocomp.live.adapters.messages import read_message, write_message
+
+
+@dataclass(kw_only=True)
+class Broker:
+    """Where a broker is, and what is talked about there.
+
+    Parameters
+    ----------
+    topic : str
+    host : str
+    port : int
+    """
+
+    topic: str
+    host: str = "127.0.0.1"
+    port: int = 1883
+    _client: aiomqtt.Client | None = field(default=None, init=False, repr=False)
+    _connection: Connection = field(default_factory=Connection, init=False, repr=False)
+
+    async def connect(self, timeout: float) -> None:
+        """Connect within so long [s], or raise `ThermocompError` with the reason."""
+        await self.close()
+        self._connection.to("connecting")
+        try:
+            client = aiomqtt.Client(self.host, self.port, timeout=timeout)
+            async with asyncio.timeout(timeout):
+                await client.__aenter__()
+        except (aiomqtt.MqttError, OSError, TimeoutError, ValueError) as e:
+            reason = f"MQTT broker {self.host}:{self.port}: {str(e) or 'no answer'}"
+            self._connection.to("failed", reason)
+            raise ThermocompError(reason) from e
+        self._client = client
+        self._connection.to("connected")
+
+    def status(self) -> Status:
+        """Return how the connection is, at once."""
+        return self._connection.now
+
+    async def close(self) -> None:
+        """Give back what was taken; a second time does nothing."""
+        client, self._client = self._client, None
+        if client is not None:
+            with suppress(aiomqtt.MqttError, OSError, TimeoutError):  # it was lost before
+                await client.__aexit__(None, None, None)
+        self._connection.to("closed")
+
+    def _fail(self, error: Exception) -> ThermocompError:
+        reason = f"MQTT broker {self.host}:{self.port}, topic {self.topic}: {str(error) or 'lost'}"
+        self._connection.to("failed", reason)
+        return ThermocompError(reason)
+
+    def _connected(self) -> aiomqtt.Client:
+        if self._client is None:
+            raise ThermocompError(f"MQTT broker {self.host}:{self.port}: not connected")
+        return self._client
+
+
+@dataclass(kw_only=True)
+class MqttSource(Broker):
+    """Readings from a topic.
+
+    Parameters
+    ----------
+    names : dict of str to str
+        Channel by the name in the message.
+    """
+
+    names: dict[str, str] = field(default_factory=dict)
+    refused: int = field(default=0, init=False)  #: messages that were none
+    last_refusal: str = field(default="", init=False)
+
+    async def readings(self) -> AsyncIterator[Reading]:
+        """Return readings as they come, until the broker is lost.
+
+        A message that the broker kept from before counts only if it says when it was taken.
+        """
+        client = self._connected()
+        try:
+            await client.subscribe(self.topic, qos=0)
+            async for message in client.messages:
+                try:
+                    payload = message.payload if isinstance(message.payload, bytes | str) else b""
+                    reading = read_message(payload, -1.0 if message.retain else time.time(), self.names)
+                except ReadingError as e:
+                    self.refused, self.last_refusal = self.refused + 1, f"{escape(message.topic, 200)}: {e}"
+                    continue
+                if reading.time >= 0.0:
+                    yield reading
+        except (aiomqtt.MqttError, OSError, ValueError) as e:
+            raise self._fail(e) from e
+
+
+@dataclass(kw_only=True)
+class MqttSink(Broker):
+    """Corrections to a topic."""
+
+    async def apply(self, corrections: Mapping[str, Correction]) -> None:
+        """Publish corrections, or raise `ThermocompError` with the reason."""
+        try:
+            await self._connected().publish(self.topic, write_message(corrections, time.time()), qos=0, timeout=5.0)
+        except (aiomqtt.MqttError, OSError, TimeoutError, ValueError) as e:
+            raise self._fail(e) from e

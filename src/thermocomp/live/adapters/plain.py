@@ -1,0 +1,240 @@
+"""Sources and sinks that need no network: a recording played back, the virtual machine, a file."""
+
+import asyncio
+import csv
+import json
+import math
+import time
+from collections.abc import AsyncIterator, Generator, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import BinaryIO
+
+from thermocomp.core.correction import Correction
+from thermocomp.core.exceptions import InputError, ThermocompError
+from thermocomp.core.ports import Status
+from thermocomp.core.reading import Reading
+from thermocomp.core.shown import explain_unfit
+from thermocomp.files.draft import write_text
+from thermocomp.live.adapters.connection import Connection
+from thermocomp.live.adapters.messages import write_message
+from thermocomp.virtual.experiments import simulate
+from thermocomp.virtual.protocol import Experiment
+
+
+@dataclass(kw_only=True)
+class Played:
+    """Rows that are played back, each at its time.
+
+    Parameters
+    ----------
+    speed : float
+        How many times faster than they were taken.
+    """
+
+    speed: float = 1.0
+    _connection: Connection = field(default_factory=Connection, init=False, repr=False)
+    _rows: Iterator[tuple[float, dict[str, float]]] | None = field(default=None, init=False, repr=False)
+    _at: float = field(default=-math.inf, init=False, repr=False)  #: row that was played last [s]
+    _broken: ThermocompError | None = field(default=None, init=False, repr=False)
+    _begun: float = field(default=math.nan, init=False, repr=False)  #: clock at which the row of time 0 was due [s]
+
+    def _open(self) -> Iterator[tuple[float, dict[str, float]]]:
+        raise NotImplementedError
+
+    async def connect(self, timeout: float) -> None:  # noqa: ARG002 - of the port
+        """Begin with the first row, or go on after the last that was played."""
+        self._connection.to("connecting")
+        if self._broken is not None:  # what cannot be read once cannot be read later, and it is not played anew
+            self._connection.to("failed", str(self._broken))
+            raise self._broken
+        if self._rows is None:
+            try:
+                self._rows = await asyncio.to_thread(self._open)
+            except (OSError, ThermocompError) as e:
+                self._connection.to("failed", str(e))
+                raise ThermocompError(str(e)) from e
+        self._connection.to("connected")
+
+    async def readings(self) -> AsyncIterator[Reading]:
+        """Return rows when they are due, until the last."""
+        if self._rows is None:
+            raise ThermocompError("not connected")
+        while (row := self._next()) is not None:
+            at, values = row
+            if math.isnan(self._begun):
+                self._begun = time.monotonic() - at / self.speed
+            await asyncio.sleep(max(0.0, self._begun + at / self.speed - time.monotonic()))
+            yield Reading(time.time(), values)
+        self._connection.to("closed", "played to its end")
+
+    def _next(self) -> tuple[float, dict[str, float]] | None:
+        """Return the next row; None behind the last."""
+        assert self._rows is not None
+        try:
+            return next(self._rows, None)
+        except ThermocompError as e:
+            self._broken = e
+            self._connection.to("failed", str(e))
+            raise
+
+    def status(self) -> Status:
+        """Return how it is, at once."""
+        return self._connection.now
+
+    async def close(self) -> None:
+        """Stop; a second time does nothing."""
+        self._connection.to("closed")
+
+
+@dataclass(kw_only=True)
+class ReplaySource(Played):
+    """A recording in thermocomp's own CSV, played back.
+
+    Parameters
+    ----------
+    path : Path
+    """
+
+    path: Path
+
+    def _open(self) -> Iterator[tuple[float, dict[str, float]]]:
+        return read_rows(self.path)
+
+
+@dataclass(kw_only=True)
+class SimulatedSource(Played):
+    """The virtual machine.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        What it does; all its tests, one after the other.
+    seed : int
+    """
+
+    experiment: Experiment
+    seed: int = 0
+    #: displacements without noise of the row that was played last: what a probe would find [um]
+    truth: dict[str, float] = field(default_factory=dict, init=False)
+
+    def _open(self) -> Iterator[tuple[float, dict[str, float]]]:
+        return self._simulated()
+
+    def _simulated(self) -> Iterator[tuple[float, dict[str, float]]]:
+        begin = 0.0
+        for test in simulate(self.experiment, seed=self.seed):
+            inputs = [k for k, c in enumerate(test.channels) if c.quantity in ("temperature", "spindle_speed", "feed")]
+            names = [test.channels[k].name for k in inputs]
+            moved = [c.name for c in test.displacements]
+            for at, row, true in zip(
+                test.time.tolist(), test.values[:, inputs].tolist(), test.truth.tolist(), strict=True
+            ):
+                self.truth = dict(zip(moved, true, strict=True))
+                yield begin + at, dict(zip(names, row, strict=True))
+            begin += float(test.time[-1]) + 1.0
+
+
+@dataclass(kw_only=True)
+class FileSink:
+    """The corrections in force, in a file that is replaced each time: whole, whoever reads it when.
+
+    Parameters
+    ----------
+    path : Path
+    """
+
+    path: Path
+    _connection: Connection = field(default_factory=Connection, init=False, repr=False)
+
+    async def connect(self, timeout: float) -> None:  # noqa: ARG002 - of the port
+        """See whether its folder is there."""
+        if not self.path.parent.is_dir():
+            reason = f"{self.path}: there is no folder {self.path.parent}"
+            self._connection.to("failed", reason)
+            raise ThermocompError(reason)
+        self._connection.to("connected")
+
+    async def apply(self, corrections: Mapping[str, Correction]) -> None:
+        """Replace the file, or raise `ThermocompError` with the reason."""
+        text = write_message(corrections, time.time()) + "\n"
+        try:
+            await asyncio.to_thread(write_text, text, self.path, overwrite=True)
+        except (OSError, ThermocompError) as e:
+            self._connection.to("failed", str(e))
+            raise ThermocompError(str(e)) from e
+
+    async def confirmed(self) -> dict[str, Correction] | None:
+        """Return what stands in the file; None if there is none yet."""
+        try:
+            table = json.loads(self.path.read_text(encoding="utf-8"))["corrections"]
+            return {
+                name: Correction(c["offset_um"], c["slope_um_per_m"], c["reference_position_mm"])
+                for name, c in table.items()
+            }
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError, InputError):
+            return None
+
+    def status(self) -> Status:
+        """Return how it is, at once."""
+        return self._connection.now
+
+    async def close(self) -> None:
+        """Leave the file as it is."""
+        self._connection.to("closed")
+
+
+def read_rows(path: Path) -> Generator[tuple[float, dict[str, float]], None, None]:
+    """Return time [s] and values by channel of a recording in thermocomp's own CSV, row by row as they are read.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    InputError
+        It cannot be read, has no times, or names that are none; while rows are read: a line is no text.
+    """
+    try:
+        file = path.open("rb")
+    except OSError as e:
+        raise InputError(f"{path}: cannot be read: {e.strerror or e}") from e
+    rows = _rows_of(path, file)
+    next(rows)  # the heading
+    return rows
+
+
+def _rows_of(path: Path, file: BinaryIO) -> Generator[tuple[float, dict[str, float]], None, None]:
+    line = 0
+
+    def lines() -> Iterator[str]:
+        nonlocal line
+        for line, content in enumerate(file, start=1):  # noqa: B007 - told if it cannot be read
+            if not content.startswith(b"#"):
+                yield content.decode("utf-8")
+
+    with file:
+        table = csv.reader(lines())
+        try:
+            names = next(table, [])
+            if "time_s" not in names:
+                raise InputError(f"{path}: has no column time_s; want a recording that thermocomp wrote")
+            if why := next(filter(None, map(explain_unfit, names)), ""):
+                raise InputError(f"{path}: line {line}: {why}")
+            place = names.index("time_s")
+            yield math.nan, {}
+            for row in table:
+                if (at := _parsed(row, place)) is not None:
+                    found = {name: _parsed(row, k) for k, name in enumerate(names) if k != place}
+                    yield at, {name: v for name, v in found.items() if v is not None}
+        except (OSError, UnicodeDecodeError, csv.Error) as e:
+            raise InputError(f"{path}: line {line}: cannot be read: {e}") from e
+
+
+def _parsed(row: Sequence[str], place: int) -> float | None:
+    try:
+        value = float(row[place])
+    except (ValueError, IndexError):
+        return None
+    return value if math.isfinite(value) else None

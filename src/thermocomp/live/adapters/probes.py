@@ -1,0 +1,84 @@
+"""Measurements of the tool point while the machine runs: from MQTT, and of the virtual machine."""
+
+import asyncio
+import random
+import time
+from collections.abc import AsyncIterator
+from dataclasses import dataclass, field
+
+import aiomqtt
+
+from thermocomp.core.exceptions import ReadingError
+from thermocomp.core.ports import Status
+from thermocomp.core.reading import Measurement
+from thermocomp.live.adapters.connection import Connection
+from thermocomp.live.adapters.messages import read_measurement
+from thermocomp.live.adapters.mqtt import Broker
+from thermocomp.live.adapters.plain import SimulatedSource
+
+
+@dataclass(kw_only=True)
+class MqttProbe(Broker):
+    """Measurements from a topic; one that the broker kept from before is not taken twice: it is not taken."""
+
+    refused: int = field(default=0, init=False)  #: messages that were none
+    last_refusal: str = field(default="", init=False)
+
+    async def measurements(self) -> AsyncIterator[Measurement]:
+        """Return measurements as they come, until the broker is lost."""
+        client = self._connected()
+        try:
+            await client.subscribe(self.topic, qos=1)
+            async for message in client.messages:
+                if message.retain:
+                    continue
+                try:
+                    payload = message.payload if isinstance(message.payload, bytes | str) else b""
+                    yield read_measurement(payload, time.time())
+                except ReadingError as e:
+                    self.refused, self.last_refusal = self.refused + 1, str(e)
+        except (aiomqtt.MqttError, OSError) as e:
+            raise self._fail(e) from e
+
+
+@dataclass(kw_only=True)
+class SimulatedProbe:
+    """A probe in the virtual machine: it finds the deviation, the correction is not in it.
+
+    Parameters
+    ----------
+    machine : SimulatedSource
+    targets : tuple of str
+    every : float
+        Time of the machine between two probings [s].
+    repeatability : float
+        Standard deviation [um].
+    """
+
+    machine: SimulatedSource
+    targets: tuple[str, ...]
+    every: float
+    repeatability: float
+    _connection: Connection = field(default_factory=Connection, init=False, repr=False)
+
+    async def connect(self, timeout: float) -> None:  # noqa: ARG002 - of the port
+        """Connect at once."""
+        self._connection.to("connected")
+
+    async def measurements(self) -> AsyncIterator[Measurement]:
+        """Return a measurement of each target, whenever it is due."""
+        noise = random.Random(self.machine.seed)
+        while True:
+            await asyncio.sleep(self.every / self.machine.speed)
+            for target in self.targets:
+                if (true := self.machine.truth.get(target)) is not None:
+                    now, found = time.time(), true + noise.gauss(0.0, self.repeatability)
+                    yield Measurement(now, target, found, False, self.repeatability, keys=(f"time {now!r}",))
+
+    def status(self) -> Status:
+        """Return how it is, at once."""
+        return self._connection.now
+
+    async def close(self) -> None:
+        """Stop; a second time does nothing."""
+        self._connection.to("closed")

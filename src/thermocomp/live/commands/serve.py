@@ -1,0 +1,176 @@
+"""`thermocomp serve`: the compensator beside the controller, live."""
+
+import asyncio
+import contextlib
+import secrets
+import signal
+from collections.abc import Coroutine, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from thermocomp.cli.extras import needs
+from thermocomp.cli.terminal import console, words
+from thermocomp.core.alone import alone
+from thermocomp.core.exceptions import InputError
+from thermocomp.files.draft import write_text
+
+if TYPE_CHECKING:
+    from thermocomp.live.config import Settings
+    from thermocomp.live.loop import Service
+
+#: seconds of the virtual machine in one of the world, in the demo
+_SPEED = 60
+
+#: what the demo's model knows the virtual machine by
+_TARGETS = ("x1_um", "y1_um", "z_um")
+_INPUTS = (
+    *("t_housing_C", "t_motor_C", "t_column_front_left_C", "t_z_bearing_C", "t_table_C", "t_enclosure_C"),
+    "spindle_rpm",
+)
+
+
+def serve(
+    config: Path | None = None,
+    /,
+    *,
+    demo: bool = False,
+    port: int | None = None,
+    output: Path = Path("thermocomp-live"),
+    check: bool = False,
+) -> int:
+    """Run the compensator live: sensors in, corrections out, with a page to watch.
+
+    Parameters
+    ----------
+    config : Path
+        TOML file: models, sources, sinks, limits, page.
+    demo : bool
+        Without a configuration: the virtual machine at 60 times the speed of the world, with a model that is fitted to
+        a recording of it first (a minute or more).
+    port : int
+        Of the page, in place of the configured one; 0: any that is free.
+    output : Path
+        Folder of the demo: its model, state and corrections.
+    check : bool
+        Only read the configuration and what it names, and say what is wrong.
+
+    Returns
+    -------
+    int
+        0 stopped as asked.
+    """
+    with needs("live"):
+        from thermocomp.live.config import read_config
+    if (config is None) != demo:
+        raise InputError("name a configuration (a TOML file), or --demo")
+    path = _demo(output) if config is None else config
+    settings = read_config(path)
+    own, journal = settings.config.state, settings.config.journal
+    with contextlib.ExitStack() as stack:
+        for name in (own, journal.file if journal else ""):
+            if name and not check and (settings.folder / name).parent.is_dir():
+                stack.enter_context(alone(settings.folder / name))
+        return _serve(settings, port, check=check)
+
+
+def _serve(settings: "Settings", port: int | None, *, check: bool) -> int:
+    from thermocomp.live.build import build
+    from thermocomp.live.config import Page
+    from thermocomp.live.findings import find_faults, find_faults_now
+    from thermocomp.live.page import web
+    from thermocomp.live.page.page import make_app
+
+    page = settings.config.page
+    if port is not None:
+        page = replace(page or Page(), port=port)
+    if check and (found := [*find_faults(settings), *find_faults_now(settings, page)]):
+        raise InputError("\n".join(["what the configuration names cannot be used:", *(f"  {f}" for f in found)]))
+    service = build(settings)
+    for target in service.compensator.lines:
+        order = service.state.orders.get(target)
+        console.print(
+            words(f"{target}: {'runs' if order is None else f'{order.word}: {order.reason}'}"), soft_wrap=True
+        )
+    token = web.read_token(settings.folder / page.token_file) if page is not None and page.token_file else ""
+    if check:
+        return 0
+    work: list[Coroutine[Any, Any, None]] = []
+    if page is not None:
+        listening = web.listen(page.host, page.port)
+        host, number = listening.getsockname()[:2]
+        where = f"[{host}]" if ":" in host else host
+        console.print(words(f"Page: http://{where}:{number}"), soft_wrap=True)
+        work.append(web.serve(make_app(service, token, page.settled, (page.host, *page.hosts)), listening))
+    asyncio.run(_run(service, settings.config.at_stop == "fade", [service.run(), *work]))
+    return 0
+
+
+async def _run(service: "Service", fades: bool, work: Sequence[Coroutine[Any, Any, None]]) -> None:
+    loop, task = asyncio.get_running_loop(), asyncio.current_task()
+    assert task is not None
+    fading: list[asyncio.Task[None]] = []
+
+    def stop() -> None:
+        if not fades or fading:  # a second signal does not wait
+            task.cancel()
+            return
+        console.print("stopping: the corrections go to zero first; stop again not to wait for it")
+        fading.append(asyncio.create_task(service.fade_out()))
+        fading[0].add_done_callback(lambda _: task.cancel())
+
+    for name in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(name, stop)
+    with contextlib.suppress(asyncio.CancelledError):
+        async with asyncio.TaskGroup() as group:
+            for one in work:
+                group.create_task(one)
+    kept = f"the state is not saved: {service.not_saved}" if service.not_saved else "the state is saved"
+    console.print(words(f"stopped: the corrections stay as they are now; {kept}"), soft_wrap=True)
+
+
+def _demo(folder: Path) -> Path:
+    """Return the configuration of the demo, in a folder that is made if it is not there."""
+    config, model = folder / "serve.toml", folder / "model.json"
+    folder.mkdir(parents=True, exist_ok=True)
+    if not model.exists():
+        console.print("A model of the virtual machine is fitted to a recording of it, a minute or more ...")
+        with needs("study"):
+            from thermocomp.api.verbs import fit, simulate
+        fit(simulate("demo"), _TARGETS, inputs=_INPUTS, jobs=-1).save(model)
+    if not config.exists():
+        text = _CONFIG.format(speed=_SPEED)
+        write_text(text, config, overwrite=False)
+    if not (token := folder / "token.txt").exists():
+        write_text(secrets.token_hex(16) + "\n", token, overwrite=False)
+        token.chmod(0o600)
+    console.print(words(f"Token for the page's buttons: {token}"), soft_wrap=True)
+    return config
+
+
+_CONFIG = """# thermocomp serve --demo: the virtual machine, {speed} times as fast as the world
+models = ["model.json"]
+state = "state.json"
+speed = {speed}.0
+own_compensation = "off"
+
+[[sources]]
+kind = "simulated"
+experiment = "demo"
+seed = 7
+
+[[sinks]]
+kind = "file"
+file = "corrections.json"
+
+[[probes]]
+kind = "simulated"
+every = 7200.0
+
+[journal]
+file = "live.db"
+
+[page]
+port = 8731
+token_file = "token.txt"
+"""

@@ -1,0 +1,389 @@
+"""The configuration of the service: a TOML file, read strictly, all that is wrong with it at once."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from copy import deepcopy
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple
+
+from pydantic import ConfigDict, Discriminator, Field, TypeAdapter, ValidationError, with_config
+from pydantic_core import ErrorDetails
+
+from thermocomp.core.correction import Limits
+from thermocomp.core.exceptions import InputError, SettingError
+from thermocomp.core.shown import explain_unfit
+from thermocomp.core.units import HOUSE_UNITS
+from thermocomp.files.tomlfile import as_json, read_toml
+from thermocomp.live.network import MqttIn, MqttOut, MqttProbing, Names, OnBroker, explain_host_name
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimulatedIn:
+    """The virtual machine.
+
+    Parameters
+    ----------
+    kind : {'simulated'}
+    experiment : str
+        What it does: one that comes with the package, or a protocol (.toml).
+    seed : int
+        Of weather and noise.
+    """
+
+    kind: Literal["simulated"]
+    experiment: str = "demo"
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.seed < 0:
+            raise SettingError(f"seed = {self.seed}: want 0 or more")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReplayIn:
+    """A recording played back.
+
+    Parameters
+    ----------
+    kind : {'replay'}
+    file : str
+        In thermocomp's own CSV.
+    """
+
+    kind: Literal["replay"]
+    file: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimulatedProbing:
+    """Probings of the virtual machine.
+
+    Parameters
+    ----------
+    kind : {'simulated'}
+    every : float
+        Time of the machine between two [s].
+    repeatability : float
+        Of the probe, standard deviation [um].
+    """
+
+    kind: Literal["simulated"]
+    every: float = 7200.0
+    repeatability: float = 0.5
+
+    def __post_init__(self) -> None:
+        if not self.every > 0 or not self.repeatability >= 0:
+            raise SettingError(f"every = {self.every:g}, repeatability = {self.repeatability:g}: want more than 0 s")
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinuxCncOut:
+    """Corrections to a LinuxCNC on this computer.
+
+    Parameters
+    ----------
+    kind : {'linuxcnc'}
+    socket : str
+        Of the HAL component that ``thermocomp linuxcnc setup`` puts there.
+    axes : dict of str to str
+        Axis by target, such as ``{z_um = "Z"}``.
+    """
+
+    kind: Literal["linuxcnc"]
+    socket: str
+    axes: Names
+
+    def __post_init__(self) -> None:
+        letters = [a.upper() for a in self.axes.values()]
+        if not letters or set(letters) - set("XYZUVW") or len(set(letters)) < len(letters):
+            raise SettingError(f'axes = {self.axes}: want a straight axis per target, such as {{z_um = "Z"}}')
+
+
+@dataclass(frozen=True, kw_only=True)
+class FileOut:
+    """Corrections to a file.
+
+    Parameters
+    ----------
+    kind : {'file'}
+    file : str
+        Replaced as a whole each time.
+    """
+
+    kind: Literal["file"]
+    file: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Page:
+    """The page to watch it on.
+
+    Parameters
+    ----------
+    host, port : str, int
+        Where it is served; loopback unless it is stated otherwise.
+    hosts : tuple of str
+        Names by which it may be called beside `host`, ``localhost`` and the addresses of this computer.
+    token_file : str
+        File with the token that buttons want; without one the page only shows.
+    settled : float
+        A drift below this in ten minutes counts as settled [um].
+    """
+
+    host: str = "127.0.0.1"
+    port: int = 8731
+    hosts: tuple[str, ...] = ()
+    token_file: str = ""
+    settled: float = 1.0
+
+    def __post_init__(self) -> None:
+        bare = self.host[1:-1] if self.host.startswith("[") and self.host.endswith("]") else self.host
+        for key, host in (("host", bare), *(("hosts", host) for host in self.hosts)):
+            if why := explain_host_name(host):
+                raise SettingError(f"{key} = {host[:200]!r}: {why}")
+        if not self.settled > 0.0:
+            raise SettingError(f"settled = {self.settled:g}: want more than 0 um in ten minutes")
+        if not 0 <= self.port <= 65535:
+            raise SettingError(f"port = {self.port}: want a port from 0 (any that is free) to 65535")
+
+
+@dataclass(frozen=True, kw_only=True)
+class MachineOf:
+    """A machine file in place of models: offset and slope of each axis, through one point of the work volume.
+
+    Parameters
+    ----------
+    file : str
+    at : tuple of 3 float
+        Where the other axes stand while one moves [mm].
+    tool : tuple of 3 float or None
+        From the gauge point to the tip [mm]; the machine file's own if not given.
+    """
+
+    file: str
+    at: tuple[float, float, float]
+    tool: tuple[float, float, float] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class JournalOut:
+    """Where it is written down what happens.
+
+    Parameters
+    ----------
+    file : str
+        Its files are numbered: ``live.db`` is ``live.000001.db`` and so on.
+    size_mb : float
+        A file that has become larger is followed by a new one.
+    files : int
+        So many at most: the oldest is removed.
+    channels : dict of str to str
+        Quantity of what readings hold beside the models' inputs, such as ``{t9_C = "temperature"}``: kept, too. A
+        displacement that is named as a target measures what its correction leaves.
+    """
+
+    file: str
+    size_mb: float = 64.0
+    files: int = 8
+    channels: Names = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if unknown := set(self.channels.values()) - HOUSE_UNITS.keys():
+            raise SettingError(f"channels: {', '.join(sorted(unknown))}: want one of {', '.join(HOUSE_UNITS)}")
+        if not 0.1 <= self.size_mb <= 1e6 or not self.files >= 2:
+            raise SettingError(f"size_mb = {self.size_mb:g}, files = {self.files}: want 0.1 or more, and 2 or more")
+
+
+In = Annotated[MqttIn | SimulatedIn | ReplayIn, Discriminator("kind")]
+Out = Annotated[MqttOut | FileOut | LinuxCncOut, Discriminator("kind")]
+Probings = Annotated[MqttProbing | SimulatedProbing, Discriminator("kind")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Config:
+    """What the service runs.
+
+    Parameters
+    ----------
+    sources, sinks : tuple
+        Where readings come from, where corrections go.
+    models : tuple of str
+        Model files, a target each model; or none, and a machine.
+    machine : MachineOf or None
+    probes : tuple
+        Where measurements of the tool point come from.
+    state : str
+        File that the state is kept in; without one every start is a cold one.
+    limits : Limits
+    shadow : bool
+        Nothing moves: the models are watched.
+    speed : float
+        Seconds of the machine in a second of the world: for the virtual machine and recordings alone.
+    page : Page or None
+    journal : JournalOut or None
+    own_compensation : {'on', 'off', 'unknown'}
+        Whether the controller compensates for temperature by itself.
+    at_stop : {'hold', 'fade'}
+        When it is stopped corrections stay as they are, or go to zero first, within the limits.
+    """
+
+    sources: tuple[In, ...]
+    sinks: tuple[Out, ...] = ()
+    models: tuple[str, ...] = ()
+    machine: MachineOf | None = None
+    probes: tuple[Probings, ...] = ()
+    state: str = ""
+    limits: Limits = Limits()
+    shadow: bool = False
+    speed: Annotated[float, Field(gt=0, le=10_000)] = 1.0
+    page: Page | None = None
+    journal: JournalOut | None = None
+    own_compensation: Literal["on", "off", "unknown"] = "unknown"
+    at_stop: Literal["hold", "fade"] = "hold"
+
+    def __post_init__(self) -> None:
+        if found := list(self._wrong()):
+            raise SettingError("\n".join(found))
+
+    def _wrong(self) -> Iterator[str]:
+        """Say what does not fit together."""
+        if bool(self.models) == bool(self.machine):
+            yield (
+                f"models = {list(self.models)}: name at least one model file, as 'thermocomp fit' writes it, or a "
+                "[machine], and not both"
+            )
+        if not self.sources:
+            yield 'no source: add a table [[sources]] with kind = "mqtt", "simulated" or "replay"'
+        if self.own_compensation == "on" and not self.shadow:
+            yield (
+                'own_compensation = "on": the same error would be corrected twice; switch that of the controller off, '
+                "or let the models run in shadow (shadow = true)"
+            )
+        controlled = any(isinstance(s, LinuxCncOut) for s in self.sinks)
+        if self.own_compensation == "unknown" and (self.journal or self.probes or controlled):
+            yield (
+                'own_compensation = "unknown": write "off" or "on"; what is measured at the machine means nothing '
+                "unless it is known whether the controller compensates for temperature by itself"
+            )
+        for what, many in (("source", self.sources), ("sink", self.sinks), ("probe", self.probes)):
+            for place, count in Counter(map(_place, many)).items():
+                if count > 1:
+                    yield f"{count} {what}s with the same {place}: leave one of them"
+        for sink in (s for s in self.sinks if isinstance(s, MqttOut)):
+            for source in (*self.sources, *self.probes):
+                if isinstance(source, MqttIn | MqttProbing) and source.hears(sink):
+                    yield (
+                        f"topic = {source.topic!r}: hears the corrections that go to {sink.topic!r}; let them go to a "
+                        "topic that no source and no probe listens to"
+                    )
+        machine = any(isinstance(s, SimulatedIn) for s in self.sources)
+        if not machine and any(isinstance(p, SimulatedProbing) for p in self.probes):
+            yield 'a probe of kind = "simulated" wants a source of kind = "simulated"'
+        if self.speed != 1.0 and any(isinstance(s, MqttIn) and not s.virtual for s in self.sources):
+            yield (
+                f"speed = {self.speed:g}: a machine that MQTT tells of runs at the speed of the world, 1, unless it is "
+                "a virtual one (virtual = true)"
+            )
+
+
+def _place(one: In | Out | Probings) -> str:
+    """Return what two links must not share."""
+    if isinstance(one, OnBroker):
+        return f"topic = {one.topic!r} of {one.host}:{one.port}"
+    found = {"file": getattr(one, "file", ""), "socket": getattr(one, "socket", "")}
+    return next((f"{key} = {name!r}" for key, name in found.items() if name), f"kind = {one.kind!r}")
+
+
+class Settings(NamedTuple):
+    """A configuration and the folder that its files are named from."""
+
+    config: Config
+    folder: Path
+
+
+_ADAPTER: TypeAdapter[Config] = TypeAdapter(
+    with_config(ConfigDict(strict=True, extra="forbid", allow_inf_nan=False))(Config)
+)
+_PLAIN = {
+    "missing": "is missing",
+    "unexpected_keyword_argument": "is no key that is known",
+    "extra_forbidden": "is no key that is known",
+    "dataclass_type": "must be a table, such as [limits]",
+    "tuple_type": "must be a list: [...]",
+    "dict_type": "must be a table",
+    "union_tag_not_found": 'has no kind: write kind = "..."',
+}
+
+
+def read_config(path: str | Path) -> Settings:
+    """Read a configuration.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Raises
+    ------
+    InputError
+        There is no such file, it is no TOML, or something in it is wrong: all of it is listed, each with its place.
+    """
+    content = read_toml(path, "configuration of the service")
+    if unfit := list(_unfit(content)):
+        raise InputError("\n".join([f"{path}: {len(unfit)} to mend:", *(f"  {line}" for line in unfit)]))
+    try:
+        config = _ADAPTER.validate_json(as_json(content))
+    except ValidationError as e:
+        errors = e.errors(include_url=False)
+        lines = [line for error in [*errors, *_behind(content, errors)] for line in _tell(dict(error)).splitlines()]
+        raise InputError("\n".join([f"{path}: {len(lines)} to mend:", *(f"  {line}" for line in lines)])) from e
+    return Settings(config, Path(path).resolve().parent)
+
+
+def _unfit(value: Any, place: str = "") -> Iterator[str]:
+    """Say which keys and texts cannot be printed, or are longer than any topic."""
+    if isinstance(value, str) and (why := explain_unfit(value, 65_535)):
+        yield f"{place}: {why}"
+    pairs = value.items() if isinstance(value, dict) else enumerate(value, 1) if isinstance(value, list) else ()
+    for key, inner in pairs:
+        if why := explain_unfit(str(key)):
+            yield f"{place or 'file'}: {why}"
+        else:
+            yield from _unfit(inner, f"{place}.{key}" if place else str(key))
+
+
+def _behind(content: dict[str, Any], errors: Sequence[ErrorDetails]) -> list[ErrorDetails]:
+    """Return what else is wrong in tables that have a key of a wrong type: they are not judged as a whole then."""
+    content = deepcopy(content)
+    tables = set[tuple[int | str, ...]]()
+    for error in errors:
+        keys = _keys(error["loc"])
+        if len(keys) > 1 and error["type"] not in ("value_error", "missing"):
+            table: Any = content
+            for k in keys[:-1]:
+                table = table[k]
+            if isinstance(table, dict) and table.pop(keys[-1], None) is not None:
+                tables.add(keys[:-1])
+    try:
+        _ADAPTER.validate_json(as_json(content))
+    except ValidationError as e:
+        return [x for x in e.errors(include_url=False) if x["type"] == "value_error" and _keys(x["loc"]) in tables]
+    return []
+
+
+def _keys(loc: tuple[int | str, ...]) -> tuple[int | str, ...]:
+    """Return the keys and places in lists that lead to an error: the kind of an entry, behind its place, is none."""
+    kinds = ("mqtt", "simulated", "replay", "file", "linuxcnc")
+    pairs = zip((None, *loc), loc, strict=False)
+    return tuple(k for before, k in pairs if not (k in kinds and isinstance(before, int)))
+
+
+def _tell(error: dict[str, Any]) -> str:
+    place = ".".join(f"{k + 1}" if isinstance(k, int) else k for k in _keys(error["loc"])) or "file"
+    context = error.get("ctx", {})
+    if error["type"] == "value_error":
+        return str(context["error"]) if place == "file" else f"{place}: {context['error']}"
+    if error["type"] == "union_tag_invalid":
+        return f"{place}: kind = {context['tag']!r} is none of {context['expected_tags']}"
+    message = _PLAIN.get(error["type"])
+    return f"{place} {message}" if message else f"{place}: {error['msg']}, found {error['input']!r:.60}"

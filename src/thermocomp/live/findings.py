@@ -1,0 +1,141 @@
+"""What a configuration names and what is there: all that would keep the service from starting, at once."""
+
+import os
+import re
+from collections import Counter, deque
+from collections.abc import Iterator
+from pathlib import Path
+
+from thermocomp.core.alone import alone
+from thermocomp.core.exceptions import InputError
+from thermocomp.live.adapters.linuxcnc.halsetup import HAL_NAME, LONGEST
+from thermocomp.live.adapters.plain import read_rows
+from thermocomp.live.config import FileOut, LinuxCncOut, Page, ReplayIn, Settings, SimulatedIn
+from thermocomp.live.page import web
+
+#: bytes of a file's name on a disk
+_LONG = 255
+
+
+def find_faults(settings: Settings) -> Iterator[str]:
+    """Say which files cannot be read, and which cannot be written.
+
+    Parameters
+    ----------
+    settings : Settings
+    """
+    config, folder = settings
+    read = [*config.models, *([config.machine.file] if config.machine else [])]
+    read += [s.experiment for s in config.sources if isinstance(s, SimulatedIn) and s.experiment.endswith(".toml")]
+    read += [config.page.token_file] if config.page and config.page.token_file else []
+    replayed = [s.file for s in config.sources if isinstance(s, ReplayIn)]
+    for name in (*read, *replayed):
+        if why := _unreadable(folder / name, recording=name in replayed):
+            yield f"{folder / name}: {why}"
+    kept = [name for name in (config.state, config.journal.file if config.journal else "") if name]
+    locks, sent = [f"{name}.lock" for name in kept], [s.file for s in config.sinks if isinstance(s, FileOut)]
+    written = [*kept, *locks, *sent]
+    names = Counter((folder / name).resolve() for name in (*read, *replayed, *written))
+    if config.journal:
+        journal = folder / config.journal.file
+        parts = re.compile(rf"{re.escape(journal.stem)}\.\d+{re.escape(journal.suffix)}(-wal|-shm)?")
+        for path in (folder / name for name in sent):
+            if path.parent.resolve() == journal.parent.resolve() and parts.fullmatch(path.name):
+                yield f"{path}: may be a part of the journal {journal}, and would be written over; name another file"
+    for name in dict.fromkeys(written):
+        if name in locks and not (folder / name).parent.is_dir():  # said of the file itself
+            continue
+        if why := _unwritable(folder / name):
+            yield f"{folder / name}: {why}"
+        if names[(folder / name).resolve()] > 1:
+            yield f"{folder / name}: is named more than once, and would be written over; name another file"
+    for one in config.sinks:
+        if isinstance(one, LinuxCncOut) and len(os.fsencode(folder / one.socket)) > LONGEST:
+            yield f"{folder / one.socket}: a socket has a path of at most {LONGEST} bytes"
+
+
+def find_faults_now(settings: Settings, page: Page | None) -> Iterator[str]:
+    """Say what else would keep the service from starting, or a link from working, as it is now.
+
+    Parameters
+    ----------
+    settings : Settings
+    page : Page or None
+        As it will be served.
+    """
+    config, folder = settings
+    for source in config.sources:
+        if isinstance(source, ReplayIn) and not _unreadable(folder / source.file, recording=True):
+            try:
+                deque(read_rows(folder / source.file), maxlen=0)
+            except InputError as e:
+                yield str(e)
+    for sink in config.sinks:
+        if isinstance(sink, LinuxCncOut):
+            yield from _faults_of_setup(folder / sink.socket, {a.lower() for a in sink.axes.values()})
+    if page is not None:
+        if page.token_file and (folder / page.token_file).is_file():
+            try:
+                web.read_token(folder / page.token_file)
+            except InputError as e:
+                yield str(e)
+        try:
+            web.listen(page.host, 0 if runs_now(settings) else page.port).close()
+        except InputError as e:
+            yield f"{e} (as found now)"
+
+
+def runs_now(settings: Settings) -> bool:
+    """Return whether the service of this configuration runs: then its port is taken.
+
+    Parameters
+    ----------
+    settings : Settings
+    """
+    config, folder = settings
+    for name in (config.state, config.journal.file if config.journal else ""):
+        if name and (folder / f"{name}.lock").exists():  # otherwise nobody uses it
+            try:
+                with alone(folder / name):
+                    pass
+            except InputError:
+                return True
+    return False
+
+
+def _unreadable(path: Path, *, recording: bool) -> str:
+    if not path.is_file():
+        return "no such file"
+    if not os.access(path, os.R_OK):
+        return "this user may not read it"
+    try:
+        if recording:
+            read_rows(path).close()
+    except InputError as e:
+        return str(e).removeprefix(f"{path}: ")
+    return ""
+
+
+def _unwritable(path: Path) -> str:
+    if len(os.fsencode(path.name)) > _LONG:
+        return f"a name of {len(os.fsencode(path.name))} bytes; at most {_LONG}"
+    if path.exists() and not path.is_file():
+        return f"is {'a folder' if path.is_dir() else 'a pipe or a device'}; name a file"
+    if not path.parent.is_dir():
+        return f"there is no folder {path.parent}"
+    if not os.access(path.parent, os.W_OK):
+        return f"nothing can be written in {path.parent}"
+    return "is read-only" if path.exists() and not os.access(path, os.W_OK) else ""
+
+
+def _faults_of_setup(socket: Path, axes: set[str]) -> Iterator[str]:
+    """Say what is wrong with the set-up of a LinuxCNC."""
+    hal, do = socket.with_name(HAL_NAME), "see 'thermocomp linuxcnc setup', which says where the service connects"
+    if socket.exists() and not socket.is_socket():
+        yield f"{socket}: is no socket; {do}"
+    elif hal.is_file():
+        there = set(re.findall(r"--axis (\w),", hal.read_text(encoding="utf-8", errors="replace")))
+        if missing := axes - there:
+            yield f"{hal}: does not correct {', '.join(sorted(missing)).upper()}; set it up with --axes"
+    elif not socket.exists():
+        yield f"{socket}: LinuxCNC is not set up there: there is no {HAL_NAME}; {do}"

@@ -1,0 +1,271 @@
+"""A journal as it is read: all its files together, row by row, each checked."""
+
+import math
+import re
+import sqlite3
+import zlib
+from bisect import bisect_right
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator
+from contextlib import ExitStack, closing, contextmanager
+from heapq import merge
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.live.journal.journalrows import KINDS, Row, Start, loads
+
+#: ``tcJl``, and of the tables
+APPLICATION, VERSION = 0x74634A6C, 1
+SCHEMA = """
+CREATE TABLE rows (
+  id INTEGER PRIMARY KEY,   -- in the order in which they were written
+  run INTEGER NOT NULL,     -- of the service, drawn by lot
+  seq INTEGER NOT NULL,     -- in this run, from 1; 0: its start, which each file repeats
+  time REAL NOT NULL,       -- s since 1970
+  kind TEXT NOT NULL,
+  content TEXT NOT NULL,    -- JSON
+  crc INTEGER NOT NULL,     -- of all these
+  UNIQUE (run, seq)
+)
+"""
+#: kinds that do not come with every reading
+EVENTS = ("state", "reference", "measurement", "alarm", "update")
+#: a row that is so much earlier than one written before it was written after a clock was set back [s]
+SET_BACK = 5.0
+_ROWS = "SELECT run, seq, time, kind, content, crc FROM rows"
+
+
+class Stored(NamedTuple):
+    """A row, and which one it is."""
+
+    run: int
+    seq: int
+    row: Row
+
+
+class Summary(NamedTuple):
+    """What a journal holds."""
+
+    files: tuple[Path, ...]
+    size_bytes: int
+    first: float | None  #: [s] since 1970; None: there is no row
+    last: float | None
+    counts: dict[str, int]  #: rows by kind
+    lost: int  #: rows that are missing between others of their run
+
+
+class JournalReader:
+    """A journal, opened to be read, also while a service writes into it.
+
+    Parameters
+    ----------
+    path : str or Path
+        As the service was given it: all its files are read. Or one of its files, to be read alone.
+
+    Raises
+    ------
+    InputError
+        There is none, or a file is no journal, damaged, or of a newer version.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        given = Path(path)
+        self.paths = tuple(numbered(given).values()) or ((given,) if given.is_file() else ())
+        if not self.paths:
+            raise InputError(f"{given}: there is no journal of that name; name the one in the service's configuration")
+        self.starts: dict[int, Start] = {}  #: by run
+        for file, stored in self._each(f"{_ROWS} WHERE kind = 'start'"):
+            start = self._row(file, *stored).row
+            assert isinstance(start, Start)
+            self.starts[stored[0]] = start
+
+    def rows(self, kinds: Collection[str] = tuple(KINDS)) -> Iterator[Stored]:
+        """Return the rows of some kinds in the order of their times; the start of a run once.
+
+        Parameters
+        ----------
+        kinds : collection of str
+
+        Raises
+        ------
+        InputError
+            A row is damaged.
+        """
+        marks = ",".join("?" * len(kinds))
+        query = f"{_ROWS} WHERE kind IN ({marks}) ORDER BY time, id"
+        begun = set()
+        with ExitStack() as stack:
+            parts = [self._read(stack, path, query, tuple(kinds)) for path in self.paths]
+            for stored in merge(*parts, key=lambda s: s.row.time):
+                if stored.seq or stored.run not in begun:
+                    begun |= {stored.run} if not stored.seq else set()
+                    yield stored
+
+    def overtaken(self) -> Callable[[Stored], bool]:
+        """Return what tells whether a row stands at a time that was written again later: a clock was set back.
+
+        Then the later rows are right, and the earlier ones would stand among them.
+        """
+        begins: list[tuple[int, int, float]] = []  # run, its row and time, wherever it goes back
+        last = -math.inf
+        for _, (run, seq, time) in self._each("SELECT run, seq, time FROM rows WHERE seq > 0 ORDER BY id"):
+            if time < last - SET_BACK:
+                begins.append((run, seq, time))
+                last = time
+            last = max(last, time)
+        if not begins:
+            return lambda _: False
+        order = {run: k for k, run in enumerate(self.starts)}
+        places = [(order[run], seq) for run, seq, _ in begins]
+        firsts = [min(time for *_, time in begins[k:]) for k in range(len(begins))]
+
+        def told(stored: Stored) -> bool:
+            k = bisect_right(places, (order[stored.run], stored.seq))
+            return k < len(firsts) and stored.row.time >= firsts[k]
+
+        return told
+
+    def latest(self, n: int, kinds: Collection[str] = EVENTS) -> list[Stored]:
+        """Return the rows of some kinds that were written last, oldest first.
+
+        Parameters
+        ----------
+        n : int
+        kinds : collection of str
+        """
+        marks = ",".join("?" * len(kinds))
+        query = f"{_ROWS} WHERE kind IN ({marks}) ORDER BY id DESC LIMIT ?"
+        found: list[Stored] = []
+        with ExitStack() as stack:
+            for path in reversed(self.paths):
+                found += self._read(stack, path, query, (*kinds, n - len(found)))
+        return found[::-1]
+
+    def summary(self) -> Summary:
+        """Return what the journal holds."""
+        counts: Counter[str] = Counter(dict.fromkeys(KINDS, 0))
+        for _, (kind, n) in self._each("SELECT kind, COUNT(*) FROM rows WHERE seq > 0 GROUP BY kind"):
+            counts[kind] += n
+        counts["start"] = len(self.starts)
+        runs: dict[int, list[int]] = {}
+        for _, (run, low, high, n) in self._each(
+            "SELECT run, MIN(seq), MAX(seq), COUNT(*) FROM rows WHERE seq > 0 GROUP BY run"
+        ):
+            before = runs.setdefault(run, [low, high, 0])
+            runs[run] = [min(before[0], low), max(before[1], high), before[2] + n]
+        ends = [e for _, e in self._each("SELECT MIN(time), MAX(time) FROM rows") if e[0] is not None]
+        return Summary(
+            self.paths,
+            sum(size(p) for p in self.paths),
+            min((e[0] for e in ends), default=None),
+            max((e[1] for e in ends), default=None),
+            dict(counts),
+            sum(high - low + 1 - n for low, high, n in runs.values()),
+        )
+
+    def _each(self, query: str) -> Iterator[tuple[Path, Any]]:
+        for path in self.paths:
+            with reading(path) as connection:
+                for found in connection.execute(query) if connection else ():
+                    yield path, found
+
+    def _read(self, stack: ExitStack, path: Path, query: str, values: tuple[object, ...]) -> Iterator[Stored]:
+        connection = stack.enter_context(reading(path))
+        with telling(path):
+            for found in connection.execute(query, values) if connection else ():
+                yield self._row(path, *found)
+
+    def _row(self, path: Path, run: int, seq: int, time: float, kind: str, text: str, crc: int) -> Stored:
+        where = f"{path}: row {seq} of run {run}"
+        if crc != checksum(run, seq, time, kind, text):
+            raise InputError(f"{where} is damaged; set the file aside, {_OTHERS}")
+        try:
+            return Stored(run, seq, loads(kind, time, text, self.starts.get(run)))
+        except (ValueError, TypeError, InputError) as e:
+            raise InputError(f"{where} cannot be understood: {e}") from e
+
+
+_OTHERS = "and read the others"
+
+
+# -- files -------------------------------------------------------------------------------------------------------------
+
+
+def numbered(path: Path) -> dict[int, Path]:
+    """Return the files of a journal by their numbers, the oldest first: ``live.db`` is ``live.000001.db`` ..."""
+    pattern = re.compile(rf"{re.escape(path.stem)}\.(\d{{6,}}){re.escape(path.suffix)}")
+    names = {p: pattern.fullmatch(p.name) for p in (path.parent.iterdir() if path.parent.is_dir() else ())}
+    return dict(sorted((int(m[1]), p) for p, m in names.items() if m and p.is_file()))
+
+
+def size(path: Path) -> int:
+    """Return the bytes of a file of a journal, with what is not yet moved into it."""
+    beside = (path, path.with_name(f"{path.name}-wal"))
+    return sum(p.stat().st_size for p in beside if p.exists())
+
+
+def checksum(run: int, seq: int, time: float, kind: str, text: str) -> int:
+    """Return the CRC-32 of a row.
+
+    Parameters
+    ----------
+    run, seq, time, kind, text
+        As the columns of `SCHEMA`.
+    """
+    # SQLite knows no -0.0
+    return zlib.crc32(f"{run} {seq} {time + 0.0!r} {kind} {text}".encode())
+
+
+def find_version(connection: sqlite3.Connection) -> int | None:
+    """Return the version of a journal; 0: nothing is in it yet; None: it is the database of something else."""
+    (application,) = connection.execute("PRAGMA application_id").fetchone()
+    (version,) = connection.execute("PRAGMA user_version").fetchone()
+    if application == APPLICATION:
+        return int(version)
+    (tables,) = connection.execute("SELECT COUNT(*) FROM sqlite_master").fetchone()
+    return None if application or version or tables else 0
+
+
+@contextmanager
+def telling(path: Path) -> Iterator[None]:
+    """Turn what SQLite says of a file into an error that names it."""
+    try:
+        yield
+    except sqlite3.Error as e:
+        code = getattr(e, "sqlite_errorcode", 0) & 0xFF
+        if code == sqlite3.SQLITE_NOTADB:
+            raise InputError(f"{path}: is no journal of thermocomp, nor any database") from e
+        if code == sqlite3.SQLITE_CANTOPEN:
+            hint = "may it be read? Else copy it, and what is named like it, into a folder where files may be made"
+            raise InputError(f"{path}: cannot be opened; {hint}") from e
+        raise InputError(f"{path}: cannot be read ({e}); set the file aside, {_OTHERS}") from e
+
+
+@contextmanager
+def reading(path: Path) -> Iterator[sqlite3.Connection | None]:
+    """Open a file of a journal to be read; None: it was removed meanwhile, or nothing is in it yet.
+
+    Yields
+    ------
+    Connection or None
+
+    Raises
+    ------
+    InputError
+        It is no journal, or of a newer version.
+    """
+    # without leave to make files beside it, SQLite reads one that nobody writes into only if it is told so
+    how = "mode=ro" if path.with_name(f"{path.name}-wal").exists() else "mode=ro&immutable=1"
+    if not path.exists():
+        yield None
+        return
+    with telling(path), closing(sqlite3.connect(f"{path.resolve().as_uri()}?{how}", uri=True)) as connection:
+        version = find_version(connection)
+        if version is None:
+            raise InputError(f"{path}: is no journal of thermocomp but another database")
+        if version > VERSION:
+            raise InputError(
+                f"{path}: a journal of version {version}, and this thermocomp knows {VERSION}: read it with a newer one"
+            )
+        yield connection if version else None

@@ -1,0 +1,122 @@
+"""The page's server, in the same loop as the service."""
+
+import contextlib
+import socket
+import time
+from collections.abc import Generator
+from pathlib import Path
+
+import uvicorn
+from fastapi import FastAPI
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.live.page.connections import Guarded
+
+#: characters of a token, at least
+SHORTEST = 16
+#: connections taken in at once: few, so that one is read before ``connections.MOST`` newer ones push it out
+AT_ONCE = 16
+#: that the system lets wait for us: one for which there is no room tries again only after a second
+WAITING = 1024
+#: bytes of an answer that the system takes ahead of a client that does not read
+AHEAD = 65_536
+_OTHERWISE = "choose another with --port, or 0 for any"
+
+
+class _Server(uvicorn.Server):
+    @contextlib.contextmanager
+    def capture_signals(self) -> Generator[None, None, None]:
+        yield  # whoever runs the service listens to them
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        for one in sockets or ():
+            one.listen(WAITING)
+
+    async def on_tick(self, counter: int) -> bool:
+        if counter % 10 == 0:  # once a second
+            for connection in list(self.server_state.connections):
+                if isinstance(connection, Guarded):
+                    connection.look(time.monotonic())
+        return await super().on_tick(counter)
+
+
+def read_token(path: Path) -> str:
+    """Return the token in a file.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    InputError
+        It cannot be read, or is too short.
+    """
+    try:
+        token = path.read_text(encoding="ascii").strip()
+    except (OSError, UnicodeDecodeError) as e:
+        raise InputError(f"{path}: the page's token cannot be read: {e}") from e
+    if len(token) < SHORTEST:
+        raise InputError(
+            f"{path}: a token of {len(token)} characters; want {SHORTEST} or more, such as of 'openssl rand -hex 16'"
+        )
+    return token
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """Return a socket that listens.
+
+    Parameters
+    ----------
+    host : str
+        Name or address; ``0.0.0.0``: all IPv4 addresses of this computer, ``::``: all of IPv6 and IPv4.
+    port : int
+        0: any that is free.
+
+    Raises
+    ------
+    InputError
+        It is taken, or there is no such host.
+    """
+    bare = host.removeprefix("[").removesuffix("]")
+    try:
+        found = socket.getaddrinfo(bare, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+        family, *_, address = min(found, key=lambda one: one[0] != socket.AF_INET)  # a name that has both: IPv4
+        both = address[0] == "::" and socket.has_dualstack_ipv6()
+        listening = socket.create_server(address, family=family, dualstack_ipv6=both)
+    except (OSError, ValueError) as e:  # a host that cannot be one is a ValueError
+        why = getattr(e, "strerror", None) or e
+        do = "choose another host in [page]" if isinstance(e, socket.gaierror | ValueError) else _OTHERWISE
+        raise InputError(f"page on {host}, port {port}: {why}; {do}") from e
+    # a client that does not read is found out the sooner, and takes the less memory
+    listening.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, AHEAD)
+    return listening
+
+
+async def serve(app: FastAPI, listening: socket.socket) -> None:
+    """Serve an application until it is cancelled.
+
+    Parameters
+    ----------
+    app : FastAPI
+    listening : socket
+    """
+    config = uvicorn.Config(
+        app,
+        http=Guarded,
+        ws="none",
+        backlog=AT_ONCE,
+        log_level="error",
+        lifespan="off",
+        access_log=False,
+        timeout_graceful_shutdown=1,
+    )
+    server = _Server(config)
+    with listening:
+        try:
+            await server.serve([listening])
+        finally:
+            if server.started and not server.should_exit:
+                server.should_exit = True
+                await server.shutdown([listening])

@@ -1,0 +1,111 @@
+"""What the service writes into its journal."""
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Literal
+
+from thermocomp.core.correction import Correction
+from thermocomp.core.machine import Channel
+from thermocomp.core.reading import Measurement
+from thermocomp.core.units import HOUSE_UNITS
+from thermocomp.live.clock import Clock
+from thermocomp.live.journal.journal import Journal, JournalLimits
+from thermocomp.live.journal.journalrows import (
+    AlarmRow,
+    ConfirmationRow,
+    DemandRow,
+    MeasurementRow,
+    Own,
+    ReadingRow,
+    ReferenceRow,
+    Start,
+    StateRow,
+    Target,
+    UpdateRow,
+)
+from thermocomp.live.probe import Checked
+from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.state import Compensated, Reference
+
+#: so long after a confirmation the correction in force counts as known [s of the world]
+CONFIRM_WITHIN = 10.0
+
+
+class Recorder:
+    """A journal, in the words of the service.
+
+    Parameters
+    ----------
+    path : Path
+    compensator : Compensator
+    own : {'on', 'off', 'unknown'}
+        Whether the controller compensates by itself.
+    clock : Clock
+    limits : JournalLimits
+    more : mapping of str to str, optional
+        Quantity of channels that are kept beside the inputs of the models.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        compensator: Compensator,
+        own: Own,
+        clock: Clock,
+        limits: JournalLimits,
+        more: Mapping[str, str] | None = None,
+    ) -> None:
+        inputs = [i for m in compensator.models for i in (*m.inputs, *(m.watch.inputs if m.watch else ()))]
+        channels = {name: Channel(name, kind, HOUSE_UNITS[kind]) for name, kind in (more or {}).items()}
+        channels |= {i.name: Channel(i.name, i.quantity, i.unit) for i in inputs}
+        targets = tuple(Target(name) for name in compensator.lines)
+        start = Start(clock.now(), targets, tuple(channels.values()), own, CONFIRM_WITHIN * clock.speed)
+        self.journal = Journal(path, limits, start)  # nothing is written before the service runs
+        self._before: Compensated | None = None
+        self._references: dict[str, Reference] = {}
+
+    def take(self, time: float, values: Mapping[str, float], said: Compensated) -> None:
+        """Write a reading, and what came of it."""
+        self.journal.add(ReadingRow(time, values))
+        self.tell(time, said)
+
+    def tell(self, time: float, said: Compensated) -> None:
+        """Write what has changed."""
+        before, self._before = self._before, said
+        for target, correction in said.corrections.items():
+            if before is None or before.corrections.get(target) != correction:
+                self.journal.add(DemandRow(time, target, correction))
+        for target, status in said.states.items():
+            if before is None or (known := before.states.get(target)) is None or known.word != status.word:
+                self.journal.add(StateRow(time, target, status.word, status.reason))
+
+    def count(self, time: float, references: Mapping[str, Reference]) -> None:
+        """Write where targets count from, where that is new."""
+        for target, reference in references.items():
+            if self._references.get(target) != reference:
+                self.journal.add(ReferenceRow(time, target, reference.why, reference.shift))
+        self._references = dict(references)
+
+    def confirm(self, time: float, in_force: Mapping[str, Correction]) -> None:
+        """Write what a controller says is in force."""
+        for target, correction in in_force.items():
+            self.journal.add(ConfirmationRow(time, target, correction))
+
+    def measure(self, time: float, found: Measurement, in_force: Correction | None) -> None:
+        """Write a measurement of the tool point."""
+        kind: Literal["probing"] = "probing"
+        row = MeasurementRow(time, found.target, found.measured, kind, not found.left, found.position, in_force)
+        self.journal.add(row)
+
+    def update(self, checked: Checked, after: float) -> None:
+        """Write what a probing changed; `after` is what is added to the deviation from now on [um]."""
+        measured = checked.predicted + checked.residual
+        if math.isfinite(measured):
+            self.journal.add(
+                UpdateRow(checked.time, checked.target, measured, checked.predicted, after, checked.refused)
+            )
+
+    def alarm(self, time: float, kind: str, text: str) -> None:
+        """Write something that somebody should look at."""
+        self.journal.add(AlarmRow(time, kind, text))

@@ -1,0 +1,163 @@
+"""`thermocomp revise`: an NC program is corrected by the drift it will cause, before it is run."""
+
+import math
+import sys
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+from cyclopts import Group, Parameter
+
+from thermocomp.cli import loudness
+from thermocomp.cli.jsonoutput import print_json
+from thermocomp.cli.options import Output
+from thermocomp.cli.progress import show_share
+from thermocomp.cli.terminal import console, print_table, words
+from thermocomp.nc.revision import outcome
+from thermocomp.nc.revision.job import Done, Job
+from thermocomp.nc.revision.job import revise as revise_program
+from thermocomp.nc.revision.options import Controller, Drifting, Starting, Timing, Way
+from thermocomp.nc.revision.prepare import prepare_job
+from thermocomp.nc.rewrite.course import Bound
+from thermocomp.report.layout import Column, Layout
+
+#: lines from which on the time that one takes can be told
+MANY = 1000
+
+
+_GROUPS = {
+    "The drift": Drifting,
+    "The state at the start: exactly one of cold, carried, measured": Starting,
+    "The revision": Way,
+    "The controller: what does not stand in the program": Controller,
+    "The time it takes": Timing,
+}
+for order, (title, group) in enumerate(_GROUPS.items(), start=1):
+    Parameter(name="*", group=Group(title, sort_key=order))(group)
+
+
+def revise(
+    program: Path,
+    /,
+    *,
+    drifting: Drifting,
+    output: Output,
+    starting: Starting = Starting(),
+    way: Way = Way(),
+    controller: Controller = Controller(),
+    timing: Timing = Timing(),
+    date: str | None = None,
+    overwrite: bool = False,
+    json: bool = False,
+) -> int:
+    """Correct an NC program by the drift it will cause, before it is run.
+
+    The program is followed as the controller would, timed, and its spindle speed drives the models; what they say is
+    taken off its coordinates. What cannot be corrected safely is refused with line and reason. The original stays as it
+    is. Beside the new program are written: the differences (.diff), a table of all lines (.csv), a picture (.png), and
+    the state that the machine is left in (.job.json), from which the next job can start.
+
+    Parameters
+    ----------
+    program : Path
+        NC program (ISO 6983, as LinuxCNC and Fanuc controls read it).
+    drifting : Drifting
+        What makes the tool drift.
+    output : Path
+        Program to write.
+    starting : Starting
+        How warm the machine is when the program starts.
+    way : Way
+        How the correction gets into the program.
+    controller : Controller
+        What stands at the controller and not in the program.
+    timing : Timing
+        How fast the machine is.
+    date : str
+        For the header, such as 2026-01-31; today if not given.
+    overwrite : bool
+        Write over existing files; never over the program.
+    json : bool
+        Print results for a machine instead of tables.
+
+    Returns
+    -------
+    int
+        0 done, 1 nothing was taken off and nothing written, 2 the program or something else cannot be used.
+    """
+    job, notes = prepare_job(program, drifting, output, starting, way, controller, timing, date, overwrite=overwrite)
+    loudness.tell(f"read {job.program}")
+    # a pipe gets its lines on stderr, whatever stdout is for
+    done = revise_program(job, partial(show_share, hidden=json and sys.stderr.isatty()))
+    if json:
+        print_json(outcome.content(job, done, notes))
+    else:
+        _show(job, done, notes)
+    return 0 if done.written else 1
+
+
+def _show(job: Job, done: Done, notes: Sequence[str]) -> None:
+    """Print what was done to a program, and how far the tool may still be off."""
+    revision = job.revision
+
+    def say(mark: str, text: str) -> None:
+        console.print(f"{mark} {words(text)}".lstrip(), soft_wrap=True)
+
+    console.print(
+        f"[bold]{words(job.program)}[/]: {_many(revision.lines, 'line')}, "
+        f"{revision.changed if done.written else 'none'} of them changed; "
+        f"runs {outcome.duration(revision.seconds)}; {_spindle(job)}; "
+        f"{_many(len(revision.tool_changes), 'tool change')}",
+        soft_wrap=True,
+    )
+    say("", f"Start: {job.begun}; {job.method}")
+    print_table(_bounds(done.bounds), console)
+    if (proof := done.proof) is not None:
+        say(
+            "[green]proved[/]",
+            f"LinuxCNC's interpreter ran both programs: {_many(proof.moves, 'move')}, each that of the original plus "
+            f"its correction, within {max(proof.largest, 0.001):.3f} um",
+        )
+        say("[green]proved[/]", f"{proof.sentence}; the time of each move within {max(proof.slower, 0.1):.1f} %")
+    for warning in outcome.warnings(job, done):
+        say("[yellow]but[/]", warning)
+    for note in (*notes, *outcome.describe_place(job, done)):
+        say("[yellow]note[/]", note)
+    took = f"revised in {done.seconds:.1f} s"
+    if revision.lines >= MANY:
+        took += f", {1e6 * done.seconds / revision.lines:.0f} us per line"
+    console.print(f"[dim]{took}; proof and picture {done.proving:.1f} s[/]")
+    if done.written:
+        say("", f"Written: {', '.join(map(str, job.paths.all()))}")
+    else:
+        say("[bold yellow]nothing written:[/]", outcome.explain_nothing(job, done))
+
+
+def _bounds(bounds: Sequence[Bound]) -> Layout:
+    columns = (
+        Column("axis", lambda b: b.axis),
+        Column("drift from", lambda b: b.low, "um"),
+        Column("to", lambda b: b.high, "um"),
+        Column("in the cuts", lambda b: b.without, "um"),
+        Column("left in the cuts", lambda b: b.left, "um"),
+        Column("at line", lambda b: b.line or "", ">"),
+        Column("model", lambda b: _known(b, b.model), "um"),
+        Column("bound", lambda b: _known(b, b.most), "um"),
+    )
+    caption = "um; bound of a cut = what is left between updates + largest error of the model on unseen cycles"
+    return Layout(columns, bounds, caption=caption)
+
+
+def _known(bound: Bound, value: float) -> str | float:
+    return "not known" if math.isnan(bound.model) else value
+
+
+def _many(n: int, what: str) -> str:
+    return f"{n:,} {what}{'s' * (n != 1)}"
+
+
+def _spindle(job: Job) -> str:
+    slowest, fastest = job.revision.slowest, job.revision.fastest
+    if not fastest:
+        return "the spindle stands still"
+    return f"spindle {slowest:g} 1/min" if slowest == fastest else f"spindle {slowest:g} to {fastest:g} 1/min"

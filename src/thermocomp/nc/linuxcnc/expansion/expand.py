@@ -1,0 +1,293 @@
+"""Expands an NC program: loops, parameters, subprograms, cycles and G91 become plain lines; the result is proven."""
+
+import re
+from array import array
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+from itertools import zip_longest
+from pathlib import Path
+
+from thermocomp.core.exceptions import InputError, ProgramError
+from thermocomp.files.draft import draft
+from thermocomp.nc.linuxcnc.expansion.origins import DEPENDS, G10, SYSTEMS
+from thermocomp.nc.linuxcnc.expansion.plain import Writer
+from thermocomp.nc.linuxcnc.expansion.proof import compare, compare_parameters
+from thermocomp.nc.linuxcnc.expansion.words import Side
+from thermocomp.nc.linuxcnc.rs274 import Canonical, read
+from thermocomp.nc.linuxcnc.rs274process import InterpreterJob, InterpreterRun
+from thermocomp.nc.linuxcnc.stored import Stored, draw_controller
+from thermocomp.nc.rewrite.header import clean_comment
+
+_NO_CODE = re.compile(r"\([^)]*\)|<[^>]*>|;.*|\s")
+_ORIENTS = re.compile(r"M0*19(?:\.0*)?(?![0-9.])")
+#: diameters or radii for X: the interpreter makes no call of them, and plain lines are in radii
+_DIAMETERS = re.compile(r"G0*[78](?:\.0*)?(?![0-9.])")
+#: ends the main program as M2 does where it is read here, and begins it again at the machine
+_REPEATS = re.compile(r"M(?:0*99(?:\.0*)?(?![0-9.])|[-+]*[#\[])")
+#: seeds of the controllers that a program is written from, and that it is proved in
+_WRITTEN, _PROVED = (1, 2), (3, 4)
+#: lines after which it is told how many are written
+_OFTEN = 1000
+#: of the program's name in a comment that old controls can read
+_NAME = 48
+#: lines that are written at most
+MOST = 2_000_000
+
+
+@dataclass(frozen=True)
+class Expansion:
+    """What `expand` wrote.
+
+    Parameters
+    ----------
+    path : Path
+    sources : array of int
+        For each line of the file, from the first: the line of the program it comes from; 0: of none.
+    acts : int
+        Moves, dwells, stops, tool changes ... that were compared with the program's.
+    """
+
+    path: Path
+    sources: "array[int]"
+    acts: int
+
+
+@dataclass(frozen=True)
+class _Around:
+    """What a program is run in; see `expand`."""
+
+    inch: bool | None
+    startup: str | None
+    diameters: Mapping[int, float]
+    block_delete: bool
+    subroutines: Sequence[Path]
+    user_codes: bool
+    seconds: int
+    systems: Mapping[int, int]  #: work coordinate system in force at the start, by seed
+
+    def run(
+        self,
+        path: Path,
+        stored: Stored,
+        *,
+        task: bool = False,
+        left: dict[int, float] | None = None,
+        opened: set[Path] | None = None,
+    ) -> Generator[Canonical]:
+        """Run a program in it."""
+        return read(
+            path,
+            stored,
+            inch=bool(self.inch),
+            block_delete=self.block_delete,
+            subroutines=self.subroutines,
+            task=task,
+            seconds=self.seconds,
+            left=left,
+            opened=opened,
+        )
+
+    def try_whether_it_ends(self, path: Path, stored: Stored) -> None:
+        """Run a program and look at nothing: a loop without end is refused before anything is made of its moves."""
+        job = InterpreterJob(
+            path, stored, bool(self.inch), self.block_delete, self.subroutines, task=False, seconds=self.seconds
+        )
+        with InterpreterRun(job) as run:
+            for _ in run.blocks():
+                pass
+
+    def controller(self, seed: int) -> Stored:
+        """Return a controller that has nothing else in common with that of another seed."""
+        stored = draw_controller(seed, self.startup or "")
+        return replace(stored, diameters={**stored.diameters, **self.diameters}, system=self.systems[seed])
+
+
+def expand(
+    path: Path,
+    out: Path,
+    *,
+    inch: bool | None = None,
+    startup: str | None = None,
+    diameters: Mapping[int, float] | None = None,
+    block_delete: bool = False,
+    subroutines: Sequence[Path] = (),
+    user_codes: bool = False,
+    seconds: int = 600,
+    progress: Callable[[int], object] = lambda _: None,
+) -> Expansion:
+    """Write a program out in plain lines that do the same on every machine, whatever its origins and tool lengths.
+
+    LinuxCNC's interpreter runs the program in two controllers with other origins, tool lengths, homes, parameters,
+    another tool in the spindle and another start, and what both runs have in common is written. Then program and result
+    are run in two more such controllers and have to make the same moves within 1e-6 mm, with the same feeds, spindle,
+    coolant, stops and tools, and to leave the same origins behind. Texts of ``(PRINT,...)`` and ``(LOG,...)`` are left
+    out.
+
+    Parameters
+    ----------
+    path, out : Path
+        `out` must not exist.
+    inch : bool, optional
+        The unit in force at the start; if not given the program has to say it.
+    startup : str, optional
+        Codes in force at the start that the end of a program does not put back, such as ``G64 P0.01 G98`` [mm]. Canned
+        cycles need them; what is not given the program has to say (G61, G61.1 or G64; G98 or G99).
+    diameters : dict of int to float, optional
+        Of the tools [mm]: G41 and G42 are worked out for them. A program that uses another one, which is stored in the
+        controller, is refused.
+    block_delete : bool
+        Leave out the lines that begin with ``/``.
+    subroutines : sequence of Path
+        Folders of subprograms, at most 8; the program's own comes first anyway.
+    user_codes : bool
+        Keep M100 to M199; without it they are refused, for nobody knows what they do.
+    seconds : int
+        Processor time each run may take [s].
+    progress : callable, optional
+        Told how many lines are written.
+
+    Returns
+    -------
+    Expansion
+
+    Raises
+    ------
+    ProgramError
+        The program does something that depends on what is stored in the machine, or that has no plain words; a file
+        that was run has M19.
+    InputError
+        `out` exists already or cannot be written, or the program is not there.
+    """
+    if not path.is_file():
+        raise InputError(f"{path} is not a file")
+    systems = _start_systems(path, block_delete)
+    around = _Around(inch, startup, diameters or {}, block_delete, subroutines, user_codes, seconds, systems)
+    acts = 0
+    around.try_whether_it_ends(path, around.controller(_WRITTEN[0]))
+    with draft(out, overwrite=False) as part:
+        sources: array[int] = array("I")
+        with part.open("w", encoding="ascii", newline="\n") as file:
+            for text, line in _lines(path, around):
+                file.write(text + "\n")
+                sources.append(line)
+                if not len(sources) % _OFTEN:
+                    progress(len(sources))
+                if len(sources) > MOST:
+                    raise ProgramError(line, f"more than {MOST:,} plain lines come out: does a loop never end?")
+        for seed in _PROVED:
+            left: tuple[dict[int, float], dict[int, float]] = ({}, {})
+            stored = around.controller(seed)
+            try:
+                with (
+                    closing(around.run(path, stored, left=left[0])) as asked,
+                    closing(around.run(part, stored, left=left[1])) as done,
+                ):
+                    acts = compare(asked, done)
+                compare_parameters(*left)
+            except ProgramError as error:
+                raise ProgramError(error.line, f"it cannot be expanded: {error.reason}") from error
+    return Expansion(out, sources, acts)
+
+
+def _lines(path: Path, around: _Around) -> Iterator[tuple[str, int]]:
+    """Yield the lines of the plain program, each with the line of the program it comes from."""
+    percent = _first(path) == "%"
+    if percent:
+        yield "%", 0
+    yield f"(expanded from {clean_comment(path.name)[:_NAME]} by thermocomp)", 0
+    if around.diameters:
+        yield "(cutter radius compensation is worked out for given tool diameters)", 0
+    yield "G17 G40 G80 G90 G94", 0
+    if around.startup is not None:
+        yield f"G21 {around.startup}", 0
+    if around.inch is not None:
+        yield "G20" if around.inch else "G21", 0
+    radii = any(_lines_with(_DIAMETERS, path, around.block_delete))
+    if radii:
+        yield "G8", 0
+    one, two = (around.controller(seed) for seed in _WRITTEN)
+    writer = Writer(one, two, _Source(path), around.inch, around.user_codes)
+    opened: set[Path] = set()
+    with closing(around.run(path, one, opened=opened)) as run1, closing(around.run(path, two, task=True)) as run2:
+        for first, second in zip_longest(_told(run1, writer.sides[0]), _told(run2, writer.sides[1])):
+            if first is None or second is None:
+                raise writer.refuse(f"where it ends {DEPENDS}")
+            if first.kind == "end" and not first.file and _REPEATS.search(_code(writer.source(first.line))):
+                raise ProgramError(first.line, "M99 in a main program repeats it without end: end it with M2 or M30")
+            yield from writer.write(first, second)
+    for file in sorted(opened):
+        _refuse_lost(file, path, around.block_delete, radii=radii)
+    if not writer.ended:
+        yield from writer.flush()
+        if percent:
+            yield "%", 0
+
+
+def _start_systems(program: Path, block_delete: bool) -> dict[int, int]:
+    """Return the work coordinate systems that are in force at the start, by seed.
+
+    The interpreter makes no call where one is chosen that is in force already. So a program is written where one is
+    that it does not name, and proved in two others, of which one is G54: what it chooses is seen, and what it leaves
+    as it is stays so.
+    """
+    named = (
+        any(_lines_with(re.compile(re.escape(code) + r"(?![0-9.])"), program, block_delete))
+        for code in SYSTEMS.values()
+    )
+    free = [system for system, is_named in zip(SYSTEMS, named, strict=True) if not is_named]
+    written = free[-1] if free else len(SYSTEMS)
+    other = next(system for system in reversed(SYSTEMS) if system != written)
+    return dict.fromkeys(_WRITTEN, written) | dict(zip(_PROVED, (other, 1 if written != 1 else 2), strict=True))
+
+
+def _refuse_lost(file: Path, program: Path, block_delete: bool, *, radii: bool) -> None:
+    """Refuse what the interpreter passes over without a trace in a file that was run: M19 without R, G7 and G8."""
+    own = file == program.resolve()
+    reasons = {_ORIENTS: "it orients the spindle (M19), which plain lines would lose"}
+    if not radii:
+        reasons[_DIAMETERS] = "a subprogram says G7 or G8 and the program does not; write G8 at its top"
+    for code, reason in reasons.items():
+        for number in _lines_with(code, file, block_delete):
+            where = "" if own else f" (line {number} of {file.name})"
+            raise ProgramError(number if own else 1, f"it cannot be expanded: {reason}{where}")
+
+
+def _lines_with(code: re.Pattern[str], file: Path, block_delete: bool) -> Iterator[int]:
+    """Yield the numbers of the lines with a code."""
+    with file.open(encoding="latin-1") as lines:
+        for number, text in enumerate(lines, 1):
+            words = _code(text)
+            if code.search(words) and not (block_delete and words.startswith("/")):
+                yield number
+
+
+def _code(text: str) -> str:
+    """Return a line without comments and blanks, in upper case."""
+    return _NO_CODE.sub("", text).upper()
+
+
+def _first(path: Path) -> str:
+    """Return the first line that is not empty."""
+    with path.open(encoding="latin-1") as file:
+        return next((line.strip() for line in file if line.strip()), "")
+
+
+def _told(calls: Iterator[Canonical], side: Side) -> Iterator[Canonical]:
+    """Yield the calls without the interpreter's own remarks; what stands before the first line is where it starts."""
+    for call in calls:
+        if call.line == 0:
+            side.begin(call)
+        elif call.kind != "comment" or call.text == G10 or not call.text.startswith("interpreter: "):
+            yield call
+
+
+class _Source:
+    """Text of a line; the file is read again from its start at each question, which is rare."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def __call__(self, number: int) -> str:
+        with self.path.open(encoding="latin-1") as file:
+            return next((text for i, text in enumerate(file, 1) if i == number), "")

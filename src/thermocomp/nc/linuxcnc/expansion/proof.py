@@ -1,0 +1,164 @@
+"""Proves that two programs make a machine do the same."""
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import zip_longest
+from typing import NamedTuple
+
+from thermocomp.core.exceptions import ProgramError
+from thermocomp.nc.linuxcnc.rs274 import ORIGIN, PLANE_AXES, Canonical, Place, ProgramFrame
+
+TOLERANCE = 1e-6  #: [mm]
+#: calls that set a state, and its name
+STATES = {
+    "feedmode": "feed mode", "speed": "speed", "speedmode": "speed mode", "select": "tool", "path": "path",
+    "naive": "naive",
+    "m3": "spindle", "m4": "spindle", "m5": "spindle", "mist": "mist", "mistoff": "mist", "flood": "flood",
+    "floodoff": "flood", "sync": "sync", "unsync": "sync", "feedoverride": "feed override",
+    "nofeedoverride": "feed override", "speedoverride": "speed override", "nospeedoverride": "speed override",
+    "adaptive": "adaptive", "noadaptive": "adaptive", "feedhold": "feed hold", "nofeedhold": "feed hold",
+}  # fmt: skip
+#: calls that say nothing of what the machine does, or that what it does shows
+REMARKS = {"comment", "unit", "plane", "feedrate", "g5x", "g92", "rotation", "length"}
+#: parameters a controller keeps: homes, G92, work coordinate systems
+KEPT = range(5161, 5391)
+#: of which the offsets of G92 and G52, and whether they are in force
+G92, G92_IN_FORCE = range(5211, 5220), 5210
+
+
+class Act(NamedTuple):
+    """Something the machine does, and the state it does it in."""
+
+    line: int
+    kind: str
+    numbers: tuple[float, ...]  #: of moves machine coordinates [mm, deg] and the feed
+    state: tuple[tuple[str, str, tuple[float, ...]], ...]
+    text: str
+
+    def told(self) -> str:
+        """Return it in words."""
+        return f"{self.kind} {' '.join(f'{n:.6f}' for n in self.numbers)} {self.text}".strip()
+
+
+def compare(asked: Iterator[Canonical], done: Iterator[Canonical]) -> int:
+    """Compare what two programs do in the same controller.
+
+    Parameters
+    ----------
+    asked, done : iterator of Canonical
+        Of the program, and of what is to do the same.
+
+    Returns
+    -------
+    int
+        Number of acts, all of them equal: moves within 1e-6 mm, their feeds, spindle, coolant, tools, stops, dwells.
+
+    Raises
+    ------
+    ProgramError
+        They differ: line of the program, and how.
+    """
+    count, line = 0, 1
+    for first, second in zip_longest(trace_acts(asked), trace_acts(done)):
+        line = first.line if first else line
+        if first is None or second is None or not _equal(first, second):
+            words = [act.told() if act else "nothing" for act in (first, second)]
+            if first and second and words[0] == words[1]:
+                words = [f"{word} with {act.state}" for word, act in zip(words, (first, second), strict=True)]
+            raise ProgramError(max(line, 1), f"the plain lines would do: {words[1]}, instead of: {words[0]}")
+        count += 1
+    return count
+
+
+def compare_parameters(asked: dict[int, float], done: dict[int, float]) -> None:
+    """Compare the parameters that two programs leave in the controller; raise `ProgramError` if they differ."""
+    shifted = any(left.get(number) for left in (asked, done) for number in G92)
+    for number in KEPT:
+        if number == G92_IN_FORCE and not shifted:
+            continue  # in force or not, nothing is shifted
+        if abs(asked.get(number, 0.0) - done.get(number, 0.0)) > TOLERANCE:
+            raise ProgramError(1, f"the plain lines would leave another parameter #{number} in the controller")
+
+
+def trace_acts(calls: Iterator[Canonical]) -> Iterator[Act]:
+    """Yield what the machine does from the first line on, without moves that go nowhere."""
+    frame, here, feed = ProgramFrame(), ORIGIN, (0.0, 0.0)
+    states: dict[str, tuple[str, str, tuple[float, ...]]] = {}
+    state: tuple[tuple[str, str, tuple[float, ...]], ...] = ()
+    for call in calls:
+        kind = call.kind
+        if kind in {"rapid", "feed", "arc", "probe", "tap", "curve"}:
+            end, numbers = _way(call, frame, here)
+            if kind in {"rapid", "feed"} and all(abs(x - y) < 2 * TOLERANCE for x, y in zip(end, here, strict=True)):
+                continue
+            if kind != "rapid" and states.get("sync", ("", "", ()))[1] != "sync":
+                turning = all(abs(end[i] - here[i]) < TOLERANCE for i in (0, 1, 2, 6, 7, 8))  # rotary axes alone
+                numbers = (*numbers, feed[turning])
+            here = end
+            if call.line:
+                yield Act(call.line, kind, numbers, state, "")
+        elif kind in STATES:
+            states[STATES[kind]] = (STATES[kind], kind, call.values)
+            state = tuple(states[name] for name in sorted(states))
+        elif kind == "feedrate":
+            feed = call.values[0], call.values[1]
+        elif kind in REMARKS:
+            frame.take(kind, call.values)
+        elif call.line:
+            yield Act(call.line, kind, call.values, state, call.text)
+
+
+def _way(call: Canonical, frame: ProgramFrame, here: Place) -> tuple[Place, tuple[float, ...]]:
+    """Return where a move ends and all that tells its way, in machine coordinates."""
+    if call.arc is not None:
+        arc = call.arc
+        return call.machine, (
+            *call.machine,
+            arc.plane,
+            arc.turns,
+            *arc.machine_centre,
+            _sweep(call, frame.program(here)),
+        )
+    if call.kind in {"rapid", "feed", "probe"}:
+        return call.machine, call.machine
+    from_here = frame.program(here)
+    if call.kind == "tap":
+        x, y, z = call.values[:3]
+        return here, (*frame.machine((x, y, z, *from_here[3:])), call.values[3])
+    ways = [frame.machine((x, y, *from_here[2:])) for x, y in _pairs(call.values[1:])]
+    return ways[-1], tuple(v for way in ways for v in way)
+
+
+def _pairs(values: Sequence[float]) -> list[tuple[float, float]]:
+    return [(values[k], values[k + 1]) for k in range(0, len(values), 3)]
+
+
+def _sweep(call: Canonical, start: Place) -> float:
+    """Return the length of an arc in its plane [mm]: end points alone do not tell a full circle from none."""
+    assert call.arc is not None
+    i, j, _ = PLANE_AXES[call.arc.plane]
+    x, y = call.arc.centre[i], call.arc.centre[j]
+    first = math.atan2(start[j] - y, start[i] - x)
+    last = math.atan2(call.program[j] - y, call.program[i] - x)
+    radius = math.hypot(start[i] - x, start[j] - y)
+    angle = ((last - first) if call.arc.turns > 0 else (first - last)) % math.tau
+    if min(angle, math.tau - angle) * radius < 2 * TOLERANCE:
+        # where start and end differ, but by less than the digits written, one controller turns and another does not
+        angle = math.tau if math.dist((start[i], start[j]), (call.program[i], call.program[j])) < 1e-9 else angle
+    return radius * (angle + (abs(call.arc.turns) - 1) * math.tau)
+
+
+def _equal(asked: Act, done: Act) -> bool:
+    if (asked.kind, len(asked.numbers), asked.text) != (done.kind, len(done.numbers), done.text):
+        return False
+    if asked.state != done.state and not (
+        [s[:2] for s in asked.state] == [s[:2] for s in done.state]
+        and all(all(map(_near, s[2], t[2])) for s, t in zip(asked.state, done.state, strict=True))
+    ):
+        return False
+    return all(map(_near, asked.numbers, done.numbers))
+
+
+def _near(first: float, second: float) -> bool:
+    # the digits of 1e-6 mm are beyond a double's in what is turned and summed, from a metre on
+    return abs(first - second) <= TOLERANCE * max(1.0, abs(first) / 1000.0)

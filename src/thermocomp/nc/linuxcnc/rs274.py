@@ -1,0 +1,248 @@
+"""The canonical calls of an NC program, as LinuxCNC's own interpreter tells them.
+
+It is what judges every program that is written here, and what takes loops and parameters apart (see `expand`). It comes
+with Debian's package linuxcnc-uspace and needs neither a machine nor a display.
+"""
+
+import math
+import subprocess
+from collections.abc import Generator, Iterator, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from thermocomp.core.exceptions import ThermocompError
+from thermocomp.files.scratch import scratch
+from thermocomp.nc.linuxcnc import rs274process
+from thermocomp.nc.linuxcnc.rs274process import AXES, InterpreterJob, InterpreterRun
+from thermocomp.nc.linuxcnc.stored import HIGHEST_TOOL, Stored
+
+__all__ = [
+    "AXES", "HIGHEST_TOOL", "ORIGIN", "PACKAGE", "PLANE_AXES", "ArcPath", "Canonical", "Place", "ProgramFrame",
+    "Stored", "find_obstacle", "read",
+]  # fmt: skip
+
+PACKAGE = "linuxcnc-uspace"
+#: Axes of a plane of arcs: first, second, and the one the helix goes along.
+PLANE_AXES = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
+
+Place = tuple[float, float, float, float, float, float, float, float, float]
+Places = np.ndarray[Any, np.dtype[np.float64]]
+ORIGIN: Place = (0.0,) * 9
+
+
+class ArcPath(NamedTuple):
+    """How an arc turns; the third coordinate of its centre is that of the arc's end."""
+
+    plane: int  #: 17, 18, 19
+    centre: tuple[float, float, float]  #: program coordinates [mm]
+    machine_centre: tuple[float, float, float]  #: machine coordinates [mm]
+    turns: int  #: positive anticlockwise; 1: the arc ends in its first turn
+
+
+class Canonical(NamedTuple):
+    """One canonical call.
+
+    `kind` is ``rapid``, ``feed``, ``arc``, ``probe``, ``tap``, ``curve`` for moves, else ``dwell`` (s), ``feedrate`` (F
+    in mm, F as written), ``feedmode`` (spindle, 1 for G95), ``unit`` (mm in a program's unit), ``plane``, ``m3``,
+    ``m4``, ``m5``, ``speed`` (spindle, 1/min), ``speedmode`` (spindle, highest speed of G96 or 0), ``select`` and
+    ``change`` (tool), ``toolnumber`` (M61), ``tooltable`` (G10 L1, L10, L11), ``length`` (tool offset), ``g5x``
+    (system, origin), ``g92``, ``rotation`` (degrees), ``sync`` (spindle, mm per turn, 1 for speed only), ``unsync``,
+    ``path`` (3 G64, 2 G61, 1 G61.1; tolerance), ``naive`` (G64 Q), ``mist``, ``flood``, ``mistoff``, ``floodoff``,
+    ``m0``, ``m1``, ``pallet`` (M60, and before the end in M30), ``end``, overrides, ``m62`` to ``m68``, ``wait`` (M66),
+    ``orient`` (M19), ``user`` (code, P, Q), ``comment`` and ``message``.
+    """
+
+    kind: str
+    line: int  #: of the file the block stands in, from 1
+    file: str  #: empty for the program itself, else the file of the subprogram
+    program: Place  #: end of a move in program coordinates, X to W [mm, deg]
+    machine: Place  #: end of a move in machine coordinates [mm, deg]
+    arc: ArcPath | None
+    values: tuple[float, ...]
+    text: str
+
+
+class ProgramFrame:
+    """What stands between program and machine coordinates.
+
+    Attributes
+    ----------
+    system : int
+        Work coordinate system in force, 1 to 9.
+    origin, shift, length : tuple of float
+        Of the system, of G92, of the tool, X to W [mm, deg].
+    rotation : float
+        About Z [deg].
+    """
+
+    def __init__(self) -> None:
+        self.system = 1
+        self.origin = self.shift = self.length = ORIGIN
+        self.rotation = 0.0
+        self._settle()
+
+    def _settle(self) -> None:
+        self._cos, self._sin = math.cos(math.radians(self.rotation)), math.sin(math.radians(self.rotation))
+        self._fixed = _nine(o + t for o, t in zip(self.origin, self.length, strict=True))
+        # without a rotation all offsets are one
+        self._sum = None if self.rotation else _nine(f + s for f, s in zip(self._fixed, self.shift, strict=True))
+
+    def take(self, kind: str, values: tuple[float, ...]) -> None:
+        """Follow a canonical call; calls of other kinds change nothing."""
+        if kind == "g5x":
+            self.system, self.origin = int(values[0]), _nine(values[1:])
+        elif kind == "g92":
+            self.shift = _nine(values)
+        elif kind == "length":
+            self.length = _nine(values)
+        elif kind == "rotation":
+            self.rotation = values[0]
+        else:
+            return
+        self._settle()
+
+    def machine(self, p: Place) -> Place:
+        """Machine coordinates of program coordinates."""
+        if (o := self._sum) is not None:
+            return (
+                p[0] + o[0], p[1] + o[1], p[2] + o[2], p[3] + o[3], p[4] + o[4],
+                p[5] + o[5], p[6] + o[6], p[7] + o[7], p[8] + o[8],
+            )  # fmt: skip
+        x, y, *more = (a + b for a, b in zip(p, self.shift, strict=True))
+        turned = (x * self._cos - y * self._sin, x * self._sin + y * self._cos, *more)
+        return _nine(a + b for a, b in zip(turned, self._fixed, strict=True))
+
+    def machines(self, places: Places) -> Places:
+        """Machine coordinates of program coordinates, a row each."""
+        turned = places + self.shift
+        if self.rotation:
+            x, y = turned[:, 0].copy(), turned[:, 1].copy()
+            turned[:, 0], turned[:, 1] = x * self._cos - y * self._sin, x * self._sin + y * self._cos
+        turned += self._fixed
+        return turned
+
+    def program(self, p: Place) -> Place:
+        """Program coordinates of machine coordinates."""
+        x, y, *more = (a - b for a, b in zip(p, self._fixed, strict=True))
+        turned = (x * self._cos + y * self._sin, y * self._cos - x * self._sin, *more)
+        return _nine(a - b for a, b in zip(turned, self.shift, strict=True))
+
+
+def _nine(values: Iterator[float] | Sequence[float]) -> Place:
+    a, b, c, d, e, f, g, h, i = values
+    return a, b, c, d, e, f, g, h, i
+
+
+@cache
+def find_obstacle() -> str | None:
+    """Return why the interpreter cannot be used here; None if it can."""
+    advice = f"LinuxCNC's interpreter is needed: install the Debian package {PACKAGE} (apt-get install {PACKAGE})"
+    python = rs274process.PYTHON
+    if not python.exists():
+        return f"{python} is not here; {advice}"
+    with scratch() as folder:
+        trying = [str(python), rs274process.ISOLATED, "-c", "import gcode"]
+        if subprocess.run(trying, capture_output=True, cwd=folder, check=False).returncode:
+            return f"{python} cannot import gcode; {advice}"
+        trial = folder / "trial.ngc"
+        trial.write_text("G21 M3 S7\nG0 X1\nM5\nM2\n", encoding="ascii")
+        try:
+            kinds = [call.kind for call in read(trial)]
+        except ThermocompError as error:
+            return f"the interpreter of {PACKAGE} does not work as expected: {error}"
+    expected = {"m3", "speed", "rapid", "m5", "end"}
+    if missing := expected - set(kinds):
+        return f"the interpreter of {PACKAGE} does not tell of {', '.join(sorted(missing))}: its version is not known"
+    return None
+
+
+def read(
+    path: Path,
+    stored: Stored | None = None,
+    *,
+    inch: bool = False,
+    block_delete: bool = False,
+    subroutines: Sequence[Path] = (),
+    task: bool = False,
+    seconds: int = 600,
+    left: dict[int, float] | None = None,
+    opened: set[Path] | None = None,
+) -> Generator[Canonical]:
+    """Run a program through LinuxCNC's interpreter and yield its canonical calls as they come.
+
+    Parameters
+    ----------
+    path : Path
+    stored : Stored, optional
+        What is stored in the controller; nothing if not given.
+    inch : bool
+        The controller stands in G20 when the program starts.
+    block_delete : bool
+        Lines that begin with ``/`` are not run.
+    subroutines : sequence of Path
+        Folders of subprograms, at most 8; the program's own folder comes first anyway.
+    task : bool
+        What ``#<_task>`` tells: that the program is run, not previewed.
+    seconds : int
+        Processor time the interpreter may take [s]: a program can have an endless loop.
+    left : dict, optional
+        Filled at the end with the parameters the controller would have stored afterwards.
+    opened : set, optional
+        Filled at the end with the files the interpreter has opened: the program, and those of subprograms.
+
+    Yields
+    ------
+    Canonical
+        Calls before the first line (offsets in force at the start) have line 0. Close the generator if not all is
+        read: it ends the interpreter.
+
+    Raises
+    ------
+    ProgramError
+        The interpreter refuses the program: its line and its words.
+    InputError
+        The file is not there, or the interpreter crashed.
+    """
+    job = InterpreterJob(path, stored or Stored(), inch, block_delete, subroutines, task, seconds)
+    with InterpreterRun(job) as run:
+        yield from calls(run)
+        if opened is not None:
+            opened.update(run.opened())
+        if left is not None:
+            left.update(run.left())
+
+
+def calls(run: InterpreterRun) -> Iterator[Canonical]:
+    """Yield the calls of the next job of a run; see `read`."""
+    frame, plane, file, turns = ProgramFrame(), 17, "", 1
+    nowhere: tuple[Place, Place] = (ORIGIN, ORIGIN)
+    centre = [0.0, 0.0]
+    for records, more in run.blocks():
+        names = {code: kind for kind, code in run.codes.items()}
+        columns = (records[name].tolist() for name in ("kind", "count", "line", "values"))
+        for code, count, line, numbers in zip(*columns, strict=True):
+            kind = names[code]
+            values = tuple(numbers[:count])
+            if kind in {"rapid", "feed", "probe"}:
+                yield Canonical(kind, line, file, values, frame.machine(values), None, (), "")
+            elif kind == "centre":
+                centre[:], turns, plane = values[:2], int(values[2]), int(values[3])
+            elif kind == "arc":
+                i, j, _ = PLANE_AXES[plane]
+                at = list(values)
+                at[i], at[j] = centre
+                about = at[0], at[1], at[2]
+                arc = ArcPath(plane, about, frame.machine(_nine(at))[:3], turns)
+                yield Canonical(kind, line, file, values, frame.machine(values), arc, (), "")
+            elif kind in {"comment", "message"}:
+                yield Canonical(kind, line, file, *nowhere, None, (), more[int(values[0])])
+            elif kind == "file":
+                file = Path(more[int(values[0])]).name
+            elif kind == "curve":
+                yield Canonical(kind, line, file, *nowhere, None, tuple(more[int(values[0])]), "")
+            elif kind != "done":
+                frame.take(kind, values)
+                yield Canonical(kind, line, file, *nowhere, None, values, "")

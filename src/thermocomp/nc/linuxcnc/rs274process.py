@@ -1,0 +1,244 @@
+"""LinuxCNC's own interpreter in a child process: what a program makes of a controller, in blocks of numbers.
+
+The child runs isolated (``-I``) in a folder of its own and reads a copy of the program there: nothing that lies beside
+the program is imported or run, only subprograms (``.ngc``) are found. The copy is ASCII: the interpreter's module
+cannot tell of comments that are not.
+"""
+
+import json
+import os
+import re
+import subprocess
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any, NamedTuple, NoReturn
+
+import numpy as np
+
+from thermocomp.core.exceptions import InputError, ProgramError
+from thermocomp.files.scratch import scratch
+from thermocomp.nc.linuxcnc.stored import HIGHEST_TOOL, Stored
+
+#: The Python of the Debian package, which has the module `gcode`.
+PYTHON = Path("/usr/bin/python3")
+#: it sees nothing of the user's: no environment, no folder but the system's
+ISOLATED = "-I"
+CHILD = Path(__file__).with_name("_rs274_child.py")
+AXES = "XYZABCUVW"
+MOST_FOLDERS = 8
+MM = 25.4
+#: a canonical call: code of its kind, how many numbers, line, numbers
+RECORD = np.dtype([("kind", "<u2"), ("count", "<u2"), ("line", "<i4"), ("values", "<f8", (10,))])
+#: factors of the axes of a move
+_UNITS = np.array((MM, MM, MM, 1.0, 1.0, 1.0, MM, MM, MM, 1.0))
+_ASCII = bytes(range(128)) + b"?" * 128
+_PIPE = 1 << 20
+#: the interpreter's words for a subprogram that it does not find
+_NOT_THERE = re.compile(r"(?:EOF in file|Unable to open file).*?(o<[^>]*>)(?: from line: \d+)?.*")
+_TOO_DEEP = "Too many subroutine levels"
+_RECURSION = "more than 10 calls inside each other: a subprogram that calls itself has no end; write a loop instead"
+_MISSING = r"\1 is not there: of a subprogram name the folder (--subroutines); a loop or a branch needs its end"
+
+
+class CallBlock(NamedTuple):
+    """Canonical calls that come together."""
+
+    records: np.ndarray[tuple[int], np.dtype[Any]]  #: of `RECORD`; moves in program coordinates [mm, deg]
+    more: list[Any]  #: texts and curves; the first number of their record is their place here
+
+
+@dataclass(frozen=True)
+class InterpreterJob:
+    """A program, and the controller it is run in.
+
+    Parameters
+    ----------
+    path : Path
+    stored : Stored
+    inch : bool
+        The controller stands in G20 when the program starts.
+    block_delete : bool
+        Lines that begin with ``/`` are not run.
+    subroutines : sequence of Path
+        Folders of subprograms, at most 8; the program's own folder comes first anyway.
+    task : bool
+        What ``#<_task>`` tells: that the program is run, not previewed.
+    seconds : int
+        Processor time the interpreter may take [s].
+    """
+
+    path: Path
+    stored: Stored = Stored()  # noqa: RUF009 - it cannot be changed
+    inch: bool = False
+    block_delete: bool = False
+    subroutines: Sequence[Path] = ()
+    task: bool = False
+    seconds: int = 600
+
+
+class InterpreterRun:
+    """Runs of the interpreter, one after the other; it starts with the object, and ends with the block.
+
+    Parameters
+    ----------
+    *jobs : InterpreterJob
+        All of the same program.
+
+    Attributes
+    ----------
+    codes : dict of str to int
+        Of the kinds of calls.
+    """
+
+    def __init__(self, *jobs: InterpreterJob) -> None:
+        path, subroutines = jobs[0].path.absolute(), jobs[0].subroutines
+        if not path.is_file():
+            raise InputError(f"{path} is not a file")
+        if len(subroutines) > MOST_FOLDERS:
+            raise InputError(f"{len(subroutines)} folders of subprograms; the interpreter takes {MOST_FOLDERS}")
+        self.jobs, self.path, self._number = jobs, path, -1
+        self._home = ExitStack()
+        self.folder = self._home.enter_context(scratch())
+        copy = self.folder / "program.ngc"
+        lines = 1
+        with path.open("rb") as program, copy.open("wb") as written:
+            while part := program.read(_PIPE):
+                lines += part.count(b"\n")
+                written.write(part.translate(_ASCII))
+        folders = [self.folder / str(number) for number in range(len(jobs))]
+        for folder, job in zip(folders, jobs, strict=True):
+            _lay_out(folder, copy, [path.parent, *subroutines], job, lines)
+        with (self.folder / "errors").open("wb") as errors:
+            self.process = subprocess.Popen(
+                [PYTHON, ISOLATED, CHILD, *folders],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=errors,
+                cwd=self.folder,
+                pipesize=_PIPE,
+            )
+        self.codes: dict[str, int] = {}
+
+    def __enter__(self) -> "InterpreterRun":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.process.kill()  # does nothing if it has ended
+        self.process.communicate()
+        self._home.close()
+
+    def blocks(self) -> Iterator[CallBlock]:
+        """Yield what the interpreter tells of the next job; the last record is ``done``.
+
+        Raises
+        ------
+        ProgramError
+            The interpreter refuses the program: its line and its words.
+        InputError
+            The interpreter crashed.
+        """
+        pipe = self.process.stdout
+        assert pipe is not None
+        self._number += 1
+        if not self.codes:
+            if not (first := pipe.readline()):
+                self._ended(0, self.process.wait())
+            self.codes = {kind: code for code, kind in enumerate(json.loads(first))}
+        moves = [self.codes[kind] for kind in ("rapid", "feed", "probe", "arc")]
+        line, file, refusal, done = 0, "", "", False
+        while len(head := pipe.read(8)) == 8:
+            count, size = np.frombuffer(head, "<u4").tolist()
+            records = np.frombuffer(_all(pipe, count * RECORD.itemsize), RECORD).copy()
+            block = CallBlock(records, json.loads(_all(pipe, size)))
+            if not count:
+                if refusal:
+                    where = f" (in {Path(file).name})" if file else ""
+                    raise ProgramError(max(line, 1), f"the interpreter refuses it{where}: {refusal}")
+                if not done:
+                    self._ended(line, block.more[0])
+                return
+            is_move = np.isin(records["kind"], moves)
+            if is_move.any():
+                records["values"][is_move] *= _UNITS
+            for told in records[records["kind"] == self.codes["file"]]:
+                file = block.more[int(told["values"][0])]
+            line, kind = int(records["line"][-1]), int(records["kind"][-1])
+            done = kind == self.codes["done"]
+            if kind == self.codes["error"]:
+                refusal = _NOT_THERE.sub(_MISSING, block.more[-1].replace(_TOO_DEEP, _RECURSION))
+                block = CallBlock(records[:-1], block.more)
+            if len(block.records):
+                yield block
+        self._ended(line, self.process.wait())
+
+    def _ended(self, line: int, code: int) -> NoReturn:
+        """Raise the error of a child that ended too early."""
+        words = (self.folder / "errors").read_text(encoding="utf-8", errors="replace").strip().splitlines()
+        if code == -24:
+            seconds = self.jobs[self._number].seconds
+            raise ProgramError(
+                max(line, 1), f"the program takes more than {seconds} s to interpret: has it an endless loop?"
+            )
+        said = words[-1] if words else "it said nothing"
+        if code < 0:
+            raise ProgramError(max(line, 1), f"the interpreter died of signal {-code}: {said}")
+        raise InputError(f"LinuxCNC's interpreter ended with code {code}: {said}")
+
+    def opened(self) -> set[Path]:
+        """Return the files the last job has opened: the program, and those of subprograms."""
+        names = map(os.fsdecode, (self.folder / str(self._number) / "opened").read_bytes().split(b"\0"))
+        folder = self.folder.resolve()
+        return {self.path.resolve(), *(file for file in map(Path, names) if not file.is_relative_to(folder))}
+
+    def left(self) -> dict[int, float]:
+        """Return the parameters the controller would have stored after the last job."""
+        text = (self.folder / str(self._number) / "parameters").read_text(encoding="ascii")
+        rows = (row.split() for row in text.splitlines())
+        return {int(row[0]): float(row[1]) for row in rows if len(row) == 2}
+
+
+def _all(pipe: IO[bytes], size: int) -> bytes:
+    found = pipe.read(size)
+    if len(found) < size:
+        raise InputError("LinuxCNC's interpreter ended in the middle of what it told")
+    return found
+
+
+def _lay_out(folder: Path, program: Path, folders: Sequence[Path], job: InterpreterJob, lines: int) -> None:
+    """Write the files of a run; links keep the lines of the settings short, which are cut at 255 characters."""
+    stored = job.stored
+    folder.mkdir()
+    names = [f"s{i}" for i in range(len(folders))]
+    for name, target in zip(names, folders, strict=True):
+        (folder / name).symlink_to(target.absolute())
+    paths = ":".join(f"{folder.name}/{name}" for name in names)
+    (folder / "ini").write_text(f"[RS274NGC]\nSUBROUTINE_PATH = {paths}\n", encoding="ascii")
+    numbers = sorted(stored.numbers().items())
+    (folder / "parameters").write_text("".join(f"{n}\t{v:.9f}\n" for n, v in numbers), encoding="ascii")
+    tools = [(n, stored.lengths.get(n, 0.0), stored.diameters.get(n, 0.0)) for n in range(1, HIGHEST_TOOL)]
+    table = "".join(f"T{n} P{n} Z{length:.9f} D{diameter:.9f}\n" for n, length, diameter in tools)
+    (folder / "table").write_text(table, encoding="ascii")
+    start = ""
+    if stored.start is not None:
+        start = " G53 G0 " + " ".join(f"{a}{v:.9f}" for a, v in zip(AXES, stored.start, strict=False))
+    given = {
+        "program": str(program),
+        "folders": [str(target.absolute()) for target in folders],
+        "lines": lines,
+        "home": str(folder),
+        "ini": str(folder / "ini"),
+        "parameters": str(folder / "parameters"),
+        "table": str(folder / "table"),
+        "opened": str(folder / "opened"),
+        "tools": tools,
+        "spindle": stored.spindle,
+        "units": f"G21 G90 G17 G40 G49 G80 G94 {stored.startup}{start}",
+        # the child waits for this comment and the tool length after it: then the program begins
+        "start": f"(begin) G2{int(not job.inch)} G43.1 Z{stored.active_length / (25.4 if job.inch else 1.0):.9f}",
+        "block_delete": job.block_delete,
+        "task": int(job.task),
+        "seconds": job.seconds,
+    }
+    (folder / "job").write_text(json.dumps(given), encoding="utf-8")

@@ -1,0 +1,142 @@
+"""States a controller may stand in when a program starts: what is stated is held, all else is drawn."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from types import MappingProxyType
+from typing import Final, NamedTuple
+
+from thermocomp.nc.interpreter import startup
+from thermocomp.nc.interpreter.block import Setup, system_name
+from thermocomp.nc.linuxcnc.rs274process import InterpreterJob
+from thermocomp.nc.linuxcnc.stored import SYSTEMS, Stored, draw_controller
+
+#: states a revised program is proved in
+STATES = 8
+#: seed of a start that is none of theirs
+ELSEWHERE = 99
+#: what is there in half of the states only
+HALF = frozenset({"rotation", "G92"})
+#: what is drawn: how to state it
+REMEDIES: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "rotation": "say --rotation none if none is stored, or state it, such as --rotation 'G54=0 deg'",
+        "G92": "say --no-g92 if no G92 or G52 is in force when the program starts",
+        "G98/G99": "write G98 or G99 before the first cycle, or state it: --startup G98",
+        "system in force": "write G54 before the first move",
+        "origins": "state them, such as --origin 'G54=0 mm, 0 mm, 0 mm'",
+        "tool lengths": "state them, such as --tool '1=120 mm'",
+        "homes": "state it: --home '0 mm, 0 mm, 0 mm'; G30 cannot be stated",
+        "start": "position all axes before",
+        "unit": "write G20 or G21 at the top, or state it: --units",
+        "optional lines": "say whether they are run: --block-delete",
+        "tool diameters": "expand the program for its tools: --expand",
+        "parameters": "give them a value in the program",
+    }
+)
+
+
+class ControllerState(NamedTuple):
+    """A controller before the program starts."""
+
+    stored: Stored
+    inch: bool
+    block_delete: bool
+
+    def job(self, program: InterpreterJob) -> InterpreterJob:
+        """Return the run of a program in it."""
+        return replace(program, stored=self.stored, inch=self.inch, block_delete=self.block_delete)
+
+
+def build_stored(setup: Setup) -> Stored:
+    """Return what stands at the controller, as far as it is stated; all else is 0."""
+    return Stored(
+        origins={system: origin for system, origin in setup.offsets.items() if system in SYSTEMS},
+        lengths=setup.tools,
+        home28=setup.home or (),
+        rotations=setup.rotations,
+        startup=startup.complete_codes(setup),
+    )
+
+
+def list_unstated(setup: Setup) -> tuple[str, ...]:
+    """Return what is not stated, and so is drawn."""
+    held = {
+        "rotation": all(system in setup.rotations for system in SYSTEMS),
+        "G92": setup.no_shift,
+        "G98/G99": not {"G98", "G99"}.isdisjoint(setup.startup.split()),
+        "homes": False,
+        "unit": setup.inch is not None,
+        "optional lines": setup.skip_optional,
+    }
+    return tuple(name for name in REMEDIES if not held.get(name, False))
+
+
+def state(setup: Setup, number: int, what: frozenset[str] | set[str]) -> ControllerState:
+    """Return a state.
+
+    Parameters
+    ----------
+    setup : Setup
+        What is stated.
+    number : int
+        Its bits tell of G98 or G99, of a rotation and of a G92; so that all of them meet among eight states.
+    what : set of str
+        What is drawn in it, see `REMEDIES`; all else is 0, but the machine never starts at a place that the program
+        could mean.
+    """
+    base = replace(build_stored(setup), start=draw_controller(ELSEWHERE).start)
+    one, two, four = number & 1, number >> 1 & 1, number >> 2 & 1
+    other = draw_controller(number)
+    changes: dict[str, object] = {}
+    if "rotation" in what and two:
+        changes["rotations"] = {**other.rotations, **setup.rotations}
+    if "G92" in what and four:
+        changes["shift"] = other.shift
+    if "G98/G99" in what and one:
+        changes["startup"] = base.startup.replace("G99", "G98")
+    if "system in force" in what:
+        changes["system"] = 1 + number
+    if "origins" in what:
+        # the rotary axes' origins are never stated
+        given = {s: (*origin[:3], *other.origins[s][3:]) for s, origin in base.origins.items()}
+        changes["origins"] = {**other.origins, **given}
+    if "tool lengths" in what:
+        changes["lengths"] = {**other.lengths, **setup.tools}
+    if "tool diameters" in what:
+        changes["diameters"] = other.diameters
+    if "homes" in what:
+        changes["home28"] = (*(setup.home or other.home28[:3]), *other.home28[3:])
+        changes["home30"] = other.home30
+    if "parameters" in what:
+        # not all five thousand: reading them would take as long as a short program
+        changes["parameters"] = {number: other.parameters[number] for number in range(31, 131)}
+    if "start" in what and other.start is not None:
+        x, y, z, *more = other.start
+        changes |= {
+            "start": (x, y, -abs(z) if two ^ four else abs(z), *more),
+            "active_length": other.active_length,
+            "spindle": other.spindle,
+        }
+    inch = bool(setup.inch) or ("unit" in what and bool(one ^ two))
+    skips = setup.skip_optional or ("optional lines" in what and bool(one ^ two ^ four))
+    return ControllerState(replace(base, **changes), inch, skips)  # type: ignore[arg-type]
+
+
+def describe_setup(setup: Setup) -> tuple[str, ...]:
+    """Return what is stated, in words."""
+    said = [] if setup.inch is None else ["inch" if setup.inch else "mm"]
+    said += [f"{system_name(system)} at {_point(origin)}" for system, origin in sorted(setup.offsets.items())]
+    said += [f"tool {tool} = {length:g} mm" for tool, length in sorted(setup.tools.items())]
+    said += [] if setup.home is None else [f"home {_point(setup.home)}"]
+    angles = sorted(setup.rotations.items())
+    if len(angles) >= len(SYSTEMS) and not any(angle for _, angle in angles):
+        said.append("no rotation")
+    else:
+        said += [f"{system_name(system)} turned by {angle:g} deg" for system, angle in angles]
+    said += ["no G92"] * setup.no_shift + [setup.startup] * bool(setup.startup)
+    said += [f"M{number} moves nothing" for number in sorted(setup.harmless)]
+    return (*said, *["optional lines left out"] * setup.skip_optional)
+
+
+def _point(place: tuple[float, ...]) -> str:
+    return " ".join(f"{axis}{value:g}" for axis, value in zip("XYZ", place, strict=True))

@@ -1,0 +1,271 @@
+"""A revised program is judged by LinuxCNC's own interpreter: its moves are the original's plus what was asked for.
+
+It is run in eight stored controllers: what is stated is the same in all of them, what is not is drawn.
+"""
+
+from array import array
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from thermocomp.core.exceptions import ProgramError, Unprovable
+from thermocomp.files.scratch import scratch
+from thermocomp.nc.interpreter.block import Setup
+from thermocomp.nc.linuxcnc import rs274
+from thermocomp.nc.linuxcnc.rs274process import InterpreterJob, InterpreterRun
+from thermocomp.nc.linuxcnc.verification import states
+from thermocomp.nc.linuxcnc.verification.comparison import Found, Lines, RefusedError, compare
+from thermocomp.nc.linuxcnc.verification.ledger import Integers, Ledger, Shift
+from thermocomp.nc.linuxcnc.verification.translation import Translator, UntranslatableError
+from thermocomp.nc.parser.tokens import program_lines
+
+__all__ = ["Ledger", "Proof", "Shift", "prove"]
+
+#: what a state may be without if the original does not run with it
+_SPARED = ("rotation", "tool diameters")
+
+
+class Proof(NamedTuple):
+    """What the interpreter has found."""
+
+    moves: int  #: that were compared in each state
+    largest: float  #: largest difference between a move and what was asked for [um]
+    states: int  #: controllers both programs were run in
+    slower: float  #: largest change of the time a move takes, of the larger of it and 0.25 s [%]
+    held: tuple[str, ...]  #: what is stated, and the same in all states
+    drawn: tuple[str, ...]  #: what is not
+
+    @property
+    def sentence(self) -> str:
+        """In which states it was proved."""
+        return _say_states(self.states, self.held, self.drawn)
+
+
+class _Proving(NamedTuple):
+    """Two programs, and what is known of the controller."""
+
+    original: Path
+    revised: Path
+    ledger: Ledger
+    setup: Setup
+    origin: Lines
+
+    def run(
+        self, wanted: Sequence[tuple[int, set[str]]], progress: Callable[[int], object] = lambda _: None
+    ) -> Iterator[Found]:
+        """Compare them in states, one after the other."""
+        jobs = [states.state(self.setup, number, drawn) for number, drawn in wanted]
+        with (
+            InterpreterRun(*[state.job(InterpreterJob(self.original)) for state in jobs]) as first,
+            InterpreterRun(*[state.job(InterpreterJob(self.revised)) for state in jobs]) as second,
+        ):
+            for number, _ in wanted:
+
+                def told(line: int, number: int = number) -> None:
+                    progress((line + number * self.ledger.lines) // states.STATES)
+
+                yield compare(first, second, self.ledger, self.origin, told)
+
+    def fails(self, number: int, drawn: set[str]) -> bool:
+        """Return whether they fail in a state as they have failed before."""
+        try:
+            list(self.run([(number, drawn)]))
+        except (ProgramError, RefusedError):
+            return True
+        return False
+
+    def causes(self, number: int, drawn: set[str]) -> list[str]:
+        """Return what of that is drawn makes them fail: each by itself, or those without which they do not fail.
+
+        Nothing if they fail with nothing drawn as well.
+        """
+        if self.fails(number, set()):
+            return []
+        alone = [name for name in states.REMEDIES if name in drawn and self.fails(number, {name})]
+        return alone or [name for name in states.REMEDIES if name in drawn and not self.fails(number, drawn - {name})]
+
+
+def prove(
+    original: Path,
+    revised: Path,
+    ledger: Ledger,
+    setup: Setup,
+    progress: Callable[[int], object] = lambda _: None,
+) -> Proof:
+    """Run the interpreter on both programs in eight controller states, and compare them call by call.
+
+    Every move has to be that of the original, shifted by what its line should carry, within 0.1 um, and has to take as
+    long, within 2 % or 5 ms; where the original moves no linear axis none may move. All else that the interpreter tells
+    (feeds, speeds, tools, dwells ...) has to be the same. A move may be divided: then its pieces lie on its way. A
+    Fanuc's programs are said in LinuxCNC's words first.
+
+    Parameters
+    ----------
+    original, revised : Path
+        The programs.
+    ledger : Ledger
+        What the lines of the original should be shifted by.
+    setup : Setup
+        That of the revision.
+    progress : callable, optional
+        Told the line of the original, as if all states were one run.
+
+    Returns
+    -------
+    Proof
+
+    Raises
+    ------
+    ProgramError
+        A move is not where it should be, or the interpreter refuses the revised program: a fault of thermocomp, or it
+        depends on something that is stored in the controller and has not been stated.
+    Unprovable
+        The interpreter refuses the original, or it is not installed; what a Fanuc does LinuxCNC does otherwise.
+    """
+    if (reason := rs274.find_obstacle()) is not None:
+        raise Unprovable(reason)
+    if setup.controller == "linuxcnc":
+        proof = _prove(_Proving(original, revised, ledger, setup, Lines(_same, ledger.originals)), progress)
+        return proof._replace(held=_assumed(setup, proof.held))
+    with scratch() as folder:
+        try:
+            first = _Translated.of(original, folder / "original.ngc", setup)
+            second = _Translated.of(revised, folder / "revised.ngc", setup)
+        except UntranslatableError as e:
+            raise Unprovable(f"line {e.line} cannot be said in LinuxCNC's words: {e.reason}") from e
+        origin = Lines(first.lines, lambda lines: ledger.originals(second.lines(lines)), divided=False)
+        proof = _prove(_Proving(first.path, second.path, ledger, first.setup, origin), progress)
+        return proof._replace(held=_assumed(setup, proof.held))
+
+
+def _assumed(setup: Setup, held: Sequence[str]) -> tuple[str, ...]:
+    """Return what is the same in all states, and which of that nobody has stated."""
+    if setup.controller == "linuxcnc":
+        # all moves of X and all arcs would be others
+        return (*held, "G8 and G91.1 at the start (assumed)")
+    # a Fanuc stores no rotation, but G68 may have been left on; and with G52 or G68 no G92 can be drawn
+    assumed = {"no rotation": "no G68 at the start (assumed)"}
+    if not setup.no_shift:
+        assumed["no G92"] = "no G92 at the start (assumed)"
+    return ("as LinuxCNC runs its translation", *(assumed.get(word, word) for word in held))
+
+
+def foresee_sentence(setup: Setup) -> str:
+    """Return what a proof will say of its states, but for what does not run in all of them."""
+    drawn = setup if setup.controller == "linuxcnc" else Translator(setup).setup()
+    return _say_states(states.STATES, _assumed(setup, states.describe_setup(drawn)), states.list_unstated(drawn))
+
+
+def _say_states(count: int, held: Sequence[str], drawn: Sequence[str]) -> str:
+    named = (f"{name} (in half of them)" if name in states.HALF else name for name in drawn)
+    return (
+        f"in {count} controller states; the same in all: {', '.join(('what the program says', *held))}; "
+        f"not the same: {', '.join(named)}"
+    )
+
+
+def _same(lines: Integers) -> Integers:
+    return lines
+
+
+class _Translated(NamedTuple):
+    """A Fanuc's program in LinuxCNC's words."""
+
+    path: Path
+    setup: Setup
+    sources: "array[int]"  #: line of the program, by line of the translation
+
+    @classmethod
+    def of(cls, program: Path, path: Path, setup: Setup) -> "_Translated":
+        """Write the translation of a program."""
+        translator, sources = Translator(setup), array("i")
+        with (
+            program.open(encoding="latin-1", newline="") as texts,
+            path.open("w", encoding="latin-1", newline="") as written,
+        ):
+            for text, source in translator.translate(program_lines(texts)):
+                written.write(text)
+                sources.append(source)
+        return cls(path, translator.setup(), sources)
+
+    def lines(self, lines: Integers) -> Integers:
+        """Return the lines of the program that lines of the translation come from."""
+        found = np.frombuffer(self.sources, np.intc).astype(int)
+        return np.where(lines > 0, found[np.clip(lines, 1, len(found)) - 1], 0)
+
+
+def _prove(proving: _Proving, progress: Callable[[int], object]) -> Proof:
+    """Run both programs in all states."""
+    setup = proving.setup
+    drawn = set(states.list_unstated(setup))
+    found: list[Found] = []
+    wanted = [(number, set(drawn)) for number in range(states.STATES)]
+    while len(found) < len(wanted):
+        state = wanted[len(found)]
+        try:
+            for more in proving.run(wanted[len(found) :], progress):
+                found.append(more)
+                state = wanted[min(len(found), len(wanted) - 1)]
+        except ProgramError as e:
+            raise _fault(proving, *state, e) from e
+        except RefusedError as e:
+            state[1].remove(_spared(proving, *state, e))
+    spared = {name: sum(name not in mine for _, mine in wanted) for name in drawn}
+    words = [
+        f"{name} (not in {spared[name]} of them, where it does not run)" if spared[name] else name
+        for name in states.REMEDIES
+        if name in drawn
+    ]
+    return Proof(
+        min(f.moves for f in found),
+        max(f.largest for f in found),
+        len(found),
+        max(f.slower for f in found),
+        states.describe_setup(setup),
+        tuple(words),
+    )
+
+
+def _fault(proving: _Proving, number: int, drawn: set[str], error: ProgramError) -> ProgramError:
+    """Return the error of a difference: a fault in the stated state, else what it depends on."""
+    what = f"LinuxCNC's interpreter disagrees: {error.reason}"
+    causes = proving.causes(number, drawn)
+    if not causes:
+        return ProgramError(error.line, f"{what}; please report this: nothing was written")
+    remedies = "; ".join(states.REMEDIES[cause] for cause in causes)
+    if "rotation" in causes:
+        remedies = f"a correction of X or Y turns with the rotation of its work coordinate system; {remedies}"
+    return ProgramError(
+        error.line,
+        f"{what}, in a controller where {_listed(causes)} {'is' if len(causes) == 1 else 'are'} another: that is not "
+        f"stated, so it cannot be proved; {remedies}",
+    )
+
+
+def _spared(proving: _Proving, number: int, drawn: set[str], error: RefusedError) -> str:
+    """Return what a state has to be without so that the original runs in it."""
+    line, reason = error.args
+    neutral = InterpreterJob(
+        proving.original, states.build_stored(proving.setup), bool(proving.setup.inch), proving.setup.skip_optional
+    )
+    try:
+        with InterpreterRun(neutral) as run:
+            for _ in run.blocks():
+                pass
+    except ProgramError as e:
+        raise Unprovable(f"LinuxCNC's interpreter does not run the original: {e}") from e
+    causes = proving.causes(number, drawn)
+    if len(causes) == 1 and causes[0] in _SPARED:
+        return causes[0]
+    causes = causes or ["start"]  # the only thing that is drawn always
+    raise Unprovable(
+        f"line {line}: where the tool stands depends on what is stored in the controller "
+        f"({_listed(causes)}), and the original does not run in all states of it: {reason}; "
+        + "; ".join(states.REMEDIES[cause] for cause in causes)
+    ) from error
+
+
+def _listed(causes: list[str]) -> str:
+    return " and ".join(causes)

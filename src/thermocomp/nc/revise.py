@@ -1,0 +1,141 @@
+"""`thermocomp.revise`: the command as a function."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import MISSING, dataclass, fields
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.nc.revision import outcome
+from thermocomp.nc.revision.job import Tell
+from thermocomp.nc.revision.job import revise as revise_program
+from thermocomp.nc.revision.options import Controller, Drifting, Starting, Timing, Way
+from thermocomp.nc.revision.prepare import prepare_job
+
+_GROUPS = (Drifting, Starting, Way, Controller, Timing)
+#: words of the command that name files
+_PATHS = ("model", "forecast", "carried", "machine", "subroutines")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RevisedProgram:
+    """An NC program that was revised, or was not because nothing was taken off.
+
+    Parameters
+    ----------
+    path : Path
+        The program that was written.
+    written : bool
+        False: nothing was taken off, so there are no files.
+    files : tuple of Path
+        All that was written.
+    summary : dict
+        What ``thermocomp revise --json`` says.
+    """
+
+    path: Path
+    written: bool
+    files: tuple[Path, ...]
+    summary: dict[str, Any]
+
+    def __repr__(self) -> str:
+        return f"<RevisedProgram: {self.path if self.written else 'nothing was taken off, nothing was written'}>"
+
+
+def revise(
+    program: str | Path,
+    model: str | Path | Sequence[str | Path],
+    output: str | Path,
+    *,
+    overwrite: bool = False,
+    date: str | None = None,
+    **words: Any,
+) -> RevisedProgram:
+    r"""Correct an NC program by the drift it will cause, before it is run.
+
+    Parameters
+    ----------
+    program : str or Path
+        NC program.
+    model : str, Path, or sequence of them
+        Model files of `fit`.
+    output : str or Path
+        Program to write.
+    overwrite : bool
+        Write over existing files; never over the program.
+    date : str, optional
+        For the header; today without it.
+    **words
+        The options of ``thermocomp revise`` with underscores: ``cold=True``, ``controller="fanuc"``,
+        ``axis=["ch3=Z"]``.
+
+    Returns
+    -------
+    RevisedProgram
+
+    Raises
+    ------
+    InputError
+        An option, the program or something else cannot be used.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import thermocomp as tc
+    >>> learned, _ = tc.simulate("precompensation")
+    >>> fitted = tc.fit(
+    ...     learned, "z_at_0_um", "dynamic", inputs="spindle_rpm", accept_unproven="M. Weber, trial on machine 7"
+    ... )
+    >>> fitted.save("speed.json").name
+    'speed.json'
+    >>> lines = ["G21 G90 G94 G54", "S4000 M3", "G0 X0 Y0 Z5", "G1 Z-1 F100", "X50", "G0 Z50", "M2"]
+    >>> _ = Path("part.ngc").write_text("\n".join(lines))
+    >>> options = {"controller": "linuxcnc", "axis": ["z_at_0_um=Z"], "cold": True, "unproved": True}
+    >>> done = tc.revise("part.ngc", "speed.json", "revised.ngc", **options)
+    >>> done.summary["changed"], f"{done.summary['axes'][0]['left_um']:.1f} um"  # lines changed, drift left
+    (2, '0.1 um')
+    >>> print("\n".join(Path("revised.ngc").read_text().splitlines()[-4:]))
+    G1 Z-1 F100
+    X50 Z-0.9984
+    G0 Z50.0016
+    M2
+    """
+    models = [model] if isinstance(model, str | Path) else list(model)
+    given = {"model": models, **words}
+    for name in given.keys() & set(_PATHS):
+        value = given[name]
+        given[name] = [Path(v) for v in value] if isinstance(value, list | tuple) else value and Path(value)
+    known = {f.name for group in _GROUPS for f in fields(group)}
+    for name in given.keys() - known:
+        near = get_close_matches(name, known, n=3, cutoff=0.5)
+        raise InputError(f"revise: there is no option {name!r}; the nearest are {', '.join(near) or ', '.join(known)}")
+    groups: list[Any] = []
+    for group in _GROUPS:
+        mine = {f.name: given[f.name] for f in fields(group) if f.name in given}
+        missing = [
+            f.name
+            for f in fields(group)
+            if f.default is MISSING and f.default_factory is MISSING and f.name not in given
+        ]
+        if missing:
+            raise InputError(f"revise: give {', '.join(missing)}")
+        groups.append(group(**mine))
+    drifting, starting, way, controller, timing = groups
+    job, notes = prepare_job(
+        Path(program), drifting, Path(output), starting, way, controller, timing, date, overwrite=overwrite
+    )
+    done = revise_program(job, _untold)
+    return RevisedProgram(
+        Path(output),
+        done.written,
+        tuple(job.paths.all()) if done.written else (),
+        outcome.content(job, done, notes),
+    )
+
+
+@contextmanager
+def _untold(_: str) -> Iterator[Tell]:
+    """Tell nobody."""
+    yield lambda *_: None

@@ -1,0 +1,149 @@
+"""Forecasts of inputs that a program does not tell: a CSV file with a column of time and one per input."""
+
+import csv
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+from thermocomp.core.exceptions import InputError, UnitError
+from thermocomp.core.units import Unit
+from thermocomp.recordings.readers.headings import understand
+from thermocomp.recordings.readers.leftout import why_left_out
+from thermocomp.recordings.readers.limits import Limits, check_file
+
+#: hours at a row a second are below one
+_MOST_BYTES = 64 << 20
+_TIME = ("time", "t", "elapsed")
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """What a forecast file holds, in house units.
+
+    Parameters
+    ----------
+    source : str
+        The file.
+    columns : dict of str to (tuple of float, tuple of float)
+        By channel name, such as ``t3_C``: times since the start of the program [s], and values; empty cells are left
+        out.
+    left_out : tuple of str
+        Why a column was not read.
+    """
+
+    source: str
+    columns: dict[str, tuple[tuple[float, ...], tuple[float, ...]]]
+    left_out: tuple[str, ...] = ()
+
+
+def read(path: str | Path) -> Forecast:
+    """Read a forecast.
+
+    Headings tell the unit as in a recording: ``time_min``, ``t3_C``, ``room [degF]``. Lines that begin with ``#`` are
+    comments. Columns are parted by comma, semicolon or tab; a decimal comma is understood unless commas part them.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    Forecast
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, has no column of time or nothing else, a time is missing or does not rise, or a cell is
+        no number; the message names line and column.
+    """
+    source = Path(path)
+    try:
+        check_file(source, Limits())
+        if source.stat().st_size > _MOST_BYTES:
+            raise InputError(f"{source}: has more than {_MOST_BYTES >> 20} MiB, which no forecast has; leave rows out")
+        text = source.read_text(encoding="utf-8-sig")
+    except FileNotFoundError as e:
+        raise InputError(f"{source}: no such file") from e
+    except (OSError, UnicodeDecodeError) as e:
+        raise InputError(f"{source}: cannot be read as a text file of a forecast: {e}") from e
+    lines = [
+        (n, line) for n, line in enumerate(text.splitlines(), start=1) if line.strip() and not line.startswith("#")
+    ]
+    if len(lines) < 2:
+        raise InputError(f"{source}: a forecast is a line of headings and rows of numbers below it; found {len(lines)}")
+    delimiter = next((d for d in "\t;" if d in lines[0][1]), ",")
+    cells = [_cells(line, delimiter, f"{source}: line {number}") for number, line in lines]
+    headings = [h.strip() for h in cells[0]]
+    kept, left_out = _columns(headings, str(source))
+    time = next((k for k, (name, _) in kept.items() if name == ""), None)
+    if time is None or len(kept) < 2:
+        what = "a column of time such as time_s" if time is None else "a column of an input such as t3_C"
+        raise InputError(f"{source}: a forecast needs {what}; found {', '.join(headings)}")
+    found: dict[str, tuple[list[float], list[float]]] = {name: ([], []) for name, _ in kept.values() if name}
+    last = -math.inf
+    for (number, _), row in zip(lines[1:], cells[1:], strict=True):
+        where = f"{source}: line {number}"
+        if len(row) != len(headings):
+            raise InputError(f"{where} has {len(row)} cells where the headings are {len(headings)}")
+        numbers = {
+            k: _number(row[k], unit, delimiter, f"{where}, column {headings[k]!r}") for k, (_, unit) in kept.items()
+        }
+        now = numbers.pop(time)
+        if now is None or not now > last:
+            raise InputError(f"{where}, column {headings[time]!r}: {row[time]!r}: the time must be there and rise")
+        last = now
+        for k, value in numbers.items():
+            if value is not None:
+                times, values = found[kept[k][0]]
+                times.append(now)
+                values.append(value)
+    for name, (times, _) in found.items():
+        if not times:
+            left_out.append(f"{name} is empty")
+    return Forecast(str(source), {n: (tuple(t), tuple(v)) for n, (t, v) in found.items() if t}, tuple(left_out))
+
+
+def _cells(line: str, delimiter: str, where: str) -> list[str]:
+    try:
+        return next(csv.reader([line], delimiter=delimiter))
+    except csv.Error as e:
+        raise InputError(f"{where} cannot be read: {e}") from e
+
+
+def _columns(headings: list[str], source: str) -> tuple[dict[int, tuple[str, Unit]], list[str]]:
+    """Return name and unit of the columns that can be read, by position; the name of the time is empty."""
+    kept: dict[int, tuple[str, Unit]] = {}
+    left_out = []
+    for k, heading in enumerate(headings):
+        try:
+            meaning = understand(heading)
+        except UnitError as e:
+            raise InputError(f"{source}: column {heading!r}: {e}") from e
+        if meaning is None:
+            if heading.casefold() in (*_TIME, "timestamp", "date", "datetime"):
+                raise InputError(
+                    f"{source}: column {heading!r}: write the time as a number since the start of the program, and its "
+                    "unit in the heading: time_s, time_min"
+                )
+            left_out.append(why_left_out(heading) if heading else f"column {k + 1} has no heading")
+            continue
+        is_time = meaning.unit.quantity == "time"
+        name = "" if is_time else meaning.name
+        if name in (n for n, _ in kept.values()):
+            raise InputError(f"{source}: column {heading!r}: there is another one of {name or 'time'}; delete one")
+        kept[k] = name, meaning.unit
+    return kept, left_out
+
+
+def _number(cell: str, unit: Unit, delimiter: str, where: str) -> float | None:
+    """Return a cell in the house unit; None if it is empty."""
+    text = cell.strip()
+    if not text:
+        return None
+    try:
+        number = float(text if delimiter == "," else text.replace(",", "."))
+    except ValueError as e:
+        raise InputError(f"{where}: {text!r} is no number") from e
+    if not math.isfinite(number):
+        raise InputError(f"{where}: {text!r} is no finite number")
+    return unit.scale * number + unit.shift

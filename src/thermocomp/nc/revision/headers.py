@@ -1,0 +1,85 @@
+"""What the header of a revised program says of its run."""
+
+import math
+from collections.abc import Sequence
+
+from thermocomp.nc.interpreter.block import system_name
+from thermocomp.nc.linuxcnc.verification.verify import Proof
+from thermocomp.nc.rewrite.course import Bound
+from thermocomp.nc.rewrite.elsewhere import AWAY, Elsewhere
+from thermocomp.nc.rewrite.header import wrap_text
+from thermocomp.nc.rewrite.revise import Revision
+
+UNPROVED = "UNPROVED: NO INTERPRETER HAS JUDGED IT"
+#: most lines for the models, and for the place
+_MODELS, _PLACE = 2, 3
+#: lines for all else: that it has been revised, when, which program, start, zero, method, bound
+_ALWAYS = 7
+
+
+def count_lines(models: Sequence[str], taken: Sequence[str], states: str, *, by_position: bool) -> int:
+    """Return how many lines a header has, before it is known what they say.
+
+    Parameters
+    ----------
+    models, taken : sequence of str
+        What is told of models, and of those who take unproven ones.
+    states : str
+        In which states of the controller it will be proved; empty: it will not be.
+    by_position : bool
+        The drift depends on the place.
+
+    Returns
+    -------
+    int
+    """
+    told = min(len(models), _MODELS) + len(told_taken(taken))
+    # one more: what does not run in all states is known only afterwards
+    proof = len(wrap_text(f"proved {states}")) + 1 if states else 1
+    return _ALWAYS + told + _PLACE * by_position + proof
+
+
+def describe_models(models: Sequence[str]) -> list[str]:
+    """Return the lines about the models, the last ones on one line."""
+    said = [f"model {m}" for m in models]
+    return said if len(said) <= _MODELS else [*said[: _MODELS - 1], ", ".join(said[_MODELS - 1 :])]
+
+
+def told_taken(taken: Sequence[str]) -> list[str]:
+    """Return the line about unproven models: who takes them."""
+    return [f"unproven, taken by {'; '.join(taken)}"] if taken else []
+
+
+def describe_bound(bounds: Sequence[Bound]) -> str:
+    """Return how far the tool may be off in the cuts."""
+    return "bound " + ", ".join(
+        f"{b.axis} {b.most:.1f} um" if math.isfinite(b.most) else f"{b.axis} not known" for b in bounds
+    )
+
+
+def describe_proof(proof: Proof | None, lines: int) -> list[str]:
+    """Return in which states of the controller it was proved, in so many lines."""
+    return [UNPROVED] if proof is None else wrap_text(f"proved {proof.sentence}", lines)
+
+
+def describe_place(revision: Revision, axes: Sequence[str]) -> list[str]:
+    """Return for which origins and tools it was made, and what others would cost."""
+    return [*wrap_text(f"made for {describe_origins(revision)}", _PLACE - 1), cost(revision.elsewhere, axes)]
+
+
+def describe_origins(revision: Revision) -> str:
+    """Return the origins and lengths of tools that a drift along the axes was computed for."""
+    setup = revision.setup
+    origins = [
+        f"{system_name(system)} " + " ".join(f"{a}{v:g}" for a, v in zip("XYZ", place, strict=True))
+        for system, place in setup.offsets.items()
+    ]
+    tools = [f"T{tool} {length:g}" for tool, length in setup.tools.items()]
+    said = f"{', '.join(origins + tools)} mm" if origins or tools else "the origins that the program sets"
+    return said + ", G54 in force at the start" * revision.taken_system
+
+
+def cost(elsewhere: Elsewhere, axes: Sequence[str]) -> str:
+    """Return what another work offset or tool length would cost."""
+    costs = ", ".join(f"{axis} {elsewhere.most['XYZ'.index(axis)]:.1f} um" for axis in axes)
+    return f"{AWAY:g} mm of another offset cost up to {costs}"

@@ -1,0 +1,328 @@
+"""One revision of a program: the files it reads and writes, all of them or none."""
+
+import time
+from array import array
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from datetime import datetime
+from importlib.util import find_spec
+from pathlib import Path
+from typing import NamedTuple, TextIO
+
+from thermocomp import __version__
+from thermocomp.core.exceptions import InputError, ProgramError
+from thermocomp.files.draft import drafts
+from thermocomp.nc.linuxcnc.verification.verify import Ledger, Proof, prove
+from thermocomp.nc.parser.tokens import program_lines
+from thermocomp.nc.revision import headers, jobstate, ncprogram
+from thermocomp.nc.revision.expanded import write_expanded
+from thermocomp.nc.rewrite import diff, header
+from thermocomp.nc.rewrite.course import Bound, Course, Run
+from thermocomp.nc.rewrite.offset import ending
+from thermocomp.nc.rewrite.revise import Revised, Revision
+from thermocomp.nc.rewrite.travel import Travel
+from thermocomp.nc.thermal.drift import Drift
+
+#: what a program that cannot be proved is refused with
+ALL_THE_SAME = "--unproved writes it all the same, and its header says so"
+#: program and differences while their header says nothing yet
+PROGRAM, DIFF = "program", "diff"
+#: of longer programs it is found out first whether they are refused: revising them takes a while [bytes]
+LONG = 2_000_000
+#: lines after which the bar moves
+TOLD = 500
+
+
+#: tells which share of the work is done, and where it is
+Tell = Callable[[float, str], None]
+#: for the time of a phase of the work: who is told
+Phase = Callable[[str], AbstractContextManager[Tell]]
+
+
+class Paths(NamedTuple):
+    """The files that are written, by what they hold."""
+
+    program: Path
+    diff: Path
+    table: Path
+    job: Path
+    picture: Path | None  #: None: there is no matplotlib to draw it
+    expanded: Path | None  #: None: it is revised as it is
+
+    @classmethod
+    def of(cls, output: Path, *, expanded: bool) -> "Paths":
+        """Return the names of the files beside a program."""
+
+        def beside(end: str) -> Path:
+            return output.with_name(output.name + end)
+
+        drawn = beside(".png") if find_spec("matplotlib") is not None else None
+        plain = beside(".expanded") if expanded else None
+        return cls(output, beside(".diff"), beside(".csv"), beside(".job.json"), drawn, plain)
+
+    def all(self) -> list[Path]:
+        """Return those that will be there."""
+        return [p for p in self if p is not None]
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is done to a program.
+
+    Parameters
+    ----------
+    program : Path
+    paths : Paths
+    revision : Revision
+    drift : Drift
+        That of the revision.
+    models : sequence of str
+    taken : sequence of str
+        Who takes unproven ones of them, and why.
+    start, zero, method : str
+        For the header: which models, from what state, what the drift counts from, in what way.
+    when : date
+    unproved : bool
+        It is written though no interpreter has judged it.
+    diameters : dict of int to float, optional
+        Of the tools, for the expansion [mm].
+    subroutines : sequence of Path
+        Folders of subprograms, for the expansion.
+    travel : Travel, optional
+        Watches where the axes go.
+    overwrite : bool
+        Files that are there are replaced.
+    """
+
+    program: Path
+    paths: Paths
+    revision: Revision
+    drift: Drift
+    models: Sequence[str]
+    taken: Sequence[str]
+    start: str
+    zero: str
+    method: str
+    when: datetime
+    unproved: bool = False
+    diameters: Mapping[int, float] | None = None
+    subroutines: Sequence[Path] = ()
+    travel: Travel | None = None
+    overwrite: bool = False
+
+    @property
+    def begun(self) -> str:
+        """Return how the run begins, in words."""
+        return f"{self.start}, {self.zero}"
+
+
+class Done(NamedTuple):
+    """What has come of it."""
+
+    run: Run
+    bounds: tuple[Bound, ...]
+    written: bool  #: False: nothing was taken off, so there are no files
+    proof: Proof | None  #: None: the interpreter has not judged it
+    seconds: float  #: for the revision
+    proving: float  #: for the proof
+
+
+def revise(job: Job, phase: Phase) -> Done:
+    """Revise a program and write all files; none if something is wrong, or if there is nothing to take off.
+
+    Parameters
+    ----------
+    job : Job
+    phase : callable
+        Gives, by the name of a phase, what is told how far that is.
+
+    Returns
+    -------
+    Done
+
+    Raises
+    ------
+    InputError
+        The program cannot be revised or proved, or the interpreter disagrees; the message begins with its name.
+    """
+    try:
+        return _revise(job, phase)
+    except InputError as e:
+        raise InputError(f"{job.program}: {e}") from e
+
+
+def _revise(job: Job, phase: Phase) -> Done:
+    paths = job.paths
+    # the program comes last: where it is, all is
+    with drafts(paths.all()[::-1], overwrite=job.overwrite) as started:
+        folder = started[paths.program].parent
+        source, lines = job.program, None
+        if paths.expanded is not None:
+            source = started[paths.expanded]
+            lines = _expand(job, source, phase)
+        ledger, course = Ledger(), Course()
+        watching = () if job.travel is None else (job.travel,)
+        begin = time.perf_counter()
+        try:
+            if source.stat().st_size > LONG:
+                _rehearse(job, source, phase)
+            with phase("revising") as tell:
+                blank = _write(job, source, folder, started[paths.table], (ledger, course, *watching), tell)
+        except ProgramError as e:
+            if lines is not None and 0 < e.line <= len(lines):
+                line = lines[e.line - 1] or 1
+                where = f"(line {e.line} when expanded) " if line != e.line else ""
+                raise ProgramError(line, where + e.reason) from e
+            raise
+        took = time.perf_counter() - begin
+        run = course.run()
+        bounds = _bounds(job, run)
+        if not job.revision.corrected:
+            return Done(run, bounds, written=False, proof=None, seconds=took, proving=0.0)
+        begin = time.perf_counter()
+        proof = None
+        if not job.unproved:
+            with phase("proving") as tell:
+                proof = _proved(job, source, folder / PROGRAM, ledger, tell)
+        # what is proved has a header that says nothing yet: from here on nothing but its comments changes
+        filled = header.fill(
+            _facts(job, bounds, proof), ending(blank[0]), len(blank), upper=job.revision.setup.controller == "fanuc"
+        )
+        ncprogram.replace_lines(folder / PROGRAM, started[paths.program], dict(zip(blank, filled, strict=True)))
+        ncprogram.replace_lines(
+            folder / DIFF, started[paths.diff], {f"+{b}": f"+{f}" for b, f in zip(blank, filled, strict=True)}
+        )
+        started[paths.job].write_text(jobstate.dumps(job.drift.state(), job.when), encoding="utf-8")
+        if paths.picture is not None:
+            from thermocomp.nc.report import revision as pictures
+
+            title = f"{job.program.name}, {job.begun}"
+            started[paths.picture].write_bytes(pictures.render(run, bounds, job.revision.tool_changes, title))
+        started.publish()
+        return Done(run, bounds, written=True, proof=proof, seconds=took, proving=time.perf_counter() - begin)
+
+
+def _expand(job: Job, source: Path, phase: Phase) -> "array[int]":
+    with phase("expanding") as tell:
+        return write_expanded(
+            job.program,
+            source,
+            job.revision.setup,
+            job.diameters,
+            job.subroutines,
+            lambda lines: tell(0.0, f"{lines:,} lines"),
+        )
+
+
+def _rehearse(job: Job, source: Path, phase: Phase) -> None:
+    size = source.stat().st_size
+    with phase("checking") as tell, ncprogram.open_to_read(source) as texts:
+        read = 0
+        for block in job.revision.rehearse(program_lines(texts)):
+            read += len(block.line.text)
+            if block.line.number % TOLD == 0:
+                tell(read / size, f"line {block.line.number}")
+
+
+def _write(
+    job: Job, source: Path, folder: Path, table: Path, listeners: Sequence[Ledger | Course | Travel], tell: Tell
+) -> tuple[str, ...]:
+    """Write program, diff and table, and return the header that still says nothing."""
+    size = max(source.stat().st_size, 1)
+    axes = ["XYZ".index(axis) for axis in job.drift.axes]
+    blank: tuple[str, ...] = ()
+
+    def told(texts: Iterator[str], program: TextIO, rows: TextIO) -> Iterator[tuple[str, tuple[str, ...]]]:
+        nonlocal blank
+        read = number = 0
+        for revised in job.revision.revise(texts):
+            program.writelines(revised.texts)
+            number += len(revised.texts)
+            if revised.number:
+                rows.write(_row(revised, number, axes))
+                for listener in listeners:
+                    listener.take(revised)
+                read += len(revised.text)
+                if revised.number % TOLD == 0:
+                    tell(read / size, f"line {revised.number}")
+            else:
+                blank = revised.texts
+                for listener in listeners:
+                    if isinstance(listener, Ledger):  # it counts the lines that are written
+                        listener.take(revised)
+            yield revised.text, revised.texts
+
+    with (
+        ncprogram.open_to_read(source) as texts,
+        ncprogram.open_to_write(folder / PROGRAM) as program,
+        ncprogram.open_to_write(folder / DIFF) as written,
+        ncprogram.open_to_write(table) as rows,
+    ):
+        columns = (f"{what}_{'xyz'[k]}_um" for k in axes for what in ("drift", "correction"))
+        rows.write(",".join(("line", "revised_line", "start_s", "end_s", *columns, "changed")) + "\n")
+        pairs = told(program_lines(texts), program, rows)
+        names = header.clean_comment(job.program.name), header.clean_comment(job.paths.program.name)
+        written.writelines(diff.unified(pairs, *names))
+    return blank
+
+
+def _row(revised: Revised, number: int, axes: Sequence[int]) -> str:
+    in_hole = revised.block is not None and revised.block.kind == "cycle"  # it counts, not the level where a cycle ends
+    carried = revised.inner if in_hole else revised.carried
+    cells = "".join(f",{revised.deviation[k] + 0.0:.3f},{carried[k] + 0.0:.4f}" for k in axes)
+    changed = revised.texts != (revised.text,)
+    return f"{revised.number},{number},{revised.start:.3f},{revised.end:.3f}{cells},{changed:d}\n"
+
+
+def _bounds(job: Job, run: Run) -> tuple[Bound, ...]:
+    wrong, left = job.drift.uncertainty(), job.revision.left
+    return tuple(
+        Bound(
+            axis,
+            float(run.deviation[:, 0, k].min()),
+            float(run.deviation[:, 1, k].max()),
+            left.without[k],
+            left.most[k],
+            left.line[k],
+            wrong[k],
+        )
+        for k, axis in enumerate("XYZ")
+        if axis in job.drift.axes
+    )
+
+
+def _facts(job: Job, bounds: Sequence[Bound], proof: Proof | None) -> list[str]:
+    """Return what the header says."""
+    place = headers.describe_place(job.revision, job.drift.axes) if job.drift.by_position else []
+    facts = [
+        f"thermocomp {__version__}, {job.when.date()}, for {job.revision.setup.controller}",
+        f"program {job.program.name}",
+        *headers.describe_models(job.models),
+        *headers.told_taken(job.taken),
+        f"start {job.start}",
+        job.zero,
+        job.method,
+        headers.describe_bound(bounds),
+        *place,
+    ]
+    # the first line says that it has been revised
+    return [*facts, *headers.describe_proof(proof, job.revision.header_lines - len(facts) - 1)]
+
+
+def _proved(job: Job, original: Path, revised: Path, ledger: Ledger, tell: Tell) -> Proof:
+    """Return what the interpreter says."""
+    lines, last = max(job.revision.lines, 1), 0
+
+    def progress(line: int) -> None:
+        nonlocal last
+        if line >= last + TOLD:
+            last = line
+            tell(line / lines, f"line {line}")
+
+    try:
+        return prove(original, revised, ledger, job.revision.setup, progress)
+    except ProgramError:
+        raise
+    except InputError as e:  # whatever it is that keeps the interpreter from judging
+        raise InputError(f"it cannot be proved: {e}; {ALL_THE_SAME}") from e

@@ -1,0 +1,100 @@
+"""What a job leaves behind for the next one, as JSON: versioned, bit-exact, damaged or unknown files refused."""
+
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from functools import cache
+from pathlib import Path
+
+from pydantic import AwareDatetime
+from pydantic_core import SchemaValidator
+
+from thermocomp.core.exceptions import InputError, ModelFileError
+from thermocomp.files import jsonfile
+from thermocomp.nc.thermal.jobstate import JobState
+
+KIND = jsonfile.Format("thermocomp-job-state", 1, "state file of a job", "thermocomp revise")
+
+
+@dataclass(frozen=True)
+class SavedJob:
+    """A state and when it was.
+
+    Parameters
+    ----------
+    written : datetime
+        End of the job, in UTC.
+    state : JobState
+    """
+
+    written: AwareDatetime
+    state: JobState
+
+
+@cache
+def _reader() -> SchemaValidator:
+    return jsonfile.reader_of(SavedJob)
+
+
+def dumps(state: JobState, written: datetime) -> str:
+    """Return the text of a state file; floats are written so that reading gives the same bits.
+
+    Raises
+    ------
+    InputError
+        `written` does not know its time zone.
+    """
+    if written.tzinfo is None:
+        raise InputError(f"state of a job: {written} has no time zone")
+    entry = {"written": written.astimezone(UTC).isoformat(), "state": asdict(state)}
+    return jsonfile.pack(KIND, [entry])
+
+
+def loads(text: str, source: str = "state of a job") -> SavedJob:
+    """Read the text of a state file.
+
+    Parameters
+    ----------
+    text : str
+    source : str
+        What to call it in an error.
+
+    Raises
+    ------
+    ModelFileError
+        Not JSON, not a state file, of a newer version, altered or incomplete.
+    """
+    jobs: list[SavedJob] = jsonfile.unpack(KIND, _reader(), text, source).models
+    if len(jobs) > 1:
+        raise ModelFileError(f"{source}: holds the states of {len(jobs)} jobs: want one")
+    saved = jobs[0]
+    return SavedJob(saved.written.astimezone(UTC), saved.state)
+
+
+def write(state: JobState, written: datetime, path: str | Path, *, overwrite: bool = False) -> None:
+    """Write what a job has left.
+
+    Parameters
+    ----------
+    state : JobState
+    written : datetime
+        End of the job, with its time zone.
+    path : str or Path
+    overwrite : bool
+
+    Raises
+    ------
+    InputError
+        The file exists and `overwrite` is False.
+    """
+    jsonfile.write(dumps(state, written), path, overwrite=overwrite)
+
+
+def read(path: str | Path) -> SavedJob:
+    """Read what a job has left.
+
+    Raises
+    ------
+    ModelFileError
+        There is no such file, or it cannot be used; see `loads`.
+    """
+    return loads(*jsonfile.read(KIND, path))

@@ -1,0 +1,406 @@
+"""What can be told of a revision, in the words of ``thermocomp revise``, and the objects that come of it."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import Literal
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.machine import Machine
+from thermocomp.core.model import ErrorModel
+from thermocomp.files import modelfile
+from thermocomp.files.machines import read_machine
+from thermocomp.nc.interpreter.block import Setup
+from thermocomp.nc.planner.timeline import MotionLimits
+from thermocomp.nc.revision import forecast as forecasts
+from thermocomp.nc.revision import jobstate
+from thermocomp.nc.revision.values import (
+    m_code_of,
+    origin_of,
+    point_of,
+    read_positive,
+    read_value,
+    rotations_of,
+    startup_of,
+    tool_of,
+)
+from thermocomp.nc.rewrite.coordinates import Coordinates
+from thermocomp.nc.rewrite.demand import Demand
+from thermocomp.nc.rewrite.method import CorrectionMethod
+from thermocomp.nc.rewrite.offset import Offset
+from thermocomp.nc.rewrite.text import DIGITS
+from thermocomp.nc.thermal import start
+from thermocomp.nc.thermal.drift import Drift
+from thermocomp.nc.thermal.inputs import SPEED, InputSignal, constants
+from thermocomp.nc.thermal.start import ThermalStart
+from thermocomp.nc.thermal.stations import Station, stations
+
+Zero = Literal["start", "cold", "last"]
+
+#: a temperature that has moved by more is no constant, unless it is that of the surroundings [degC]
+WARMED = 3.0
+
+_COUNTED: dict[Zero, str] = {
+    "start": "from the start of the program",
+    "cold": "from the cold machine",
+    "last": "from where the last job counted it",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drifting:
+    """What makes the tool drift.
+
+    Parameters
+    ----------
+    model : list of Path
+        Model files of thermocomp fit (.json).
+    axis : list of str
+        Which axis a model is for, such as ch3=Z, or "zz=X at Z 200 mm" for one of several places; models that are not
+        named are left out. Not needed where the targets are called x_um, z or z_at_200.
+    constant : list of str
+        Inputs that the program does not tell, such as "ambient=22 degC".
+    forecast : Path
+        CSV file with such inputs over the time since the start of the program (columns such as time_min, ambient_C).
+    accept_unproven : str
+        Who takes unproven models all the same, and why: "NAME, REASON".
+    """
+
+    model: list[Path]
+    axis: list[str] | None = None
+    constant: list[str] | None = None
+    forecast: Path | None = None
+    accept_unproven: str | None = None
+
+    def stations(self) -> list[Station]:
+        """Return which model stands for which axis."""
+        models = [m.taken(self.accept_unproven) for path in self.model for m in modelfile.read(path)]
+        return stations(models, self.axis or ())
+
+    def others(self, found: Sequence[Station]) -> tuple[dict[str, InputSignal], list[str]]:
+        """Return the inputs that the program does not tell, and what was not read of them."""
+        models = [s.model for s in found]
+        if self.constant and all(i.quantity == SPEED for m in models for i in m.inputs):
+            raise InputError(f"--constant {self.constant[0]!r}: the models are driven by the spindle speed alone")
+        signals = constants(self.constant or (), models)
+        for m in models:
+            _refuse_heated(m, signals)
+        driven = any(i.quantity == SPEED and i.name in m.sensors for m in models for i in m.inputs)
+        if not driven and self.forecast is None and any(m.sensors for m in models):
+            raise InputError(
+                "no model is driven by the spindle speed, and no --forecast tells what changes: they cannot tell what "
+                "this program does to the machine; fit one with --inputs spindle_rpm"
+            )
+        if self.forecast is None:
+            return signals, _taken(signals, "held at a constant")
+        read = forecasts.read(self.forecast)
+        twice = sorted(set(signals) & set(read.columns))
+        if twice:
+            raise InputError(f"{self.forecast}: {twice[0]} is given by --constant too; take one of them away")
+        wanted = {i.name for m in models for i in m.inputs}
+        notes = [f"{self.forecast}: {name} is no input of the models" for name in read.columns if name not in wanted]
+        notes += [f"{self.forecast}: {text}" for text in read.left_out]
+        notes += _taken(signals, "held at a constant") + _taken(wanted & set(read.columns), "forecast")
+        return signals | {n: InputSignal(*column) for n, column in read.columns.items() if n in wanted}, notes
+
+    def hashes(self) -> dict[str, str]:
+        """Return the name of the file and the beginning of its SHA-256 by target."""
+        return {
+            m.target: f"{path.name} {sha256(path.read_bytes()).hexdigest()[:8]}"
+            for path in self.model
+            for m in modelfile.read(path)
+        }
+
+
+def _refuse_heated(model: ErrorModel, constant: Iterable[str]) -> None:
+    """Raise `InputError` if a temperature that the machine warms is said to stand still while a program runs."""
+    surroundings = model.validity.ambient_channel if model.validity is not None else ""
+    for i in model.inputs:
+        if i.name in constant and i.quantity == "temperature" and i.name != surroundings and i.high - i.low > WARMED:
+            raise InputError(
+                f"--constant {i.name}: it went over {i.high - i.low:.1f} degC in training, so it will not stand still "
+                "while this program runs; give it by --forecast, or fit a model that does without it, such as "
+                "--inputs spindle_rpm"
+            )
+
+
+def _taken(names: Iterable[str], how: str) -> list[str]:
+    return [f"{name} is {how}: that it may be otherwise is in no bound" for name in sorted(names)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Starting:
+    """How warm the machine is when the program starts.
+
+    Parameters
+    ----------
+    cold : bool
+        It has stood still for long.
+    carried : Path
+        It is as the last job has left it: the file OUT.job.json of that revision.
+    pause : str
+        How long the spindle stood still since then, such as "30 min"; not at all if not given.
+    measured : list of str
+        How far the tool point has drifted from the cold machine, such as z=12um.
+    zero : str
+        What the drift counts from, that is when the work offsets were set. start: at the start of the program; cold: on
+        the cold machine; last: when those of the last job were. If not given, nobody has touched them since the machine
+        was cold, or since the last job: start for --cold, cold for --measured, last for --carried.
+    """
+
+    cold: bool = False
+    carried: Path | None = None
+    pause: str | None = None
+    measured: list[str] | None = None
+    zero: Zero | None = None
+
+    def check(self) -> None:
+        """Raise `InputError` if the state is not stated, or more than once."""
+        given = self.cold + (self.carried is not None) + (self.measured is not None)
+        if given != 1:
+            found = "it is not stated" if not given else f"it is stated {given} times"
+            raise InputError(
+                f"how warm is the machine when the program starts? {found}: give one of --cold, --carried JOB.json and "
+                "--measured z=12um"
+            )
+        if self.pause is not None and self.carried is None:
+            raise InputError("--pause is the time since the last job: it goes with --carried")
+
+    def start(self, found: Sequence[Station], others: Mapping[str, InputSignal]) -> ThermalStart:
+        """Return the state of the models."""
+        if self.carried is not None:
+            pause = 0.0 if self.pause is None else read_value(self.pause, "time", "--pause", "30 min")
+            return start.carry_over(found, jobstate.read(self.carried).state, pause)
+        if self.measured is not None:
+            return start.begin_measured(found, start.deviations(self.measured), others)
+        return start.begin_cold(found, others)
+
+    def drift(self, found: Sequence[Station], others: Mapping[str, InputSignal]) -> Drift:
+        """Return the drift at the start of the program."""
+        return Drift(found, self.start(found, others), others, zero=self._zero)
+
+    @property
+    def _zero(self) -> Zero:
+        return self.zero or ("start" if self.cold else "cold" if self.carried is None else "last")
+
+    def words(self) -> str:
+        """Return the start state in words."""
+        if self.carried is not None:
+            name = self.carried.name
+            return f"{self.pause} after {name}" if self.pause else f"as {name} left it"
+        return f"measured {', '.join(self.measured)}" if self.measured else "cold"
+
+    def counted(self) -> str:
+        """Return what the drift counts from, in words."""
+        return _COUNTED[self._zero]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Way:
+    """How the correction gets into the program.
+
+    Parameters
+    ----------
+    method : str
+        coordinates: it is added to the words of X, Y and Z; offset: G52 shifts the work coordinates, where the tool is
+        up only; it wants --no-g92.
+    every : str
+        Renew the correction every so often, such as "10 min".
+    tolerance : str
+        Renew it as soon as the drift has moved by that much; with --every only along the way, where the drift depends
+        on the place.
+    step : str
+        In a cut it changes by that much at most per 10 mm of way, spread over the block.
+    largest : str
+        A correction beyond that is refused: it is no thermal drift any more.
+    safe_z : str
+        At and above this Z of the work coordinates the tool is up: no cut is there. If not given, the tool counts as up
+        after a rapid that lifts it (coordinates), or after tool changes and moves of Z in machine coordinates (offset).
+    no_split : bool
+        Split no long cut. If not given, it is split where one straight change of the correction would leave more than a
+        step in its middle (method coordinates, linuxcnc).
+    expand : bool
+        Turn loops, variables and subprograms into plain lines first: by LinuxCNC's interpreter, or, for a Fanuc, those
+        in the same file by an unroller of our own.
+    subroutines : list of Path
+        With --expand: folders of subprograms; the program's own comes first anyway.
+    unproved : bool
+        Write the program though no interpreter has judged it; its header says so.
+    """
+
+    method: Literal["coordinates", "offset"] = "coordinates"
+    every: str | None = None
+    tolerance: str = "1 um"
+    step: str = "1 um"
+    largest: str = "400 um"
+    safe_z: str | None = None
+    no_split: bool = False
+    expand: bool = False
+    subroutines: list[Path] | None = None
+    unproved: bool = False
+
+    def demand(self) -> Demand:
+        """Return when the correction is renewed."""
+        every = None if self.every is None else read_positive(self.every, "time", "--every", "10 min")
+        tolerance = read_positive(self.tolerance, "displacement", "--tolerance", "1 um")
+        return Demand(tolerance, every, read_positive(self.largest, "displacement", "--largest", "400 um"))
+
+    def made(self, setup: Setup, axes: Sequence[str]) -> CorrectionMethod:
+        """Return the method."""
+        digits, step = DIGITS[setup.controller], read_positive(self.step, "displacement", "--step", "1 um")
+        safe = None if self.safe_z is None else read_value(self.safe_z, "position", "--safe-z", "5 mm")
+        if self.method == "coordinates":
+            # a helix is an option of older Fanucs
+            return Coordinates(digits, step, safe_z=safe, helix=setup.controller == "linuxcnc")
+        if not setup.no_shift:
+            raise InputError(
+                "--method offset writes G52, which wipes a G92 or G52 that is in force when the program starts: make "
+                "sure that none is, and say --no-g92; or take --method coordinates"
+            )
+        x, y, z = (name in axes for name in "XYZ")
+        return Offset(digits, step, safe_z=safe, axes=(x, y, z))
+
+    def folders(self) -> list[Path]:
+        """Return the folders of subprograms."""
+        folders = self.subroutines or []
+        if folders and not self.expand:
+            raise InputError("--subroutines is for --expand: without it subprograms are refused")
+        for folder in folders:
+            if not folder.is_dir():
+                raise InputError(f"--subroutines {folder}: no such folder")
+        return folders
+
+    def words(self) -> str:
+        """Return the method in words."""
+        often = f"every {self.every}" if self.every else f"by {self.tolerance}"
+        return f"{self.method}, renewed {often}" + (f", steps {self.step}" if self.method == "coordinates" else "")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Controller:
+    """What stands at the controller and not in the program.
+
+    Parameters
+    ----------
+    controller : str
+        Whose habits the program has: linuxcnc, or fanuc, for Haas and the ISO programs of most machining centres too.
+        If not given, linuxcnc; but a program that is a Fanuc's, or that the two would read in different ways, is
+        refused.
+    units : str
+        Unit when the program starts; without it the program has to say G20 or G21.
+    startup : str
+        Codes in force when the program starts, such as "G64 P0.01 G98" (mm). Without it G64 (no tolerance) is taken,
+        and G99 for linuxcnc, G98 for fanuc; what --expand needs to know of them the program has to say itself.
+    speed : str
+        Spindle speed when the program starts, such as "6000 1/min"; without it the program has to say S and M3.
+    origin : list of str
+        Where work coordinates begin, such as "G54=100 mm, 50 mm, 0 mm": it counts where the drift depends on the place.
+    tool : list of str
+        Lengths of tools, such as "1=120 mm".
+    diameter : list of str
+        With --expand: diameters of tools, such as "1=10 mm", for which G41 and G42 are worked out.
+    home : str
+        Where G28 goes, such as "0 mm, 0 mm, 400 mm".
+    rotation : list of str
+        Rotations of work coordinate systems that are stored in the controller, such as "G54=12 deg"; none if there are
+        none. They turn a correction of X and Y.
+    no_g92 : bool
+        No G92 or G52 is in force when the program starts, nor put away by G92.2: the method offset would erase it.
+    integers : str
+        What a length without a decimal point is: whole millimetres or inches; the least increment; or a reason to
+        refuse the program. If not given, whole for linuxcnc, refuse for fanuc.
+    least : str
+        The least increment.
+    block_delete : str
+        on: lines that begin with / are not run. off: they may be run or not, and what depends on it is refused. With
+        --expand it has to be said: off writes them out as plain lines.
+    harmless : list of str
+        M codes of the machine's maker that move no axis and leave the spindle as it is, such as M88
+        of a Fanuc or M101 of LinuxCNC.
+    """
+
+    controller: Literal["linuxcnc", "fanuc"] | None = None
+    units: Literal["mm", "inch"] | None = None
+    startup: str | None = None
+    speed: str | None = None
+    origin: list[str] | None = None
+    tool: list[str] | None = None
+    diameter: list[str] | None = None
+    home: str | None = None
+    rotation: list[str] | None = None
+    no_g92: bool = False
+    integers: Literal["whole", "least", "refuse"] | None = None
+    least: str = "1 um"
+    block_delete: Literal["on", "off"] | None = None
+    harmless: list[str] | None = None
+
+    @property
+    def whose(self) -> Literal["linuxcnc", "fanuc"]:
+        """Whose habits the program has."""
+        return self.controller or "linuxcnc"
+
+    def setup(self, machine: Machine | None) -> Setup:
+        """Return it as the follower wants it, with what the machine file tells."""
+        return Setup(
+            controller=self.whose,
+            inch=None if self.units is None else self.units == "inch",
+            startup="" if self.startup is None else startup_of(self.startup, self.whose),
+            speed=0.0 if self.speed is None else read_positive(self.speed, "spindle_speed", "--speed", "6000 1/min"),
+            offsets=dict(origin_of(text) for text in self.origin or ()),
+            tools=dict(tool_of(text, "--tool", "120 mm") for text in self.tool or ()),
+            home=None if self.home is None else point_of(self.home, f"--home {self.home!r}"),
+            rotations=rotations_of(self.rotation or ()),
+            no_shift=self.no_g92,
+            rotary={} if machine is None else dict(machine.structure.rotary),
+            integers=self.integers or ("whole" if self.whose == "linuxcnc" else "refuse"),
+            least=read_positive(self.least, "position", "--least", "1 um"),
+            skip_optional=self.block_delete == "on",
+            harmless=frozenset(m_code_of(text, self.whose) for text in self.harmless or ()),
+        )
+
+    def diameters(self, *, expand: bool) -> dict[int, float] | None:
+        """Return the diameters of the tools [mm]."""
+        if self.diameter is None:
+            return None
+        if not expand:
+            raise InputError("--diameter is for --expand: without it G41 and G42 stay in the program")
+        return dict(tool_of(text, "--diameter", "10 mm") for text in self.diameter)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Timing:
+    """How fast the machine is.
+
+    Parameters
+    ----------
+    machine : Path
+        Machine file (.toml) with rapids and accelerations of the axes; its structure tells where rotary axes are.
+    tool_change : str
+        How long a tool change takes.
+    stop : str
+        How long the operator lets it stand at M0 and M1.
+    """
+
+    machine: Path | None = None
+    tool_change: str = "8 s"
+    stop: str = "60 s"
+
+    def read(self) -> Machine | None:
+        """Return the machine, if there is a file of it."""
+        return None if self.machine is None else read_machine(self.machine)
+
+    def kinematics(self, machine: Machine | None) -> tuple[MotionLimits, list[str]]:
+        """Return how fast the machine is, and what of it is a guess."""
+        change = read_value(self.tool_change, "time", "--tool-change", "8 s")
+        stop = read_value(self.stop, "time", "--stop", "60 s")
+        if machine is None:
+            guess = "no --machine: the times are those of a medium machining centre (rapids 30 m/min, 3 m/s2)"
+            return MotionLimits(tool_change=change, stop=stop), [guess]
+        axes = sorted((a for a in machine.axes if a.name in "XYZ"), key=lambda a: a.name)
+        notes = [
+            f"{self.machine}: no {what} of {', '.join(silent)}: taken as {taken}"
+            for what, taken in (("rapid", "30 m/min"), ("acceleration", "3 m/s2"))
+            if (silent := [a.name for a in axes if getattr(a, what) is None])
+        ]
+        return MotionLimits.of(machine, tool_change=change, stop=stop), notes

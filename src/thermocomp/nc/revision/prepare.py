@@ -1,0 +1,165 @@
+"""What is told of a revision becomes a job, or is refused before any work."""
+
+from collections.abc import Mapping, Sequence
+from datetime import date, datetime
+from itertools import chain, islice
+from pathlib import Path
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.files.draft import refuse_existing
+from thermocomp.nc.interpreter.block import Setup
+from thermocomp.nc.interpreter.dialect import check_dialect
+from thermocomp.nc.linuxcnc import rs274
+from thermocomp.nc.linuxcnc.verification.verify import foresee_sentence
+from thermocomp.nc.parser.recognise import recognise
+from thermocomp.nc.parser.tokens import program_lines, read_lines
+from thermocomp.nc.revision import headers, ncprogram
+from thermocomp.nc.revision.job import ALL_THE_SAME, Job, Paths
+from thermocomp.nc.revision.options import Controller, Drifting, Starting, Timing, Way
+from thermocomp.nc.rewrite.revise import FIRST, Revision
+from thermocomp.nc.rewrite.travel import Travel
+from thermocomp.nc.thermal.stations import Station
+
+
+def prepare_job(
+    program: Path,
+    drifting: Drifting,
+    output: Path,
+    starting: Starting,
+    way: Way,
+    controller: Controller,
+    timing: Timing,
+    when: str | None,
+    *,
+    overwrite: bool,
+) -> tuple[Job, list[str]]:
+    """Return what is to be done to a program, and notes.
+
+    Parameters
+    ----------
+    program : Path
+    drifting : Drifting
+    output : Path
+    starting : Starting
+    way : Way
+    controller : Controller
+    timing : Timing
+    when : str or None
+        Date for the header; today without it.
+    overwrite : bool
+        Existing files are replaced.
+
+    Returns
+    -------
+    job : Job
+    notes : list of str
+
+    Raises
+    ------
+    InputError
+        It cannot be done, which is found out before any work.
+    """
+    if controller.controller is None:
+        _check_dialect(program, controller)
+    ncprogram.open_to_read(program).close()
+    starting.check()
+    found = drifting.stations()
+    others, notes = drifting.others(found)
+    drift = starting.drift(found, others)
+    machine = timing.read()
+    setup = controller.setup(machine)
+    kinematics, guesses = timing.kinematics(machine)
+    method = way.made(setup, drift.driven)
+    models = _files(found, drifting.hashes())
+    taken = tuple(dict.fromkeys(h.taken for s in found if (h := s.model.honest_error) is not None and h.taken))
+    states = "" if way.unproved else foresee_sentence(setup)
+    header_lines = headers.count_lines(models, taken, states, by_position=drift.by_position)
+    revision = Revision(setup, kinematics, drift, method, way.demand(), header_lines, not way.no_split)
+    _check_interpreter(way, setup, diameters=controller.diameter is not None)
+    if way.expand and setup.controller == "linuxcnc" and controller.block_delete is None:
+        _refuse_optional(program)
+    paths = Paths.of(output, expanded=way.expand)
+    given = (timing.machine, starting.carried, drifting.forecast)
+    refuse_existing(paths.all(), overwrite, [program, *drifting.model, *(p for p in given if p is not None)])
+    job = Job(
+        program,
+        paths,
+        revision,
+        drift,
+        models,
+        taken,
+        starting.words(),
+        f"drift counts {starting.counted()}",
+        f"method {way.words()}",
+        _moment(when),
+        unproved=way.unproved,
+        diameters=controller.diameters(expand=way.expand),
+        subroutines=way.folders(),
+        travel=None if machine is None else Travel({a.name: a.travel for a in machine.axes}),
+        overwrite=overwrite,
+    )
+    return job, [*notes, *guesses]
+
+
+def _files(stations: Sequence[Station], hashes: Mapping[str, str]) -> list[str]:
+    """Return which files the models come from, each with what it is for."""
+    found = []
+    for name in dict.fromkeys(hashes[s.model.target] for s in stations):
+        mine = [s for s in stations if hashes[s.model.target] == name]
+        places = {a: [s.along for s in mine if s.axis == a] for a in dict.fromkeys(s.axis for s in mine)}
+        said = [a if along[0] is None else f"{a} at {len(along)} places of {along[0]}" for a, along in places.items()]
+        unproven = any((h := s.model.honest_error) is not None and h.taken for s in mine)
+        found.append(f"{name} for {', '.join(said)}{' UNPROVEN' if unproven else ''}")
+    return found
+
+
+def _check_dialect(program: Path, controller: Controller) -> None:
+    """Raise `InputError` if nobody has said whose a program is, and it need not be LinuxCNC's."""
+    startup = f"{controller.startup or ''} {'G20' if controller.units == 'inch' else ''}"
+    with ncprogram.open_to_read(program) as texts:
+        lines = program_lines(texts)
+        try:
+            recognise(first := list(islice(lines, FIRST)))
+            check_dialect(chain(first, lines), whole=controller.integers is not None, startup=startup)
+        except InputError as e:
+            raise InputError(f"{program}: {e}") from e
+
+
+def _refuse_optional(program: Path) -> None:
+    """Raise `InputError` if the program has optional lines: written out, they would be run always, or never."""
+    with ncprogram.open_to_read(program) as lines:
+        for line in read_lines(lines):
+            if line.optional:
+                raise InputError(
+                    f"{program}: line {line.number}: an optional line: --expand writes it out as a plain one, or "
+                    "leaves it out; say --block-delete off or on"
+                )
+
+
+def _check_interpreter(way: Way, setup: Setup, *, diameters: bool) -> None:
+    """Raise `InputError` before any work if the interpreter is needed and cannot be had."""
+    if way.expand and setup.controller == "linuxcnc" and (reason := rs274.find_obstacle()) is not None:
+        raise InputError(f"--expand: {reason}")
+    if way.expand and setup.controller == "fanuc" and (way.subroutines or diameters):
+        raise InputError(
+            "--subroutines and --diameter are for LinuxCNC: a Fanuc's subprograms stand in its file, and its G41 stays"
+        )
+    if not way.unproved and (reason := rs274.find_obstacle()):
+        raise InputError(f"it cannot be proved: {reason}; {ALL_THE_SAME}")
+
+
+def _moment(text: str | None) -> datetime:
+    """Return when it is: a date the user gives, or now.
+
+    Raises
+    ------
+    InputError
+        It is no date.
+    """
+    if text is None:
+        return datetime.now().astimezone()
+    try:
+        given = date.fromisoformat(text)
+    except ValueError as e:
+        raise InputError(f"--date {text!r}: write year-month-day, such as 2026-01-31") from e
+    return datetime(given.year, given.month, given.day).astimezone()

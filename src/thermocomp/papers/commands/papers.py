@@ -1,0 +1,240 @@
+"""``thermocomp papers``: the papers' studies redone, their number beside ours."""
+
+import time
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from cyclopts import Parameter
+
+from thermocomp.cli.jsonoutput import print_json
+from thermocomp.cli.options import (
+    OptionalOutput,
+    read_recordings,
+    tell_trouble,
+)
+from thermocomp.cli.progress import show_share
+from thermocomp.cli.terminal import console, make_console, marked, print_table, words
+from thermocomp.core.exceptions import InputError
+from thermocomp.files.draft import refuse_existing
+from thermocomp.report.layout import Column, Layout, Toned
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from thermocomp.papers.study import Claim, Study, StudyTable
+    from thermocomp.papers.study import Progress as Told
+    from thermocomp.recordings.recording import Recording
+    from thermocomp.virtual.protocol import Physics
+
+Name = Literal["chen1996", "wessel2004", "hwang", "precompensation", "stepwise2017", "cross"]
+Names = Annotated[list[Name], Parameter(show_default=False)]
+Measured = Annotated[list[Path], Parameter(name="--with", show_default=False)]
+#: what is not a paper's study but the table of all methods on all experiments (X-03)
+CROSS = "cross"
+
+#: columns that the tables of cross need
+TABLE_WIDTH = 120
+
+_TONES = {"yes": "good", "no": "grave", "-": "soft"}
+
+
+def papers(
+    names: Names = [],  # noqa: B006 - never changed
+    /,
+    *,
+    measured: Measured = [],  # noqa: B006 - never changed
+    mapping: Path | None = None,
+    target: list[str] | None = None,
+    models: list[str] | None = None,
+    physics: Literal["linear", "nonlinear"] | None = None,
+    seed: int = 0,
+    repeats: int = 3,
+    jobs: int = 1,
+    scheduler: str | None = None,
+    output: OptionalOutput = None,
+    overwrite: bool = False,
+    json: bool = False,
+) -> int:
+    """Redo the papers' studies on the virtual machine: their number, ours, and whether their claim holds here.
+
+    A claim that does not hold is a finding, not a failure.
+
+    Parameters
+    ----------
+    names : list of str
+        Papers; all five if none is named. cross is the table of methods on all experiments.
+    measured : list of Path
+        Recordings on which the methods of cross are judged as well; each is one test.
+    mapping : Path
+        TOML file that says what their columns are.
+    target : list of str
+        Their displacements that cross judges; all of them if not given.
+    models : list of str
+        Methods of cross, or all; without it those that take seconds.
+    physics : {'linear', 'nonlinear'}
+        Of the virtual machine, for wessel2004: linear, or with joints, bearings and films that depend on temperature
+        and speed.
+    seed : int
+        Of the weather, the sensors' noise and what is drawn by lot.
+    repeats : int
+        Runs of each paper's study, with seeds 100 apart: what holds in one weather only is told. Numbers and figures
+        are those of the first.
+    jobs : int
+        Processes to share the runs, or the methods of cross, among; -1 takes all cores.
+    scheduler : str
+        Dask scheduler whose workers do the work in place of these processes, such as tcp://192.168.1.20:8786.
+    output : Path
+        Page with claims, figures and tables to write (.html).
+    overwrite : bool
+        Write over an existing page.
+    json : bool
+        Print results for a machine instead of tables.
+
+    Returns
+    -------
+    int
+        0 the studies ran, whatever holds; 1 one of them failed; 2 unusable input.
+    """
+    _check_numbers(seed, repeats, jobs)
+    from thermocomp.judging.sharing import shared_among
+    from thermocomp.papers.studies import PHYSICS, STUDIES
+
+    chosen: list[str] = list(dict.fromkeys(names)) or list(STUDIES)
+    for name in (n for n in chosen if physics and n not in PHYSICS):
+        raise InputError(
+            f"--physics is for {', '.join(PHYSICS)}, not for {name}: thermocomp papers {PHYSICS[0]} --physics {physics}"
+        )
+    asked = {"--with": measured, "--mapping": mapping, "--target": target, "--models": models}
+    for option in (o for o, value in asked.items() if value):
+        if CROSS not in chosen:
+            raise InputError(f"{option} is for {CROSS}: thermocomp papers {CROSS} {option} ...")
+        if not measured and option in ("--mapping", "--target"):
+            raise InputError(f"{option} is for measured recordings: name them by --with")
+    if output is not None:
+        refuse_existing([output], overwrite, measured, ".html")
+    tests = read_recordings(measured, mapping) if measured else []
+    tell_trouble(tests)
+    done: list[tuple[Study, float]] = []
+    with shared_among(scheduler):
+        for number, name in enumerate(chosen, start=1):
+            begin = time.perf_counter()
+            with show_share(f"{number}/{len(chosen)} {name}", hidden=json) as progress:
+                run = (
+                    partial(_cross, seed, tests=tests, models=models, targets=target, jobs=jobs)
+                    if name == CROSS
+                    else partial(_run, name, seed, repeats, physics, jobs)
+                )
+                study = _tried(name, run, progress)
+            done.append((study, time.perf_counter() - begin))
+            if not json:
+                _show(*done[-1])
+    if output is not None:
+        from thermocomp.papers.report import papers as pages
+
+        pages.write([study for study, _ in done], output, seed=seed, overwrite=overwrite)
+        if not json:
+            console.print(f"Page: {words(output)}", soft_wrap=True)
+    if json:
+        print_json({"seed": seed, "repeats": repeats, "studies": [_content(*d) for d in done]})
+    return 1 if any(not study.ran for study, _ in done) else 0
+
+
+def _check_numbers(seed: int, repeats: int, jobs: int) -> None:
+    if seed < 0:
+        raise InputError(f"--seed {seed}: must not be negative")
+    if repeats < 1:
+        raise InputError(f"--repeats {repeats}: must be at least 1")
+    if jobs == 0:
+        raise InputError("--jobs 0: name a number of processes, or -1 for all cores")
+
+
+def _tried(name: str, run: "Callable[[Told], Study]", progress: "Told") -> "Study":
+    """Return a study; one that says why if it fails: the others are run all the same."""
+    from thermocomp.judging.pieces import explain
+    from thermocomp.papers.studies import not_redone
+
+    try:
+        return run(progress)
+    except InputError:  # what was asked for cannot be
+        raise
+    except Exception as e:  # noqa: BLE001 - whatever fails in one study, the others have their results
+        return not_redone(name, explain(e))
+
+
+def _run(name: str, seed: int, repeats: int, physics: "Physics | None", jobs: int, progress: "Told") -> "Study":
+    from thermocomp.papers import studies
+
+    return studies.repeat(name, seed=seed, repeats=repeats, progress=progress, physics=physics, jobs=jobs)
+
+
+def _cross(
+    seed: int,
+    progress: "Told",
+    tests: "list[Recording]",
+    models: list[str] | None,
+    targets: list[str] | None,
+    jobs: int,
+) -> "Study":
+    from thermocomp.papers import cross
+
+    return cross.run(seed, progress, tests, methods=models or cross.FAST, targets=targets, jobs=jobs)
+
+
+def _show(study: "Study", seconds: float) -> None:
+    from thermocomp.papers.report.papers import headline
+
+    console.print(f"\n[bold]{words(study.title)}[/]")
+    if study.claims:
+        columns = (
+            Column("id", lambda c: ", ".join(c.ids)),
+            Column("claim", lambda c: c.text),
+            Column("paper", lambda c: c.paper or "-"),
+            Column("ours", lambda c: c.ours or "-"),
+            Column("holds", _holds, whole=True),
+        )
+        print_table(Layout(columns, study.claims), console)
+        for c in study.claims:
+            if c.finding:
+                console.print(f"{marked(Toned(', '.join(c.ids), _holds(c).tone))} {words(c.finding)}")
+    if study.name == CROSS:
+        # Numbers must not be cut: a narrow terminal wraps whole lines instead.
+        wide = make_console(width=max(console.width, TABLE_WIDTH))
+        for t in study.tables:
+            print_table(_laid_out(t), wide)
+    said = f"{headline(study)}; " if study.claims else ""
+    console.print(f"{words(said)}{seconds:.0f} s")
+
+
+def _holds(claim: "Claim") -> Toned:
+    return Toned(claim.verdict, _TONES.get(claim.verdict, "doubtful"))
+
+
+def _laid_out(t: "StudyTable") -> Layout:
+    from thermocomp.papers.report.papers import rows, words
+
+    left = words(t)
+    columns = [Column(h, k, "" if k in left else ">", whole=k == 0) for k, h in enumerate(t.header)]
+    return Layout(columns, rows(t), caption=t.caption)
+
+
+def _content(study: "Study", seconds: float) -> dict[str, Any]:
+    return {
+        "name": study.name,
+        "title": study.title,
+        "seconds": seconds,
+        "claims": [
+            {
+                "ids": c.ids,
+                "claim": c.text,
+                "paper": c.paper,
+                "ours": c.ours,
+                "holds": c.holds,
+                "again": c.again,
+                "finding": c.finding,
+            }
+            for c in study.claims
+        ],
+        "tables": [{"caption": t.caption, "header": t.header, "rows": t.rows} for t in study.tables],
+        "numbers": study.numbers,
+    }

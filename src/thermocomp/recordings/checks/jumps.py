@@ -1,0 +1,193 @@
+"""Steps of one channel that nothing else of the machine shares, and two channels that change places."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from thermocomp.recordings.checks.findings import BoolArray, Finding, FloatArray, IntArray, Signal, at_row, cut
+
+#: smallest step that is told, by quantity [degC, um, urad]
+LEAST = {"temperature": 1.5, "displacement": 5.0, "angle": 20.0}
+#: a jump is as many times the largest move of the rows beside it
+RATIO = 4.0
+#: rows on each side that it is compared with
+_BESIDE = 5
+#: usual moves over two rows that a jump exceeds
+_NOISE = 8.0
+#: a channel that jumps more often is made so: a thermostat, a pump
+_OFTEN = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Edges:
+    """The jumps of one signal.
+
+    Parameters
+    ----------
+    signal : Signal
+    before, after : ndarray of int of shape (n_jumps,)
+        Last row of the old level and first row of the new one, in the recording; one row may lie between them.
+    height : ndarray of shape (n_jumps,)
+        In the channel's unit.
+    clear : ndarray of bool of shape (n_jumps,)
+        Beyond doubt by itself; the others need a second channel that does the opposite.
+    """
+
+    signal: Signal
+    before: IntArray
+    after: IntArray
+    height: FloatArray
+    clear: BoolArray
+
+    def near(self, row: int, *, clearly: bool = True) -> bool:
+        """Return whether the signal jumps at `row` or right beside it."""
+        return bool(((self.clear | (not clearly)) & (self.before <= row + 1) & (self.after >= row)).any())
+
+
+def find_edges(signal: Signal) -> Edges:
+    """Find jumps: from one row to the next but one, a move that stands out from all those beside it.
+
+    Clear is one over 4 times the largest move from row to row among the five rows on each side, so that no exponential
+    of a warm-up is one, however coarsely it is sampled; and over 8 times the usual move over two rows (robust standard
+    deviation; 3 times the resolution where that is 0). Others are over half as much.
+    """
+    x, rows = signal.x, signal.rows
+    if len(x) < 2 * _BESIDE + 3:
+        none = np.empty(0, dtype=np.intp)
+        return Edges(signal, none, none, np.empty(0), np.empty(0, dtype=np.bool_))
+    moves = np.abs(np.diff(x))
+    jump = x[2:] - x[:-2]
+    noise = 1.4826 * float(np.median(np.abs(jump - np.median(jump))))
+    if noise == 0:
+        noise = 3 / _NOISE * float(np.median(moves[moves > 0])) if moves.any() else 0.0
+    padded = np.concatenate([np.zeros(_BESIDE), moves, np.zeros(_BESIDE)])
+    most = sliding_window_view(padded, _BESIDE).max(axis=1)
+    beside = np.maximum(most[: len(jump)], most[2 + _BESIDE :][: len(jump)])
+    size = np.abs(jump)
+    limit = np.maximum(RATIO * beside, _NOISE * noise)
+    found = 2 * size > limit
+    found[:2] = found[-2:] = False  # no level to compare with
+    # of neighbours that see the same jump the largest is kept
+    largest = sliding_window_view(np.pad(size * found, 1), 3).max(axis=1)
+    first = np.flatnonzero(found & (size == largest))
+    first = first[np.diff(first, prepend=-9) > 1]
+    # where the first or the last of the two moves is all of it, the row between belongs to a level
+    early = np.abs(x[first + 1] - x[first]) > 0.8 * size[first]
+    late = np.abs(x[first + 2] - x[first + 1]) > 0.8 * size[first]
+    return Edges(signal, rows[first + late], rows[first + 2 - (early & ~late)], jump[first], size[first] > limit[first])
+
+
+def jumps(signals: Sequence[Signal], time: FloatArray, moved: BoolArray) -> Iterator[Finding]:
+    """Yield steps of a single channel, and two channels that change places.
+
+    A step: a jump (`find_edges`) of 1.5 degC, 5 um or 20 urad or more that no other channel shares within a row,
+    whatever it measures. Where the spindle speed changes, it is told only if it is over 3 times what the channel did
+    at all other such changes. A step that comes back is told with both its ends, and its rows. A channel with over
+    four jumps is taken for a thermostat. Steps across a gap in time are no steps.
+
+    Changed places: two channels of one quantity jump at the same row, and each goes on where the other was, to within
+    a quarter of the jump, and no third channel jumps there. What two sensors say alike at that moment cannot be
+    told apart.
+
+    Parameters
+    ----------
+    signals : sequence of Signal
+        Without spikes.
+    time : ndarray of shape (n_rows,)
+        [s]
+    moved : ndarray of bool of shape (n_rows - 1,)
+        Steps from row to row in which the spindle speed changes.
+    """
+    edges = [find_edges(s) for s in signals]
+    usual = float(np.quantile(np.diff(time), 0.9)) if len(time) > 1 else 0.0
+    swapped: set[tuple[int, int]] = set()
+    for a, mine in enumerate(edges):
+        for row, height in zip(mine.after, mine.height, strict=True):
+            for b, other in enumerate(edges[a + 1 :], start=a + 1):
+                if (a, b) not in swapped and _exchanged(mine, other, int(row), float(height), moved):
+                    if any(e.near(int(row), clearly=False) for e in edges if e is not mine and e is not other):
+                        continue
+                    swapped.add((a, b))
+                    yield _swap(mine.signal, other.signal, int(row), time)
+                    yield _swap(other.signal, mine.signal, int(row), time)
+    for a, mine in enumerate(edges):
+        least = LEAST.get(mine.signal.channel.quantity)
+        if least is None or any(a in pair for pair in swapped) or mine.clear.sum() > _OFTEN:
+            continue
+        lone = [
+            k
+            for k in range(len(mine.after))
+            if mine.clear[k]
+            and abs(mine.height[k]) >= least
+            and time[mine.after[k]] - time[mine.before[k]] <= 4 * usual
+            and not any(e.near(int(mine.after[k])) for e in edges if e is not mine)
+            and not _explained(mine, k, moved)
+        ]
+        if lone:
+            yield _step(mine, lone, time)
+
+
+def _explained(mine: Edges, k: int, moved: BoolArray) -> bool:
+    """Return whether the spindle speed changes at jump `k`, and the channel does a third as much elsewhere there."""
+    near = np.convolve(moved, np.ones(7), mode="same") > 0
+    if not near[mine.before[k] : mine.after[k]].any():
+        return False
+    signal = mine.signal
+    rows, x = signal.rows, signal.x
+    here = (rows[2:] > mine.before[k] - 8) & (rows[:-2] < mine.after[k] + 8)
+    elsewhere = near[np.minimum(rows[:-2], len(near) - 1)] & ~here
+    most = np.abs(x[2:] - x[:-2])[elsewhere].max(initial=0.0)
+    return not most or abs(mine.height[k]) < 3 * most
+
+
+def _step(mine: Edges, lone: list[int], time: FloatArray) -> Finding:
+    """Tell the largest step; two that cancel each other are told as a stretch to be deleted."""
+    channel = mine.signal.channel
+    k = max(lone, key=lambda j: abs(mine.height[j]))
+    height, row = float(mine.height[k]), int(mine.after[k])
+    back = [j for j in lone if abs(mine.height[j] + height) < 0.25 * abs(height)]
+    if len(lone) == 2 and back:
+        first, last = (int(r) for r in sorted([row, int(mine.after[back[0]])]))
+        up = float(mine.height[min(lone)])
+        text = (
+            f"is off by {up:+.3g} {channel.unit} from {at_row(first, time)} to {at_row(last - 1, time)}, by a step "
+            "that no other channel shares and that comes back: delete these values"
+        )
+        rows = np.arange(first - 1, last)
+        return Finding("trouble", channel.name, "step", text, rows, remedy=cut(channel.name, rows, time, "step"))
+    more = f", the largest of {len(lone)} such steps" if len(lone) > 1 else ""
+    text = (
+        f"steps by {height:+.3g} {channel.unit} at {at_row(row, time)}{more}, which no other channel shares: a sensor "
+        "or probe that was touched or came loose. Cut the test there into two files, each with its own zero, subtract "
+        "the step behind it, or leave the channel out"
+    )
+    times = sorted(float(time[mine.after[j]]) for j in lone)
+    zeroed = [{"do": "rezero", "channels": [channel.name], "at": t, "reason": "step"} for t in times]
+    return Finding("trouble", channel.name, "step", text, row=row, remedy={"clean": zeroed})
+
+
+def _exchanged(a: Edges, b: Edges, row: int, height: float, moved: BoolArray) -> bool:
+    """Return whether `a`, which jumps by `height` to a new level at `row`, and `b` change places there."""
+    if a.signal.channel.quantity != b.signal.channel.quantity:
+        return False
+    for j in np.flatnonzero(b.after == row):
+        k = int(np.flatnonzero(a.after == row)[0])
+        # a start of the spindle moves many at once: there both must be beyond doubt
+        if moved[max(row - 4, 0) : row + 3].any() and not (a.clear[k] and b.clear[j]):
+            return False
+        before, first, second = int(b.before[j]), a.signal.values, b.signal.values
+        misses = [b.height[j] + height, first[row] - second[before], second[row] - first[before]]
+        return bool(np.abs(misses).max() <= 0.25 * abs(height))
+    return False
+
+
+def _swap(a: Signal, b: Signal, row: int, time: FloatArray) -> Finding:
+    text = (
+        f"changes places with {b.channel.name} at {at_row(row, time)}: each goes on where the other was. Swap the two "
+        "columns back from there on, or leave both out"
+    )
+    names = sorted([a.channel.name, b.channel.name])  # both tell the same step
+    back = {"do": "swap", "channels": names, "at": float(time[row])}
+    return Finding("trouble", a.channel.name, "swapped", text, row=row, remedy={"clean": [back]})

@@ -1,0 +1,310 @@
+"""What is wrong with a recording: gaps, dead, stuck and spiking sensors, codes, wrong units, steps, swaps, clocks."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from thermocomp.core.machine import Channel
+from thermocomp.recordings.checks import suspects
+from thermocomp.recordings.checks.clocks import clocks
+from thermocomp.recordings.checks.findings import (
+    SEVERITIES,
+    BoolArray,
+    Finding,
+    FloatArray,
+    IntArray,
+    Severity,
+    Signal,
+    at_row,
+    column,
+    count,
+    cut,
+    runs,
+    speed_changes,
+)
+from thermocomp.recordings.checks.jumps import jumps
+from thermocomp.recordings.checks.spikes import spikes
+from thermocomp.recordings.checks.stuck import stuck
+from thermocomp.recordings.compensated import UNKNOWN
+from thermocomp.recordings.cycles import SPLITS
+from thermocomp.recordings.recording import Recording
+
+__all__ = ["Finding", "Severity", "check", "lasting_trouble", "troubled_rows"]
+
+#: numbers that instruments write instead of a value
+CODES = (-9999.0, -999.0, 9999.0, 99999.0, -99999.0, -32768.0, 32767.0, 1e30, -1e30)
+#: the same for temperatures [degC]: absent thermistor, 0 K, DS18B20 unplugged and just switched on, open thermocouple
+TEMPERATURE_CODES = (-180.0, -273.15, -200.0, -127.0, 85.0, 850.0)
+#: what a machine tool can show [degC], [um], [urad]; wide for angles, which may be turns of a rotary axis
+PLAUSIBLE = {"temperature": (-60.0, 400.0), "displacement": (-1e5, 1e5), "angle": (-1e9, 1e9)}
+#: what a sensor's noise never lets stand still; a spindle speed or a position may well
+_SENSED = ("temperature", "displacement", "angle")
+
+
+def check(recording: Recording) -> tuple[Finding, ...]:
+    """Look for what makes a recording unfit for a model.
+
+    Parameters
+    ----------
+    recording : Recording
+
+    Returns
+    -------
+    tuple of Finding
+        The gravest first; empty if nothing was found.
+
+    Notes
+    -----
+    Thresholds are set so that a sound recording of a real machine raises no trouble; each check's docstring names its
+    own.
+    """
+    time = recording.time
+    found = [Finding("warning", "", "left out", note) for note in recording.notes if note.startswith("left out")]
+    if recording.compensation == "unknown":
+        found.append(Finding("trouble", "", "compensation", UNKNOWN))
+    found += [*_sampling(time), *_no_cycle(recording), *_duplicates(recording)]
+    speed = None
+    if recording.speed is not None:  # what is beyond is no speed, and its square no number
+        speed = np.clip(np.nan_to_num(recording.table[recording.speed.name].to_numpy(dtype=np.float64)), -1e9, 1e9)
+    moved = speed_changes(speed, len(time))
+    probed = _probed(recording)
+    signals = []
+    for channel in recording.channels:
+        values = recording.table[channel.name].to_numpy(dtype=np.float64)
+        signal, mine = _channel(channel, values, time, moved, probed=channel.name in probed)
+        found += mine
+        signals.append(signal)
+    found += _together(signals, time, moved, speed, stamped=bool(recording.start))
+    return tuple(sorted(found, key=lambda f: SEVERITIES.index(f.severity)))
+
+
+def troubled_rows(recording: Recording, findings: Sequence[Finding] | None = None) -> dict[str, BoolArray]:
+    """Return the rows in which a channel is in trouble, where others of its rows are sound.
+
+    Parameters
+    ----------
+    recording : Recording
+    findings : sequence of Finding, optional
+        Of `check`; it is called if they are not given.
+
+    Returns
+    -------
+    dict of str to ndarray of bool of shape (n_rows,)
+        By the channel's name; only channels with such rows: spikes, codes, implausible values, what is stuck, and a
+        step with its way back. See `lasting_trouble` for the rest.
+    """
+    rows: dict[str, BoolArray] = {}
+    for f in check(recording) if findings is None else findings:
+        if f.severity == "trouble" and f.rows is not None:
+            rows.setdefault(f.channel, np.zeros(len(recording), dtype=np.bool_))[f.rows] = True
+    return rows
+
+
+def lasting_trouble(findings: Sequence[Finding]) -> tuple[Finding, ...]:
+    """Return the troubles that concern a whole channel or recording: units, steps, swaps, clocks, dead sensors."""
+    return tuple(f for f in findings if f.severity == "trouble" and f.rows is None)
+
+
+def _together(
+    signals: Sequence[Signal], time: FloatArray, moved: BoolArray, speed: FloatArray | None, *, stamped: bool
+) -> Iterator[Finding]:
+    """Yield what several channels, or a channel and the clock, tell together; a time from stamps has no unit."""
+    of = {q: [s for s in signals if s.channel.quantity == q and s.good.any()] for q in _SENSED}
+    yield from suspects.temperature_units(of["temperature"])
+    yield from suspects.displacement_units(of["displacement"], of["temperature"])
+    if not stamped:
+        yield from suspects.time_unit(time, of["temperature"])
+    yield from suspects.zeros([*of["displacement"], *of["angle"]], time)
+    whole = [s for s in signals if not s.probed and s.channel.quantity in _SENSED]
+    leaps = list(jumps(whole, time, moved))
+    yield from leaps
+    leaping = {f.channel for f in leaps}  # what such a step looks like to a regression is anyone's guess
+    yield from clocks([s for s in signals if s.channel.name not in leaping], time, speed)
+
+
+def _duplicates(recording: Recording) -> Iterator[Finding]:
+    prints: dict[int, str] = {}
+    for channel in recording.channels:
+        values = recording.table[channel.name].to_numpy(dtype=np.float64)
+        if np.nanmax(values, initial=-np.inf) > np.nanmin(values, initial=np.inf):  # constant ones are told as such
+            other = prints.setdefault(hash(values.tobytes()), channel.name)
+            if other != channel.name:
+                text = f"has the same value as {other} in every row; leave one of them out"
+                gone = column(channel.name, role="ignore")
+                yield Finding("warning", channel.name, "duplicate channel", text, remedy=gone)
+
+
+def _probed(recording: Recording) -> set[str]:
+    """Return the displacements that are measured in probing cycles: several have their few values in the same rows."""
+    rows: dict[bytes, list[str]] = {}
+    for channel in (*recording.displacements, *recording.of_quantity("residual")):
+        there = np.isfinite(recording.table[channel.name].to_numpy(dtype=np.float64))
+        if 1 < there.sum() < 0.5 * len(there):
+            rows.setdefault(there.tobytes(), []).append(channel.name)
+    return {name for names in rows.values() if len(names) > 1 for name in names}
+
+
+def _channel(
+    channel: Channel, values: FloatArray, time: FloatArray, moved: BoolArray, *, probed: bool
+) -> tuple[Signal, list[Finding]]:
+    """Return the sound part of a channel, and all findings of this channel alone."""
+    least, most = PLAUSIBLE.get(channel.quantity, (-np.inf, np.inf))
+    plausible = (values >= least) & (values <= most)
+    coded = _coded(channel, values, plausible)
+    found = [_code_finding(channel, values, coded, time)] if coded.any() else []
+    wild: IntArray = np.flatnonzero(np.isfinite(values) & ~plausible & ~coded)
+    if wild.size:
+        found.append(_wild_finding(channel, values, wild, time))
+    found += _missing(channel.name, values, time, probed=probed)
+    # the other checks look at the rest: beside such values nothing else would stand out
+    signal = Signal(channel, values, np.isfinite(values) & plausible & ~coded, probed)
+    x = signal.x
+    if probed or len(x) < 2:
+        return signal, found
+    if x.min() == x.max():
+        found.append(_constant_finding(channel, x))
+    elif channel.quantity in _SENSED and len(x) >= 5:
+        nearby = np.convolve(np.concatenate([moved, [False]]), np.ones(5), mode="same") > 0
+        mine = [*spikes(signal, time, nearby), *stuck(signal, time)]
+        found += mine
+        gone = [f.rows for f in mine if f.rows is not None]
+        signal = signal.without(np.concatenate(gone)) if gone else signal
+    return signal, found
+
+
+def _wild_finding(channel: Channel, values: FloatArray, wild: IntArray, time: FloatArray) -> Finding:
+    least, most = PLAUSIBLE[channel.quantity]
+    row = int(wild[np.argmax(np.abs(values[wild]))])
+    text = (
+        f"{count(wild.size, 'value')} of {len(values)} beyond {least:g} to {most:g} {channel.unit}, the farthest "
+        f"{values[row]:g} at {at_row(row, time)}: no {channel.quantity} of a machine; check unit, scale, zero and "
+        "sensor"
+    )
+    every = wild.size == np.isfinite(values).sum()
+    if every:
+        return Finding("trouble", channel.name, "implausible", text)
+    return Finding(
+        "trouble", channel.name, "implausible", text, wild, remedy=cut(channel.name, wild, time, "implausible")
+    )
+
+
+def _constant_finding(channel: Channel, x: FloatArray) -> Finding:
+    sensed = channel.quantity in _SENSED
+    advice = "check whether the sensor is connected, or leave the channel out" if sensed else "it tells models nothing"
+    text = f"is {x[0]:g} {channel.unit} in all {len(x)} rows; {advice}"
+    gone = column(channel.name, role="ignore")
+    return Finding("trouble" if sensed else "info", channel.name, "constant", text, remedy=gone)
+
+
+def _sampling(time: FloatArray) -> Iterator[Finding]:
+    """Yield too few rows, gaps, and irregular intervals.
+
+    Few is: under 10. A gap: over 5 times the interval that 90 % of the rows keep. Irregular: varying by over 20 %.
+    """
+    if len(time) < 10:
+        text = f"has only {count(len(time), 'row')}, too few to say anything; record a whole warm-up and cool-down"
+        yield Finding("warning", "", "short", text)
+    if len(time) < 3:
+        return
+    steps = np.diff(time)
+    # the 90 % quantile, not the median: probings that come in bursts are irregular, they have no gap every minute
+    usual = float(np.quantile(steps, 0.9, method="lower"))
+    gaps = np.flatnonzero(steps > 5 * usual)
+    if gaps.size:
+        longest = int(gaps[np.argmax(steps[gaps])])
+        text = (
+            f"{count(gaps.size, 'gap')} in time, the longest {steps[longest]:.6g} s after {at_row(longest, time)}, "
+            f"where rows are {usual:g} s apart; a model's memory is unsure behind it: split the test there or "
+            "record it again"
+        )
+        yield Finding("warning", "", "gap", text, row=longest)
+    kept = steps[steps <= 5 * usual]
+    low, middle, high = (float(q) for q in np.quantile(kept, (0.05, 0.5, 0.95)))
+    if high - low > 0.2 * middle:
+        text = (
+            f"rows are {low:.4g} to {high:.4g} s apart (median {middle:.4g} s); "
+            "resample for methods that need one interval"
+        )
+        # so that every interval has a row
+        even = {"clean": [{"do": "resample", "every_s": float(np.ceil(kept.max()))}]}
+        yield Finding("warning", "", "irregular sampling", text, remedy=even)
+
+
+def _no_cycle(recording: Recording) -> Iterator[Finding]:
+    if len(recording.cycles) > 1:
+        return
+    why = "there is no spindle speed and no column 'cycle'"
+    if recording.speed is not None:
+        speed = np.abs(np.nan_to_num(recording.table[recording.speed.name].to_numpy(dtype=np.float64)))
+        runs = int(np.count_nonzero(np.diff(speed > 0.02 * speed.max(initial=0.0), prepend=False)) + 1) // 2
+        why = "the spindle does not start anew"
+        if runs > 1:
+            why = (
+                f"none of the spindle's {runs} starts has a stop and a run of {SPLITS:.0f} s about it (are the times "
+                "minutes or hours? Then say so in a mapping: [time] unit)"
+            )
+    text = (
+        f"the whole test is one thermal cycle, as {why}; judging on unseen cycles needs several cycles or several tests"
+    )
+    yield Finding("info", "", "no cycle", text)
+
+
+def _coded(channel: Channel, values: FloatArray, plausible: BoolArray) -> BoolArray:
+    """Return where a known code stands, if it stands apart from the other values by half their span and by 5 units."""
+    none = np.zeros(len(values), dtype=np.bool_)
+    if channel.quantity not in _SENSED:
+        return none
+    codes = CODES + (TEMPERATURE_CODES if channel.quantity == "temperature" else ())
+    # a change of unit may have rounded a code
+    hits = {c: np.abs(values - c) <= 1e-9 * abs(c) for c in codes}
+    hits = {c: hit for c, hit in hits.items() if hit.any()}
+    rest = values[plausible & ~np.logical_or.reduce([none, *hits.values()])]
+    if rest.size:
+        low, high = float(rest.min()), float(rest.max())
+        margin = max(0.5 * (high - low), 5.0)
+        hits = {c: hit for c, hit in hits.items() if not low - margin <= c <= high + margin}
+    found: BoolArray = np.logical_or.reduce([none, *hits.values()])
+    return found
+
+
+def _code_finding(channel: Channel, values: FloatArray, coded: BoolArray, time: FloatArray) -> Finding:
+    codes = ", ".join(f"{c:g}" for c in np.unique(values[coded]))
+    first = int(np.flatnonzero(coded)[0])
+    every = coded.sum() == np.isfinite(values).sum()
+    if every:
+        text = (
+            f"is {codes} in every row, a code for a missing value: the sensor is absent; leave the channel out, or "
+            f"mark the code by a mapping, missing = [{codes}]"
+        )
+    else:
+        text = (
+            f"{count(int(coded.sum()), 'value')} of {len(values)}, the first at {at_row(first, time)}, hold {codes}, a "
+            f"code for a missing value; mark it by a mapping, missing = [{codes}]"
+        )
+    said = {"role": "ignore"} if every else {"missing": np.unique(values[coded]).tolist()}
+    rows = None if every else np.flatnonzero(coded)
+    return Finding("trouble", channel.name, "missing-value code", text, rows, remedy=column(channel.name, **said))
+
+
+def _missing(name: str, values: FloatArray, time: FloatArray, *, probed: bool) -> Iterator[Finding]:
+    """Yield missing values; trouble where they are more than a fifth, but between the cycles of a touch probe."""
+    gone = ~np.isfinite(values)
+    n = int(gone.sum())
+    if not n:
+        return
+    if n == len(values):
+        text = "has no value at all; leave the channel out"
+        yield Finding("trouble", name, "missing values", text, remedy=column(name, role="ignore"))
+        return
+    if probed:
+        text = f"has {len(values) - n} values in {len(values)} rows, as others have: probing cycles"
+        yield Finding("info", name, "probed", f"{text}; models see only these rows")
+        return
+    starts, lengths = runs(gone)
+    starts, lengths = starts[gone[starts]], lengths[gone[starts]]
+    longest = int(np.argmax(lengths))
+    text = (
+        f"{count(n, 'value')} of {len(values)} ({n / len(values):.1%}) missing, at most {lengths[longest]} "
+        f"in a row from {at_row(int(starts[longest]), time)}; models skip these rows: mend the sensor if they are many"
+    )
+    yield Finding("trouble" if n > 0.2 * len(values) else "warning", name, "missing values", text)

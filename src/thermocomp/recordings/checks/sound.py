@@ -1,0 +1,48 @@
+"""What `check` finds reaches the judgement: rows in trouble are left out, other trouble is kept in mind."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from thermocomp.recordings.checks.quality import check, lasting_trouble, troubled_rows
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.samples import Samples
+
+
+def drop_unsound(samples: Samples, recordings: Sequence[Recording]) -> Samples:
+    """Return samples without what is in trouble.
+
+    Parameters
+    ----------
+    samples : Samples
+    recordings : sequence of Recording
+        What they were stacked of, in their order; the files that they go on from are looked at, too.
+
+    Returns
+    -------
+    Samples
+        Values in trouble are missing (nan); trouble of a whole channel or recording stands in ``trouble``.
+    """
+    values, deviations = samples.values.copy(), samples.deviations.copy()
+    trouble: list[tuple[str, str]] = []
+    for k, recording in enumerate(recordings):
+        rows = np.flatnonzero(samples.test == k)
+        first = 0
+        for part in (*(samples.starts[k].earlier if samples.starts else ()), recording):
+            mine, first = rows[first : first + len(part)], first + len(part)
+            own = (*samples.inputs, *samples.targets) if part is recording else samples.inputs
+            named = {part.channel(c.name).name: c.name for c in own}
+            findings = check(part)
+            for name, hit in troubled_rows(part, findings).items():
+                for table, channels in ((values, samples.inputs), (deviations, samples.targets)):
+                    for j, c in enumerate(channels):
+                        if named.get(name) == c.name:
+                            table[mine[hit], j] = np.nan
+            called = samples.test_names[k] if part is recording else part.name
+            trouble += [
+                (named.get(f.channel, ""), f"{called}: {f.channel or 'the recording'} has trouble ({f.kind})")
+                for f in lasting_trouble(findings)
+                if not f.channel or f.channel in named
+            ]
+    return replace(samples, values=values, deviations=deviations, trouble=tuple(dict.fromkeys(trouble)))

@@ -1,0 +1,101 @@
+"""A value that stands still though its sensor should move, and the steps a channel moves in."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from thermocomp.recordings.checks.findings import BoolArray, Finding, FloatArray, Severity, Signal, at_row, cut, runs
+
+#: rows that a value must stand still for
+SHORTEST = 30
+#: chance in the whole recording that noise and resolution alone let a value stand as long
+_CHANCE = 1e-3
+
+
+def stuck(signal: Signal, time: FloatArray) -> Iterator[Finding]:
+    """Yield stretches of 30 or more rows in which a value stands still though the sensor says it should move.
+
+    It should if its noise shakes it right before and after, or if it was moving fast and stops dead. A sensor that
+    creeps to rest, or whose noise is finer than its resolution, may well stand still: noise of a single step makes it a
+    warning, and only over a tenth of the test. So does noise of a few steps, if it leaves a value in the middle of a
+    step as long by chance (once in a thousand recordings). How coarse the steps are is told as an info.
+
+    Parameters
+    ----------
+    signal : Signal
+        Of 5 good rows or more, not constant.
+    time : ndarray of shape (n_rows,)
+        [s]
+    """
+    x, rows, channel = signal.x, signal.rows, signal.channel
+    step, span = _resolution(x), signal.span
+    moves = np.diff(x) / step
+    coarse = step > 0.02 * span and np.count_nonzero(moves) >= 10 and np.abs(moves - np.round(moves)).max() < 1e-3
+    starts, lengths = runs(x)
+    longest = [int(k) for k in np.argsort(lengths, kind="stable")[::-1][:20] if lengths[k] >= SHORTEST]
+    possible = _by_chance(x, step, np.repeat(lengths < SHORTEST, lengths)) if longest else 0.0
+    reasons = {k: _why(x, int(starts[k]), int(lengths[k]), step, possible) for k in longest}
+    for severity in ("trouble", "warning"):
+        hits = [k for k in longest if reasons[k] == severity]
+        if not hits or (severity == "warning" and coarse):
+            continue
+        k = hits[0]
+        first, last = int(rows[starts[k]]), int(rows[starts[k] + lengths[k] - 1])
+        more = f", one of {len(hits)} such stretches" if len(hits) > 1 else ""
+        text = (
+            f"stands still at {x[starts[k]]:.6g} {channel.unit} for {lengths[k]} rows, from {at_row(first, time)} to "
+            f"{at_row(last, time)}{more}, while it moves from row to row right beside; check the sensor, then delete "
+            "the values or leave the channel out"
+        )
+        # the first value of each stretch may have been measured
+        concerned = np.concatenate([rows[starts[j] + 1 : starts[j] + lengths[j]] for j in sorted(hits)])
+        yield Finding(
+            severity, channel.name, "stuck", text, concerned, remedy=cut(channel.name, concerned, time, "stuck")
+        )
+    if coarse:
+        text = f"moves in steps of {step:g} {channel.unit} over a span of {span:.3g}; a finer resolution would help"
+        yield Finding("info", channel.name, "quantised", text)
+
+
+def _by_chance(x: FloatArray, step: float, lively: BoolArray) -> float:
+    """Return how many rows the noise may leave a value in the middle of a step, by chance, somewhere in `x`."""
+    moves = np.diff(x)[lively[1:]]
+    moving = moves[np.abs(moves) <= max(8 * float(np.median(np.abs(moves))), 2 * step)] if moves.size else moves
+    if moving.size < 8:
+        return 0.0
+    # a difference has twice the noise's variance and twice that of the rounding
+    variance = float(np.var(moving)) / 2 - step**2 / 12
+    stay = math.erf(step / math.sqrt(8 * variance)) if variance > 0 else 1.0
+    return len(x) if stay == 1 else math.log(_CHANCE / len(x)) / math.log(stay) if stay > 0 else 0.0
+
+
+def _why(x: FloatArray, start: int, length: int, step: float, possible: float) -> Severity | None:
+    """Judge one standing stretch of `length` rows by the 50 rows on each side of it."""
+    before, after = x[max(start - 50, 0) : start + 1], x[start + length - 1 : start + length + 50]
+    sides = [np.diff(side) for side in (before, after) if len(side) > 30]
+    if not sides:
+        return "trouble" if length > 0.9 * len(x) else None
+    noisy, fine = True, length > possible
+    for moves in sides:
+        real = moves[moves != 0]
+        drifting = real - np.median(real) if real.size else real
+        # noise on a slope does not turn the signal, but the moves go up and down by more than rounding explains
+        turns = max(_turns(real), _turns(drifting[np.abs(drifting) > 1.01 * step]))
+        noisy = noisy and real.size >= 8 and turns >= real.size / 5 and length * (real.size + 1) >= 20 * moves.size
+        fine = fine and bool(np.abs(real).max(initial=0) > 1.5 * step)
+    if noisy:
+        return "trouble" if fine else "warning" if length >= len(x) // 10 else None
+    last = np.abs(np.diff(before[-6:]))
+    return "trouble" if last.size == 5 and last.min() >= 10 * step else None
+
+
+def _turns(moves: FloatArray) -> int:
+    return int(np.count_nonzero(np.diff(np.sign(moves))))
+
+
+def _resolution(x: FloatArray) -> float:
+    """Return the smallest step of a channel that is not constant, rounding errors apart."""
+    moves = np.diff(x)
+    steps = np.abs(np.concatenate([moves, np.diff(moves)]))
+    return float(steps[steps > 1e-9 * np.abs(x).max()].min(initial=np.ptp(x)))

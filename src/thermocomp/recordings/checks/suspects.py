@@ -1,0 +1,188 @@
+"""Units that cannot be right, and displacements that do not start at their zero."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from thermocomp.recordings.checks.findings import Finding, FloatArray, Severity, Signal, column
+
+_ABSOLUTE = 273.15
+
+
+#: a displacement beyond that in a whole test is no drift [um]
+FAR = 5000.0
+
+
+def temperature_units(signals: Sequence[Signal]) -> Iterator[Finding]:
+    """Yield temperatures that are Kelvin or degrees Fahrenheit, though the heading says degC.
+
+    Kelvin: 98 % of the values lie between 240 and 400, so that the sensor never cooled to below 240 degC, which is
+    hotter than any part of a machine stays. Fahrenheit: nothing in the whole test is ever below 50 (1 % quantile of
+    every sensor that is not Kelvin), but no hall is at 50 degC; 50 degF are 10 degC, so that in a colder hall it is
+    not noticed. Of single sensors among others: it is always warmer than all others ever are, taken as degF it lies
+    between the others' lowest less 3 degC and their highest plus 5 degC, and it moves with one of them (rank
+    correlation over 0.7), which a part held hot does not.
+
+    Parameters
+    ----------
+    signals : sequence of Signal
+        The temperatures, without spikes.
+    """
+    ranges = {s.channel.name: np.quantile(s.x, (0.01, 0.99)) for s in signals if len(s.x) >= 5}
+    known = [s for s in signals if s.channel.name in ranges]
+    kelvin = [s for s in known if ranges[s.channel.name][0] >= 240 and ranges[s.channel.name][1] <= 400]
+    for s in kelvin:
+        low, high = (float(v) for v in ranges[s.channel.name])
+        yield _wrong_unit(s, low, high, "K", low - _ABSOLUTE)
+    rest = [s for s in known if s not in kelvin]
+    warm = [s for s in rest if ranges[s.channel.name][0] >= 50]
+    others = [s for s in rest if s not in warm]
+    for s in warm:
+        low, high = (float(v) for v in ranges[s.channel.name])
+        if not others or _follows(s, others):
+            yield _wrong_unit(s, low, high, "degF", (low - 32) / 1.8)
+
+
+def _follows(signal: Signal, others: Sequence[Signal]) -> bool:
+    """Return whether a warm sensor, taken as degF, behaves as the others do."""
+    converted = (signal.x - 32) / 1.8
+    low = min(float(s.x.min()) for s in others)
+    high = max(float(s.x.max()) for s in others)
+    if signal.x.min() <= high or converted.min() < low - 3 or converted.max() > high + 5:
+        return False
+    return any(_rank_correlation(signal, s) > 0.7 for s in others)
+
+
+def _rank_correlation(a: Signal, b: Signal) -> float:
+    both = a.good & b.good
+    if both.sum() < 10:
+        return 0.0
+    x, y = (s.values[both].argsort().argsort().astype(np.float64) for s in (a, b))
+    return float(np.corrcoef(x, y)[0, 1])
+
+
+def _wrong_unit(signal: Signal, low: float, high: float, unit: str, coldest: float) -> Finding:
+    text = (
+        f"lies between {low:.4g} and {high:.4g} degC all the time, which no machine does; as {unit} its coldest would "
+        f'be {coldest:.1f} degC. Say so in a mapping: unit = "{unit}"'
+    )
+    return Finding("trouble", signal.channel.name, "unit", text, remedy=column(signal.channel.name, unit=unit))
+
+
+def displacement_units(signals: Sequence[Signal], temperatures: Sequence[Signal]) -> Iterator[Finding]:
+    """Yield displacements whose numbers must be mm, though the heading says um, or um that are called mm.
+
+    No machine drifts by `FAR`.
+
+    A probe whose values lie within 0.3 um in the whole test, noise and all, is quieter than any: 0.3 mm is more than
+    machines drift. And where the probe that moves most makes less than 0.05 um per degC of the sensor that moves
+    most, all of them are: 100 mm of steel grow by 1.1 um per degC. Only a warning where no temperature moves
+    by 1 degC: a still machine may move as little.
+
+    Parameters
+    ----------
+    signals, temperatures : sequence of Signal
+        Without spikes.
+    """
+    spans = {s.channel.name: s.span for s in signals if len(s.x) >= 5}
+    moving = {s.channel.name: width for s in signals if s.channel.name in spans and (width := float(np.ptp(s.x))) > 0}
+    warming = max((t.span for t in temperatures if len(t.x) >= 5), default=np.inf)
+    largest = max(spans.values(), default=0.0)
+    all_of_them = np.isfinite(warming) and warming >= 1 and largest < 0.05 * warming
+    for name, width in moving.items():
+        if width > FAR:
+            text = (
+                f"moves by {width / 1000:.3g} mm in the whole test, more than any machine drifts. Are these um, or nm? "
+                'Then say so in a mapping: unit = "um"'
+            )
+            yield Finding("trouble", name, "unit", text, remedy=column(name, unit="um"))
+        if width >= 0.3 and not all_of_them:
+            continue
+        against = f" while a temperature moves by {warming:.3g} degC" if np.isfinite(warming) else ""
+        text = (
+            f"moves by {width:.2g} um in the whole test{against}, less than any probe at a machine. Are these "
+            'mm? Then say so in a mapping: unit = "mm"; else the probe does not touch'
+        )
+        severity: Severity = "trouble" if warming >= 1 else "warning"
+        yield Finding(severity, name, "unit", text, remedy=column(name, unit="mm"))
+
+
+def time_unit(time: FloatArray, temperatures: Sequence[Signal]) -> Iterator[Finding]:
+    """Yield a time that must be ms, though the heading says s.
+
+    Rows over an hour apart (median) tell nothing of a warm-up; nobody records one so. With rows of a second or two,
+    read as 17 or 33 min, the sensors tell it: the time in which a temperature moves by half its span, where it does so
+    fastest, is minutes to hours on a machine. Over a day for three quarters of the sensors is trouble. Sensors that
+    move by less than 1 degC, or less than 10 times their noise, are not asked; if none is left, ms are noticed only
+    where rows are over 3.6 s apart.
+
+    Parameters
+    ----------
+    time : ndarray of shape (n_rows,)
+        [s]
+    temperatures : sequence of Signal
+        Without spikes.
+    """
+    if len(time) < 10:
+        return
+    interval = float(np.median(np.diff(time)))
+    fastest = 0.0
+    if interval <= 3600 and time[-1] - time[0] > 86400:
+        times = [t for s in temperatures if (t := _half_span_time(s, time)) is not None]
+        fastest = float(np.quantile(times, 0.25)) if times else 0.0
+    if interval > 3600:
+        told = f"rows are {interval:.6g} s ({interval / 3600:.3g} h) apart"
+    elif fastest > 86400:
+        told = f"most temperatures take over {fastest / 86400:.3g} days for half of what they move by"
+    else:
+        return
+    text = (
+        f"the test would last {(time[-1] - time[0]) / 86400:.4g} days, and {told}: no warm-up is as slow. Are the "
+        'times ms? Then say so in a mapping: [time] unit = "ms"'
+    )
+    yield Finding("trouble", "", "time unit", text, remedy={"time": {"unit": "ms"}})
+
+
+def _half_span_time(signal: Signal, time: FloatArray) -> float | None:
+    """Return the shortest time in which a signal moves by half its span [s]; None if it does not move enough."""
+    x, t = signal.x, time[signal.good]
+    if len(x) < 10:
+        return None
+    span = signal.span
+    if span < max(1.0, 10 * signal.noise):
+        return None
+    for rows in np.unique(np.geomspace(1, len(x) - 1, 60).astype(int)):
+        moved = np.abs(x[rows:] - x[:-rows]) >= 0.5 * span
+        if moved.any():
+            return float((t[rows:] - t[:-rows])[moved].min())
+    return None
+
+
+def zeros(signals: Sequence[Signal], time: FloatArray) -> Iterator[Finding]:
+    """Yield displacements and tilts that do not start near their zero: a continued recording, or a probe not zeroed.
+
+    The start is the value nearest to 0 among the first and the median of the first three. Far is over 2 um or 2 urad,
+    over 5 % of the span and over 6 times the noise. A warning, as the numbers are sound; but models count from zero.
+
+    Parameters
+    ----------
+    signals : sequence of Signal
+        Displacements and angles, without spikes.
+    time : ndarray of shape (n_rows,)
+        [s]
+    """
+    for s in signals:
+        x = s.x
+        if len(x) < 3 or np.ptp(x) == 0:
+            continue
+        start = min(float(x[0]), float(np.median(x[:3])), key=abs)
+        if abs(start) > max(2.0, 0.05 * s.span, 6 * s.noise):
+            unit = s.channel.unit
+            text = (
+                f"starts at {start:.3g} {unit}, not near its zero; models count from zero at the start. If the test "
+                "is the continuation of another, join them; else take its first value for zero in a mapping: "
+                'zero = "first"'
+            )
+            row = int(s.rows[0])
+            zeroed = {"do": "rezero", "channels": [s.channel.name], "at": float(time[row]), "to": 0.0}
+            yield Finding("warning", s.channel.name, "not zeroed", text, row=row, remedy={"clean": [zeroed]})

@@ -1,0 +1,313 @@
+"""Cleaning: stretches that are cut, clocks that are shifted, probes that are zeroed anew, rows that are resampled.
+
+Nothing is changed but by a step that somebody has written down, and each step says what it did.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.recordings.rows import Instant, Rows
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+#: places that are listed
+MOST_LISTED = 40
+#: rows on each side that tell the height of a step
+_BESIDE = 3
+#: two times closer than that are one [s]
+_SAME = 1e-6
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of the cleaning, a table ``[[clean]]`` of a mapping.
+
+    Parameters
+    ----------
+    channels : tuple of str
+        What it concerns, by channel name.
+    do : str
+        Which one.
+    reason : str
+        Why, in words; it is reported with the step.
+    """
+
+    channels: tuple[str, ...] = ()
+    do: str = ""
+    reason: str = ""
+
+    def __post_init__(self) -> None:
+        self.check()
+
+    def check(self) -> None:
+        """Raise `InputError` if the step says nothing, or contradicts itself."""
+
+    def apply(self, rows: Rows) -> Rows:
+        """Return the cleaned rows, with a note of what was done."""
+        raise NotImplementedError
+
+    @property
+    def name(self) -> str:
+        """How the step is called in a message."""
+        return f"[[clean]] do = {self.do!r}"
+
+    def _refuse(self, found: str) -> InputError:
+        return InputError(f"{self.name}: {found}")
+
+    def _why(self) -> str:
+        return f" ({self.reason})" if self.reason else ""
+
+
+@dataclass(frozen=True)
+class Cut(Step):
+    """Take out values, or whole rows where no channel is named.
+
+    Parameters
+    ----------
+    times : tuple of float, str or pair of them
+        Instants, and stretches from one to another, both included; an instant is the time of a row.
+    """
+
+    times: tuple[Instant | tuple[Instant, Instant], ...] = ()
+    do: Literal["cut"] = "cut"
+
+    def check(self) -> None:
+        """Refuse a cut of nothing."""
+        if not self.times:
+            raise self._refuse('name what is cut, such as times = [50.0, [600.0, 660.0]] or ["2024-05-06T08:00:00"]')
+
+    def apply(self, rows: Rows) -> Rows:
+        """Set the values missing, or take the rows out."""
+        hit = np.zeros(len(rows.time), dtype=np.bool_)
+        for t in self.times:
+            hit |= self._rows(t, rows)
+        at = np.flatnonzero(hit)
+        listed = _listed([rows.place(int(k)) for k in at], at)
+        if not self.channels:
+            if hit.all():
+                raise InputError(f"{rows.source}: {self.name}: nothing would be left of the {len(hit)} rows")
+            kept = rows.kept(np.flatnonzero(~hit))
+            return kept.noted(f"cut: {len(at)} of {len(hit)} rows{self._why()}: {listed}")
+        table = rows.table.copy()
+        names = rows.columns(self.channels, self.name)
+        table.loc[hit, names] = np.nan
+        note = f"cut: {len(at)} of {len(hit)} values of {', '.join(names)}{self._why()}: {listed}"
+        return replace(rows, table=table).noted(note)
+
+    def _rows(self, t: Instant | tuple[Instant, Instant], rows: Rows) -> BoolArray:
+        single = not isinstance(t, tuple)
+        begin, end = (rows.seconds(v, self.name) for v in (t if isinstance(t, tuple) else (t, t)))
+        found: BoolArray = (rows.time >= begin - _SAME) & (rows.time <= end + _SAME)
+        if not found.any():
+            nearest = float(rows.time[np.argmin(np.abs(rows.time - begin))])
+            what = f"at {begin:.10g} s" if single else f"from {begin:.10g} to {end:.10g} s"
+            raise InputError(f"{rows.source}: {self.name}: there is no row {what}; the nearest is at {nearest:.10g} s")
+        return found
+
+
+@dataclass(frozen=True)
+class Shift(Step):
+    """Move channels in time, as those of a logger whose clock is wrong.
+
+    Parameters
+    ----------
+    by_s : float
+        What is added to their time [s].
+    """
+
+    by_s: float = 0.0
+    do: Literal["shift"] = "shift"
+
+    def check(self) -> None:
+        """Refuse a shift of nothing, or by nothing."""
+        if not self.channels or self.by_s == 0:
+            raise self._refuse('name whose clock is wrong, and by how much: channels = ["t1_C"] and by_s = -1200.0')
+
+    def apply(self, rows: Rows) -> Rows:
+        """Interpolate the channels at their new times; a spindle speed, which steps, keeps its last value."""
+        rows.refuse_twins(self.name)
+        table = rows.table.copy()
+        wanted = rows.time - self.by_s
+        after = np.clip(np.searchsorted(rows.time, wanted - _SAME), 0, len(wanted) - 1)
+        exact = np.abs(rows.time[after] - wanted) <= _SAME
+        before = np.where(exact, after, after - 1)
+        inside = (before >= 0) & (wanted <= rows.time[-1] + _SAME)
+        before = np.maximum(before, 0)
+        span = np.where(exact, 1.0, rows.time[after] - rows.time[before])
+        share = np.where(exact, 0.0, (wanted - rows.time[before]) / np.where(span == 0, 1.0, span))
+        steps = {c.name for c in rows.channels if c.quantity == "spindle_speed"}
+        for name in rows.columns(self.channels, self.name):
+            x = table[name].to_numpy(dtype=np.float64)
+            y = x[before] if name in steps else np.where(exact, x[before], x[before] + share * (x[after] - x[before]))
+            table[name] = np.where(inside, y, np.nan)
+        way = "later" if self.by_s > 0 else "earlier"
+        lost = int(np.count_nonzero(~inside))
+        note = f"shift: {', '.join(self.channels)} {abs(self.by_s):.10g} s {way}{self._why()}"
+        return replace(rows, table=table).noted(f"{note}; {lost} rows at the end of the test are left without a value")
+
+
+@dataclass(frozen=True)
+class Rezero(Step):
+    """Move a probe's values from an instant on, as after it was knocked or zeroed in the middle of a test.
+
+    Parameters
+    ----------
+    at : float or str
+        Time of the first row that is moved.
+    to : float, optional
+        What the value there becomes, in the house unit; without it the channel goes on as it went before.
+    until : float or str, optional
+        Time of the first row that is not moved any more; without it the rest of the test is moved.
+    """
+
+    at: Instant = 0.0
+    to: float | None = None
+    until: Instant | None = None
+    do: Literal["rezero"] = "rezero"
+
+    def check(self) -> None:
+        """Refuse to move nothing."""
+        if not self.channels:
+            raise self._refuse('name which probe, and when: channels = ["z_um"] and at = 3600.0')
+
+    def apply(self, rows: Rows) -> Rows:
+        """Move the values."""
+        begin = rows.seconds(self.at, self.name)
+        end = np.inf if self.until is None else rows.seconds(self.until, self.name)
+        moved = (rows.time >= begin - _SAME) & (rows.time < end - _SAME)
+        if not moved.any():
+            raise InputError(f"{rows.source}: {self.name}: there is no row at or after {begin:.10g} s")
+        first = int(np.argmax(moved))
+        table = rows.table.copy()
+        notes = []
+        for name in rows.columns(self.channels, self.name):
+            x = table[name].to_numpy(dtype=np.float64)
+            there = np.flatnonzero(moved & np.isfinite(x))
+            if not there.size:
+                raise InputError(f"{rows.source}: {self.name}: {name} has no value from {begin:.10g} s on")
+            height = _step(x, first, name, f"{rows.source}: {self.name}") if self.to is None else x[there[0]] - self.to
+            table[name] = np.where(moved, x - height, x)
+            told = f"{len(there)} values from {rows.place(first)} on by {-height:+.6g}"
+            notes.append(f"rezero: {name}: {told}{self._why()}")
+        return replace(rows, table=table).noted(*notes)
+
+
+@dataclass(frozen=True)
+class Swap(Step):
+    """Exchange two channels, as after two plugs were.
+
+    Parameters
+    ----------
+    at : float or str
+        Time of the first row that is exchanged; from there on all are.
+    """
+
+    at: Instant = 0.0
+    do: Literal["swap"] = "swap"
+
+    def check(self) -> None:
+        """Refuse anything but two channels."""
+        if len(set(self.channels)) != 2:
+            raise self._refuse('name the two that change places, and when: channels = ["t1_C", "t2_C"] and at = 3600.0')
+
+    def apply(self, rows: Rows) -> Rows:
+        """Exchange the values."""
+        a, b = rows.columns(self.channels, self.name)
+        kinds = {c.name: c.quantity for c in rows.channels}
+        if kinds[a] != kinds[b]:
+            raise InputError(
+                f"{rows.source}: {self.name}: {a} is a {kinds[a]} and {b} a {kinds[b]}: no two plugs change"
+            )
+        begin = rows.seconds(self.at, self.name)
+        moved = rows.time >= begin - _SAME
+        table = rows.table.copy()
+        table[a], table[b] = (
+            np.where(moved, rows.table[b], rows.table[a]),
+            np.where(moved, rows.table[a], rows.table[b]),
+        )
+        return replace(rows, table=table).noted(
+            f"swap: {a} and {b}, {int(moved.sum())} rows from {begin:.10g} s on{self._why()}"
+        )
+
+
+@dataclass(frozen=True)
+class Resample(Step):
+    """Average the rows over equal intervals; each ends at its time, so that no value comes from later.
+
+    Parameters
+    ----------
+    every_s : float
+        Length of an interval [s].
+    """
+
+    every_s: float = 0.0
+    do: Literal["resample"] = "resample"
+
+    def check(self) -> None:
+        """Refuse intervals without length, and single channels: a recording has one clock."""
+        if self.channels or not self.every_s > 0:
+            raise self._refuse("give the interval of all rows, such as every_s = 60.0, and no channels")
+
+    def apply(self, rows: Rows) -> Rows:
+        """Average; an interval without a row stays out, a value without a number in it is missing."""
+        rows.refuse_twins(self.name)
+        number = np.ceil((rows.time - rows.time[0]) / self.every_s - 1e-9).astype(np.int64)
+        last = np.flatnonzero(np.diff(number, append=number[-1] + 1))
+        mean = rows.table.groupby(number, sort=True).mean().reset_index(drop=True)
+        kept = rows.kept(last)
+        time = rows.time[0] + number[last] * self.every_s
+        note = f"resample: {len(rows.time)} rows to {len(last)}, averages over {self.every_s:.10g} s{self._why()}"
+        return replace(kept, time=time, table=mean).noted(note)
+
+
+def clean(rows: Rows, steps: Sequence[Step]) -> Rows:
+    """Apply the steps of a cleaning, one after the other.
+
+    Parameters
+    ----------
+    rows : Rows
+    steps : sequence of Step
+        Their times count from the first row of the file, whatever was cut before.
+
+    Returns
+    -------
+    Rows
+        With a note for each step.
+
+    Raises
+    ------
+    InputError
+        A channel or a row is not there, or nothing would be left.
+    """
+    for step in steps:
+        rows = step.apply(rows)
+    return rows
+
+
+def _step(x: FloatArray, first: int, name: str, owner: str) -> float:
+    """Return by how much a channel jumps at a row, beyond what it does beside it."""
+    before = np.flatnonzero(np.isfinite(x[:first]))[-_BESIDE:]
+    after = first + np.flatnonzero(np.isfinite(x[first:]))[:_BESIDE]
+    if not before.size or not after.size:
+        raise InputError(f"{owner}: {name} has no value before the instant, from which it could go on; give `to`")
+    y = x[np.concatenate([before, after])]
+    moves = np.concatenate([np.diff(x[before]), np.diff(x[after])])
+    slope = float(np.median(moves)) if moves.size else 0.0
+    middle = float(np.mean(np.arange(len(before), len(y))) - np.mean(np.arange(len(before))))
+    return float(np.mean(x[after]) - np.mean(x[before]) - slope * middle)
+
+
+def _listed(places: Sequence[str], at: NDArray[np.intp]) -> str:
+    """Return places in words, neighbours as one stretch."""
+    if not places:
+        return ""
+    breaks = np.flatnonzero(np.diff(at) > 1) + 1
+    parts = np.split(np.arange(len(at)), breaks)
+    words = [places[p[0]] if len(p) == 1 else f"{places[p[0]]} to {places[p[-1]].rpartition(' ')[2]}" for p in parts]
+    return ", ".join(words[:MOST_LISTED]) + " ..." * (len(words) > MOST_LISTED)

@@ -1,0 +1,99 @@
+"""Recordings that were made while a correction was in force: what a model may learn from of them.
+
+A model learns the uncompensated deviation. Beside it, ``z_um``, such a recording may hold what was measured,
+``z_residual_um``, and what was in force meanwhile, ``z_correction_um``; `uncompensated` parts them.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from thermocomp.core.correction import uncompensated
+from thermocomp.core.exceptions import RecordingError
+from thermocomp.recordings.recording import Recording
+
+#: the deviation may be off by so much from what makes it, rounded as it may be [um]
+ROUNDED = 0.5
+#: what is said of a recording, or of a column
+UNKNOWN = (
+    "compensation: unknown: nobody knows which correction was in force while it was measured, so it does not tell what "
+    "the machine does by itself; record with a controller that confirms its corrections and with its own temperature "
+    'compensation off. If none was in force, say compensation = "off" in a mapping'
+)
+
+
+def beside(target: str) -> tuple[str, str]:
+    """Return the names of the residual and of the correction of a target: ``z_residual_um`` of ``z_um``."""
+    base = target.removesuffix("_um")
+    return f"{base}_residual_um", f"{base}_correction_um"
+
+
+def refuse_compensated(recordings: Sequence[Recording], targets: Sequence[str]) -> None:
+    """Refuse recordings whose displacements are not those of an uncompensated machine.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+    targets : sequence of str
+        Displacement channels that are to be learned, or judged.
+
+    Raises
+    ------
+    RecordingError
+        It is not known what was in force; a residual has no uncompensated deviation beside it, or is asked for itself;
+        or the three do not fit together.
+    """
+    for recording in recordings:
+        where = recording.source or recording.name
+        if recording.compensation == "unknown":
+            raise RecordingError(f"{where}: {UNKNOWN}")
+        for target in targets:
+            _refuse(recording, target, where)
+
+
+def _refuse(recording: Recording, target: str, where: str) -> None:
+    name = recording.channel(target).name if recording.has(target) else target
+    residual, correction = beside(name)
+    sound = f"name the uncompensated deviation, {residual} - {correction}"
+    if not recording.has(name):
+        if recording.has(residual):
+            raise RecordingError(
+                f"{where}: there is {residual}, measured under compensation, but no {name}: add a column {name}, which "
+                f"is {residual} - {correction}"
+            )
+        return
+    channel = recording.channel(name)
+    if channel.quantity in ("residual", "correction"):
+        own = channel.name.replace(f"_{channel.quantity}_um", "_um")
+        raise RecordingError(
+            f"{where}: {channel.name} is a {channel.quantity}, of a machine under compensation: name the uncompensated "
+            f"deviation as the target, {own}"
+        )
+    if not recording.has(correction):
+        return
+    c = _values(recording, correction)
+    if not recording.has(residual):
+        if (c != 0.0).any():
+            raise RecordingError(
+                f"{where}: {name} was measured while {correction} was in force, and is taken for neither: call it "
+                f"{residual}, and add {name}, which is {residual} - {correction}"
+            )
+        return
+    d, r = _values(recording, name), _values(recording, residual)
+    if not np.isfinite(d).any() and np.isfinite(r).any():
+        raise RecordingError(f"{where}: {name} is empty beside {residual}: {UNKNOWN}")
+    off = d - uncompensated(r, c)
+    known = np.flatnonzero(np.isfinite(off))
+    if not known.size or recording.changed:
+        return
+    off -= np.median(off[known])  # they may count from another zero
+    worst = int(known[np.argmax(np.abs(off[known]))])
+    if abs(off[worst]) > ROUNDED:
+        raise RecordingError(
+            f"{where}: in row {worst} {name} is {d[worst]:g} um, and {residual} - {correction} is "
+            f"{r[worst]:g} - ({c[worst]:g}) um: one of them is wrong; {sound}"
+        )
+
+
+def _values(recording: Recording, name: str) -> "np.ndarray[tuple[int], np.dtype[np.float64]]":
+    return recording.table[recording.channel(name).name].to_numpy(dtype=np.float64)

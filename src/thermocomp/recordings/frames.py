@@ -1,0 +1,155 @@
+"""What a table that is in memory already means as a recording."""
+
+from collections.abc import Mapping, Sequence
+from datetime import datetime, timedelta
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from thermocomp.core.exceptions import InputError, RecordingError
+from thermocomp.core.instants import seconds
+from thermocomp.core.machine import Channel
+from thermocomp.core.units import find_unit
+from thermocomp.recordings.cycles import Cycle, find_cycles, make_single_cycle, split_by_labels
+from thermocomp.recordings.readers.headings import Meaning, understand
+
+FloatArray = NDArray[np.float64]
+
+
+def parts_of(
+    table: pd.DataFrame,
+    *,
+    time: str | ArrayLike | None = None,
+    units: Mapping[str, str] | None = None,
+    cycles: str | Sequence[object] | None = None,
+    name: str = "table",
+) -> dict[str, Any]:
+    """Return what a recording of a table is made of; see `thermocomp.recordings.recording.Recording.from_dataframe`.
+
+    Parameters
+    ----------
+    table : DataFrame of shape (n_rows, n_columns)
+    time : str or array-like of shape (n_rows,), optional
+    units : mapping of str to str, optional
+    cycles : str or sequence of object of shape (n_rows,), optional
+    name : str
+
+    Returns
+    -------
+    dict of str to object
+        Arguments of `Recording`.
+    """
+    units = dict(units or {})
+    columns = [str(c) for c in table.columns]
+    twice = sorted({c for c in columns if columns.count(c) > 1})
+    if twice:
+        raise RecordingError(f"{name}: two columns are named {twice[0]!r}; rename one of them")
+    for column in units:
+        if column not in columns:
+            raise InputError(f"{name}: units tells of {column!r}, and the columns are {', '.join(columns)}")
+    if not len(table):
+        raise RecordingError(f"{name}: the table has no row")
+    plain = table.set_axis(columns, axis=1)
+    labelled = cycles if isinstance(cycles, str) else "cycle" if cycles is None and "cycle" in columns else None
+    if labelled is not None and labelled not in columns:
+        raise InputError(f"{name}: cycles: no column is named {labelled!r}; there are {', '.join(columns)}")
+    clock, start, used = _time(plain, time, units, name)
+    data: dict[str, FloatArray] = {}
+    aliases: dict[str, str] = {}
+    channels, notes = [], []
+    for column in columns:
+        if column in (used, labelled):
+            continue
+        meaning = _meaning(column, units)
+        if meaning is None or meaning.unit.quantity == "time":
+            notes.append(f"left out: {column!r} has no unit of a channel; tell it by units={{{column!r}: 'degC'}}")
+            continue
+        values = _numbers(plain[column], f"{name}: column {column!r}")
+        data[meaning.name] = values * meaning.unit.scale + meaning.unit.shift
+        channels.append(Channel(meaning.name, meaning.unit.quantity, meaning.unit.house))
+        aliases |= {alias: meaning.name for alias in (column, meaning.base) if alias != meaning.name}
+    if not channels:
+        raise RecordingError(
+            f"{name}: none of the columns {', '.join(columns)} is understood as a channel: name them like t1_C, "
+            "drift_um or spindle_rpm, or tell their units by units={'T1': 'degC'}"
+        )
+    if len(data) < len(channels):
+        raise RecordingError(f"{name}: two columns would become the same channel; rename one of them")
+    speed = next((data[c.name] for c in channels if c.quantity == "spindle_speed"), None)
+    return {
+        "name": name,
+        "time": clock,
+        "table": pd.DataFrame(data),
+        "channels": tuple(channels),
+        "cycles": tuple(_cycles(plain[labelled].tolist() if labelled is not None else cycles, clock, speed, name)),
+        "start": start,
+        "aliases": aliases,
+        "notes": tuple(notes),
+    }
+
+
+def _time(table: pd.DataFrame, given: Any, units: Mapping[str, str], name: str) -> tuple[FloatArray, str, str | None]:
+    """Return the time since the first row [s], the first row's time stamp, and the column it was taken from."""
+    used = None
+    symbol = "s"
+    if given is None:
+        named = [c for c in table.columns if (m := _meaning(c, units)) is not None and m.unit.quantity == "time"]
+        if len(named) == 1:
+            given = named[0]
+        elif not named and isinstance(table.index, pd.DatetimeIndex | pd.TimedeltaIndex):
+            given = table.index
+        else:
+            found = f"there are {', '.join(named)}" if named else "no column such as time_s and no index of times"
+            raise RecordingError(
+                f"{name}: which is the time? {found}: name it by time=, the name of a column or an array"
+            )
+    if isinstance(given, str):
+        if given not in table.columns:
+            raise InputError(f"{name}: time: no column is named {given!r}; there are {', '.join(table.columns)}")
+        used, meaning = given, _meaning(given, units)
+        symbol = meaning.unit.symbol if meaning is not None else units.get(given, "s")
+        given = table[given]
+    values = np.asarray(given)
+    if values.shape != (len(table),):
+        raise InputError(f"{name}: time: want {len(table)} values, found an array of shape {values.shape}")
+    try:
+        passed = seconds(values)
+    except (TypeError, ValueError) as e:
+        raise RecordingError(f"{name}: the time holds something that is neither a number nor a datetime: {e}") from e
+    wrong = np.flatnonzero(~np.isfinite(passed))
+    if wrong.size:
+        raise RecordingError(f"{name}: the time is missing in row {wrong[0]}")
+    first = values[0]
+    if isinstance(first, datetime | np.datetime64):
+        return passed, pd.Timestamp(first).isoformat(), used
+    scale = 1.0 if isinstance(first, timedelta | np.timedelta64) else find_unit(symbol, "time").scale
+    return (passed - passed[0]) * scale, "", used
+
+
+def _meaning(column: str, units: Mapping[str, str]) -> Meaning | None:
+    """Return what a column is, by `units` or by its heading."""
+    if column not in units:
+        return understand(column)
+    meant = find_unit(units[column])
+    told = understand(column)
+    if told is not None and told.unit.quantity == meant.quantity:
+        return Meaning(told.name, told.base, meant)
+    return Meaning("_".join(column.split()), column, meant)
+
+
+def _numbers(values: Any, what: str) -> FloatArray:
+    try:
+        found = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as e:
+        raise RecordingError(f"{what} holds something that is no number: {e}") from e
+    return np.where(np.isinf(found), np.nan, found)
+
+
+def _cycles(labels: Sequence[object] | None, time: FloatArray, speed: FloatArray | None, name: str) -> Sequence[Cycle]:
+    if labels is not None:
+        if len(labels) != len(time):
+            raise InputError(f"{name}: cycles: {len(labels)} labels for {len(time)} rows")
+        return split_by_labels(labels)
+    return make_single_cycle(len(time)) if speed is None else find_cycles(time, speed)

@@ -1,0 +1,298 @@
+"""`Profiles`: the error of one component along its axis, measured in one thermal state after the other."""
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.components import BY_CODE
+from thermocomp.core.exceptions import InputError, RecordingError
+from thermocomp.recordings.recording import Recording
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.intp]
+
+#: what is measured, by the unit of the error
+QUANTITY = {"um": "displacement", "urad": "angle"}
+#: fewer positions than this are no profile
+MIN_POSITIONS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Slopes:
+    """Least-squares fits of thermal parts, one per state: k_0 + k_1 q + k_2 q^2 ..., q in m (C-04, C-07).
+
+    Parameters
+    ----------
+    powers : tuple of int
+        Power of q that each factor belongs to.
+    factors : ndarray of shape (n_states, n_powers)
+        k_i [unit/m^i]; nan where a state has too few points.
+    errors : ndarray of shape (n_states, n_powers)
+        Their standard errors, by what the fit leaves of its own profile [unit/m^i].
+    residual : ndarray of shape (n_states, n_points)
+        What the fit leaves [unit].
+    remainder : float
+        The same of all states but the reference, RMS per degree of freedom [unit]; nan if there is none.
+    shared : float
+        Share of the errors' variance that is the same in all states: the noise of the reference.
+    """
+
+    powers: tuple[int, ...]
+    factors: FloatArray
+    errors: FloatArray
+    residual: FloatArray
+    remainder: float
+    shared: float
+
+
+@dataclass(frozen=True, eq=False)
+class Profiles:
+    """Error profiles of one component, measured in several thermal states.
+
+    Parameters
+    ----------
+    target : str
+        Code of the component, such as ``EYY``, or any other name.
+    unit : {'um', 'urad'}
+    axis : {'X', 'Y', 'Z'}
+        Along which it was measured.
+    points : ndarray of shape (n_points, 3)
+        x, y, z of the axes [mm]. Where the other two coordinates vary (C-06), the points come in lines: along each, the
+        axis' own position rises.
+    values : ndarray of shape (n_states, n_points)
+        Actual minus commanded [unit]; nan where a point was missed.
+    states : Recording
+        The thermal states, one row each: time, temperatures, spindle speed; cycles.
+    zero : ndarray of shape (n_points,), optional
+        Profile that counts as cold, in place of those of its own reference states [unit].
+
+    Raises
+    ------
+    RecordingError
+        Shapes differ, a number is infinite, there are fewer than 3 positions, they do not rise, or one comes twice.
+    InputError
+        Unit or axis are none, or not those of the component.
+    """
+
+    target: str
+    unit: Literal["um", "urad"]
+    axis: str
+    points: FloatArray
+    values: FloatArray
+    states: Recording
+    zero: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        owner = self._owner
+        if self.unit not in ("um", "urad"):
+            raise InputError(f"{owner}: unit {self.unit!r}: expected um or urad")
+        if self.axis not in ("X", "Y", "Z"):
+            raise InputError(f"{owner}: axis {self.axis!r}: expected X, Y or Z")
+        component = BY_CODE.get(self.target)
+        if component is not None:
+            if component.depends_on != self.axis:
+                along = f"is one along {component.depends_on}" if component.depends_on else "has no profile"
+                raise InputError(f"{owner}: {component.description} {along}; these are along {self.axis}")
+            if component.unit != self.unit:
+                raise InputError(f"{owner}: {component.description} is in {component.unit}; these are in {self.unit}")
+        if self.points.ndim != 2 or self.points.shape[1] != 3:
+            raise RecordingError(f"{owner}: points of shape {self.points.shape}: want x, y, z of each")
+        wanted = (len(self.states), len(self.points))
+        if self.values.shape != wanted:
+            raise RecordingError(
+                f"{owner}: values of shape {self.values.shape} for {wanted[0]} states and {wanted[1]} points"
+            )
+        if not np.isfinite(self.points).all():
+            k = int(np.flatnonzero(~np.isfinite(self.points).all(axis=1))[0])
+            raise RecordingError(f"{owner}: point {k + 1} at {self.points[k].tolist()} mm: must be finite numbers")
+        if np.isinf(self.values).any():
+            state, k = np.argwhere(np.isinf(self.values))[0]
+            raise RecordingError(
+                f"{owner}: infinite in state {state + 1} at {_place(self.points[k])}: leave out what was not measured"
+            )
+        self._check_positions()
+
+    def _check_positions(self) -> None:
+        owner = self._owner
+        found = np.unique(self.position)
+        if len(found) < MIN_POSITIONS:
+            raise RecordingError(
+                f"{owner}: {len(found)} positions along {self.axis} ({', '.join(f'{p:g}' for p in found)} mm); a "
+                f"profile needs at least {MIN_POSITIONS}"
+            )
+        last: dict[tuple[float, ...], float] = {}
+        seen: set[tuple[float, ...]] = set()
+        for point in self.points:
+            if tuple(point) in seen:
+                raise RecordingError(
+                    f"{owner}: two values of a state at {_place(point)}: take their mean, or read the two directions "
+                    "as two sets of profiles"
+                )
+            seen.add(tuple(point))
+            line = tuple(np.delete(point, self._own).tolist())
+            before, here = last.get(line, -np.inf), float(point[self._own])
+            if here < before:
+                raise RecordingError(
+                    f"{owner}: positions along {self.axis} must rise, but {here:g} mm comes behind {before:g} mm: sort "
+                    "them"
+                )
+            last[line] = here
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    @property
+    def _owner(self) -> str:
+        return f"{self.states.source or self.states.name}: profiles of {self.target}"
+
+    @property
+    def _own(self) -> int:
+        return "XYZ".index(self.axis)
+
+    @property
+    def position(self) -> FloatArray:
+        """Position of the axis itself at each point, shape (n_points,) [mm]."""
+        return self.points[:, self._own]
+
+    @property
+    def varying(self) -> str:
+        """Axes whose position is not the same at all points, such as ``YX``, the own one first."""
+        return self.axis + "".join(a for k, a in enumerate("XYZ") if a != self.axis and np.ptp(self.points[:, k]) > 0)
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """SHA-256 of states, points and values."""
+        digest = hashlib.sha256(self.states.fingerprint.encode())
+        for array in (self.points, self.values):
+            digest.update(np.ascontiguousarray(array, dtype=np.float64).tobytes())
+        return digest.hexdigest()
+
+    def reference_rows(self, reference: int | Sequence[int] = 0) -> IntArray:
+        """Return the states that count as cold.
+
+        Parameters
+        ----------
+        reference : int or sequence of int
+            Of the states, from 0; negative ones count from the last.
+
+        Raises
+        ------
+        InputError
+            There is no such state.
+        """
+        rows = np.atleast_1d(np.asarray(reference, dtype=np.intp))
+        n = len(self)
+        wrong = [int(k) for k in rows if not -n <= k < n]
+        if wrong or not rows.size:
+            raise InputError(f"{self._owner}: there is no reference state {wrong or 'named'}; there are 0 to {n - 1}")
+        return np.unique(rows % n)
+
+    def cold(self, reference: int | Sequence[int] = 0) -> FloatArray:
+        """Return the profile in the reference state (C-07).
+
+        Parameters
+        ----------
+        reference : int or sequence of int
+            See `reference_rows`; of several states it is the mean.
+
+        Returns
+        -------
+        ndarray of shape (n_points,)
+            [unit]; nan where no reference state has a value.
+        """
+        if self.zero is not None:
+            return self.zero
+        rows = self.values[self.reference_rows(reference)]
+        count = np.isfinite(rows).sum(axis=0)
+        return np.where(count > 0, np.nansum(rows, axis=0) / np.maximum(count, 1), np.nan)
+
+    def thermal(self, reference: int | Sequence[int] = 0) -> FloatArray:
+        """Return the profiles minus the one of the cold machine, shape (n_states, n_points) [unit] (C-07).
+
+        Parameters
+        ----------
+        reference : int or sequence of int
+            See `reference_rows`.
+        """
+        return self.values - self.cold(reference)
+
+    def slopes(
+        self,
+        order: int = 1,
+        *,
+        offset: bool = False,
+        reference: int | Sequence[int] = 0,
+        reference_position: float = 0.0,
+    ) -> Slopes:
+        """Fit k_1 q + k_2 q^2 ... to the thermal part of each profile (C-04, C-07).
+
+        Parameters
+        ----------
+        order : int
+            Highest power m; Chen finds 1 enough (C-05).
+        offset : bool
+            Fit a k_0 too; without it the lines go through the reference position, as Chen's.
+        reference : int or sequence of int
+            See `reference_rows`.
+        reference_position : float
+            Where q is zero [mm].
+
+        Returns
+        -------
+        Slopes
+
+        Raises
+        ------
+        InputError
+            Nothing would be fitted, or there are not more positions than factors.
+        """
+        powers = tuple(range(0 if offset else 1, order + 1))
+        n_positions = len(np.unique(self.position[self.position != reference_position])) + offset
+        if order < 0 or not powers or n_positions <= len(powers):
+            raise InputError(
+                f"{self._owner}: {len(powers)} factors cannot be fitted to {n_positions} positions; choose from 1 to "
+                f"{n_positions - 1}"
+            )
+        q = 1e-3 * (self.position - reference_position)
+        reach = float(np.abs(q).max())
+        # the columns are scaled, for powers of metres differ by much
+        columns = np.stack([(q / reach) ** k for k in powers], axis=1)
+        scale = np.array([reach**-k for k in powers])
+        thermal = self.thermal(reference)
+        factors = np.full((len(self), len(powers)), np.nan)
+        errors, residual = factors.copy(), np.full(thermal.shape, np.nan)
+        warm = np.ones(len(self), dtype=np.bool_)
+        warm[self.reference_rows(reference)] = False
+        freedom, squares = 0, 0.0
+        # states with the same points are fitted together
+        alike: dict[bytes, list[int]] = {}
+        for state, there in enumerate(np.isfinite(thermal)):
+            alike.setdefault(there.tobytes(), []).append(state)
+        for mine in alike.values():
+            there = np.isfinite(thermal[mine[0]])
+            n = int(there.sum())
+            if n <= len(powers) or np.linalg.matrix_rank(columns[there]) < len(powers):
+                continue
+            Q, R = np.linalg.qr(columns[there])
+            inverse = np.linalg.inv(R)
+            parts = thermal[np.ix_(mine, there)]
+            found = parts @ Q @ inverse.T
+            left = parts - found @ columns[there].T
+            rest = (left**2).sum(axis=1)
+            factors[mine] = found * scale
+            errors[mine] = np.sqrt(np.outer(rest / (n - len(powers)), (inverse**2).sum(axis=1))) * scale
+            residual[np.ix_(mine, there)] = left
+            freedom += (n - len(powers)) * int(warm[mine].sum())
+            squares += float(rest[warm[mine]].sum())
+        remainder = float(np.sqrt(squares / freedom)) if freedom else float("nan")
+        return Slopes(powers, factors, errors, residual, remainder, 1.0 / (1.0 + int((~warm).sum())))
+
+
+def _place(point: FloatArray) -> str:
+    return ", ".join(f"{a} {v:g}" for a, v in zip("XYZ", point, strict=True)) + " mm"

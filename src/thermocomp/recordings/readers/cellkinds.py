@@ -1,0 +1,74 @@
+"""What the cells of a column hold, whatever its heading says: numbers, dates, times of day, or both in one."""
+
+import re
+from collections.abc import Callable, Sequence
+from typing import Any, Literal
+
+import pandas as pd
+
+from thermocomp.recordings.readers.layout import is_stamp
+from thermocomp.recordings.readers.numbers import is_number_like
+
+#: a time of day, or one that has passed: hh:mm:ss beyond 24 h, with days before it
+CLOCK = re.compile(
+    r"(?:(?P<days>\d+)(?: days?,? |\.))?(?P<hours>\d+):(?P<minutes>\d\d)(?::(?P<seconds>\d\d(?:[.,:]\d+)?))?"
+)
+#: a time of day with AM or PM
+HALF = re.compile(r"\d{1,2}:\d\d(?::\d\d(?:\.\d+)?)? ?[AaPp]\.?[Mm]\.?")
+#: midnight, that a spreadsheet gives a date; the day from which it counts, that it gives a time of day
+_MIDNIGHT = re.compile(r"[ T]00:00(?::00(?:\.0+)?)?$")
+_FIRST_DAY = re.compile(r"^1(?:899-12-3[01]|904-01-01)[ T]")
+#: a day of the week before a date
+_WEEKDAY = re.compile(r"^[^\W\d_]{2,10}\.?,? +(?=\d{1,4}[-./]|\d{1,2}\.? +[^\W\d_]{3,})")
+#: a date of digits alone
+_COMPACT = re.compile(r"(?:19|20)\d\d(?:0[1-9]|1[0-2])(?:0[1-9]|[12]\d|3[01])")
+
+#: ``passed``: hours beyond a day, or days before them; ``other``: words; empty: nothing
+Kind = Literal["number", "date", "clock", "passed", "stamp", "other", ""]
+#: what the column of a number holds
+Kinds = Callable[[int], Kind]
+
+
+def find_kind(cells: Sequence[str]) -> Kind:
+    """Return what cells hold.
+
+    Parameters
+    ----------
+    cells : sequence of str
+        The first filled ones of a column.
+
+    Returns
+    -------
+    Kind
+        What most of them hold; ``date`` also of dates of which a spreadsheet made midnights. Stamps that are all the
+        same are no time of the rows, and count as words.
+    """
+    if not cells:
+        return ""
+    texts = [_FIRST_DAY.sub("", cell.strip().lstrip("'")) for cell in cells]
+
+    def are(what: Callable[[str], object]) -> bool:
+        return 2 * sum(bool(what(text)) for text in texts) > len(texts)
+
+    if are(lambda t: CLOCK.fullmatch(t) or HALF.fullmatch(t)):
+        clocks = [found for t in texts if (found := CLOCK.fullmatch(t))]
+        return "passed" if any(c["days"] or int(c["hours"]) > 23 for c in clocks) else "clock"
+    if are(is_number_like):
+        return "number"
+    texts = [_WEEKDAY.sub("", text) for text in texts]
+    if are(lambda t: is_stamp(t) and ":" in _MIDNIGHT.sub("", t)):
+        return "stamp" if len(texts) == 1 or len(set(texts)) > 1 else "other"
+    return "date" if are(is_stamp) else "other"
+
+
+def plain_dates(cells: "pd.Series[Any]") -> "pd.Series[str]":
+    """Return dates without a day of the week, a midnight of a spreadsheet, and with signs between their parts."""
+    plain = cells.astype(str).str.strip().str.replace(_MIDNIGHT, "", regex=True).str.replace(_WEEKDAY, "", regex=True)
+    if _COMPACT.fullmatch(plain.iloc[0]):
+        return plain.str.replace(r"^(\d{4})(\d\d)(\d\d)$", r"\1-\2-\3", regex=True)
+    return plain
+
+
+def plain_clocks(cells: "pd.Series[Any]") -> "pd.Series[str]":
+    """Return times of day, to which a spreadsheet may have given the day from which it counts."""
+    return cells.astype(str).str.strip().str.replace(_FIRST_DAY, "", regex=True)

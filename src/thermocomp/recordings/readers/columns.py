@@ -1,0 +1,349 @@
+"""What the columns of a recording are: understood by their headings' units, or by a mapping."""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import RecordingError, UnitError
+from thermocomp.core.machine import Channel
+from thermocomp.core.units import Unit, find_unit
+from thermocomp.recordings.readers.cellkinds import Kinds
+from thermocomp.recordings.readers.headings import Meaning, understand
+from thermocomp.recordings.readers.mapping import ColumnMap, Mapping, Place
+from thermocomp.recordings.readers.tables import tell_places
+from thermocomp.recordings.readers.timecolumns import find_position, find_time
+
+FloatArray = NDArray[np.float64]
+
+#: below this no absolute temperature of a machine lies [K]
+_COLDEST = 200.0
+_SCPI_INFINITY = 9.9e37
+#: what numbers may be that are too small for kelvins
+_DOUBTFUL = ({"unit": "degC"}, {"role": "ignore"})
+# A factor, such as the base of a level, turns one of these into another.
+_GEOMETRY = ("displacement", "angle", "position")
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of the file and the channel it becomes.
+
+    Parameters
+    ----------
+    index : int
+        Position in the file.
+    channel : Channel
+    unit : Unit
+        Of the scaled value.
+    rule : ColumnMap
+        Scale, zero and missing-value codes.
+    """
+
+    index: int
+    channel: Channel
+    unit: Unit
+    rule: ColumnMap
+
+    def refuse_doubtful(self, raw: FloatArray, heading: str, source: str) -> None:
+        """Refuse kelvins that are differences: nothing in a machine hall is colder than -73 degC."""
+        valid = np.abs(raw[np.isfinite(raw)])
+        if self.unit.symbol == "K" and not self.rule.unit and valid.size and float(np.median(valid)) < _COLDEST:
+            raise RecordingError(
+                f"{source}: column {heading!r}: values about {float(np.median(valid)):.3g} K are no temperatures but "
+                f'differences, or in degC; say which in a mapping, [columns.NAME] column = "{heading}" and unit = '
+                '"degC", or role = "ignore"',
+                [{"columns": {self.channel.name: {"column": heading, **said}}} for said in _DOUBTFUL],
+            )
+
+    def convert(
+        self, raw: FloatArray, missing: Sequence[float] = (), place: Callable[[int], str] = "row {}".format
+    ) -> tuple[FloatArray, tuple[str, ...]]:
+        """Return the values in the house unit, nan where missing, and notes on what was replaced, and where."""
+        notes = []
+        codes = np.array([*self.rule.missing, *missing])
+        absent = np.isin(raw, codes) if codes.size else np.zeros(len(raw), dtype=np.bool_)
+        if absent.any():
+            found = ", ".join(f"{c:g}" for c in np.unique(raw[absent]))
+            notes.append(f"{self.channel.name}: missing-value code {found} in {absent.sum()} of {len(raw)} cells")
+        # SCPI: 9.9E37 stands for infinity, 9.91E37 for what is no number
+        infinite = (np.abs(raw) >= _SCPI_INFINITY) & ~absent
+        if infinite.any():
+            notes.append(f"{self.channel.name}: infinite, taken as missing, in {infinite.sum()} of {len(raw)} cells")
+        values = np.where(absent | infinite, np.nan, raw) if notes else raw
+        if self.rule.zero == "first":
+            valid = np.flatnonzero(np.isfinite(values))
+            values = values - values[valid[0]] if valid.size else values
+        elif self.rule.zero:
+            values = values - self.rule.zero
+        # Multiplying only where needed keeps the digits of the file, and its memory.
+        values = values if self.rule.scale == 1 else values * self.rule.scale
+        if self.rule.valid is not None:
+            low, high = self.rule.valid
+            beyond = np.flatnonzero((values < low) | (values > high))
+            if beyond.size:
+                values = np.array(values)
+                values[beyond] = np.nan
+                notes.append(
+                    f"{self.channel.name}: not within {low:g} to {high:g} {self.unit.symbol}, taken as missing, in "
+                    f"{beyond.size} of {len(raw)} cells: {tell_places(beyond.tolist(), place)}"
+                )
+        values = values if self.unit.scale == 1 else values * self.unit.scale
+        return (values + self.unit.shift if self.unit.shift else values), tuple(notes)
+
+
+@dataclass(frozen=True)
+class ColumnPlan:
+    """Which columns of a file are read, and as what.
+
+    Parameters
+    ----------
+    time : int
+        Position of the time column.
+    time_unit : str
+        A unit of time, ``timestamp``, or empty if neither heading nor mapping says.
+    date : int or None
+        Position of a column of dates that goes with a time of day.
+    fraction : int or None
+        Position of a column of milliseconds that goes with whole seconds.
+    unused : tuple of int
+        Positions of further columns that hold dates.
+    beside : tuple of int
+        Positions of further columns that must hold the same times: one beside each channel.
+    cycle : int or None
+        Position of the column of cycle labels.
+    columns : tuple of Column
+        One per channel.
+    left_out : tuple of int
+        Positions of the columns that neither a heading nor the mapping explains.
+    aliases : dict of str to str
+        Headings and names without unit to channel names.
+    notes : tuple of str
+    """
+
+    time: int
+    time_unit: str
+    date: int | None
+    fraction: int | None
+    unused: tuple[int, ...]
+    beside: tuple[int, ...]
+    cycle: int | None
+    columns: tuple[Column, ...]
+    left_out: tuple[int, ...] = ()
+    aliases: dict[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+
+def plan(headings: Sequence[str], mapping: Mapping, source: str, kinds: Kinds) -> ColumnPlan:
+    """Decide which columns are read, and as what.
+
+    Parameters
+    ----------
+    headings : sequence of str
+        The file's headings; an empty one is passed over.
+    mapping : Mapping
+    source : str
+        The file, for messages.
+    kinds : callable
+        Tells what the cells of a column hold.
+
+    Raises
+    ------
+    RecordingError
+        A heading or channel name comes twice; there is no time column or no channel; a mapped column is not there, or
+        is mapped twice.
+    UnitError
+        A unit is unknown, or the one in the heading cannot measure what the mapping states.
+    """
+    meanings = _understand_all(headings, mapping, source)
+    try:
+        time, date, fraction, unused, told = find_time(headings, meanings, mapping, source, kinds)
+    except RecordingError:
+        _refuse_twins(headings, mapping, source)
+        raise
+    notes = [*told]
+    twins = [k for k, heading in enumerate(headings) if heading and heading == headings[time] and k != time]
+    beside = () if mapping.time.column else tuple(twins)
+    _refuse_twins(headings, mapping, source, headings[time] if beside else "")
+    cycle = _find_cycle(headings, mapping, source)
+    columns: list[Column] = []
+    tables: dict[int, str] = {}
+    ignored = {k for k in (time, date, fraction, cycle, *beside) if k is not None}
+    for name, rule in mapping.columns.items():
+        place = rule.column or name
+        if rule.role == "ignore" and isinstance(place, str) and place not in headings:
+            continue
+        index = find_position(place, headings, f"[columns.{name}]", source)
+        heading = headings[index]
+        ignored.add(index)
+        if rule.role == "ignore":
+            continue
+        other = tables.setdefault(index, name)
+        if other != name:
+            raise RecordingError(
+                f"{source}: mapping: [columns.{other}] and [columns.{name}] both take the column {heading!r}; "
+                "delete one of the two tables"
+            )
+        if rule.role == "cycle":
+            continue
+        meant, note = _meant(rule, meanings[index], f"{source}: mapping [columns.{name}]", heading)
+        notes.extend([f"{name}: {note}"] if note else [])
+        columns.append(Column(index, Channel(name, meant.quantity, meant.house, rule.place), meant, rule))
+    left_out: list[int] = []
+    if not mapping.read.only_mapped:
+        for k, meaning in enumerate(meanings):
+            if k not in ignored and meaning is not None and meaning.unit.quantity != "time":
+                channel = Channel(meaning.name, meaning.unit.quantity, meaning.unit.house)
+                columns.append(Column(k, channel, meaning.unit, ColumnMap()))
+                ignored.add(k)
+        left_out = [k for k, h in enumerate(headings) if h and k not in ignored]
+    _check_names(columns, headings, source)
+    columns.sort(key=lambda c: c.index)
+    is_stamp = kinds(time) in ("date", "clock", "passed", "stamp")
+    # what the cells hold goes before what a heading says
+    said = None if is_stamp else meanings[time]
+    time_unit, note = _time_unit(headings[time], said, mapping, source)
+    notes.extend([note] if note else [])
+    aliases = _aliases(columns, headings, meanings)
+    found = tuple(columns), tuple(left_out), aliases, tuple(notes)
+    return ColumnPlan(time, time_unit, date, fraction, unused, beside, cycle, *found)
+
+
+def _meant(rule: ColumnMap, meaning: Meaning | None, where: str, heading: str) -> tuple[Unit, str]:
+    """Return the unit of a mapped column, the mapping's before the heading's, and a note where the two differ."""
+    meant = rule.conversion
+    if meaning is None:
+        if meant is None:
+            raise RecordingError(f"{where}: give it a unit or a role; {heading!r} has none")
+        return meant, ""
+    said = meaning.unit
+    if meant is None:
+        return said, ""
+    try:
+        said = find_unit(said.symbol, meant.quantity)
+    except UnitError as e:
+        if rule.unit and rule.scale != 1 and {said.quantity, meant.quantity} <= set(_GEOMETRY):
+            return meant, ""
+        raise UnitError(
+            f"{where}: it is to be a {meant.quantity} in {meant.symbol}, but the heading {heading!r} says "
+            f"{said.symbol}, a unit of {said.quantity}; correct role and unit in the mapping, or the heading in the "
+            "file if that is wrong"
+        ) from e
+    if not rule.unit or said == meant:
+        return said, ""
+    return meant, f"the heading {heading!r} says {said.symbol}, the mapping says {meant.symbol}; the mapping is obeyed"
+
+
+def _understand_all(headings: Sequence[str], mapping: Mapping, source: str) -> list[Meaning | None]:
+    """Understand every heading; a mistyped unit matters only where the mapping does not speak of the column."""
+    mapped = _mapped(mapping) | {mapping.time.column}
+    meanings: list[Meaning | None] = []
+    for k, heading in enumerate(headings, start=1):
+        try:
+            meanings.append(understand(heading))
+        except UnitError as e:
+            if mapped.isdisjoint((heading, k)) and not mapping.read.only_mapped:
+                raise UnitError(
+                    f"{source}: heading {heading!r} of column {k}: {e}. Correct it, or leave the column out by a "
+                    f'mapping with [columns."{heading}"] role = "ignore"'
+                ) from e
+            meanings.append(None)
+    return meanings
+
+
+def _time_unit(heading: str, meaning: Meaning | None, mapping: Mapping, source: str) -> tuple[str, str]:
+    """Return the unit of time, the mapping's before the heading's, and a note where the two differ."""
+    given = mapping.time.unit or ("timestamp" if mapping.time.format else "")
+    if meaning is None:
+        return given, ""
+    said = meaning.unit
+    if said.quantity != "time":
+        raise UnitError(
+            f"{source}: mapping [time]: the heading {heading!r} says {said.symbol}, a unit of {said.quantity}, not "
+            f"{given or 's'}; take the column that holds the time, or correct the heading"
+        )
+    if given in ("", "timestamp") or find_unit(given, "time") == said:
+        return given or said.symbol, ""
+    return given, f"time: the heading {heading!r} says {said.symbol}, the mapping says {given}; the mapping is obeyed"
+
+
+def _find_cycle(headings: Sequence[str], mapping: Mapping, source: str) -> int | None:
+    if mapping.cycles.column:
+        return find_position(mapping.cycles.column, headings, "[cycles]", source)
+    for name, rule in mapping.columns.items():
+        if rule.role == "cycle":
+            return find_position(rule.column or name, headings, f"[columns.{name}]", source)
+    mapped = _mapped(mapping)
+    return next((k for k, h in enumerate(headings) if h.casefold() == "cycle" and h not in mapped), None)
+
+
+def _mapped(mapping: Mapping) -> set[Place]:
+    return {rule.column or name for name, rule in mapping.columns.items()}
+
+
+def _refuse_twins(headings: Sequence[str], mapping: Mapping, source: str, time: str = "") -> None:
+    """Refuse columns of one heading, unless it is that of the time or the mapping names them by number."""
+    numbered = {*_mapped(mapping), mapping.time.column, mapping.time.date}
+    places: dict[str, list[int]] = {}
+    for k, heading in enumerate(headings, start=1):
+        places.setdefault(heading, []).append(k)
+    found = {}
+    for heading, twins in places.items():
+        alone = mapping.read.only_mapped and heading not in numbered
+        if heading not in ("", time) and len(twins) > 1 and not alone and not numbered.issuperset(twins):
+            found[heading] = twins
+    if found:
+        told = ", ".join(
+            f"columns {' and '.join(map(str, twins))} are {'both' if len(twins) == 2 else 'all'} named {heading!r}"
+            for heading, twins in found.items()
+        )
+        number = next(iter(found.values()))[1]
+        tables = [_numbered(heading, *twins) for heading, twins in found.items()]
+        raise RecordingError(
+            f"{source}: {told}; rename them, or name each by number in a mapping, such as [columns.NAME] column = "
+            f"{number}",
+            [{"columns": {name: said for table in tables for name, said in table.items()}}],
+        )
+
+
+def _numbered(heading: str, *places: int) -> dict[str, dict[str, object]]:
+    """Return tables for columns of one heading, by their numbers."""
+    meaning = understand(heading)
+    if meaning is None:
+        return {f"{'_'.join(heading.split())}_{k}": {"column": place} for k, place in enumerate(places, start=1)}
+    suffix = meaning.name.removeprefix("_".join(meaning.base.split()))
+    base = meaning.name.removesuffix(suffix)
+    return {f"{base}_{k}{suffix}": {"column": place} for k, place in enumerate(places, start=1)}
+
+
+def _check_names(columns: Sequence[Column], headings: Sequence[str], source: str) -> None:
+    if not columns:
+        raise RecordingError(
+            f"{source}: none of the columns {', '.join(h for h in headings if h)} is understood as a channel; put the "
+            "unit behind the name (t1_C, drift_um, spindle_rpm) or give a mapping with a table [columns.NAME] for each"
+        )
+    seen: dict[str, Column] = {}
+    for column in columns:
+        other = seen.setdefault(column.channel.name, column)
+        if other is not column:
+            raise RecordingError(
+                f"{source}: columns {headings[other.index]!r} and {headings[column.index]!r} would both become channel "
+                f"{column.channel.name!r}; rename one of them, or map it",
+                [{"columns": {f"{column.channel.name}_2": {"column": headings[column.index]}}}],
+            )
+
+
+def _aliases(columns: Sequence[Column], headings: Sequence[str], meanings: Sequence[Meaning | None]) -> dict[str, str]:
+    """Headings, and names without a unit where only one channel has them, to channel names."""
+    names = {c.channel.name for c in columns}
+    aliases: dict[str, str] = {}
+    for c in columns:
+        aliases.setdefault(headings[c.index], c.channel.name)
+    bases = [(m.base, c.channel.name) for c in columns if (m := meanings[c.index]) is not None]
+    counts = Counter(base for base, _ in bases)
+    for base, name in bases:
+        if counts[base] == 1:
+            aliases.setdefault(base, name)
+    return {alias: name for alias, name in aliases.items() if alias not in names}

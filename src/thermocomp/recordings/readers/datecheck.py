@@ -1,0 +1,176 @@
+"""Dates that a file holds and that the time which was read does not know."""
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import Remedy, TwoReadingsError
+from thermocomp.recordings.readers.cellkinds import find_kind, plain_dates
+from thermocomp.recordings.readers.columns import ColumnPlan
+from thermocomp.recordings.readers.dayforms import IntArray, read_other_days
+from thermocomp.recordings.readers.mapping import Mapping
+from thermocomp.recordings.readers.numbers import is_filler
+from thermocomp.recordings.readers.stamps import read_days
+from thermocomp.recordings.readers.tables import FileTable
+from thermocomp.recordings.readers.timecolumns import has_passed, is_ignored
+
+FloatArray = NDArray[np.float64]
+
+_DAY = 86_400.0
+#: clocks are set, for summer time too [s]
+_SET = 5400.0
+
+#: a date somewhere in a line, whatever stands around it
+_SOME_DATE = re.compile(
+    r"(?<!\d)(?:\d{1,2}|\d{4}) ?([./-]) ?\d{1,2} ?\1 ?(?:\d{4}|\d{1,2})(?!\d)"
+    r"|(?<!\d)(?:19|20)\d\d(?:0[1-9]|1[0-2])(?:0[1-9]|[12]\d|3[01])(?!\d)"
+    r"|(?<!\d)\d{1,2}[.-]? ?[^\s\d.,;:]{3,10}[.,-]? ?'?(?:\d{4}|\d\d)(?!\d)"
+    r"|[^\W\d_]{3,9}\.? \d{1,2},? \d{4}(?!\d)"
+    r"|\b(?:day|tag|jour|giorno) *\d"
+    r"|\b(?:mon|tues|wednes|thurs|fri|satur|sun)day\b|\b(?:mon|diens|donners|frei|sams|sonn)tag\b|\bmittwoch\b",
+    re.IGNORECASE,
+)
+
+
+def holds_date(text: str) -> bool:
+    """Return whether a text holds a date, or a day, among other words.
+
+    Parameters
+    ----------
+    text : str
+    """
+    return _SOME_DATE.search(text) is not None
+
+
+def holds_own_date(table: FileTable, number: int) -> bool:
+    """Return whether a row holds a date where other rows hold none, as one between the tests of several days.
+
+    Parameters
+    ----------
+    table : FileTable
+    number : int
+        Of the row in the file, as `FileTable.place` tells it.
+    """
+    columns = [k for k in range(len(table.headings)) if find_kind(table.head(k)) not in ("date", "stamp")]
+    cells = table.load([], columns)[0]
+    row = next((k for k in range(len(cells)) if int(table.place(k).split()[-1]) == number), None)
+    return row is not None and any(map(holds_date, cells.iloc[row].dropna().astype(str)))
+
+
+def check_dates(
+    time: FloatArray,
+    cells: pd.DataFrame,
+    columns: ColumnPlan,
+    mapping: Mapping,
+    table: FileTable,
+    source: Path,
+    *,
+    is_stamp: bool,
+    others: Sequence[int] = (),
+) -> tuple[str, ...]:
+    """Refuse times without a date of their own that do not go with the dates of another column.
+
+    Parameters
+    ----------
+    time : ndarray of shape (n_rows,)
+        Since the first row [s].
+    cells : DataFrame
+        With the columns of dates that were not used, named by position.
+    columns : ColumnPlan
+    mapping : Mapping
+    table : FileTable
+        That the cells come from.
+    source : Path
+        The file.
+    is_stamp : bool
+        The times are no numbers.
+    others : sequence of int
+        Further columns of dates, in forms that no timestamp has (`thermocomp.recordings.readers.dayforms`).
+
+    Returns
+    -------
+    tuple of str
+        Notes on dates that the mapping leaves out.
+
+    Raises
+    ------
+    TwoReadingsError
+        Tests of several days would become one.
+    """
+    notes = []
+    heading = table.headings[columns.time]
+    # a number has no date even where the mapping names the column of one
+    more = (columns.date,) if columns.date is not None and not is_stamp else ()
+    for k in (*columns.unused, *more, *others):
+        name, ignored = table.headings[k] or k + 1, is_ignored(table.headings[k], k, mapping)
+        row = (
+            _find_other(time, cells[k], heading=table.headings[k])
+            if k in others
+            else _find_contradiction(time, cells[k])
+        )
+        if row is None:
+            if is_stamp and k not in others and columns.date is None and not has_passed(heading) and not ignored:
+                notes.append(
+                    f"left out: {name!r} holds dates, and {heading!r} only a time of day: name it in a mapping, "
+                    f"[time] column = {_quoted(heading)} and date = {_quoted(name)}"
+                )
+            continue
+        said = (
+            f"{name!r} says {_shown(cells[k].iloc[row])} in {table.place(row)}, which is not the day "
+            f"{time[row] / 3600:.2f} h after {_shown(cells[k].dropna().iloc[0])}, as the time in {heading!r} says"
+        )
+        if ignored:
+            notes.append(f"left out, as the mapping says: {said}; the times between the rows may be wrong by days")
+            continue
+        use: Remedy = {"time": {"column": heading, "date": name, **({"format": ""} if mapping.time.format else {})}}
+        usable = is_stamp and k not in others
+        mend = f"name it in a mapping, [time] column = {_quoted(heading)} and date = {_quoted(name)}"
+        raise TwoReadingsError(
+            f"{source}: column {said}; if it holds the dates of the rows, "
+            f'{mend if usable else "split the file into tests"}; if not, leave it out, role = "ignore"',
+            [*([use] if usable else []), {"columns": {str(name): {"column": name, "role": "ignore"}}}],
+        )
+    return tuple(notes)
+
+
+def _shown(cell: object) -> str:
+    return str(cell).removesuffix(".0")  # of a sheet
+
+
+def _quoted(place: str | int) -> str:
+    return f'"{place}"' if isinstance(place, str) else str(place)
+
+
+def _find_contradiction(time: FloatArray, cells: "pd.Series[Any]") -> int | None:
+    """Return the first row whose date no time of day at the first row explains; None if there is none."""
+    there = np.flatnonzero(cells.notna())
+    texts = plain_dates(cells.iloc[there])
+    if texts.nunique() < 2:
+        return None  # a date of the test, or of the sensor
+    wrong = [_find_wrong(days, time[there]) for days in read_days(texts)]
+    if not wrong:
+        return int(there[np.flatnonzero(texts != texts.iloc[0])[0]])
+    return None if None in wrong else int(there[max(k for k in wrong if k is not None)])
+
+
+def _find_other(time: FloatArray, cells: "pd.Series[Any]", heading: str) -> int | None:
+    """Return the first row whose date, in a form that no timestamp has, goes not with the time."""
+    filled = cells.notna() & ~cells.astype(str).map(is_filler)
+    there = np.flatnonzero(filled)
+    texts = cells.iloc[there].astype(str)
+    if texts.nunique() < 2:
+        return None
+    wrong = [_find_wrong(days, time[there]) for days in read_other_days(texts, heading)]
+    return None if not wrong or None in wrong else int(there[max(k for k in wrong if k is not None)])
+
+
+def _find_wrong(days: IntArray, t: FloatArray) -> int | None:
+    since = (days - days[0]) * _DAY - (t - t[0])
+    # what the first row may be after midnight at least, and at most
+    wrong = np.flatnonzero(np.maximum.accumulate(since) >= np.minimum.accumulate(since) + _DAY + _SET)
+    return int(wrong[0]) if wrong.size else None

@@ -1,0 +1,134 @@
+"""Dates in forms that no timestamp has: digits alone, counts of days or seconds, weeks, dates without a year."""
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from thermocomp.recordings.readers.cellkinds import find_kind, plain_dates
+from thermocomp.recordings.readers.headings import plain_name
+from thermocomp.recordings.readers.numbers import is_filler
+from thermocomp.recordings.readers.stamps import parse, read_days
+from thermocomp.recordings.readers.tables import FileTable
+
+IntArray = NDArray[np.int64]
+
+#: columns of numbers by their type that are looked into
+_MOST = 100
+_DAY = 86_400
+#: digits behind yyyymmdd: none, hh, hhmm, hhmmss, milliseconds
+_BEHIND = (1, 10**2, 10**4, 10**6, 10**9)
+#: seconds since 1970 between the years 2000 and 2100, in parts of a second; days that spreadsheets count between them
+_EPOCH, _PARTS = (946_684_800, 2_240_611_200), (1, 10**3, 10**6, 10**9)
+_SERIAL = (36_526, 73_050)
+#: headings of a date or a day, below which numbers may be one that are not dates at sight
+_NAMED = re.compile(
+    r"(?:^|[\W_])(?:\w*(?:date|datum|tag|day|stamp|stempel)|dat|doy|fecha|jour|giorno|d[ií]a|dag|data)(?:$|[\W_])"
+)
+_ORDINAL, _WEEK = r"(\d{4})-?(\d{3})", r"(\d{4})-?W(\d\d)-?([1-7])"
+_NO_YEAR = re.compile(r"\d{1,2}[./-]\d{1,2}[./]?")
+_MONTH = re.compile(r"\d{1,2}[-. ]{1,2}[^\W\d_]{3,9}\.?|[^\W\d_]{3,9}\.?[- ]\d{1,2}")
+_DAYS = (
+    *("monday tuesday wednesday thursday friday saturday sunday", "mon tue wed thu fri sat sun"),
+    *("montag dienstag mittwoch donnerstag freitag samstag sonntag", "mo di mi do fr sa so"),
+    *("lundi mardi mercredi jeudi vendredi samedi dimanche", "lun mar mer jeu ven sam dim"),
+)
+
+
+def find_day_columns(table: FileTable, columns: Sequence[int]) -> list[int]:
+    """Find the columns whose first cells are dates in a form that no timestamp has.
+
+    Parameters
+    ----------
+    table : FileTable
+    columns : sequence of int
+        To look into.
+    """
+    found, typed = [], []
+    for k in columns:
+        head = table.head(k)
+        if not head:
+            typed += [k] if table.is_number(k, empty=False) else []
+        elif find_kind(head) not in ("date", "stamp", "clock", "passed") and _read_filled(head, table.headings[k]):
+            found.append(k)
+    if typed := typed[:_MOST]:
+        cells = table.load([], typed)[0]
+        found += [k for k in typed if _read_filled(cells[k].dropna().tolist(), table.headings[k])]
+    return sorted(found)
+
+
+def _read_filled(cells: Sequence[Any], heading: str) -> list[IntArray]:
+    filled = pd.Series([str(cell) for cell in cells if not is_filler(str(cell))], dtype=object)
+    return read_other_days(filled, heading) if len(filled) else []
+
+
+def read_other_days(cells: "pd.Series[Any]", heading: str) -> list[IntArray]:
+    """Return the days that cells may be, counted from any one, in each form that all of them have.
+
+    Parameters
+    ----------
+    cells : Series of str
+    heading : str
+    """
+    texts = cells.str.strip().str.lstrip("'")
+    named = _NAMED.search(plain_name(heading)) is not None
+    numbers = pd.to_numeric(texts.str.replace(",", ".", regex=False), errors="coerce").to_numpy(dtype=np.float64)
+    return _read_numbers(numbers, named=named) if np.isfinite(numbers).all() else _read_texts(texts, named=named)
+
+
+def _read_numbers(numbers: NDArray[np.float64], *, named: bool) -> list[IntArray]:
+    found: list[IntArray] = []
+    rises = bool((np.diff(numbers) >= 0).all())
+    low, high = numbers.min(), numbers.max()
+    if (numbers % 1 == 0).all() and low >= 1 and high < 1e18:
+        whole = numbers.astype(np.int64)
+        for behind in _BEHIND:
+            if low >= 19_900_101 * behind and high < 21_000_000 * behind:
+                found += _read_forms(pd.Series(whole // behind).astype(str), "%Y%m%d")
+        if named and high < 10**8:
+            width, forms = (8, ("%d%m%Y", "%m%d%Y")) if high >= 10**6 else (6, ("%y%m%d", "%d%m%y", "%m%d%y"))
+            found += _read_forms(pd.Series(whole).astype(str).str.zfill(width), *forms) if high >= 10**4 else []
+        if named and rises and high <= 366:
+            found.append(whole)
+    if rises and not found:
+        for parts in _PARTS:
+            if _EPOCH[0] * parts <= low and high < _EPOCH[1] * parts:
+                found.append((numbers // (parts * _DAY)).astype(np.int64))
+    if named and rises and _SERIAL[0] <= low and high < _SERIAL[1]:
+        found.append(np.floor(numbers).astype(np.int64))
+    return found
+
+
+def _read_texts(texts: "pd.Series[str]", *, named: bool) -> list[IntArray]:
+    plain = texts.str.replace(r"(?<=\d)\s*[년月월年_]\s*(?=\d)", "-", regex=True).str.replace(
+        r"\s*[日일]", "", regex=True
+    )
+    plain = plain_dates(plain.str.replace(r"'(\d\d)(?!\d)", r"\1", regex=True))
+    first = plain.iloc[0]
+    if re.fullmatch(f"{_ORDINAL}|{_WEEK}", first):
+        return _read_forms(plain.str.replace("-", "", regex=False), "%GW%V%u" if "W" in first else "%Y%j")
+    if re.fullmatch(r"W\d\d-?[1-7]", first):
+        return [_unwrap(d, 364) for d in _read_forms("2020" + plain.str.replace("-", "", regex=False), "%GW%V%u")]
+    if _NO_YEAR.fullmatch(first) and (named or first.endswith(".")):
+        bare = plain.str.rstrip("./").str.replace(r"[./]", "-", regex=True) + "-2000"
+        return [_unwrap(d, 366) for d in _read_forms(bare, "%d-%m-%Y", "%m-%d-%Y")]
+    if _MONTH.fullmatch(first):
+        return [_unwrap(d, 366) for d in read_days(plain.str.replace(r"[-. ]+", " ", regex=True).str.strip() + " 2000")]
+    words = texts.str.casefold().str.rstrip(".")
+    for names in map(str.split, _DAYS):
+        if words.isin(names).all():
+            return [_unwrap(words.map(names.index).to_numpy(dtype=np.int64), 7)]
+    return read_days(plain)
+
+
+def _read_forms(texts: "pd.Series[str]", *forms: str) -> list[IntArray]:
+    read = (parse(texts, form) for form in forms)
+    return [s.to_numpy(dtype="M8[D]").view(np.int64) for s in read if s.notna().all()]
+
+
+def _unwrap(days: IntArray, period: int) -> IntArray:
+    """Return days that count on where a week or a year begins anew."""
+    return np.concatenate([days[:1], days[0] + np.cumsum(np.diff(days) % period)])

@@ -1,0 +1,296 @@
+"""Where in a file its headings, its units and its first and last row stand: loggers write more than a table."""
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from thermocomp.core.units import is_unit
+from thermocomp.recordings.readers.headings import (
+    BRACKETS,
+    find_date_order,
+    is_foreign_unit,
+    is_time_name,
+    is_understood,
+)
+from thermocomp.recordings.readers.numbers import is_filler, is_number_like
+
+#: dates and times of day, in all their habits
+_TIME = re.compile(
+    r"'?(?:\d{1,4}[-./ ] ?(?:\d{1,2}|[^\W\d_]{3,9}\.?)[-./ ] ?\d{1,4}|[^\W\d_]{3,9}\.? \d{1,2},? \d{4}"
+    r"|(?:\d+ days? )?\d{1,4}:\d\d)"
+    r"(?!\d)[-\dT.,:+ ]*(?:[AaPp]\.?[Mm]\.?)?(?: ?[A-Z]{1,4})?(?:[+-]\d\d:?\d\d)?|\d{8}T\d{4,6}[\dZ.,+:-]*"
+)
+#: characters of a date with a time of day
+_LONGEST = 60
+#: share of the columns of numbers that have one in a row of the table
+_ROW = 0.5
+#: what stands for no unit in a row of units, in small letters: of numbers that have none, and before the row
+_NO_UNIT = frozenset(
+    (
+        *("", "-", "--", "---", "1", "n/a", "na", "none", "unitless", "ohne", "rn", "no", "nr", "#", "count", "index"),
+        *("unit", "units", "einheit", "einheiten", "unité", "unités", "unità", "unidad", "unidades", "eenheid"),
+        *("jednotka", "jednostka", "enhet", "enhed", "单位", "単位"),
+    )
+)
+#: text rows between the headings and the first row of numbers
+_MOST_BETWEEN = 12
+#: rows at the end of a file that may be none of its table
+MOST_REMARKS = 40
+#: words before a row of statistics, in small letters
+_STATISTICS = frozenset(
+    (
+        *("min", "max", "avg", "mean", "std", "stdev", "std dev", "sum", "total", "count", "range", "median", "rms"),
+        *("minimum", "maximum", "average", "standard deviation", "mittel", "mittelwert", "durchschnitt", "summe"),
+        *("anzahl", "spannweite", "standardabweichung", "stabw", "moyenne", "somme", "media", "promedio", "max-min"),
+        *("average value", "minwert", "maxwert", "minimalwert", "maximalwert", "ø", "sigma", "peak-peak", "delta"),
+    )
+)
+
+
+class Layout(NamedTuple):
+    """Rows of a file, counted from 0 as they were given."""
+
+    heading: int  #: of the headings
+    units: int  #: of their units; that of the headings if there are none
+    begin: int  #: first row of the table
+
+
+def find_layout(rows: Sequence[Sequence[str]]) -> Layout | None:
+    """Find the headings of a table, its units, and its first row.
+
+    Above the first row of numbers stand rows of text. The headings are the first of those that name most columns of
+    numbers; a row of units is known by its units.
+
+    Parameters
+    ----------
+    rows : sequence of sequence of str
+        Cells of the first rows of a file.
+
+    Returns
+    -------
+    Layout or None
+        None if there is no such row.
+    """
+    if len(rows) < 2:
+        return None
+    # a preamble is over in the later half
+    later = rows[len(rows) // 2 :]
+    width, columns = find_columns(later)
+    numbers = [k for k in columns if _holds_numbers(later, k)]
+    is_row = [_is_row(row, columns) for row in rows]
+    # a row of the numbers of channels, say, is no row of the table: units follow it
+    is_units = [_is_units(row, numbers) for row in rows]
+    labels = [*is_units[1:], False]
+    for begin in range(1, len(rows)):
+        if not is_row[begin] or labels[begin]:
+            continue
+        first = begin
+        while first and begin - first < _MOST_BETWEEN:
+            above = rows[first - 1]
+            if not any(map(str.strip, above)) and not any(map(_names_time, rows[first:begin])):
+                first -= 1  # an empty row between the headings and the table
+                continue
+            if not _is_text(above, width):
+                break
+            if any(k < len(above) and _is_value(above[k]) for k in columns) and not labels[first - 1]:
+                break  # perhaps a row of the table with words in it, which is not passed over
+            first -= 1
+        block = range(first, begin)
+        units = [k for k in block if is_units[k]]
+        names = [k for k in block if k not in units and _is_heading(rows[k])]
+        if not names and units and _names_time(rows[units[0]]):  # headings that are units: Time, rpm, um
+            names = [units.pop(0)]
+        if names:
+            said = {k: sum(is_time_name(cell) or is_understood(cell) for cell in rows[k]) for k in names}
+            known = sorted((k for k in names if said[k]), key=lambda k: -said[k])  # of as many the first
+            # of rows that say nothing the first that is full; in two columns what stands above is a preamble
+            order = 1 if width == 2 else -1
+            heading = known[0] if known else max(names, key=lambda k: (_count_filled(rows[k], columns), order * k))
+            return Layout(heading, units[-1] if units else heading, begin)
+    return None
+
+
+def find_end(first: Sequence[Sequence[str]], last: Sequence[Sequence[str]]) -> int:
+    """Count the rows at the end of a file that are none of its table: remarks and statistics.
+
+    Parameters
+    ----------
+    first, last : sequence of sequence of str
+        Cells of the first and the last rows below the headings.
+
+    Returns
+    -------
+    int
+        A row that was cut off, or lacks its time, is not counted: it begins as one of the table.
+    """
+    if len(last) < 2:
+        return 0
+    width, columns = find_columns(first[: (len(first) + 1) // 2])
+    count = 0
+    for row in reversed(last[1:]):
+        if not _is_remark(row, columns, width):
+            break
+        count += 1
+    return count
+
+
+def tell_layout(numbers: Sequence[int], layout: Layout, word: str) -> tuple[str, ...]:
+    """Return what was passed over and taken for units, in words.
+
+    Parameters
+    ----------
+    numbers : sequence of int
+        Places of the rows in the file, from 1.
+    layout : Layout
+    word : str
+        What a row is called there.
+
+    Returns
+    -------
+    tuple of str
+    """
+    found = []
+    above = [numbers[k] for k in range(layout.heading) if k != layout.units]
+    between = [numbers[k] for k in range(layout.heading + 1, layout.begin) if k != layout.units]
+    if above:
+        found.append(f"{tell_rows(above, word)} above the headings {'is' if len(above) == 1 else 'are'} passed over")
+    if between:
+        places = ", ".join(map(str, between))
+        found.append(
+            f"between the headings and the table {word}{'s' * (len(between) > 1)} {places} "
+            f"{'is' if len(between) == 1 else 'are'} passed over"
+        )
+    if layout.units != layout.heading:
+        found.append(f"{word} {numbers[layout.units]} holds the units")
+    return tuple(found)
+
+
+def tell_again(lines: Sequence[int]) -> tuple[str, ...]:
+    """Return in words which lines repeat the headings."""
+    places = ", ".join(map(str, lines[:MOST_REMARKS])) + " ..." * (len(lines) > MOST_REMARKS)
+    return (f"the headings come again, passed over, in line {places}",) if lines else ()
+
+
+def tell_end(numbers: Sequence[int], word: str) -> tuple[str, ...]:
+    """Return in words which rows at the end are left out."""
+    what = "is no row" if len(numbers) == 1 else "are no rows"
+    return (f"{tell_rows(numbers, word)} at the end {what} of the table, and left out",) if numbers else ()
+
+
+def tell_rows(numbers: Sequence[int], word: str) -> str:
+    """Return places of neighbouring rows in words: ``line 3``, ``lines 3 to 7``."""
+    return f"{word} {numbers[0]}" if len(numbers) == 1 else f"{word}s {numbers[0]} to {numbers[-1]}"
+
+
+def join_units(headings: Sequence[str], units: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    """Put the units of a row into the headings above them, where these have none.
+
+    What a column holds decides: dates, times of day and words have no unit, whatever stands there (``Unit``,
+    ``hh:mm:ss``), but the order of a date (``mm/dd/yyyy``) is kept. In the first column may stand what the row is.
+
+    Parameters
+    ----------
+    headings, units : sequence of str
+    rows : sequence of sequence of str
+        Cells of the first rows of the table.
+
+    Returns
+    -------
+    list of str
+    """
+    said = [_bare(unit) for unit in units]
+    found = []
+    for k, heading in enumerate(headings):
+        unit = said[k] if k < len(said) else ""
+        known = is_unit(unit) or is_foreign_unit(unit)
+        cell = next((row[k] for row in rows if k < len(row) and not is_filler(row[k])), "")
+        if is_stamp(cell):
+            fits = bool(find_date_order(unit))
+        elif k == 0 or is_time_name(heading) or (cell and not is_number_like(cell)):
+            fits = known
+        else:
+            fits = known or not is_time_name(unit)
+        fits = fits and unit.casefold().rstrip(".:") not in _NO_UNIT
+        found.append(f"{heading} [{unit}]" if fits and heading and not BRACKETS.fullmatch(heading) else heading)
+    return found
+
+
+def name_stamps(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> tuple[list[str], tuple[str, ...]]:
+    """Name a first column without heading that holds dates, as the index of a data frame does, and say so."""
+    first = next((row[0].strip() for row in rows if row and row[0].strip()), "")
+    if headings and not headings[0] and is_stamp(first):
+        return ["timestamp", *headings[1:]], ("column 1 has no heading and holds dates: taken as the time",)
+    return list(headings), ()
+
+
+def is_stamp(cell: str) -> bool:
+    """Return whether a cell holds a date or a time of day."""
+    return len(cell) < _LONGEST and _TIME.fullmatch(cell.strip()) is not None
+
+
+def find_columns(rows: Sequence[Sequence[str]]) -> tuple[int, list[int]]:
+    """Return the commonest number of cells of some rows, and the columns that hold values in most of them."""
+    counts = Counter(len(row) for row in rows)
+    width = max(counts, key=lambda width: (counts[width], width))
+    even = [row for row in rows if len(row) == width]
+    values = Counter(k for row in even for k, cell in enumerate(row) if _is_value(cell))
+    return width, [k for k in range(width) if 2 * values[k] >= len(even) and values[k]]
+
+
+def _is_text(row: Sequence[str], width: int) -> bool:
+    # a logger may end its rows, but not its headings, with a delimiter
+    return len(row) in (width, width - 1) and any(cell.strip() for cell in row)
+
+
+def _is_heading(row: Sequence[str]) -> bool:
+    filled = [cell for cell in row if cell.strip()]
+    return len(filled) >= min(2, len(row)) and not any(map(_is_value, filled))
+
+
+def _is_row(row: Sequence[str], columns: Sequence[int]) -> bool:
+    values = sum(k < len(row) and (_is_value(row[k]) or is_filler(row[k])) for k in columns)
+    some = any(k < len(row) and _is_value(row[k]) for k in columns)
+    begins = bool(columns) and columns[0] < len(row) and (_is_value(row[columns[0]]) or is_filler(row[columns[0]]))
+    return begins and some and values > _ROW * len(columns)
+
+
+def _is_remark(row: Sequence[str], columns: Sequence[int], width: int) -> bool:
+    """Return whether a row at the end is words or a statistic: no row of the table begins so."""
+    words = [k for k, cell in enumerate(row) if cell.strip() and not _is_value(cell) and not is_filler(cell)]
+    if not words or not columns:
+        return False
+    values = any(k < len(row) and _is_value(row[k]) for k in columns)
+    timed = columns[0] < len(row) and _is_value(row[columns[0]])
+    counted = any(row[k].strip().strip(":.").casefold() in _STATISTICS for k in words)
+    return not values or (not timed and (counted or (len(row) < width and columns[0] in words)))
+
+
+def _is_units(row: Sequence[str], numbers: Sequence[int]) -> bool:
+    """Return whether most of what stands over columns of numbers is a unit."""
+    over = [row[k] for k in numbers if k < len(row)] if numbers else row
+    filled = [unit for unit in map(_bare, over) if unit.casefold().rstrip(".:") not in _NO_UNIT]
+    known = sum(map(is_unit, filled))
+    return known > 0 and 2 * (known + sum(is_foreign_unit(u) and not is_unit(u) for u in filled)) > len(filled)
+
+
+def _bare(unit: str) -> str:
+    return unit.strip().strip("[]()").strip()
+
+
+def _holds_numbers(rows: Sequence[Sequence[str]], column: int) -> bool:
+    """Return whether most values of a column are numbers, no dates or times of day."""
+    values = [row[column] for row in rows if column < len(row) and _is_value(row[column])]
+    return 2 * sum(map(is_number_like, values)) > len(values)
+
+
+def _names_time(row: Sequence[str]) -> bool:
+    return any(map(is_time_name, row))
+
+
+def _count_filled(row: Sequence[str], columns: Sequence[int]) -> int:
+    return sum(k < len(row) and bool(row[k].strip()) for k in columns)
+
+
+def _is_value(cell: str) -> bool:
+    return is_number_like(cell) or is_stamp(cell)

@@ -1,0 +1,67 @@
+"""Columns that are left out, and those that may not be: what their headings lack."""
+
+from collections.abc import Sequence
+from difflib import get_close_matches
+
+from thermocomp.core.exceptions import RecordingError, UnitError
+from thermocomp.core.units import find_unit
+from thermocomp.recordings.readers.headings import BRACKETS, HOUSE_SUFFIX, SUFFIXES, find_named_quantity
+
+
+def refuse_nameless(headings: Sequence[str], source: str) -> None:
+    """Refuse columns of numbers whose names speak of a temperature, a displacement or a speed but say no unit.
+
+    Parameters
+    ----------
+    headings : sequence of str
+        Of columns of numbers that would be left out.
+    source : str
+
+    Raises
+    ------
+    RecordingError
+        There is one.
+    """
+    asked = {h: q for h in headings if not _says_unit(h) and (q := find_named_quantity(h))}
+    if not asked:
+        return
+    heading, quantity = next(iter(asked.items()))
+    units = {"temperature": "degC, K or degF", "displacement": "um, mm or nm", "spindle_speed": "rpm or Hz"}[quantity]
+    several = len(asked) > 1
+    raise RecordingError(
+        f"{source}: column{'s' * several} {', '.join(map(repr, asked))} {'have' if several else 'has'} no unit: "
+        f"{heading!r} may be a {quantity.replace('_', ' ')} in {units}; put the unit behind the name, such as "
+        f'"{heading} [{units.split(",")[0].split(" ")[0]}]", or write a mapping [columns.NAME] with column = '
+        f'"{heading}" and unit, or role = "ignore" if it is of no use'
+    )
+
+
+def why_left_out(heading: str) -> str:
+    """Say what a heading that `understand` makes nothing of lacks, and what to do."""
+    found = BRACKETS.fullmatch(heading.strip())
+    symbol = (found["square"] or found["round"] or "").strip() if found else heading.rpartition("_")[2]
+    mapped = f'a mapping [columns.NAME] with column = "{heading}" and'
+    ignore = 'role = "ignore" if it is of no use'
+    if not found and "_" not in heading:
+        return f"{heading!r} has no unit; put it behind the name (t1_C), or write {mapped} role and unit, or {ignore}"
+    try:
+        meant = find_unit(symbol)
+    except UnitError:
+        near = get_close_matches(symbol, SUFFIXES, n=3, cutoff=0.5)
+        known = f"the nearest are {', '.join(near)}" if near else f"known are {', '.join(HOUSE_SUFFIX)} and others"
+        return (
+            f"{heading!r}: {symbol!r} is no known unit, {known}; correct the heading, or write {mapped} role and unit, "
+            f"or {ignore}"
+        )
+    if meant.quantity == "time":
+        return f"{heading!r}: the time is taken from another column; write {mapped} role and unit if it is no time"
+    return (
+        f"{heading!r}: {symbol!r} counts as a unit of {meant.quantity} only by a mapping; write {mapped} "
+        f'role = "{meant.quantity}" and unit = "{symbol or meant.symbol}" if it is one, or {ignore}'
+    )
+
+
+def _says_unit(heading: str) -> bool:
+    """Return whether a heading says in which unit it is, even if not in one that is used here."""
+    found = BRACKETS.fullmatch(heading.strip())
+    return found is not None and (found["square"] or found["round"] or "").strip() not in ("", "1")

@@ -1,0 +1,380 @@
+"""The small TOML that says what the columns of a foreign recording are."""
+
+import codecs
+import math
+from collections.abc import Mapping as AbstractMapping
+from dataclasses import dataclass, field, fields, replace
+from datetime import datetime
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Annotated, Any, Literal
+from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
+
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError, with_config
+from pydantic_core import ErrorDetails
+
+from thermocomp.core.exceptions import InputError, UnitError
+from thermocomp.core.units import HOUSE_UNITS, Unit, find_unit
+from thermocomp.files.tomlfile import as_json, read_toml
+from thermocomp.recordings.cleaning import Cut, Resample, Rezero, Shift, Swap
+from thermocomp.recordings.readers.limits import Limits
+
+#: a column by its heading, or by its number from 1
+Place = str | int
+#: a table ``[[clean]]``
+CleaningStep = Annotated[Cut | Shift | Rezero | Swap | Resample, Field(discriminator="do")]
+Role = Literal[
+    "temperature",
+    "displacement",
+    "spindle_speed",
+    "position",
+    "angle",
+    "feed",
+    "dimensionless",
+    "residual",
+    "correction",
+    "cycle",
+    "ignore",
+]
+
+
+@dataclass(frozen=True)
+class TimeColumn:
+    """Table ``[time]``: the column that holds the time.
+
+    Parameters
+    ----------
+    column : str or int
+        Its heading, or its number from 1; empty: found by its heading (``time_s``, ``timestamp`` ...).
+    unit : str
+        A unit of time, or ``timestamp`` for dates with a time of day; empty: from the heading and the cells.
+    format : str
+        How timestamps are written, in the letters of `datetime.strptime`; empty: ISO 8601.
+    start : str
+        ISO timestamp of the first row, for files that hold only relative times: it tells the days, and which
+        file goes on from another.
+    date : str or int
+        Column of the dates where `column` holds the time of day alone.
+    zone : str
+        Time zone of timestamps that tell none, such as ``Europe/Berlin``; ``UTC`` for a clock that is never set.
+    """
+
+    column: Place = ""
+    unit: str = ""
+    format: str = ""
+    start: str = ""
+    date: Place = ""
+    zone: str = ""
+
+
+@dataclass(frozen=True)
+class ColumnMap:
+    """Table ``[columns.NAME]``: one column that becomes the channel NAME.
+
+    The value in the file's unit is ``scale * (number in the file - zero)``.
+
+    Parameters
+    ----------
+    column : str or int
+        Its heading in the file, or its number from 1, for headings that come twice; empty: NAME itself.
+    unit : str
+        Unit of the scaled value; empty: the house unit of the role, or the unit in the heading.
+    role : str, optional
+        What it measures, or ``cycle`` (labels of thermal cycles), or ``ignore``; without it the unit decides.
+    scale : float
+        Factor from the number in the file to `unit`.
+    zero : float or 'first'
+        Number in the file that counts as zero; ``first``: the first valid one of the column.
+    missing : tuple of float
+        Numbers in the file that stand for a missing value.
+    place : str
+        Where the sensor sits, in words.
+    valid : tuple of float, optional
+        Lowest and highest value that the channel can have, in `unit` after `scale` and `zero`; others are missing.
+    """
+
+    column: Place = ""
+    unit: str = ""
+    role: Role | None = None
+    scale: float = 1.0
+    zero: float | Literal["first"] = 0.0
+    missing: tuple[float, ...] = ()
+    place: str = ""
+    valid: tuple[float, float] | None = None
+
+    @property
+    def conversion(self) -> Unit | None:
+        """What leads to the house unit; None if neither unit nor role says."""
+        quantity = self.role if self.role in HOUSE_UNITS else None
+        if self.unit:
+            return find_unit(self.unit, quantity)
+        return find_unit(HOUSE_UNITS[quantity], quantity) if quantity else None
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """Table ``[read]``: how the file is written; what is left empty is found out.
+
+    Parameters
+    ----------
+    delimiter : str
+        One character; a space stands for any white space.
+    decimal : {'', '.', ','}
+    encoding : str
+        Such as ``cp1252``; empty: UTF-8, or Latin-1 if it is not UTF-8.
+    comment : str
+        Lines that begin with it are passed over; empty: there are none.
+    missing : tuple of float
+        Numbers that stand for a missing value in every column.
+    only_mapped : bool
+        True: columns that have no table ``[columns.NAME]`` are left out.
+    heading : int
+        Line or row of the headings, from 1; 0: it is looked for.
+    skip : tuple of int or pair of int
+        Lines or rows that are passed over, from 1, as errors name them; a pair is a stretch, both ends included.
+    sheet : str
+        Of a workbook; empty: the only one, or the only one that holds a table with a time.
+    """
+
+    delimiter: str = ""
+    decimal: Literal["", ".", ","] = ""
+    encoding: str = ""
+    comment: str = "#"
+    missing: tuple[float, ...] = ()
+    only_mapped: bool = False
+    heading: int = 0
+    skip: tuple[int | tuple[int, int], ...] = ()
+    sheet: str = ""
+
+    def skips(self, place: int) -> bool:
+        """Return whether a line or row, counted from 1, is passed over."""
+        return any(place == s if isinstance(s, int) else s[0] <= place <= s[1] for s in self.skip)
+
+
+@dataclass(frozen=True)
+class CycleRule:
+    """Table ``[cycles]``: how the test is split into thermal cycles.
+
+    Parameters
+    ----------
+    column : str or int
+        Column of labels; empty: a column named ``cycle``, else the spindle speed.
+    min_run_s, min_stop_s : float
+        Shorter runs and stops of the spindle do not split [s].
+    """
+
+    column: Place = ""
+    min_run_s: float = 300.0
+    min_stop_s: float = 300.0
+
+
+@dataclass(frozen=True)
+class Mapping:
+    """What the columns of a file are; see the tables' classes.
+
+    Parameters
+    ----------
+    time : TimeColumn
+    columns : mapping of str to ColumnMap
+        By channel name.
+    read : ReadOptions
+    cycles : CycleRule
+    clean : tuple of Step
+        What is changed in the values that were read, in this order; see `thermocomp.recordings.cleaning`.
+    limits : Limits
+    compensation : {'', 'off', 'known', 'unknown'}
+        Whether a correction was in force at the machine; see `thermocomp.recordings.compensated`.
+    """
+
+    time: TimeColumn = TimeColumn()
+    columns: AbstractMapping[str, ColumnMap] = field(default_factory=dict)
+    read: ReadOptions = ReadOptions()
+    cycles: CycleRule = CycleRule()
+    clean: tuple[CleaningStep, ...] = ()
+    limits: Limits = Limits()
+    compensation: Literal["", "off", "known", "unknown"] = ""
+
+    def __post_init__(self) -> None:
+        if self.time.unit not in ("", "timestamp"):
+            _unit_in("[time]", self.time.unit, "time")
+        _check_start(self.time.start)
+        _check_zone(self.time.zone)
+        for name, column in self.columns.items():
+            table = f"[columns.{name}]"
+            _unit_in(table, column.unit, column.role if column.role in HOUSE_UNITS else None)
+            if column.scale == 0 or not math.isfinite(column.scale):
+                raise InputError(f"{table}: scale = {column.scale}: must be a number other than 0")
+            if column.valid is not None and not column.valid[0] < column.valid[1]:
+                raise InputError(f"{table}: valid = {list(column.valid)}: the first must be below the second")
+        if len(self.read.delimiter) > 1:
+            raise InputError(f"[read]: delimiter = {self.read.delimiter!r}: must be one character")
+        for name in ("min_run_s", "min_stop_s"):
+            if not getattr(self.cycles, name) >= 0:
+                raise InputError(f"[cycles]: {name} = {getattr(self.cycles, name)}: must not be negative")
+        _check_encoding(self.read.encoding or "utf-8")
+
+    def over(self, below: "Mapping") -> "Mapping":
+        """Return this mapping with what only `below` says of time, compensation and columns added."""
+        time = below.time if self.time == TimeColumn() else self.time
+        taken = {rule.column or name for name, rule in self.columns.items()}
+        added = {name: rule for name, rule in below.columns.items() if (rule.column or name) not in taken}
+        said = self.compensation or below.compensation
+        return replace(self, time=time, columns={**added, **self.columns}, compensation=said)
+
+
+#: the one door for a mapping from outside; also used for the one that thermocomp writes into its own files
+ADAPTER = TypeAdapter(with_config(ConfigDict(strict=True, extra="forbid", allow_inf_nan=False))(Mapping))
+
+_STEPS: dict[str, type] = {step.do: step for step in (Cut, Shift, Rezero, Swap, Resample)}
+_TABLES: dict[str, type] = {
+    "time": TimeColumn,
+    "columns": ColumnMap,
+    "read": ReadOptions,
+    "cycles": CycleRule,
+    "limits": Limits,
+}
+
+
+def read_mapping(path: str | Path) -> Mapping:
+    """Read a mapping TOML.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    Mapping
+
+    Raises
+    ------
+    InputError
+        No such file, not TOML, or a key or value that is not understood; the message names file, table and key.
+    UnitError
+        A unit is unknown or does not belong to the role.
+
+    Examples
+    --------
+    A stepper's counts as a displacement, and a sensor that says -180 where there is none::
+
+        [time]
+        column = "time"
+        format = "%Y/%m/%d-%H:%M:%S"
+
+        [columns.z]
+        column = "mcu_pos_z"
+        role = "displacement"
+        unit = "mm"
+        scale = 0.0025
+        zero = "first"
+
+        [columns.chamber]
+        column = "chamber_t"
+        role = "temperature"
+        missing = [-180.0]
+    """
+    return check_content(read_toml(path, "mapping file"), str(path))
+
+
+def check_content(content: dict[str, Any], owner: str) -> Mapping:
+    """Return the mapping that TOML holds.
+
+    Parameters
+    ----------
+    content : dict
+    owner : str
+        The file, for messages.
+
+    Raises
+    ------
+    InputError, UnitError
+        See `read_mapping`.
+    """
+    try:
+        return ADAPTER.validate_json(as_json(content))
+    except ValidationError as e:
+        raise InputError(f"{owner}: {_explain(e)}") from e
+    except InputError as e:
+        raise type(e)(f"{owner}: {e}") from e
+
+
+def _explain(failure: ValidationError) -> str:
+    """Say table, key and the nearest known key of pydantic's first error."""
+    errors = failure.errors()
+    error = errors[0]
+    if error["loc"][:1] == ("clean",):
+        return _explain_step(error)
+    depth = 3 if error["loc"][0] == "columns" else 2
+    loc = [str(part) for part in error["loc"][:depth]]  # what follows are members of a union, which no user wrote
+    inside = _TABLES.get(loc[0]) if len(loc) == depth else None
+    table = f"table [{'.'.join(loc[:-1])}]" if len(loc) > 1 else "top level"
+    key = loc[-1]
+    if error["type"] != "unexpected_keyword_argument":
+        reasons = " or: ".join(e["msg"] for e in errors if e["loc"][:depth] == error["loc"][:depth])
+        return f"{table}: key {key!r} = {error['input']!r:.80}: {reasons}"
+    return _unknown_key(table, key, inside or Mapping)
+
+
+def _explain_step(error: ErrorDetails) -> str:
+    """Say what is wrong with a table ``[[clean]]``."""
+    loc = error["loc"]
+    table = f"[[clean]] number {int(loc[1]) + 1}" if len(loc) > 1 else "[[clean]]"
+    if len(loc) < 4:
+        steps = ", ".join(repr(do) for do in _STEPS)
+        return (
+            f"{table}: must be a table with do = one of {steps}"
+            if "tag" in error["type"]
+            else f"{table}: {error['msg']}"
+        )
+    key = str(loc[3])
+    if error["type"] == "unexpected_keyword_argument":
+        return _unknown_key(table, key, _STEPS[str(loc[2])])
+    return f"{table}: key {key!r} = {error['input']!r:.80}: {error['msg']}"
+
+
+def _unknown_key(table: str, key: str, inside: type) -> str:
+    known = [f.name for f in fields(inside)]
+    near = get_close_matches(key, known, n=1, cutoff=0.5)
+    hint = f"did you mean {near[0]!r}? " if near else ""
+    return f"{table}: unknown key {key!r}; {hint}Known are {', '.join(known)}"
+
+
+def _unit_in(table: str, symbol: str, quantity: str | None) -> None:
+    try:
+        if symbol:
+            find_unit(symbol, quantity)
+    except UnitError as e:
+        raise UnitError(f"{table}: {e}") from e
+
+
+def _check_start(stamp: str) -> None:
+    try:
+        if stamp:
+            datetime.fromisoformat(stamp)
+    except ValueError as e:
+        raise InputError(
+            f"[time]: start = {stamp!r} is no ISO timestamp: write year, month, day and time of day, such as "
+            '"2024-03-01T08:00:00" or, with its offset from UTC, "2024-03-01T08:00:00+01:00"'
+        ) from e
+
+
+def _check_zone(name: str) -> None:
+    try:
+        if name:
+            ZoneInfo(name)
+    except (ZoneInfoNotFoundError, ValueError, OSError) as e:
+        raise InputError(
+            f"[time]: zone = {name!r} is not known; write a place of the time zone database, such as "
+            '"Europe/Berlin" or "America/Detroit", or "UTC"'
+        ) from e
+
+
+def _check_encoding(name: str) -> None:
+    try:
+        plain = codecs.decode(b"a;1\n", name) == "a;1\n"
+    except (LookupError, UnicodeDecodeError, TypeError) as e:
+        raise InputError(f"[read]: encoding = {name!r} is not known; use utf-8, latin-1 or cp1252") from e
+    if not plain:
+        raise InputError(
+            f"[read]: encoding = {name!r}: save the file as UTF-8; only encodings that hold ASCII are read"
+        )

@@ -1,0 +1,364 @@
+"""Mappings that are written for somebody: what reading a file, or checking it, asks for, filled in."""
+
+import copy
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import tomlkit
+from tomlkit.items import Table
+
+from thermocomp.core.exceptions import InputError, RecordingError, Remedy, TwoReadingsError, UnitError
+from thermocomp.recordings.checks.findings import Finding, cut
+from thermocomp.recordings.checks.quality import check
+from thermocomp.recordings.readers.datecheck import holds_date, holds_own_date
+from thermocomp.recordings.readers.guesses import guess_columns, understand_or_none
+from thermocomp.recordings.readers.mapping import ADAPTER, ColumnMap, Mapping, check_content
+from thermocomp.recordings.readers.recordings import open_table, read
+from thermocomp.recordings.recording import Recording
+
+#: what may be asked about one file: rows that are passed over one by one, for the most part
+MOST_QUESTIONS = 60
+#: rows that are passed over for somebody: a file with more such rows is another kind of file
+MOST_SKIPPED = 5
+#: rounds of checking: a unit that is corrected shows what was hidden behind it
+_ROUNDS = 5
+#: a heading of a table right below a line that is no comment
+_TIGHT, _APART = re.compile(r"^([^#\n].*)\n(?=\[)", re.MULTILINE), r"\1\n\n"
+#: bytes of a file to which an error offers a mapping: it is read again for that
+_LARGE = 50_000_000
+
+
+_T = TypeVar("_T")
+
+
+@dataclass(frozen=True)
+class Question:
+    """What has to be decided.
+
+    Parameters
+    ----------
+    text : str
+        What was found.
+    options : tuple of Remedy
+        Parts of a mapping, the likeliest first.
+    severity : {'error', 'column', 'trouble', 'warning', 'info'}
+        What it is about: the file cannot be read, a column is left out, or something that `check` finds.
+    may_guess : bool
+        False: how long the recording took depends on the answer.
+    """
+
+    text: str
+    options: tuple[Remedy, ...]
+    severity: str
+    may_guess: bool = True
+
+    @property
+    def others(self) -> tuple[str, ...]:
+        """What else may be true of a file that can be read in several ways, a line each."""
+        return tuple(to_toml(r).replace("\n", " ") for r in self.options[1:]) if self.severity == "error" else ()
+
+
+#: what is decided: one of the options, or None to leave it as it is
+Decide = Callable[[Question], Remedy | None]
+
+
+def take_best(question: Question) -> Remedy | None:
+    """Decide for the likeliest, but leave alone what is no trouble, and move no values: that takes who was there.
+
+    Nor is a time decided for where another one is as likely.
+    """
+    if not question.may_guess:
+        return None
+    best = question.options[0]
+    moves = any(step["do"] in ("shift", "rezero", "swap") for step in best.get("clean", ()))
+    return None if moves or question.severity in ("warning", "info") else best
+
+
+class Draft:
+    """A mapping that is being written.
+
+    Parameters
+    ----------
+    text : str
+        TOML to begin with; its comments stay.
+    """
+
+    def __init__(self, text: str = "") -> None:
+        self.document = tomlkit.parse(text)
+
+    @property
+    def text(self) -> str:
+        """The TOML."""
+        written = tomlkit.dumps(self.document).strip()
+        return f"{re.sub(_TIGHT, _APART, written)}\n" if written else ""
+
+    def mapping(self, owner: str) -> Mapping:
+        """Return what it says.
+
+        Raises
+        ------
+        InputError
+            A value does not go with another.
+        """
+        return check_content(self.document.unwrap(), owner)
+
+    def add(self, remedy: Remedy) -> bool:
+        """Write a remedy into it; return False if all of it stood there."""
+        before = copy.deepcopy(self.document.unwrap())
+        for key, content in remedy.items():
+            if key == "clean":
+                steps = self.document.setdefault(key, tomlkit.aot())
+                for step in content:
+                    if step not in steps.unwrap():
+                        steps.append(_table(step))
+            elif key == "columns":
+                tables = self.document.setdefault(key, tomlkit.table(is_super_table=True))
+                for name, said in content.items():
+                    _update(tables.setdefault(self._named(name, said), tomlkit.table()), said)
+            else:
+                _update(self.document.setdefault(key, tomlkit.table()), content)
+        return bool(before != self.document.unwrap())
+
+    def _named(self, name: str, said: Remedy) -> str:
+        """Return the table that speaks of a column already, or its name."""
+        place = said.get("column", name)
+        tables = self.document.get("columns", {})
+        return next((n for n, table in tables.items() if table.get("column", n) == place), name)
+
+
+@dataclass(frozen=True)
+class Mended:
+    """A mapping that was written, and what it makes of the file.
+
+    Parameters
+    ----------
+    text : str
+        TOML.
+    recording : Recording
+    decided : tuple of (Question, Remedy or None)
+    """
+
+    text: str
+    recording: Recording
+    decided: tuple[tuple[Question, Remedy | None], ...]
+
+
+def mend(path: str | Path, text: str, decide: Decide) -> Mended:
+    """Write a mapping by which a file can be read, and that cleans it.
+
+    Parameters
+    ----------
+    path : str or Path
+    text : str
+        TOML to begin with.
+    decide : callable
+        Answers a `Question`.
+
+    Returns
+    -------
+    Mended
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, and no mapping helps.
+    """
+    owner = str(path)
+    dialogue = _Dialogue(Draft(text), decide, path)
+    table = dialogue.until(lambda: open_table(path, dialogue.draft.mapping(owner)))
+    mapping = dialogue.draft.mapping(owner)
+    if not mapping.read.only_mapped:
+        for shown, options in guess_columns(table, mapping):
+            dialogue.ask(Question(f"column {shown} has no unit that is known", tuple(options), "column"))
+    recording = dialogue.until(lambda: read(path, dialogue.draft.mapping(owner)))
+    for _ in range(_ROUNDS):
+        before, mapping = dialogue.draft.text, dialogue.draft.mapping(owner)
+        for f in check(recording):
+            if f.remedy is not None:
+                way = located(f, recording, mapping, table.headings)
+                dialogue.ask(Question(f"{f.channel} {f.text}".strip(), (way,), f.severity))
+        if dialogue.draft.text == before:
+            break
+        recording = dialogue.until(lambda: read(path, dialogue.draft.mapping(owner)))
+    return Mended(dialogue.draft.text, recording, tuple(dialogue.decided))
+
+
+def read_or_offer(path: str | Path, mapping: Mapping | None = None) -> Recording:
+    """Read one test from a file; an error of it offers a mapping, filled in, in a note of its own.
+
+    Parameters
+    ----------
+    path : str or Path
+    mapping : Mapping, optional
+
+    Returns
+    -------
+    Recording
+
+    Raises
+    ------
+    RecordingError, UnitError
+        See `thermocomp.recordings.readers.recordings.read`.
+    """
+    try:
+        return read(path, mapping)
+    except (RecordingError, UnitError) as e:
+        if offered := _offer(Path(path), mapping or Mapping(), e):
+            e.add_note(offered)
+        raise
+
+
+def located(finding: Finding, recording: Recording, mapping: Mapping, headings: Sequence[str]) -> Remedy:
+    """Return the remedy of a finding as a mapping of the file needs it.
+
+    Parameters
+    ----------
+    finding : Finding
+        With a remedy.
+    recording : Recording
+        That it was found in.
+    mapping : Mapping
+        That the recording was read by.
+    headings : sequence of str
+        Of the file.
+
+    Returns
+    -------
+    Remedy
+        Columns by their headings, times since the first row of the file.
+    """
+    remedy: dict[str, Any] = copy.deepcopy(dict(finding.remedy or {}))
+    for step in remedy.get("clean", ()):
+        if "times" in step:
+            step["times"] = [
+                [v + recording.origin for v in t] if isinstance(t, list) else t + recording.origin
+                for t in step["times"]
+            ]
+        if "at" in step:
+            step["at"] += recording.origin
+    for name, said in list(remedy.get("columns", {}).items()):
+        heading = next((h for h in headings if recording.aliases.get(h, h) == name), name)
+        if "missing" in said and finding.rows is not None and not _holds_as_it_is(mapping.columns.get(name), heading):
+            del remedy["columns"][name]  # the number in the file is another one: its places are known
+            remedy |= cut(name, finding.rows, recording.time + recording.origin, finding.kind)
+        elif name not in mapping.columns and heading != name:
+            said["column"] = heading
+    return remedy
+
+
+def to_toml(remedy: Remedy) -> str:
+    """Return a remedy as it stands in a mapping file."""
+    draft = Draft()
+    draft.add(remedy)
+    return draft.text.strip()
+
+
+def _holds_as_it_is(rule: ColumnMap | None, heading: str) -> bool:
+    """Return whether the numbers of a column are those of its channel."""
+    rule, meaning = rule or ColumnMap(), understand_or_none(heading)
+    unit = rule.conversion or (meaning.unit if meaning is not None else None)
+    return unit is not None and (rule.scale, rule.zero, unit.scale, unit.shift) == (1.0, 0.0, 1.0, 0.0)
+
+
+class _Dialogue:
+    """A mapping that is written by questions and answers.
+
+    Parameters
+    ----------
+    draft : Draft
+    decide : callable
+    path : str or Path
+        The file.
+    """
+
+    def __init__(self, draft: Draft, decide: Decide, path: str | Path) -> None:
+        self.draft = draft
+        self.decide = decide
+        self.path = path
+        self.decided: list[tuple[Question, Remedy | None]] = []
+
+    def ask(self, question: Question) -> bool:
+        """Have a question decided, once; return whether the mapping says something new now."""
+        if any(q.text == question.text and q.options == question.options for q, _ in self.decided):
+            return False
+        answer = self.decide(question)
+        self.decided.append((question, answer))
+        return answer is not None and self.draft.add(answer)
+
+    def _skipped(self) -> int:
+        return sum(1 for _, answer in self.decided if answer is not None and _skips(answer))
+
+    def _skips_date(self, error: InputError) -> bool:
+        """Return whether the likeliest remedy passes over a row that says on which day the next ones were taken."""
+        if not _skips(error.remedies[0]):
+            return False
+        try:
+            table = open_table(self.path, self.draft.mapping(str(self.path)))
+        except InputError:  # a row of too many cells or too few, which the message holds
+            return holds_date(str(error).removeprefix(str(self.path)))
+        return holds_own_date(table, error.remedies[0]["read"]["skip"][-1])
+
+    def until(self, action: Callable[[], _T]) -> _T:
+        """Do something; what stands in the way is asked about, one after the other."""
+        for _ in range(MOST_QUESTIONS):
+            try:
+                return action()
+            except (RecordingError, UnitError) as e:
+                if not e.remedies or (_skips(e.remedies[0]) and self._skipped() >= MOST_SKIPPED):
+                    raise
+                may_guess = not (isinstance(e, TwoReadingsError) or self._skips_date(e))
+                if not self.ask(Question(str(e), e.remedies, "error", may_guess)):
+                    raise
+        return action()
+
+
+def _skips(remedy: Remedy) -> bool:
+    """Return whether a remedy passes over a row."""
+    return "skip" in remedy.get("read", {})
+
+
+def _offer(path: Path, mapping: Mapping, error: InputError) -> str:
+    """Return words that offer a mapping by which a file can be read; empty if there is none."""
+    if not error.remedies or path.stat().st_size > _LARGE:
+        return ""
+    begun = tomlkit.dumps(ADAPTER.dump_python(mapping, mode="json", exclude_defaults=True))
+    dialogue, name = _Dialogue(Draft(begun), take_best, path), _file_name(path)
+    try:
+        dialogue.until(lambda: read(path, dialogue.draft.mapping(str(path))))
+        how = "by this mapping it is read; look it over"
+    except InputError as e:
+        if not dialogue.decided or any(map(_skips, e.remedies[:1])):
+            return ""
+        if isinstance(e, TwoReadingsError):
+            return _offer_choice(dialogue.draft.text, e.remedies, name)
+        how = f"this mapping goes part of the way ({str(e).removeprefix(f'{path}: ')}); complete it"
+    other = "".join(f"\n# or: {way}" for q, _ in dialogue.decided for way in q.others)
+    return f"{how}, save it as {name} and give it with --mapping {name}:\n\n{dialogue.draft.text.strip()}{other}"
+
+
+def _offer_choice(text: str, remedies: Sequence[Remedy], name: str) -> str:
+    """Return words that offer what somebody has to choose from."""
+    ways = "\n# or:\n".join(re.sub(r"^", "# ", to_toml(way), flags=re.MULTILINE) for way in remedies)
+    return f"choose one, save it as {name} without the # and give it with --mapping {name}:\n\n{text}{ways}"
+
+
+def _file_name(path: Path) -> str:
+    """Return a name of a mapping file that no shell takes amiss."""
+    return f"{re.sub(r'[^A-Za-z0-9_.-]+', '_', path.stem).lstrip('-.') or 'recording'}.toml"
+
+
+def _table(content: Remedy) -> Table:
+    table = tomlkit.table()
+    _update(table, content)
+    return table
+
+
+def _update(table: Any, content: Remedy) -> None:
+    for key, value in content.items():
+        if isinstance(value, list) and key in ("skip", "missing") and key in table:
+            table[key] = [*table[key], *(v for v in value if v not in table[key])]
+        else:
+            table[key] = value

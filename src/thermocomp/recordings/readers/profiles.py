@@ -1,0 +1,331 @@
+"""Error profiles from tables: wide, with a column per position, or long, with a row per position."""
+
+import re
+from collections.abc import Mapping as AbstractMapping
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal, cast
+
+import numpy as np
+
+from thermocomp.core.components import BY_CODE
+from thermocomp.core.exceptions import InputError, RecordingError, UnitError
+from thermocomp.core.machine import Channel
+from thermocomp.core.units import read_with_unit
+from thermocomp.files.tomlfile import read_toml
+from thermocomp.recordings.profiles import MIN_POSITIONS, QUANTITY, Profiles
+from thermocomp.recordings.readers.codecolumns import codes, columns_of
+from thermocomp.recordings.readers.codecolumns import is_code_column as is_profile
+from thermocomp.recordings.readers.longtables import read_long
+from thermocomp.recordings.readers.mapping import Mapping
+from thermocomp.recordings.readers.recordings import read as read_recording
+from thermocomp.recordings.readers.recordings import read_rows
+from thermocomp.recordings.recording import Recording
+
+#: a place by the axes that it tells, such as {"Y": 250.0} [mm]
+Place = AbstractMapping[str, float]
+Layout = Literal["wide", "long"]
+
+#: how a note begins about columns of a component that could not be used
+NOT_TAKEN = "not taken:"
+
+#: columns of a wide table, if nothing else is said: y_laser_250_um, a_y_-50_urad
+_PLACED = re.compile(r"(?P<base>.+)_(?P<position>-?\d+(?:\.\d+)?)_(?:um|urad)")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProfileOptions:
+    """What a table of profiles is of.
+
+    Parameters
+    ----------
+    target : str
+        Code of the component, such as ``EYY``, or any other name.
+    axis : str
+        Along which; empty: that of the component.
+    unit : str
+        um or urad; empty: that of the component.
+    columns : str
+        Wide: names of the columns, ``*`` standing for the position in mm, such as ``y_laser_*``. Long: the column of
+        the error. Empty: those called after the component, such as ``EYY_250_um`` (see
+        `thermocomp.recordings.readers.codecolumns`); if there are none, found by unit and position in the name.
+    places : mapping of str to Place
+        Wide: position of each column by its name, instead of `columns`; see `read_places`.
+    position : str
+        Long: the column of the axis' own position; empty: ``position_mm``, or that of the axis, such as ``y_mm``.
+    state : str
+        Long: the column that tells the state of a row; empty: one that is called state or profile, else the time, else
+        a state ends where a position comes again.
+    """
+
+    target: str
+    axis: str = ""
+    unit: str = ""
+    columns: str = ""
+    places: AbstractMapping[str, Place] | None = None
+    position: str = ""
+    state: str = ""
+
+    @property
+    def about(self) -> tuple[str, Literal["um", "urad"]]:
+        """Axis and unit.
+
+        Raises
+        ------
+        InputError
+            Neither the component tells them, nor is it said.
+        """
+        component = BY_CODE.get(self.target)
+        axis = self.axis or (component.depends_on if component else "") or ""
+        unit = self.unit or (component.unit if component else "")
+        if not axis:
+            hint = (
+                f"{component.description} does not depend on a position" if component else "it is no component's code"
+            )
+            raise InputError(f"{self.target}: {hint}; name a component such as EYY, or say the axis")
+        if unit not in QUANTITY:
+            raise InputError(f"{self.target}: unit {unit!r}: say whether it is in um or urad")
+        return axis, cast(Literal["um", "urad"], unit)
+
+
+def read(
+    path: str | Path,
+    options: ProfileOptions | str,
+    mapping: Mapping | None = None,
+    *,
+    layout: Layout | None = None,
+) -> Profiles:
+    """Read the profiles of one component from a file.
+
+    Parameters
+    ----------
+    path : str or Path
+        See `thermocomp.recordings.readers.recordings.read`.
+    options : ProfileOptions or str
+        What they are of; a text is the code of the component.
+    mapping : Mapping, optional
+        What the columns are, where their headings do not say.
+    layout : {'wide', 'long'}, optional
+        A row per thermal state and a column per position, or a row per position; found out if not given.
+
+    Returns
+    -------
+    Profiles
+
+    Raises
+    ------
+    RecordingError
+        The file cannot be read, or holds no profile of that kind; the message names line and column.
+    InputError
+        A column that was named is not there, or what it measures is not what the component is.
+    """
+    wanted = ProfileOptions(target=options) if isinstance(options, str) else options
+    wanted.about  # noqa: B018 - refuses before a long file is read
+    if layout is None:
+        rows = read_rows(path, mapping, rising=False)
+        has_position = any(c.quantity == "position" for c in rows.channels)
+        placed = [c for c in rows.channels if _PLACED.fullmatch(c.name)]
+        named = len(placed) >= MIN_POSITIONS or wanted.places or "*" in wanted.columns
+        layout = "long" if has_position and not named else "wide"
+    if layout == "wide":
+        return from_recording(read_recording(path, mapping), wanted)
+    axis, unit = wanted.about
+    return read_long(
+        path, mapping, wanted.target, unit, axis, error=wanted.columns, position=wanted.position, state=wanted.state
+    )
+
+
+def read_components(
+    paths: Sequence[str | Path],
+    components: Sequence[str] = (),
+    mapping: Mapping | None = None,
+) -> dict[str, tuple[Profiles, ...]]:
+    """Read the profiles of several components from wide tables whose columns are called after them.
+
+    Parameters
+    ----------
+    paths : sequence of str or Path
+        One file per test.
+    components : sequence of str
+        Codes; all that have columns, if none is given.
+    mapping : Mapping, optional
+        See `read`.
+
+    Returns
+    -------
+    dict of str to tuple of Profiles
+        By code, one per test.
+
+    Raises
+    ------
+    RecordingError
+        A file cannot be read, or has no column that is called after a component.
+    InputError
+        There is no such component, or what a column measures is not what the component is.
+    """
+    recordings = [read_recording(path, mapping) for path in paths]
+    wanted = components or list(dict.fromkeys(code for r in recordings for code in codes(r)))
+    for r in recordings:
+        for code in wanted or [""]:
+            if code not in codes(r):
+                like = f"{code or 'EXX'}_250_{BY_CODE[code].unit if code in BY_CODE else 'um'}"
+                raise RecordingError(
+                    f"{r.source}: no column is called after {code or 'a component'}, such as {like} (position in mm, "
+                    "unit); columns of other names are read one component at a time"
+                )
+    return {code: tuple(from_recording(r, code) for r in recordings) for code in wanted}
+
+
+def from_recording(recording: Recording, options: ProfileOptions | str) -> Profiles:
+    """Take profiles out of a recording that has a column per position.
+
+    Parameters
+    ----------
+    recording : Recording
+        A row per thermal state.
+    options : ProfileOptions or str
+        What they are of; a text is the code of the component.
+
+    Returns
+    -------
+    Profiles
+        Whose states have the other channels, but for profiles of other components. Coordinates that no place tells are
+        0.
+
+    Raises
+    ------
+    RecordingError, InputError
+        See `read`.
+    """
+    wanted = ProfileOptions(target=options) if isinstance(options, str) else options
+    axis, unit = wanted.about
+    owner = f"{recording.source or recording.name}: {wanted.target}"
+    notes = recording.notes
+    called, elsewhere = columns_of(recording, wanted.target)
+    if wanted.places is not None:
+        found = [(recording.channel(name), place) for name, place in wanted.places.items()]
+    elif wanted.columns:
+        found = [(c, {axis: p}) for c, p in _matching(recording, wanted.columns)]
+    elif called:
+        found = [(recording.channel(name), {axis: p}) for name, p in called.items()]
+        if elsewhere:
+            why = "another axis stood elsewhere, where turns have a lever: take that off, and read a long table"
+            notes += (f"{NOT_TAKEN} {elsewhere[0]} to {elsewhere[-1]}: {why}",)
+    else:
+        found = [(c, {axis: p}) for c, p in _by_name(recording, QUANTITY[unit], owner)]
+        _refuse_another_axis(wanted.target, axis, found, owner)
+    if not found:
+        what = f"called {wanted.columns!r}" if wanted.columns else f"like y_laser_250_{unit} (position in mm, unit)"
+        raise RecordingError(
+            f"{owner}: no column is {what}; say which columns hold the profile, such as 'y_laser_*', or read a table "
+            "with a row per position as a long one. There are "
+            + ", ".join(c.name for c in recording.channels if c.quantity in QUANTITY.values())
+        )
+    mixed = [c for c, _ in found if c.quantity != QUANTITY[unit]]
+    if mixed:
+        one, it, its = ("column", "it", "its") if len(mixed) == 1 else ("each of the columns", "them", "their")
+        raise UnitError(
+            f"{owner}: {one} {', '.join(repr(c.name) for c in mixed)} measures {mixed[0].quantity} in {mixed[0].unit} "
+            f"among {QUANTITY[unit]}s in {unit}: leave {it} out, or correct {its} unit"
+        )
+    for channel, place in found:
+        if axis not in place:
+            raise InputError(f"{owner}: column {channel.name!r}: its place does not tell the position of {axis}")
+    points = np.array([[place.get(a, 0.0) for a in "XYZ"] for _, place in found])
+    taken = [c for c, _ in found]
+    rest = tuple(c for c in recording.channels if c not in taken and not (called and is_profile(c)))
+    states = replace(recording, table=recording.table[[c.name for c in rest]], channels=rest, notes=notes)
+    return Profiles(wanted.target, unit, axis, points, recording.values(taken), states)
+
+
+def read_places(path: str | Path) -> dict[str, Place]:
+    """Read a TOML that says where each column of a wide table was measured.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    dict of str to Place
+        By column.
+
+    Raises
+    ------
+    InputError
+        No such file, no TOML, or a position without a length unit; the message names file and key.
+
+    Examples
+    --------
+    ::
+
+        [positions]
+        probe_1 = { y = "0 mm" }
+        probe_2 = { y = "250 mm", x = "300 mm" }
+    """
+    source = Path(path)
+    content = read_toml(source, "file of positions")
+    table = content.get("positions")
+    if not isinstance(table, dict) or not table or len(content) > 1:
+        raise InputError(f"{source}: want one table [positions] with a key per column, and nothing else")
+    return {name: _read_place(value, f"{source}: [positions] {name}") for name, value in table.items()}
+
+
+def _read_place(value: Any, where: str) -> Place:
+    if not isinstance(value, dict) or not value or any(a.upper() not in ("X", "Y", "Z") for a in value):
+        raise InputError(f'{where} = {value!r}: write the axes\' positions, such as {{ y = "250 mm" }}')
+    place = {}
+    for axis, text in value.items():
+        try:
+            position = read_with_unit(text, "position")
+        except UnitError as e:
+            raise UnitError(f"{where}.{axis}: {e}") from e
+        if position is None:
+            raise InputError(f'{where}.{axis} = {text!r}: write a position with its unit, such as "250 mm"')
+        place[axis.upper()] = position
+    return place
+
+
+def _matching(recording: Recording, pattern: str) -> list[tuple[Channel, float]]:
+    """Return the channels whose name, or another name they answer to, is like `pattern`, and their positions."""
+    shape = re.compile(re.escape(pattern).replace(r"\*", r"(-?\d+(?:\.\d+)?)", 1).replace(r"\*", ".*"))
+    if "*" not in pattern:
+        raise InputError(f"columns {pattern!r}: put * where the position stands in the name, such as y_laser_*")
+    found = []
+    for c in recording.channels:
+        names = [c.name, *(alias for alias, name in recording.aliases.items() if name == c.name)]
+        without = re.sub(r"_(um|urad)$", "", c.name)
+        matches = [m for name in (*names, without) if (m := shape.fullmatch(name))]
+        if matches:
+            found.append((c, float(matches[0][1])))
+    return found
+
+
+def _by_name(recording: Recording, quantity: str, owner: str) -> list[tuple[Channel, float]]:
+    """Return the channels of a quantity that have a position in their name; all must be called alike.
+
+    With them come those of another quantity that are called like them and go on where they end: a wrong unit.
+    """
+    placed = [(c, m) for c in recording.channels if (m := _PLACED.fullmatch(c.name))]
+    found = [(c, m) for c, m in placed if c.quantity == quantity]
+    bases = list(dict.fromkeys(m["base"] for _, m in found))
+    if len(bases) > 1:
+        raise RecordingError(
+            f"{owner}: there are profiles called {', '.join(f'{b}_*' for b in bases)}; say which columns to take, such "
+            f"as '{bases[0]}_*'"
+        )
+    there = {m["position"] for _, m in found}
+    strange = [(c, m) for c, m in placed if m["base"] in bases and m["position"] not in there]
+    return [(c, float(m["position"])) for c, m in (*found, *strange)]
+
+
+def _refuse_another_axis(target: str, axis: str, found: Sequence[tuple[Channel, Place]], owner: str) -> None:
+    """Refuse columns that nobody named and that are called after an axis which has no part in the error."""
+    for c, _ in found[:1]:
+        called = re.match(r"([xyz])(?:\d?_)", c.name)
+        if called and target in BY_CODE and called[1].upper() not in (axis, target[1]):
+            raise RecordingError(
+                f"{owner}: columns like {c.name!r} seem to be of {called[1].upper()}, not of {target}; say which "
+                "columns to take if they are meant"
+            )

@@ -1,0 +1,426 @@
+"""Recordings as files: CSV, XLSX and Parquet in, CSV and Parquet out."""
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from datetime import datetime, timedelta
+from difflib import get_close_matches
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from thermocomp.core.exceptions import InputError, RecordingError, TwoReadingsError
+from thermocomp.files.draft import draft
+from thermocomp.recordings.cleaning import clean
+from thermocomp.recordings.cycles import Cycle, find_cycles, make_single_cycle, split_by_labels
+from thermocomp.recordings.readers.cellkinds import find_kind
+from thermocomp.recordings.readers.columns import Column, ColumnPlan, plan
+from thermocomp.recordings.readers.datecheck import check_dates
+from thermocomp.recordings.readers.dayforms import find_day_columns
+from thermocomp.recordings.readers.guesses import guess
+from thermocomp.recordings.readers.headings import understand
+from thermocomp.recordings.readers.leftout import refuse_nameless, why_left_out
+from thermocomp.recordings.readers.limits import Limits, check_file
+from thermocomp.recordings.readers.mapping import ADAPTER, ColumnMap, Mapping, ReadOptions, TimeColumn
+from thermocomp.recordings.readers.parquet import open_parquet
+from thermocomp.recordings.readers.tables import EMBEDDED, FileTable, defuse, restore, skip_row
+from thermocomp.recordings.readers.textfile import open_csv
+from thermocomp.recordings.readers.times import read_times
+from thermocomp.recordings.readers.workbook import open_workbook
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.rows import Rows
+
+FloatArray = NDArray[np.float64]
+
+#: notes of one recording, and characters of a note or an error
+_MOST_NOTES = 100
+_MOST_SAID = 2_000
+
+ENDINGS = (".csv", ".tsv", ".txt", ".dat", ".asc", ".xlsx", ".ods", ".parquet")
+
+
+def read(path: str | Path, mapping: Mapping | None = None) -> Recording:
+    """Read one test from a file.
+
+    Columns are understood by the unit in their heading (``time_s``, ``t1_C``, ``drift_um``, ``spindle_rpm``,
+    ``T1 [degC]``) or by `mapping`. Thermal cycles come from a column ``cycle``, else from the spindle speed.
+
+    Parameters
+    ----------
+    path : str or Path
+        A file ending in .csv, .tsv, .txt, .dat, .asc, .xlsx, .ods or .parquet.
+    mapping : Mapping, optional
+        What the columns are, where their headings do not say; see `thermocomp.recordings.readers.mapping.read_mapping`.
+
+    Returns
+    -------
+    Recording
+        In house units; `notes` tells what was left out or replaced.
+
+    Raises
+    ------
+    RecordingError
+        The file cannot be read, or not as a recording; the message names line and column.
+    UnitError
+        A unit is unknown, or the one in the heading cannot measure what the mapping states.
+    """
+    rows = read_rows(path, mapping)
+    return make_recording(rows, rows.time, rows.table, rows.labels)
+
+
+def read_rows(
+    path: str | Path, mapping: Mapping | None = None, *, rising: bool = True, extra: Sequence[str] = ()
+) -> Rows:
+    """Read the rows of a file.
+
+    Parameters
+    ----------
+    path : str or Path
+    mapping : Mapping, optional
+    rising : bool
+        False: several rows may have the same time, as in a table with a row per position.
+    extra : sequence of str
+        Headings of columns, whatever they hold, to be read too if they are there.
+
+    Returns
+    -------
+    Rows
+
+    Raises
+    ------
+    RecordingError, UnitError
+        See `read`.
+    """
+    source = Path(path)
+    try:
+        return _read_rows(source, mapping or Mapping(), rising=rising, extra=extra)
+    except InputError as e:
+        text = str(e)
+        if len(text) <= _MOST_SAID:
+            raise
+        half = _MOST_SAID // 2
+        raise type(e)(f"{text[:half]} ... {text[-half:]}", e.remedies) from e
+
+
+def _read_rows(source: Path, mapping: Mapping, *, rising: bool, extra: Sequence[str]) -> Rows:
+    table, sha256 = _opened(source, mapping.read, mapping.limits)
+    notes = [*table.notes]
+    if table.embedded:
+        described, note = _described(table.embedded, source)
+        mapping = mapping.over(described)
+        notes.extend(note)
+    with _guessing(table, mapping):
+        columns = plan(table.headings, mapping, str(source), cache(lambda k: find_kind(table.head(k))))
+    notes.extend(columns.notes)
+    is_stamp = columns.time_unit == "timestamp" or not (columns.time_unit or table.is_number(columns.time))
+    numbers = [c.index for c in columns.columns]
+    more = {h: table.headings.index(h) for h in extra if h in table.headings}
+    if is_stamp and columns.fraction is not None:
+        numbers.append(columns.fraction)
+    times = [columns.time, *columns.beside]
+    known = {*numbers, *times, columns.date, columns.fraction, *columns.unused}
+    others = find_day_columns(table, [k for k, h in enumerate(table.headings) if h and k not in known])
+    numbers += [] if is_stamp else times
+    maybe = (*(times if is_stamp else ()), columns.date, *columns.unused, *others, columns.cycle, *more.values())
+    texts = [k for k in maybe if k is not None]
+    cells, told = table.load(list(dict.fromkeys(numbers)), list(dict.fromkeys(t for t in texts if t not in numbers)))
+    notes.extend(told)
+    time, start, told = _times(cells, columns, mapping, table, source, is_stamp=is_stamp, rising=rising)
+    notes.extend(told)
+    if not start or columns.date is not None:
+        notes.extend(check_dates(time, cells, columns, mapping, table, source, is_stamp=is_stamp, others=others))
+    data, changed = {}, list[str]()
+    for column in columns.columns:
+        raw = cells[column.index].to_numpy(dtype=np.float64)
+        column.refuse_doubtful(raw, table.headings[column.index], str(source))
+        data[column.channel.name], found = _convert(column, raw, mapping.read.missing, table)
+        changed.extend(found)
+    left_out = [k for k in columns.left_out if k not in more.values()]
+    numeric = [k for k in left_out if table.is_number(k, empty=False)]
+    with _guessing(table, mapping):
+        refuse_nameless([table.headings[k] for k in numeric], str(source))
+    notes.extend(f"left out: {why_left_out(table.headings[k])}" for k in numeric[:_MOST_NOTES])
+    texts_only = [table.headings[k] for k in left_out if k not in set(numeric)]
+    if texts_only:
+        notes.append(f"not read, holding no numbers: {', '.join(texts_only)}")
+    rows = Rows(
+        source=str(source),
+        sha256=sha256,
+        time=time,
+        start=start or mapping.time.start,
+        table=pd.DataFrame(data, copy=False),
+        channels=tuple(c.channel for c in columns.columns),
+        labels=_labels(cells, columns, table, source),
+        extra={h: cells[k].tolist() for h, k in more.items()},
+        min_run=mapping.cycles.min_run_s,
+        min_stop=mapping.cycles.min_stop_s,
+        most_cycles=mapping.limits.cycles,
+        aliases=columns.aliases,
+        notes=_shorten(notes, len(numeric)),
+        changed=_shorten(changed, 0),
+        place=table.place,
+        compensation=mapping.compensation,
+    )
+    return _zeroed(clean(rows, mapping.clean), columns) if mapping.clean else rows
+
+
+def make_recording(rows: Rows, time: FloatArray, table: pd.DataFrame, labels: Sequence[Any] | None) -> Recording:
+    """Make a recording of rows, or of what was made of them.
+
+    Parameters
+    ----------
+    rows : Rows
+        As read.
+    time : ndarray of shape (n,)
+        [s]
+    table : DataFrame of shape (n, n_kept)
+        Some of the channels.
+    labels : sequence of object, optional
+        Thermal cycle of each row.
+
+    Returns
+    -------
+    Recording
+    """
+    origin = float(time[0])
+    recording = Recording(
+        name=Path(rows.source).stem,
+        time=time - origin if origin else time,
+        table=table,
+        channels=tuple(c for c in rows.channels if c.name in table.columns),
+        cycles=make_single_cycle(len(time)),
+        source=rows.source,
+        sha256=rows.sha256,
+        start=_later(rows.start, origin),
+        origin=origin,
+        aliases=rows.aliases,
+        notes=(*rows.notes, *rows.changed),
+        changed=rows.changed,
+        compensation=rows.compensation,
+    )
+    return recording.with_cycles(_cycles(recording, labels, rows))
+
+
+def write(recording: Recording, path: str | Path, *, overwrite: bool = False) -> None:
+    """Write a recording so that `read` gives the same numbers, channels and cycles.
+
+    Channels whose name does not carry their unit are described in the file itself: in a comment line of a CSV file, in
+    an attribute of a Parquet file.
+
+    Parameters
+    ----------
+    recording : Recording
+    path : str or Path
+        A file ending in .csv or .parquet.
+    overwrite : bool
+
+    Raises
+    ------
+    InputError
+        Its ending is another one, or it cannot be there: see `thermocomp.files.draft.drafts`.
+    """
+    target = Path(path)
+    if target.suffix not in (".csv", ".parquet"):
+        raise InputError(f"{target}: a recording is written as .csv or .parquet")
+    as_text = target.suffix == ".csv"
+    described: dict[str, ColumnMap] = {}
+    headings = {}
+    for c in recording.channels:
+        meaning = understand(c.name)
+        said = meaning and (meaning.name, meaning.unit.symbol, meaning.unit.quantity)
+        known = said == (c.name, c.unit, c.quantity)
+        heading = c.name if known else f"{c.name} [{c.unit}]".strip()
+        if not known or c.place:
+            column = "" if known else heading
+            described[c.name] = ColumnMap(column, c.unit, c.quantity, place=c.place)  # type: ignore[arg-type]
+        headings[c.name] = _as_written(heading, as_text=as_text)
+    out = recording.table.rename(columns=headings)
+    out.insert(0, "time_s", recording.time)
+    names = [c.name for c in recording.cycles]
+    if len(set(names)) < len(names):
+        names = [f"{k}: {name}" for k, name in enumerate(names, start=1)]
+    names = [_as_written(name, as_text=as_text) for name in names]
+    out["cycle"] = np.repeat(names, [len(c) for c in recording.cycles])
+    time = TimeColumn(column="time_s", unit="s", start=recording.start)
+    embedded = Mapping(time, described, compensation=recording.compensation)  # type: ignore[arg-type]
+    needed = bool(described or recording.start or recording.compensation)
+    text = ADAPTER.dump_json(embedded, exclude_defaults=True).decode() if needed else ""
+    with draft(target, overwrite=overwrite) as started:
+        if as_text:
+            with started.open("x", encoding="utf-8", newline="") as f:
+                if text:
+                    f.write(f"# {EMBEDDED}: {text}\n")
+                out.to_csv(f, index=False, lineterminator="\n")
+        else:
+            out.attrs = {EMBEDDED: text} if text else {}  # pandas keeps these when it reads the file and writes another
+            out.to_parquet(started, index=False)
+
+
+def _as_written(name: str, *, as_text: bool) -> str:
+    """Return a heading or a label so that reading it gives the same; in text also so that no spreadsheet calculates."""
+    return defuse(name) if as_text or restore(name) != name else name
+
+
+def open_table(path: str | Path, mapping: Mapping) -> FileTable:
+    """Open a file without understanding what its columns are.
+
+    Parameters
+    ----------
+    path : str or Path
+    mapping : Mapping
+
+    Returns
+    -------
+    FileTable
+
+    Raises
+    ------
+    RecordingError
+        It cannot be read as a table.
+    """
+    return _opened(Path(path), mapping.read, mapping.limits)[0]
+
+
+def _opened(path: Path, options: ReadOptions, limits: Limits) -> tuple[FileTable, str]:
+    """Return the raw table and the SHA-256 of the file."""
+    ending = path.suffix.lower()
+    if ending not in ENDINGS:
+        raise RecordingError(
+            f"{path}: files ending in {ending or 'nothing'!r} are not read; save it as one of {', '.join(ENDINGS)}"
+        )
+    try:
+        check_file(path, limits)
+        with path.open("rb") as f:
+            sha256 = hashlib.file_digest(f, "sha256").hexdigest()
+        if ending in (".xlsx", ".ods"):
+            return open_workbook(path, options, limits), sha256
+        if ending == ".parquet":
+            return open_parquet(path, options, limits), sha256
+        return open_csv(path, options, limits), sha256
+    except FileNotFoundError as e:
+        others = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
+        near = get_close_matches(path.name, others, n=1)
+        raise RecordingError(f"{path}: no such file{f'; did you mean {near[0]}?' if near else ''}") from e
+    except OSError as e:
+        raise RecordingError(f"{path}: cannot be read: {e.strerror or e}") from e
+    except ValueError as e:  # a name that no file can have
+        raise RecordingError(f"{str(path)!r}: cannot be read: {e}") from e
+
+
+def _described(text: str, source: Path) -> tuple[Mapping, list[str]]:
+    """Return thermocomp's own description of the columns; nothing but a note if another program has damaged it."""
+    try:
+        return ADAPTER.validate_json(text), []
+    except ValidationError as e:
+        reason = e.errors()[0]["msg"]
+        return Mapping(), [f"thermocomp's own description of the columns is damaged ({reason}) and not used"]
+    except InputError as e:
+        raise type(e)(f"{source}: {e}") from e
+
+
+def _zeroed(rows: Rows, columns: ColumnPlan) -> Rows:
+    """Let columns that count from their first value do so where that was cut."""
+    table = rows.table
+    for name in (c.channel.name for c in columns.columns if c.rule.zero == "first"):
+        x = table[name].to_numpy(dtype=np.float64)
+        there = np.flatnonzero(np.isfinite(x))
+        if there.size and x[there[0]]:
+            table = table.assign(**{name: x - x[there[0]]})
+    return replace(rows, table=table)
+
+
+def _later(start: str, seconds: float) -> str:
+    """Return a timestamp some seconds later."""
+    return (datetime.fromisoformat(start) + timedelta(seconds=seconds)).isoformat() if start and seconds else start
+
+
+@contextmanager
+def _guessing(table: FileTable, mapping: Mapping) -> Iterator[None]:
+    """Let errors about columns carry a guess of what these are."""
+    try:
+        yield
+    except RecordingError as e:
+        e.remedies = e.remedies or guess(table, mapping)
+        # a unit of time says how long the recording took: nobody may guess which
+        if any(r.get("time", {}).get("unit") in ("ms", "s", "min", "h") for r in e.remedies):
+            raise TwoReadingsError(str(e), e.remedies) from e
+        raise
+
+
+def _times(
+    cells: pd.DataFrame,
+    columns: ColumnPlan,
+    mapping: Mapping,
+    table: FileTable,
+    source: Path,
+    *,
+    is_stamp: bool,
+    rising: bool,
+) -> tuple[FloatArray, str, tuple[str, ...]]:
+    where = f"{source}: column {table.headings[columns.time]!r}"
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):
+            time, start, notes = read_times(cells, columns, mapping, table, source, is_stamp=is_stamp, rising=rising)
+    except (ValueError, OverflowError, TypeError) as e:  # a format that is none, a year that no clock has
+        raise RecordingError(
+            f"{where}: the times cannot be read ({e}); correct [time] format in the mapping or in the file's first line"
+        ) from e
+    if not np.isfinite(time).all():
+        raise RecordingError(f"{where}: the times are too far apart for a number; correct them")
+    return time, start, notes
+
+
+def _convert(
+    column: Column, raw: FloatArray, missing: Sequence[float], table: FileTable
+) -> tuple[FloatArray, tuple[str, ...]]:
+    """Return the values of a column; one that a scale or a unit makes infinite is missing."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        values, notes = column.convert(raw, missing, table.place)
+    infinite = np.isinf(values)
+    if not infinite.any():
+        return values, notes
+    note = f"{column.channel.name}: infinite by its scale or unit, taken as missing, in {infinite.sum()} cells"
+    return np.where(infinite, np.nan, values), (*notes, note)
+
+
+def _shorten(notes: Sequence[str], left_out: int) -> tuple[str, ...]:
+    """Return notes as far as a user can read them, and the number of the others."""
+    found = [n if len(n) <= _MOST_SAID else f"{n[:_MOST_SAID]} ..." for n in notes]
+    more = max(len(found) - _MOST_NOTES, 0) + max(left_out - _MOST_NOTES, 0)
+    return (*found[:_MOST_NOTES], *([f"left out or replaced: {more:,} more columns"] if more else []))
+
+
+def _labels(cells: pd.DataFrame, columns: ColumnPlan, table: FileTable, source: Path) -> list[Any] | None:
+    if columns.cycle is None:
+        return None
+    labels = cells[columns.cycle]
+    if labels.isna().any():
+        row = int(np.flatnonzero(labels.isna())[0])
+        raise RecordingError(
+            f"{source}: {table.place(row)}, column {table.headings[columns.cycle]!r}: the cycle's label is missing; "
+            "every row belongs to a cycle",
+            [skip_row(table, row)],
+        )
+    return [restore(label) if isinstance(label, str) else label for label in labels.tolist()]
+
+
+def _cycles(recording: Recording, labels: Sequence[Any] | None, rows: Rows) -> tuple[Cycle, ...]:
+    speed = recording.speed
+    if labels is not None:
+        try:
+            found = split_by_labels(labels)
+        except RecordingError as e:
+            raise RecordingError(f"{recording.source}: {e}") from e
+    elif speed is None:
+        found = make_single_cycle(len(recording))
+    else:
+        values = recording.table[speed.name].to_numpy()
+        found = find_cycles(recording.time, values, min_run=rows.min_run, min_stop=rows.min_stop)
+    Limits(cycles=rows.most_cycles).check("cycles", len(found), recording.source)
+    return found

@@ -1,0 +1,262 @@
+"""Dates and times of day as people and programs write them: which of them can be read in one way only."""
+
+import re
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from thermocomp.recordings.readers.dateorder import Choice, IntArray, find_longest_step, find_order, rises
+from thermocomp.recordings.readers.headings import find_date_order
+
+_CHUNK = 100_000
+#: steps of rows that only a wrong order makes [d]: of a day and month, of a day and year
+_MONTH, _YEAR = 26, 300
+_DATE = (
+    r"'?(?P<a>\d{1,4}|[^\W\d_]{3,9})(?P<sep>[./-]|\.? )(?P<b>\d{1,2}|[^\W\d_]{3,9})(?P<sep2>[./-]|[.,]? )(?P<c>\d{1,4})"
+)
+_CLOCK = r"(?P<hour>\d{1,2}):\d\d(?P<seconds>:\d\d(?:(?P<dot>[.,:])\d+)?)?(?: ?(?P<half>[AaPp]\.?[Mm]\.?))?"
+_ZONE = r" ?(?P<zone>Z|[A-Z]{3,4}|[+-]\d\d:?\d\d)?"
+_STAMP = re.compile(rf"{_DATE}(?:(?P<join>T|[ ,;_-]+){_CLOCK}{_ZONE})?|(?P<clock>{_CLOCK.replace('?P<', '?P<only_')})")
+_ISO = re.compile(
+    r"\d{4}-\d\d-\d\d(?:[T ]\d\d:\d\d(?::\d\d(?:\.\d+)?)?(?:Z|[+-]\d\d:?\d\d)?)?|\d{8}T\d{4,6}(?:\.\d+)?Z?"
+)
+#: parts of a date in words of other languages than English, in small letters
+_MONTHS = {
+    word: str(number)
+    for number, words in enumerate(
+        (
+            *("jan januar janvier gennaio gen enero ene january", "feb februar février févr febbraio febrero february"),
+            *("mär märz mrz mar mars marzo march", "apr april avril avr aprile abril abr", "mai may mag maggio mayo"),
+            *("jun juni juin giugno giu junio june", "jul juli juillet juil luglio lug julio july"),
+            *("aug august août aou agosto ago", "sep sept september septembre settembre set septiembre"),
+            *("okt oktober oct octobre ottobre ott octubre october", "nov november novembre noviembre"),
+            "dez dezember dec décembre déc dicembre dic diciembre december",
+        ),
+        start=1,
+    )
+    for word in words.split()
+}
+#: names of zones that mean one offset from UTC wherever they are used
+_ZONES = {
+    **dict.fromkeys(("UTC", "GMT", "WET", "UT"), "+00:00"),
+    **dict.fromkeys(("CET", "MEZ", "WEST"), "+01:00"),
+    **dict.fromkeys(("CEST", "MESZ", "EET"), "+02:00"),
+    "EEST": "+03:00",
+}
+_WORDS = {"dmy": "day/month/year", "mdy": "month/day/year", "ymd": "year/month/day"}
+
+
+class Parsed(NamedTuple):
+    """Timestamps, and how they were read."""
+
+    stamps: "pd.Series[pd.Timestamp]"  #: in UTC; NaT where a cell is none
+    start: str  #: the first one in ISO 8601, on its own clock
+    notes: tuple[str, ...]
+
+
+class AmbiguousDatesError(ValueError):
+    """Dates can be read in several ways.
+
+    Parameters
+    ----------
+    readings : dict of str to Series of Timestamp
+        By the format in the letters of `datetime.strptime`, the likeliest first.
+    orders : list of str
+        In words, of each.
+    """
+
+    def __init__(self, readings: "dict[str, pd.Series[pd.Timestamp]]", orders: list[str]) -> None:
+        super().__init__(" or ".join(orders))
+        self.readings = readings
+        self.orders = orders
+
+    def differ(self) -> bool:
+        """Return whether the time between any two rows depends on the order."""
+        first, *others = (np.diff(_instants(stamps)) for stamps in self.readings.values())
+        return any((first != other).any() for other in others)
+
+    def tell(self) -> str:
+        """Return from when to when the rows go in each order, and how long, in words."""
+        told = []
+        for order, stamps in zip(self.orders, self.readings.values(), strict=True):
+            begin, end = stamps.iloc[0].tz_localize(None), stamps.iloc[-1].tz_localize(None)
+            told.append(f"{order}: from {begin} to {end}, {(end - begin).total_seconds() / 3600:.2f} h")
+        return "; ".join(told)
+
+
+def parse_stamps(text: "pd.Series[Any]", heading: str) -> Parsed | None:
+    """Read timestamps whose form is not known beforehand.
+
+    Parameters
+    ----------
+    text : Series of str
+    heading : str
+        May state the order of day, month and year.
+
+    Returns
+    -------
+    Parsed or None
+        None: the first cell is in no form that is known.
+
+    Raises
+    ------
+    AmbiguousDatesError
+        Day, month and year can be told apart neither by their numbers nor by how the rows go on
+        (`thermocomp.recordings.readers.dateorder.find_order`).
+    """
+    first = text.iloc[0].strip()
+    if _ISO.fullmatch(first):
+        return _parsed(parse(text, "ISO8601"), first, "ISO8601", ())
+    shape = _STAMP.fullmatch(first)
+    if shape is None or shape["clock"]:
+        return None
+    plain = _simplify(text, shape)
+    orders = _orders(shape)
+    stated = find_date_order(heading)
+    notes: tuple[str, ...] = ()
+    if len(orders) > 1 and stated in orders:
+        orders, notes = [stated], (f"the dates are {_WORDS[stated]}, as the heading says",)
+    read = {"dmy": parse(plain, _format(shape, "dmy"))} if _has_points(shape) and "dmy" in orders else {}
+    if not any(_is_one_stretch(stamps) for stamps in read.values()):
+        read |= {order: parse(plain, _format(shape, order)) for order in orders if order not in read}
+    whole = [order for order, stamps in read.items() if stamps.notna().all()]
+    if len(whole) > 1:
+        choice = _choose(shape, {o: _instants(read[o]) for o in whole})
+        if not choice.order:
+            possible = [o for o in whole if rises(_instants(read[o]))] or whole
+            # who writes AM and PM writes the month first, as a rule
+            possible.sort(key=lambda o: not (shape["half"] and o == "mdy"))
+            asked = {_shown_format(shape, o): read[o] for o in possible}
+            raise AmbiguousDatesError(asked, [_WORDS[o] for o in possible])
+        if choice.why:
+            notes = (f"the dates are {_WORDS[choice.order]}: {choice.why}",)
+        whole = [choice.order]
+    elif whole and len(orders) > 1 and not (_has_points(shape) and whole == ["dmy"]):
+        notes = (f"the dates are {_WORDS[whole[0]]}: {_find_proof(plain, read, whole[0])!r} is none otherwise",)
+    best = whole[0] if whole else max(orders, key=lambda o: int(read[o].notna().sum()))
+    if shape["zone"] in _ZONES and _ZONES[shape["zone"]] != "+00:00":
+        notes += (f"{shape['zone']} is taken as UTC{_ZONES[shape['zone']]}",)
+    return _parsed(read[best], plain.iloc[0], _format(shape, best), notes)
+
+
+def parse(text: "pd.Series[Any]", form: str) -> "pd.Series[pd.Timestamp]":
+    """Read timestamps in a known form, in UTC; NaT where a cell is not in it."""
+    # in parts, and without a cache of the texts seen: pandas makes objects of them, far bigger than the times
+    parts = [text.iloc[k : k + _CHUNK] for k in range(0, len(text), _CHUNK)]
+    found = [pd.to_datetime(p, format=form, utc=True, errors="coerce", cache=False) for p in parts]
+    stamps = pd.concat(found)
+    if stamps.isna().any():  # a program may leave out a fraction of zero
+        other = form.replace("%S.%f", "%S") if "%S.%f" in form else form.replace("%S", "%S.%f")
+        stamps = stamps.fillna(pd.to_datetime(text, format=other, utc=True, errors="coerce"))
+    return stamps
+
+
+def read_days(text: "pd.Series[Any]") -> list[IntArray]:
+    """Return the days on which stamps may be, counted from 1970, under each order in which all are dates."""
+    plain = text.str.strip()
+    if _ISO.fullmatch(plain.iloc[0]):
+        read = [parse(plain, "ISO8601")]
+    elif (shape := _STAMP.fullmatch(plain.iloc[0])) is not None and not shape["clock"]:
+        plain = _simplify(text, shape)
+        read = [parse(plain, _format(shape, order)) for order in _orders(shape)]
+    else:
+        return []
+    return [_instants(stamps) // 86_400_000_000_000 for stamps in read if stamps.notna().all()]
+
+
+def _parsed(stamps: "pd.Series[pd.Timestamp]", first: str, form: str, notes: tuple[str, ...]) -> Parsed:
+    forms = [form, form.replace(".%f", "")]
+    starts = (pd.to_datetime(pd.Series([first]), format=f, errors="coerce").iloc[0] for f in forms)
+    return Parsed(stamps, next((s.isoformat() for s in starts if not pd.isna(s)), ""), notes)
+
+
+def _simplify(text: "pd.Series[Any]", shape: re.Match[str]) -> "pd.Series[Any]":
+    """Bring what no format can say into one form: months in words, zones by name, signs before a fraction."""
+    plain = text.str.strip().str.lstrip("'")
+    if not (shape["a"].isdigit() and shape["b"].isdigit()):
+        plain = plain.str.replace(r"[^\W\d_]{3,}(?=[ ,./-])", _month, regex=True)
+    if shape["dot"] in (",", ":"):
+        plain = plain.str.replace(rf"(:\d\d:\d\d){shape['dot']}(\d+)", r"\1.\2", regex=True)
+    if shape["half"]:
+        plain = plain.str.replace(r" ?([AaPp])\.?[Mm]\.?(?=$| )", lambda m: f" {m[1].upper()}M", regex=True)
+    if shape["zone"] and shape["zone"].isalpha():
+        plain = plain.str.replace(
+            r" ?([A-Z]{2,4})$", lambda m: _ZONES.get(m[1], "+00:00" if m[1] == "Z" else m[0]), regex=True
+        )
+        plain = plain.str.replace(r"Z$", "+00:00", regex=True)
+    elif shape["zone"]:
+        plain = plain.str.replace(r" ?([+-]\d\d:?\d\d)$", r"\1", regex=True)
+    return plain
+
+
+def _has_points(shape: re.Match[str]) -> bool:
+    return shape["sep"].startswith(".") and shape["a"].isdigit() and shape["b"].isdigit() and len(shape["a"]) < 3
+
+
+def _is_one_stretch(stamps: "pd.Series[pd.Timestamp]") -> bool:
+    """Return whether all are dates and rise without a gap that a wrong order would make."""
+    return bool(stamps.notna().all()) and rises(t := _instants(stamps)) and find_longest_step(t) < _MONTH
+
+
+def _choose(shape: re.Match[str], read: dict[str, IntArray]) -> Choice:
+    """Choose the order of dates that fit several."""
+    choice = find_order(read)
+    if not _has_points(shape) or "dmy" not in read:
+        return choice
+    day_first = Choice("dmy", "", "")  # as wherever dates are written with points
+    if choice.order == "dmy":
+        return day_first
+    if choice.by == "going on" or (choice.by == "days in a row" and choice.order == "ymd"):
+        return choice
+    year_first = read.get("ymd")
+    if year_first is None or not rises(year_first):
+        return day_first
+    longest, other = find_longest_step(read["dmy"]), find_longest_step(year_first)
+    if not rises(read["dmy"]):
+        return choice if choice.order == "ymd" and other < _MONTH else day_first
+    return Choice("", "", "") if longest >= _YEAR and longest > other else day_first
+
+
+def _instants(stamps: "pd.Series[pd.Timestamp]") -> IntArray:
+    return stamps.to_numpy(dtype="M8[ns]").view(np.int64)
+
+
+def _month(found: re.Match[str]) -> str:
+    return _MONTHS.get(found[0].casefold(), found[0])
+
+
+def _orders(shape: re.Match[str]) -> list[str]:
+    a, b, c = shape["a"], shape["b"], shape["c"]
+    if len(a) == 4 and a.isdigit():
+        return ["ymd"]
+    if not a.isdigit():
+        return ["mdy"]
+    if not b.isdigit():
+        return ["dmy"]
+    return ["dmy", "mdy"] if len(c) == 4 else ["dmy", "mdy", "ymd"]
+
+
+def _format(shape: re.Match[str], order: str) -> str:
+    """Return the format of simplified cells."""
+    digits = shape["c" if order[2] == "y" else "a"]
+    letters = {"d": "%d", "m": "%m", "y": "%Y" if len(digits) == 4 else "%y"}
+    form = f"{letters[order[0]]}{shape['sep']}{letters[order[1]]}{shape['sep2']}{letters[order[2]]}"
+    if shape["hour"] is None:
+        return form
+    form += f"{shape['join']}{'%I' if shape['half'] else '%H'}:%M"
+    if shape["seconds"]:
+        form += ":%S.%f" if shape["dot"] else ":%S"
+    return form + (" %p" if shape["half"] else "") + ("%z" if shape["zone"] else "")
+
+
+def _shown_format(shape: re.Match[str], order: str) -> str:
+    """Return the format of the cells as they stand in the file."""
+    form = _format(shape, order)
+    return form.replace("%S.", f"%S{shape['dot']}") if shape["dot"] else form
+
+
+def _find_proof(text: "pd.Series[Any]", read: dict[str, "pd.Series[pd.Timestamp]"], order: str) -> str:
+    """Return the first cell that is a date in one order only."""
+    others = np.logical_and.reduce([s.isna().to_numpy() for o, s in read.items() if o != order])
+    return str(text.iloc[int(np.flatnonzero(others)[0])]) if others.any() else str(text.iloc[0])

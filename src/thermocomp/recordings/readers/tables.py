@@ -1,0 +1,398 @@
+"""Raw tables, their cells not yet understood: what all kinds of files share."""
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NoReturn, Protocol
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import RecordingError, Remedy
+from thermocomp.recordings.readers.limits import Limits
+from thermocomp.recordings.readers.numbers import Notation, Signs, is_filler, is_number_like, is_word
+
+FloatArray = NDArray[np.float64]
+
+#: before thermocomp's own description of the columns, as a comment line or a Parquet attribute
+EMBEDDED = "thermocomp"
+#: cells that tell what a column holds
+_HEAD = 100
+#: places of cells that are listed
+_MOST_TOLD = 40
+_UNGROUPED = re.compile(r"[-+]?\d{4}")
+
+#: what a spreadsheet calculates, perhaps behind apostrophes
+_FORMULA = re.compile(r"'*[=+\-@\t\r\n\u240d\u240a]")
+_LINE_ENDS, _LINE_SIGNS = {13: "\u240d", 10: "\u240a"}, {0x240D: "\r", 0x240A: "\n"}
+#: heading of an index that had none
+_NAMELESS = re.compile(r"Unnamed: \d+")
+
+
+class FileTable(Protocol):
+    """The cells of a file before anybody knows what its columns mean."""
+
+    @property
+    def headings(self) -> tuple[str, ...]:
+        """Stripped headings; empty where there is none."""
+
+    @property
+    def embedded(self) -> str:
+        """JSON of the mapping that thermocomp wrote into the file; empty if there is none."""
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a user should know."""
+
+    def is_number(self, column: int, *, empty: bool = True) -> bool:
+        """Return whether the first filled cell of a column is a number; `empty` if there is none."""
+
+    def head(self, column: int) -> list[str]:
+        """Return the first filled cells of a column, as texts; none of one that holds numbers by its type."""
+
+    def load(self, numbers: Sequence[int], texts: Sequence[int]) -> tuple[pd.DataFrame, tuple[str, ...]]:
+        """Read some columns, as float64 and as they are, and say what was made of their cells.
+
+        The table's columns are named by position.
+
+        Raises
+        ------
+        RecordingError
+            A cell of `numbers` holds text.
+        """
+
+    def place(self, row: int) -> str:
+        """Say where a row stands in the file, such as ``line 7``."""
+
+
+@dataclass(frozen=True)
+class FrameTable:
+    """A sheet, which arrives as a whole.
+
+    Parameters
+    ----------
+    source : str
+        The file, for messages.
+    headings : tuple of str
+    frame : DataFrame
+        Cells as they are; columns named by position.
+    rows : sequence of int
+        Row in the file of each row of `frame`, from 1.
+    embedded : str
+    notes : tuple of str
+    decimal : str
+        Decimal sign of numbers that are texts, if it is known beforehand.
+    """
+
+    source: str
+    headings: tuple[str, ...]
+    frame: pd.DataFrame
+    rows: Sequence[int]
+    embedded: str = ""
+    notes: tuple[str, ...] = ()
+    decimal: str = ""
+
+    def is_number(self, column: int, *, empty: bool = True) -> bool:
+        """Return whether the first filled cell of a column is a number; `empty` if there is none."""
+        return first_is_number(self.frame[column], empty=empty)
+
+    def head(self, column: int) -> list[str]:
+        """Return the first filled cells of a column; see `FileTable.head`."""
+        return first_texts(self.frame[column])
+
+    def load(self, numbers: Sequence[int], texts: Sequence[int]) -> tuple[pd.DataFrame, tuple[str, ...]]:
+        """Read columns; see `FileTable.load`."""
+        data = {k: self.frame[k] for k in texts}
+        written = {k: self.frame[k] for k in numbers if not pd.api.types.is_numeric_dtype(self.frame[k].dtype)}
+        values, notes = convert_all(self, self.source, written, self.decimal)
+        for k in numbers:
+            data[k] = pd.Series(values[k] if k in written else as_floats(self.frame[k]))
+        return pd.DataFrame(data, copy=False), notes
+
+    def place(self, row: int) -> str:
+        """Say in which row of the sheet or file, counted from 1, a row stands."""
+        return f"row {self.rows[row]}"
+
+
+def first_is_number(cells: "pd.Series[Any]", *, empty: bool) -> bool:
+    """Return whether the first filled cell is a number.
+
+    Parameters
+    ----------
+    cells : Series
+    empty : bool
+        What to return if there is none.
+    """
+    filled = (str(cell) for cell in cells.dropna())
+    first = next((cell for cell in filled if not is_filler(cell)), None)
+    return empty if first is None else is_number_like(first)
+
+
+def first_texts(cells: "pd.Series[Any]") -> list[str]:
+    """Return the first cells of a column that hold something, as texts; none of a column of numbers."""
+    if pd.api.types.is_numeric_dtype(cells.dtype):
+        return []
+    return [text for text in map(str, cells.iloc[:_HEAD].dropna()) if not is_filler(text)]
+
+
+def as_floats(cells: "pd.Series[Any]") -> FloatArray:
+    """Return the cells of a column of numbers; nan where there is none."""
+    return cells.to_numpy(dtype=np.float64, na_value=np.nan)
+
+
+def clean_heading(cell: object) -> str:
+    """Return a heading as it was before other programs had it.
+
+    White space at its ends is gone, the name that pandas gives an index without one, and the apostrophe before what a
+    spreadsheet would calculate (`defuse`).
+
+    Parameters
+    ----------
+    cell : object
+    """
+    text = restore(str(cell).strip())
+    return "" if _NAMELESS.fullmatch(text) else text
+
+
+def defuse(text: str) -> str:
+    """Return a text that no spreadsheet takes for a formula when it opens a CSV file, on one line.
+
+    An apostrophe stands before ``=``, ``+``, ``-``, ``@``, a tab or a line's end; line ends become the signs for them.
+    `restore` turns it back.
+
+    Parameters
+    ----------
+    text : str
+        A heading or a label.
+    """
+    return f"'{text}".translate(_LINE_ENDS) if _FORMULA.match(text) else text.translate(_LINE_ENDS)
+
+
+def restore(text: str) -> str:
+    """Turn back what `defuse` did.
+
+    Parameters
+    ----------
+    text : str
+        A heading or a label of a file.
+    """
+    return (text[1:] if text.startswith("'") and _FORMULA.match(text) else text).translate(_LINE_SIGNS)
+
+
+def check_headings(path: Path, headings: Sequence[str], n_rows: int, limits: Limits) -> None:
+    """Refuse a table that cannot be a recording, whatever its columns mean.
+
+    Parameters
+    ----------
+    path : Path
+    headings : sequence of str
+    n_rows : int
+        Without that of the headings.
+    limits : Limits
+
+    Raises
+    ------
+    RecordingError
+        No headings, numbers instead of headings, one column, no rows, or over a limit.
+    """
+    limits.check_table(n_rows, len(headings), path)
+    limits.check("heading_characters", max(map(len, headings), default=0), path)
+    filled = [h for h in headings if h.strip()]
+    if not filled:
+        raise RecordingError(f"{path}: no heading line; a recording has headings such as time_s,t1_C,drift_um")
+    if all(is_float(h.replace(",", ".")) for h in filled):
+        raise RecordingError(
+            f"{path}: the first row holds numbers ({', '.join(filled[:3])} ...); put a heading line before it, such as "
+            "time_s,t1_C,drift_um"
+        )
+    if len(filled) < 2:
+        raise RecordingError(
+            f"{path}: only one column, {filled[0]!r}; a recording needs a time and at least one channel. If a CSV file "
+            'has another delimiter than , ; | tab or white space: give it in a mapping, [read] delimiter = "..."'
+        )
+    if n_rows < 1:
+        raise RecordingError(f"{path}: a heading line but no rows below it; the recording is empty")
+
+
+def refuse_cell(
+    table: FileTable, source: str, row: int, column: int, cell: object, cause: Exception | None = None
+) -> NoReturn:
+    """Tell which cell holds text where a number belongs.
+
+    Parameters
+    ----------
+    table : FileTable
+    source : str
+        The file.
+    row, column : int
+        Position of the cell in `table`.
+    cell : object
+        What it holds.
+    cause : Exception, optional
+        What it was noticed by.
+
+    Raises
+    ------
+    RecordingError
+        Always.
+    """
+    raise RecordingError(
+        f"{source}: {table.place(row)}, column {table.headings[column]!r}: {str(cell)!r} is not a number; correct the "
+        'cell, leave it empty for a missing value, or leave the column out by a mapping with role = "ignore"',
+        [skip_row(table, row), {"columns": {table.headings[column]: {"role": "ignore"}}}],
+    ) from cause
+
+
+def skip_row(table: FileTable, row: int) -> Remedy:
+    """Return what of a mapping passes over a row."""
+    return {"read": {"skip": [int(table.place(row).split()[-1])]}}
+
+
+def decide(signs: Signs, stated: str, delimiter: str, source: str) -> Notation:
+    """Return how the numbers of a file are written; see `thermocomp.recordings.readers.numbers.Signs.decide`.
+
+    Parameters
+    ----------
+    signs : Signs
+    stated, delimiter : str
+    source : str
+        The file.
+
+    Raises
+    ------
+    RecordingError
+        They can be read in two ways.
+    """
+    try:
+        return signs.decide(stated, delimiter) or Notation(".")
+    except RecordingError as e:
+        raise RecordingError(f"{source}: {e}", e.remedies) from e
+
+
+def convert_all(
+    table: FileTable, source: str, columns: Mapping[int, "pd.Series[Any]"], decimal: str
+) -> tuple[dict[int, FloatArray], tuple[str, ...]]:
+    """Read the numbers of columns whose cells are texts, all in one notation; see `convert`.
+
+    Parameters
+    ----------
+    table : FileTable
+    source : str
+        The file.
+    columns : mapping of int to Series
+        By their position in `table`.
+    decimal : str
+        Decimal sign, if it is known beforehand.
+    """
+    signs = Signs()
+    for cells in columns.values():
+        signs.add(cell for cell in cells if isinstance(cell, str))
+    notation = decide(signs, decimal, "", source)
+    values, notes = dict[int, FloatArray](), list[str]()
+    for k, cells in columns.items():
+        values[k], found = convert(table, source, k, cells, notation)
+        notes += found
+    return values, (*tell_notation(notation), *notes)
+
+
+def tell_notation(notation: Notation) -> tuple[str, ...]:
+    """Say how numbers are written, where not as in Python."""
+    notes: tuple[str, ...] = ("the decimal sign is a comma",) if notation.decimal == "," else ()
+    if notation.thousands:
+        notes += (f"thousands are separated by {' or '.join(map(repr, notation.thousands))}",)
+    return notes
+
+
+def convert(
+    table: FileTable, source: str, column: int, cells: "pd.Series[Any]", notation: Notation
+) -> tuple[FloatArray, tuple[str, ...]]:
+    """Read the numbers of a column whose cells are texts.
+
+    Parameters
+    ----------
+    table : FileTable
+    source : str
+        The file.
+    column : int
+        Position of the column in `table`.
+    cells : Series
+        Numbers, texts, and None where there is nothing.
+    notation : Notation
+
+    Returns
+    -------
+    values : ndarray of shape (n_rows,)
+        nan where a word stands for a missing number.
+    notes : tuple of str
+        Which words, and where.
+
+    Raises
+    ------
+    RecordingError
+        A cell holds anything else; the message names it.
+    """
+    values, odd = read_plain(cells, notation.decimal)
+    words: dict[str, list[int]] = {}
+    grouped = -1
+    for row in np.flatnonzero(odd):
+        cell = cells.iloc[row]
+        number = notation.read(cell) if isinstance(cell, str) else None
+        if number is not None:
+            values[row] = number
+            if grouped < 0 and any(s in cell.strip() for s in notation.thousands):
+                grouped = int(row)
+        elif not isinstance(cell, str) or not is_filler(cell):
+            refuse_cell(table, source, int(row), column, cell)
+        elif is_word(cell):
+            words.setdefault(cell.strip(), []).append(int(row))
+    if grouped >= 0:
+        _refuse_mixed(table, source, column, cells, grouped)
+    return values, tuple(
+        f"{table.headings[column]}: {word!r}, taken as missing, in {len(rows)} of {len(cells)} cells: "
+        f"{tell_places(rows, table.place)}"
+        for word, rows in words.items()
+    )
+
+
+def read_plain(cells: "pd.Series[Any]", decimal: str) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Return numbers without separators of thousands, and where a cell is filled with anything else."""
+    filled = cells.notna().to_numpy()
+    texts = cells.map(lambda c: isinstance(c, str)).to_numpy(dtype=np.bool_) if cells.dtype == object else filled
+    plain = cells
+    if decimal == "," and texts.any():
+        # a point is no part of a number where the comma is the decimal sign
+        swapped = cells[texts].astype("str").str.replace(".", "?", regex=False).str.replace(",", ".", regex=False)
+        plain = cells.astype(object).where(~texts, swapped)
+    good = pd.to_numeric(plain, errors="coerce").notna().to_numpy() & filled
+    if cells.dtype == object:  # True counts as a number
+        good &= ~cells.map(lambda c: isinstance(c, bool | np.bool_)).to_numpy(dtype=np.bool_)
+    values = np.full(len(cells), np.nan)
+    # to the last digit, which pandas does not promise
+    values[good] = plain[good].to_numpy(dtype=object).astype(np.float64)
+    return values, filled & ~good
+
+
+def tell_places(rows: Sequence[int], place: Callable[[int], str]) -> str:
+    """List where rows stand, not too many of them."""
+    return ", ".join(place(int(k)) for k in rows[:_MOST_TOLD]) + " ..." * (len(rows) > _MOST_TOLD)
+
+
+def _refuse_mixed(table: FileTable, source: str, column: int, cells: "pd.Series[Any]", grouped: int) -> None:
+    """Refuse thousands with and without separator in one column: the separator may be a decimal sign there."""
+    for row, cell in enumerate(cells):
+        if isinstance(cell, str) and _UNGROUPED.match(cell.strip()):
+            raise RecordingError(
+                f"{source}: column {table.headings[column]!r}: {table.place(grouped)} has {cells.iloc[grouped]!r} with "
+                f"a separator of thousands, {table.place(row)} has {cell!r} without; write both in one way"
+            )
+
+
+def is_float(text: str) -> bool:
+    """Return whether a text is a number."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

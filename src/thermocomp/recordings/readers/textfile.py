@@ -1,0 +1,335 @@
+"""CSV files: how they are written is found out from the file, then pandas reads the columns asked for."""
+
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from thermocomp.core.exceptions import RecordingError
+from thermocomp.recordings.readers.encodings import bring_to_utf8, find_encoding
+from thermocomp.recordings.readers.layout import (
+    MOST_REMARKS,
+    Layout,
+    find_end,
+    find_layout,
+    join_units,
+    name_stamps,
+    tell_again,
+    tell_end,
+    tell_layout,
+)
+from thermocomp.recordings.readers.limits import Limits
+from thermocomp.recordings.readers.mapping import ReadOptions
+from thermocomp.recordings.readers.numbers import MISSING_TEXT, Notation, Signs, is_filler, is_number_like
+from thermocomp.recordings.readers.tables import check_headings, clean_heading, convert, decide, tell_notation
+from thermocomp.recordings.readers.textlines import Lines, count_cells, describe_ragged, is_utf8, open_lines, split_line
+
+#: lines that tell how the file is written; fewer if they are long
+_SAMPLE_LINES = 100
+_SAMPLE_BYTES = 2 << 20
+_CHUNK = 100_000  # rows that are text in memory at a time
+_MISSING = [text for t in MISSING_TEXT for text in {t, t.upper(), t.capitalize()}] + ["NaN", "-NaN"]
+# pandas before 3.1 may read the last digit wrong unless told
+_PANDAS = tuple(int(n) for n in pd.__version__.split(".")[:2])
+_EXACT: dict[str, Any] = {} if _PANDAS >= (3, 1) else {"float_precision": "round_trip"}
+
+
+@dataclass(frozen=True)
+class CsvTable:
+    """A text file with a heading line; made by `open_csv`. A `thermocomp.recordings.readers.tables.FileTable`.
+
+    Parameters
+    ----------
+    path : Path
+    headings : tuple of str
+    sample : tuple of tuple of str
+        Cells of the first rows.
+    delimiter : str
+        One character; a space stands for any white space.
+    decimal : str
+        Decimal sign, if it is known beforehand.
+    encoding : str
+    errors : {'strict', 'replace'}
+        What is done about bytes that are none of that encoding.
+    skipped : tuple of int
+        Lines that are no rows (headings, comments, blank ones), from 0.
+    n_rows : int
+    embedded : str
+    notes : tuple of str
+    data : bytes or None
+        The whole file in UTF-8, where it had to be brought to that.
+    """
+
+    path: Path
+    headings: tuple[str, ...]
+    sample: tuple[tuple[str, ...], ...]
+    delimiter: str
+    decimal: str
+    encoding: str
+    errors: str
+    skipped: tuple[int, ...]
+    n_rows: int
+    embedded: str
+    notes: tuple[str, ...] = ()
+    data: bytes | None = None
+
+    def is_number(self, column: int, *, empty: bool = True) -> bool:
+        """Return whether the first filled cell of a column is a number; `empty` if the first rows have none."""
+        cells = (row[column] for row in self.sample if column < len(row))
+        first = next((c for c in cells if not is_filler(c)), None)
+        return empty if first is None else is_number_like(first)
+
+    def head(self, column: int) -> list[str]:
+        """Return the first filled cells of a column; see `thermocomp.recordings.readers.tables.FileTable.head`."""
+        return [row[column] for row in self.sample if column < len(row) and not is_filler(row[column])]
+
+    def load(self, numbers: Sequence[int], texts: Sequence[int]) -> tuple[pd.DataFrame, tuple[str, ...]]:
+        """Read columns; see `thermocomp.recordings.readers.tables.FileTable.load`."""
+        signs = Signs()
+        for row in self.sample:
+            signs.add(row[k] for k in numbers if k < len(row))
+        text: dict[int, Any] = dict.fromkeys(texts, str)
+        decimal = self.decimal or signs.proven_sign() or ("." if self.delimiter == "," and not signs.open else "")
+        if decimal:
+            with suppress(ValueError):
+                frame = self._read_frame({**text, **dict.fromkeys(numbers, np.float64)}, decimal=decimal)
+                return frame, tell_notation(Notation(decimal))
+        try:
+            # what pandas does not take for numbers stays text
+            types = text if decimal else {**text, **dict.fromkeys(numbers, str)}
+            frame = self._read_frame({**dict.fromkeys(numbers), **types}, decimal=decimal or ".")
+        except ValueError as e:
+            raise RecordingError(f"{self.path}: cannot be read as a table: {e}") from e
+        written = [k for k in numbers if frame[k].dtype == bool or not pd.api.types.is_numeric_dtype(frame[k].dtype)]
+        for k in written:
+            # pandas takes True for a number
+            frame[k] = frame[k].map(lambda cell: str(cell) if isinstance(cell, bool | np.bool_) else cell)
+            signs.add(cell for cell in frame[k] if isinstance(cell, str))
+        notation = decide(signs, decimal if self.decimal or signs.proven else "", self.delimiter, str(self.path))
+        notes = tell_notation(notation)
+        for k in numbers:
+            if k in written:
+                frame[k], found = convert(self, str(self.path), k, frame[k], notation)
+                notes += found
+        return frame, notes
+
+    def _read_frame(self, types: dict[int, Any], **more: Any) -> pd.DataFrame:
+        """Read columns of some types, or of the one that pandas finds (None); a ValueError if they are not."""
+        try:
+            with pd.read_csv(
+                BytesIO(self.data) if self.data else self.path, **self._options(types), **more, **_EXACT
+            ) as chunks:
+                frame: pd.DataFrame = pd.concat(chunks, ignore_index=True)
+        except IndexError as e:  # pandas meets an end of the file within a cell
+            raise ValueError("no row is found in it") from e
+        except UnicodeDecodeError as e:
+            raise RecordingError(
+                f"{self.path}: is not written in {self.encoding} ({e.reason}); give the right one in a mapping, "
+                "[read] encoding"
+            ) from e
+        if len(frame) != self.n_rows:
+            raise RecordingError(
+                f"{self.path}: {self.n_rows} lines give {len(frame)} rows: a quotation mark opens a cell that "
+                "goes over the end of its line; close it, or delete the mark"
+            )
+        return frame
+
+    def place(self, row: int) -> str:
+        """Say in which line of the file, counted from 1, a row stands."""
+        line = row
+        while (shifted := row + bisect_right(self.skipped, line)) != line:
+            line = shifted
+        return f"line {line + 1}"
+
+    def _options(self, types: dict[int, Any]) -> dict[str, Any]:
+        return {
+            "sep": r"\s+" if self.delimiter == " " else self.delimiter,
+            "header": None,
+            "names": range(len(self.headings)),
+            "usecols": sorted(types),
+            "dtype": {k: kind for k, kind in types.items() if kind is not None},
+            "low_memory": False,
+            "index_col": False,
+            "skiprows": list(self.skipped),
+            "skipinitialspace": True,
+            "encoding": self.encoding,
+            "encoding_errors": self.errors,
+            "chunksize": _CHUNK,
+            "keep_default_na": False,
+            "na_values": {k: [""] if types[k] is str else _MISSING for k in types},
+        }
+
+
+def open_csv(path: Path, options: ReadOptions, limits: Limits = Limits()) -> CsvTable:
+    """Find out how a text file is written: one pass over its lines, none of which is kept.
+
+    Parameters
+    ----------
+    path : Path
+    options : ReadOptions
+        What is known beforehand.
+    limits : Limits
+
+    Raises
+    ------
+    RecordingError
+        Empty, binary, no heading line, no rows, one column, rows of unequal length, or over a limit.
+    """
+    data, told = bring_to_utf8(path, limits)
+    lines = open_lines(path, data, options, limits)
+    head = _read_head(lines)
+    delimiter, layout, first = head.delimiter, head.layout, head.lines
+    body = _scan(lines, head)
+    encoding = options.encoding or (find_encoding(body.odd) if body.odd else "utf-8")
+
+    def split(line: bytes, errors: str = "replace") -> list[str]:
+        return split_line(line.decode(encoding, errors), delimiter)
+
+    rows = [split(line) for _, line in first[layout.begin :]]
+    n_remarks = find_end(rows, [split(line) for _, line in body.tail])
+    remarks = [number for number, _ in body.tail][len(body.tail) - n_remarks :]
+    if body.ragged and not (remarks and body.ragged[0] >= remarks[0]):
+        raise RecordingError(body.ragged[1], [{"read": {"skip": [body.ragged[0] + 1]}}])
+    try:
+        headings = [
+            clean_heading(h) for h in split(first[layout.heading][1], "strict" if options.encoding else "replace")
+        ]
+    except UnicodeDecodeError as e:
+        raise RecordingError(f"{path}: the heading line is not written in {encoding}: {e.reason}") from e
+    headings += [""] * (body.width - len(headings))
+    check_headings(path, headings, body.n_rows, limits)
+    if layout.units != layout.heading:
+        headings = join_units(headings, split(first[layout.units][1]), rows)
+    headings, named = name_stamps(headings, rows)
+    if body.odd and not options.encoding:
+        told += (f"written in {encoding}, not in UTF-8",)
+    if head.in_remark:
+        told += (f"line {first[0][0] + 1} holds the headings, behind {options.comment!r}",)
+    return CsvTable(
+        path=path,
+        data=data,
+        headings=tuple(headings),
+        sample=tuple(map(tuple, rows)),
+        delimiter=delimiter,
+        decimal=options.decimal,
+        encoding=encoding,
+        errors="strict" if options.encoding else "replace",
+        skipped=tuple(sorted((*body.skipped, *remarks))),
+        n_rows=body.n_rows - len(remarks),
+        embedded=lines.embedded(),
+        notes=(
+            *told,
+            *tell_layout([number + 1 for number, _ in first], layout, "line"),
+            *named,
+            *tell_again(body.again),
+            *tell_end([number + 1 for number in remarks], "line"),
+        ),
+    )
+
+
+class _Head(NamedTuple):
+    """What the first lines of a file say."""
+
+    lines: list[tuple[int, bytes]]  #: with their numbers from 0
+    delimiter: str
+    layout: Layout
+    in_remark: bool  #: the headings stand in a comment, as numpy writes them
+
+
+class _Body(NamedTuple):
+    """What a pass over all lines of a file finds."""
+
+    skipped: list[int]  #: lines that are no rows, from 0
+    width: int
+    n_rows: int
+    odd: list[bytes]  #: lines that are not UTF-8
+    again: list[int]  #: lines that repeat the headings, from 1
+    tail: list[tuple[int, bytes]]  #: the last rows
+    ragged: tuple[int, str] | None  #: first row of another width, and what is to be said of it
+
+
+def _read_head(lines: Lines) -> _Head:
+    options, limits, path = lines.options, lines.limits, lines.path
+    first = _sample(lines.content([]), options.heading - 1)
+    if not first:
+        raise RecordingError(f"{path}: the file is empty; a recording has a heading line and rows of numbers below it")
+    delimiter, layout = _find_table(path, first, options.delimiter or lines.separator(), limits)
+    remark = lines.remark_above(first[0][0]) if layout is None else None
+    if remark is not None:
+        first = [remark, *first]
+        delimiter, layout = _find_table(path, first, options.delimiter, limits)
+    return _Head(first, delimiter, layout or Layout(0, 0, 1), remark is not None)
+
+
+def _sample(content: Iterator[tuple[int, bytes]], top: int) -> list[tuple[int, bytes]]:
+    """Return the first lines; a few at least, however long they are."""
+    found: list[tuple[int, bytes]] = []
+    size = 0
+    for number, line in content:
+        if number >= top:
+            found.append((number, line))
+            size += len(line)
+            if len(found) == _SAMPLE_LINES or (size > _SAMPLE_BYTES and len(found) >= 8):
+                break
+    return found
+
+
+def _scan(lines: Lines, head: _Head) -> _Body:
+    heading, delimiter, ending = head.lines[head.layout.heading][1], head.delimiter, head.delimiter.encode()
+    skipped, odd, again = list[int](), list[bytes](), list[int]()
+    number, ragged = 0, None
+    width, n_rows = count_cells(heading, delimiter), int(head.in_remark) - head.layout.begin
+    top, plain, long = lines.options.heading - 1, delimiter != " ", lines.limits.cell_characters
+    for number, line in lines.content(skipped):
+        if not line.isascii() and len(odd) < _SAMPLE_LINES and not is_utf8(line):
+            odd.append(line)
+        n_rows += number >= top
+        if n_rows <= 0 or line == heading:  # what stands above the rows; or of a logger that was started again
+            again += [number + 1] if n_rows > 0 else []
+            n_rows -= n_rows > 0
+            skipped.append(number)
+            continue
+        cells = line.count(ending) + 1 if plain and b'"' not in line else count_cells(line, delimiter)
+        if n_rows == 1 and cells == width + 1 and line.rstrip(b" \r\n").endswith(ending):
+            width += 1  # a logger that ends its rows, but not the heading line, with the delimiter
+        if cells != width and ragged is None:
+            ragged = number, describe_ragged(lines.path, number + 1, cells, width, line, delimiter)
+        if len(line) > long:
+            most = max(map(len, split_line(line.decode("latin-1"), delimiter)))
+            lines.limits.check("cell_characters", most, f"{lines.path}: line {number + 1}")
+    tail = lines.read_tail(1 + max(number, *skipped[-1:]), skipped)[-MOST_REMARKS:]
+    return _Body(skipped, width, n_rows, odd, again, tail[-n_rows:] if n_rows > 0 else [], ragged)
+
+
+def _find_table(
+    path: Path, first: Sequence[tuple[int, bytes]], delimiter: str, limits: Limits
+) -> tuple[str, Layout | None]:
+    """Choose the delimiter, unless it is given, under which most rows have as many cells as the headings."""
+    lines = [line.decode("utf-8" if is_utf8(line) else "latin-1") for _, line in first]
+    best, best_layout, best_fit = delimiter or ",", None, (False, 0.0, 0)
+    widest = 0
+    for tried in delimiter or "\t;|, ":
+        if tried == " " and not delimiter:  # it stands inside headings and timestamps too: the last resort
+            if best_fit > (False, 0.0, 0):
+                continue
+            limits.check("columns", widest, path)
+        cells = max(line.count(tried) for line in lines) + 1
+        if cells > limits.columns + 1:  # one more may be empty
+            widest = max(widest, cells)
+            continue
+        rows = [split_line(line, tried) for line in lines]
+        found = find_layout(rows)
+        width = len(rows[found.heading if found else 0])
+        fits = [len(row) in (width, width + 1) for row in rows[found.begin if found else 1 :]]
+        fit = (found is not None, sum(fits) / len(fits) if fits else 1.0, width)
+        if delimiter or (width > 1 and fit > best_fit and (fit[1] > 0 or tried != " ")):
+            best, best_layout, best_fit = tried, found, fit
+    if best_fit == (False, 0.0, 0):
+        limits.check("columns", widest, path)
+    return best, best_layout

@@ -1,0 +1,196 @@
+"""Which columns of a file hold the time: found by headings, and by what the cells hold."""
+
+import re
+from collections.abc import Sequence
+from difflib import get_close_matches
+from typing import NamedTuple
+
+from thermocomp.core.exceptions import RecordingError
+from thermocomp.recordings.readers.cellkinds import Kinds
+from thermocomp.recordings.readers.headings import BRACKETS, Meaning, is_time_name, plain_name
+from thermocomp.recordings.readers.mapping import Mapping, Place
+
+#: headings of a time without unit, those that say more first
+_BARE = (
+    *("timestamp", "datetime", "date_time", "date time", "date/time", "datum/uhrzeit", "datum/zeit", "datum uhrzeit"),
+    *("datum und uhrzeit", "zeitstempel", "time stamp", "timestamps", "date and time", "date & time", "date&time"),
+)
+#: those that mean a time only beside a unit or another one
+_NEEDS_UNIT = ("t", "data", "tag", "day")
+#: headings of a date, and of the time of day beside it
+_DATES = ("date", "datum", "fecha", "data", "tag", "day")
+_CLOCKS = ("time", "uhrzeit", "zeit", "heure", "hora", "ora", "clock", "time of day", "tijd", "čas", "czas")
+#: milliseconds beside a time of whole seconds
+_FRACTIONS = ("ms", "msec", "millisecond", "milliseconds", "millisekunden")
+#: names of a time that counts from the start of a test, even where it is written as a time of day
+_PASSED = re.compile(
+    r"elapsed|relativ|\brel\b|dauer|laufzeit|duration|dur[ée]e|durata|duraci|run[ _]?time|test[ _]?time|\bsince\b"
+    r"|passed|verstrichen|vergangen|écoul|trascors"
+)
+
+
+class TimePlan(NamedTuple):
+    """The columns that hold the time, by position."""
+
+    time: int
+    date: int | None  #: of the dates, where `time` holds a time of day
+    fraction: int | None  #: of milliseconds that go with whole seconds
+    unused: tuple[int, ...]  #: further columns that hold dates
+    notes: tuple[str, ...]
+
+
+def find_time(
+    headings: Sequence[str], meanings: Sequence[Meaning | None], mapping: Mapping, source: str, kinds: Kinds
+) -> TimePlan:
+    """Find the time column, and the column of dates where the time column holds only a time of day.
+
+    Parameters
+    ----------
+    headings : sequence of str
+    meanings : sequence of Meaning or None
+        Of the headings.
+    mapping : Mapping
+    source : str
+        The file, for messages.
+    kinds : callable
+        Tells what a column holds.
+
+    Raises
+    ------
+    RecordingError
+        There is no time column, or the mapping names one that is not there.
+    """
+    notes: list[str] = []
+    if mapping.time.column:
+        time = find_position(mapping.time.column, headings, "[time]", source)
+        date = find_position(mapping.time.date, headings, "[time]", source) if mapping.time.date else None
+    else:
+        time, date, notes = _by_name(headings, meanings, source, kinds)
+    if date is None and mapping.time.unit in ("", "timestamp") and not mapping.time.format:
+        time, date = _paired(time, headings, mapping, kinds)
+        if date is not None:
+            notes.append(_tell_pair(headings, time, date))
+    fraction = None if mapping.time.column else _find_fraction(headings, time)
+    used = (time, date, fraction)
+    twins = {k for k, heading in enumerate(headings) if heading and heading == headings[time]}
+    unused = [k for k in range(len(headings)) if k not in used and k not in twins and kinds(k) in ("date", "stamp")]
+    return TimePlan(time, date, fraction, tuple(unused), tuple(notes))
+
+
+def find_position(place: Place, headings: Sequence[str], table: str, source: str) -> int:
+    """Return the position of a column that a mapping names.
+
+    Parameters
+    ----------
+    place : str or int
+        Its heading, or its number from 1.
+    headings : sequence of str
+    table : str
+        Of the mapping, for messages.
+    source : str
+        The file, for messages.
+
+    Raises
+    ------
+    RecordingError
+        There is no such column.
+    """
+    if isinstance(place, int):
+        if 1 <= place <= len(headings):
+            return place - 1
+        raise RecordingError(f"{source}: mapping {table}: there are {len(headings)} columns, and no number {place}")
+    if place in headings:
+        return list(headings).index(place)
+    near = get_close_matches(place, headings, n=3, cutoff=0.5)
+    hint = f"the nearest are {', '.join(near)}" if near else f"there are {', '.join(h for h in headings if h)}"
+    raise RecordingError(f"{source}: mapping {table}: the file has no column {place!r}; {hint}")
+
+
+def is_ignored(heading: str, index: int, mapping: Mapping) -> bool:
+    """Return whether a mapping says of a column that it is of no use."""
+    rules = mapping.columns.items()
+    return any(rule.role == "ignore" and (rule.column or name) in (heading, index + 1) for name, rule in rules)
+
+
+def has_passed(heading: str) -> bool:
+    """Return whether a heading speaks of time that passed, no time of day."""
+    return _PASSED.search(heading.casefold()) is not None
+
+
+def _by_name(
+    headings: Sequence[str], meanings: Sequence[Meaning | None], source: str, kinds: Kinds
+) -> tuple[int, int | None, list[str]]:
+    timed = {k: m for k, m in enumerate(meanings) if m is not None and m.unit.quantity == "time"}
+    # of two columns of one name the first is meant
+    plain = {plain_name(h): k for k, h in reversed(list(enumerate(headings)))}
+    named = [k for k, m in timed.items() if is_time_name(m.base) and plain_name(headings[k]) not in _FRACTIONS]
+    clear = [k for k in named if timed[k].base != "T"]  # T_s may be the temperature of a surface
+    if clear:
+        return clear[0], None, []
+    date = next((plain[name] for name in _DATES if name in plain), None)
+    clock = next((plain[name] for name in _CLOCKS if name in plain), None)
+    if date is not None and clock is not None:
+        whole = next((k for k in (clock, date) if kinds(k) == "stamp"), None)
+        alone = clock if kinds(clock) == "passed" else whole
+        return (clock, date, []) if alone is None else (alone, None, [])
+    names = (*(n for n in _BARE if n in plain), *(n for n in plain if is_time_name(n)))
+    bare = [plain[name] for name in names if name not in _NEEDS_UNIT or kinds(plain[name]) in ("date", "stamp")]
+    if bare or named:
+        return [*bare, *named][0], None, []
+    if len(timed) == 1:
+        index = next(iter(timed))
+        return index, None, [f"{headings[index]!r} is taken as the time"]
+    if held := _by_cells(headings, kinds):
+        return held
+    raise RecordingError(
+        f"{source}: no time column found among {', '.join(h for h in headings if h)}; name it time_s (or time_min, "
+        'time_h, timestamp) in the heading line, or give a mapping with [time] column = "..." and unit = "s"'
+    )
+
+
+def _by_cells(headings: Sequence[str], kinds: Kinds) -> tuple[int, int | None, list[str]] | None:
+    """Find the only column of dates with a time of day, or the only ones of dates and of times of day."""
+    held = [kinds(k) for k in range(len(headings))]
+    if held.count("stamp") == 1:
+        time = held.index("stamp")
+        return time, None, [f"{headings[time]!r} holds dates: taken as the time"]
+    if held.count("stamp") or held.count("date") != 1 or held.count("clock") != 1:
+        return None
+    time, date = held.index("clock"), held.index("date")
+    return (time, date, [_tell_pair(headings, time, date)]) if not has_passed(headings[time]) else None
+
+
+def _tell_pair(headings: Sequence[str], time: int, date: int) -> str:
+    return f"{headings[date]!r} holds the dates, {headings[time]!r} the time of day"
+
+
+def _paired(time: int, headings: Sequence[str], mapping: Mapping, kinds: Kinds) -> tuple[int, int | None]:
+    """Return the column of the times of day and that of their dates, if one of them was found and both are there."""
+
+    def others(kind: str, names: Sequence[str]) -> list[int]:
+        found = [
+            k
+            for k, heading in enumerate(headings)
+            if k != time and kinds(k) == kind and not is_ignored(heading, k, mapping) and not has_passed(heading)
+        ]
+        # the next one, but first those of a name that says it
+        return sorted(found, key=lambda k: (plain_name(headings[k]) not in names, abs(k - time)))
+
+    kind = kinds(time)
+    if kind == "clock" and not has_passed(headings[time]):
+        return time, next(iter(others("date", _DATES)), None)
+    if kind == "date" and not mapping.time.column and (clocks := others("clock", _CLOCKS)):
+        return clocks[0], time
+    return time, None
+
+
+def _find_fraction(headings: Sequence[str], time: int) -> int | None:
+    """Find a column of milliseconds next to the time."""
+    after = time + 1
+    return after if after < len(headings) and _bare_name(headings[after]) in _FRACTIONS else None
+
+
+def _bare_name(heading: str) -> str:
+    """Return a heading in small letters without whatever stands in brackets."""
+    found = BRACKETS.fullmatch(heading.strip())
+    return plain_name(found["base"] if found else heading)

@@ -1,0 +1,92 @@
+"""What a workbook becomes when it is unzipped: all of it is counted before anything is made of it."""
+
+import zipfile
+from pathlib import Path
+from xml.parsers import expat
+
+from thermocomp.core.exceptions import RecordingError
+from thermocomp.recordings.readers.limits import Limits
+
+#: what an element of XML counts, in bytes: it costs time, however short it is
+_ELEMENT = 48
+_BLOCK = 1 << 16
+#: elements whose content is done with at their end, by the root of the part
+_DONE_WITH = {"worksheet": "row", "sst": "si", "document-content": "table-row"}
+#: longest name of a cell that a spreadsheet has
+_PLACE = len("XFD1048576")
+
+
+def check_unzipped(path: Path, limits: Limits) -> None:
+    """Refuse a zip bomb, and XML that would take much more memory or time than its size.
+
+    What the zip file says of its sizes is not believed. Parts of a workbook never define entities.
+
+    Parameters
+    ----------
+    path : Path
+    limits : Limits
+
+    Raises
+    ------
+    RecordingError
+        See `Limits.check`; or a part defines its own kind of XML.
+    zipfile.BadZipFile
+        It is no zip file.
+    """
+    unpacked = 0
+    with zipfile.ZipFile(path) as parts:
+        for part in parts.infolist():
+            survey = _Survey(f"{path}: {part.filename}", limits)
+            with parts.open(part) as content:
+                while block := content.read(_BLOCK):
+                    survey.take(block)
+                    limits.check_unpacked(unpacked + survey.unpacked, path)
+            unpacked += survey.unpacked
+
+
+class _Survey:
+    """Counts the elements of one part, and the longest text and row in it."""
+
+    def __init__(self, where: str, limits: Limits) -> None:
+        self.where = where
+        self.limits = limits
+        self.size = self.elements = self.begun = self.last = 0
+        self.root = ""
+        self.parser: expat.XMLParserType | None = expat.ParserCreate()
+        self.parser.StartElementHandler = self._element
+        self.parser.StartDoctypeDeclHandler = self._doctype
+
+    @property
+    def unpacked(self) -> int:
+        """Bytes, or what the elements count if that is more."""
+        return max(self.size, _ELEMENT * self.elements)
+
+    def take(self, block: bytes) -> None:
+        self.size += len(block)
+        if self.parser is None:
+            return
+        try:
+            self.parser.Parse(block)
+        except expat.ExpatError:
+            self.parser = None  # a picture, or damaged: who reads it stops here as well
+            return
+        self.limits.check("line_bytes", self.size - self.last, self.where)
+
+    def _element(self, name: str, attributes: dict[str, str]) -> None:
+        assert self.parser is not None
+        self.last = self.parser.CurrentByteIndex
+        self.elements += 1
+        local = name.rpartition(":")[2]
+        if not self.root:
+            self.root = local
+        if local == _DONE_WITH.get(self.root):
+            self.begun = self.elements
+        elif self.elements - self.begun > self.limits.row_elements:
+            self.limits.check("row_elements", self.elements - self.begun, self.where)
+        if len(attributes.get("r", "")) > _PLACE:
+            raise RecordingError(f"{self.where}: a cell cannot stand in {attributes['r'][:40]!r}; save the file anew")
+
+    def _doctype(self, *_: object) -> None:
+        raise RecordingError(
+            f"{self.where}: defines entities or a document type, as no spreadsheet does; save the file anew"
+        )

@@ -1,0 +1,228 @@
+"""`Recording`: the synchronised table of one test, with units, roles and thermal cycles."""
+
+import hashlib
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
+from functools import cached_property
+from pathlib import PurePath
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from thermocomp.core.exceptions import InputError, RecordingError
+from thermocomp.core.machine import Channel
+from thermocomp.recordings.cycles import Cycle
+from thermocomp.recordings.frames import parts_of
+
+FloatArray = NDArray[np.float64]
+
+AMBIENT = re.compile(r"(?:^|[_\W])(air|ambient|room|workshop|environment|umgebung)(?:$|[_\W])", re.IGNORECASE)
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """One test: what the sensors and the displacement probes said, row by row.
+
+    Parameters
+    ----------
+    name : str
+        What the test is called; mostly the file's name without its ending.
+    time : ndarray of shape (n_rows,)
+        Seconds since the first row [s], strictly rising.
+    table : DataFrame of shape (n_rows, n_channels)
+        One float column per channel, in house units; nan where a value is missing.
+    channels : tuple of Channel
+        One per column of `table`, in its order.
+    cycles : tuple of Cycle
+        Thermal cycles; together they cover all rows. Several cycles or one.
+    source : str
+        File it was read from; empty if it never was in a file.
+    sha256 : str
+        Hash of that file.
+    start : str
+        ISO timestamp of the first row; empty if the file has only relative times.
+    origin : float
+        Time between the first row of the file and that of the recording, where the first rows were cut [s].
+    aliases : mapping of str to str
+        Other names a channel answers to: the file's own heading, the name without its unit.
+    notes : tuple of str
+        What the reader did that a user should know.
+    changed : tuple of str
+        Those of the notes that say what a mapping has changed in the values.
+    compensation : {'', 'off', 'known', 'unknown'}
+        Whether a correction was in force at the machine, and known; empty: not said. See
+        `thermocomp.recordings.compensated`.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> from thermocomp import Recording
+    >>> table = pd.DataFrame({"time_s": [0, 60, 120], "t_front_C": [20.0, 20.6, 21.1], "z_um": [0.0, 2.1, 3.8]})
+    >>> recording = Recording.from_dataframe(table, name="monday")
+    >>> recording
+    <Recording monday: 3 rows, 0.0 h, 1 temperatures, 1 displacements, 1 thermal cycle(s)>
+    >>> recording.time.tolist(), recording.table["z_um"].tolist()
+    ([0.0, 60.0, 120.0], [0.0, 2.1, 3.8])
+    """
+
+    name: str
+    time: FloatArray
+    table: pd.DataFrame
+    channels: tuple[Channel, ...]
+    cycles: tuple[Cycle, ...]
+    source: str = ""
+    sha256: str = ""
+    start: str = ""
+    origin: float = 0.0
+    aliases: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    changed: tuple[str, ...] = ()
+    compensation: str = ""
+
+    def __post_init__(self) -> None:
+        if len(self.time) != len(self.table):
+            raise RecordingError(f"{self.name}: {len(self.time)} times for {len(self.table)} rows")
+        if list(self.table.columns) != [c.name for c in self.channels]:
+            raise RecordingError(f"{self.name}: table columns and channels differ")
+        if len(self.time) > 1 and not (np.diff(self.time) > 0).all():
+            row = int(np.flatnonzero(~(np.diff(self.time) > 0))[0]) + 1
+            raise RecordingError(f"{self.name}: time does not rise at row {row}")
+        covered = [row for c in self.cycles for row in (c.start, c.stop)]
+        if covered != sorted(covered) or covered[:1] != [0] or covered[-1:] != [len(self.time)]:
+            raise RecordingError(f"{self.name}: cycles {self.cycles} do not cover the {len(self.time)} rows")
+
+    @classmethod
+    def from_dataframe(
+        cls,
+        table: pd.DataFrame,
+        *,
+        time: str | ArrayLike | None = None,
+        units: Mapping[str, str] | None = None,
+        cycles: str | Sequence[object] | None = None,
+        name: str = "table",
+    ) -> "Recording":
+        """Make a recording of a table.
+
+        Parameters
+        ----------
+        table : DataFrame of shape (n_rows, n_columns)
+            A column is a channel if its heading has a unit (``t1_C``, ``drift_um``, ``spindle_rpm``) or `units` tells
+            it; what is left out is told in `notes`.
+        time : str or array-like of shape (n_rows,), optional
+            Name of a column, or the time of each row: numbers (seconds without a unit), datetimes with or
+            without a time zone (the first is kept as `start`), or timedeltas. Without it the one column of times, such
+            as ``time_s``, or an index of times.
+        units : mapping of str to str, optional
+            Column to unit, such as ``{"T1": "degC", "Z": "um"}``.
+        cycles : str or sequence of object of shape (n_rows,), optional
+            Name of a column, or the label of each row's thermal cycle. Without it a column ``cycle``, or the spindle
+            speed tells.
+        name : str
+            What the test is called.
+
+        Returns
+        -------
+        Recording
+            In house units.
+
+        Raises
+        ------
+        RecordingError
+            There is no time, or it does not rise; no column is a channel; a cell is no number.
+        UnitError
+            A unit is unknown.
+        InputError
+            A column that was named is not there, or an array has another length.
+        """
+        return cls(**parts_of(table, time=time, units=units, cycles=cycles, name=name))
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return the table with the time since the first row in front, as ``time_s``."""
+        table = self.table.reset_index(drop=True)
+        table.insert(0, "time_s", self.time)
+        return table
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __repr__(self) -> str:
+        hours = self.time[-1] / 3600 if len(self) else 0.0
+        return (
+            f"<Recording {self.name}: {len(self)} rows, {hours:.1f} h, {len(self.temperatures)} temperatures, "
+            f"{len(self.displacements)} displacements, {len(self.cycles)} thermal cycle(s)>"
+        )
+
+    def of_quantity(self, quantity: str) -> tuple[Channel, ...]:
+        """Return the channels that measure `quantity`, in the order of the table."""
+        return tuple(c for c in self.channels if c.quantity == quantity)
+
+    @property
+    def temperatures(self) -> tuple[Channel, ...]:
+        """Temperature channels [degC]."""
+        return self.of_quantity("temperature")
+
+    @property
+    def displacements(self) -> tuple[Channel, ...]:
+        """Displacement channels [um]."""
+        return self.of_quantity("displacement")
+
+    @property
+    def ambient(self) -> Channel | None:
+        """The first temperature whose name says air, ambient, room, workshop or environment; None if none does."""
+        return next((c for c in self.temperatures if AMBIENT.search(c.name)), None)
+
+    @property
+    def speed(self) -> Channel | None:
+        """The spindle speed [1/min], if recorded."""
+        found = self.of_quantity("spindle_speed")
+        return found[0] if found else None
+
+    def channel(self, name: str) -> Channel:
+        """Find a channel by its name, the file's own heading, or its name without the unit.
+
+        Raises
+        ------
+        InputError
+            There is none; the message names the nearest.
+        """
+        wanted = self.aliases.get(name, name)
+        for c in self.channels:
+            if c.name == wanted:
+                return c
+        names = [c.name for c in self.channels]
+        near = get_close_matches(name, names, n=3, cutoff=0.4)
+        hint = f"the nearest are {', '.join(near)}" if near else f"there are {', '.join(names)}"
+        raise InputError(f"{PurePath(self.source).name or self.name}: no channel is named {name!r}; {hint}")
+
+    def has(self, name: str) -> bool:
+        """Return whether `channel` finds a channel."""
+        try:
+            self.channel(name)
+        except InputError:
+            return False
+        return True
+
+    def values(self, channels: Sequence[Channel]) -> FloatArray:
+        """Return the columns of `channels` as an array of shape (n_rows, n_channels), in house units."""
+        return self.table[[c.name for c in channels]].to_numpy(dtype=np.float64)
+
+    def with_cycles(self, cycles: Sequence[Cycle]) -> "Recording":
+        """Return the same recording, split into other cycles."""
+        return replace(self, cycles=tuple(cycles))
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """SHA-256 of times and values: the same for the same test, however its file was written."""
+        digest = hashlib.sha256(np.ascontiguousarray(self.time).tobytes())
+        for name in sorted(str(c) for c in self.table.columns):
+            digest.update(name.encode())
+            digest.update(np.ascontiguousarray(self.table[name].to_numpy(dtype=np.float64)).tobytes())
+        return digest.hexdigest()
+
+    @property
+    def sampling_interval(self) -> float:
+        """Median time between two rows [s]; nan for a single row."""
+        return float(np.median(np.diff(self.time))) if len(self) > 1 else float("nan")

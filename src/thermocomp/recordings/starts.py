@@ -1,0 +1,287 @@
+"""How a test begins: cold, continued from an earlier file, re-zeroed on a warm machine, or with a known zero."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.machine import Channel
+from thermocomp.core.zero import Zeroing, first_rows, robust_mean
+from thermocomp.recordings.recording import Recording
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+Word = Literal["cold", "continued", "rezeroed", "known"]
+#: what the words mean, for tables and errors
+WORDS: dict[Word, str] = {
+    "cold": "zeroed at rest at its start",
+    "continued": "goes on from an earlier file, and counts from the zero of that",
+    "rezeroed": "displacements and temperatures count from its start, on a machine that may be warm",
+    "known": "counts from a zero that is known",
+}
+#: a displacement that begins nearer to zero than this was zeroed there [um or urad]
+NEAR = 3.0
+#: or nearer than this share of its range
+SHARE = 0.1
+#: or nearer than so many times its noise
+LOUD = 6.0
+#: a file follows another if it begins at most this long after its end [s], or ten of its intervals
+SOON = 600.0
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """How a test begins.
+
+    Parameters
+    ----------
+    word : {'cold', 'continued', 'rezeroed', 'known'}
+        See `WORDS`.
+    why : str
+        How that is known: stated, or found out.
+    earlier : tuple of Recording
+        What the machine went through before, in the order of time.
+    gap : float or None
+        From the last row of each of them to the first row of what follows [s]; None: from their time stamps, or else
+        one sampling interval.
+    zero : mapping of str to float
+        Temperatures that count as zero, by channel [degC]; for ``known``, and none where they are taken as they are.
+
+    Raises
+    ------
+    InputError
+        The word does not go with the rest.
+
+    Examples
+    --------
+    >>> from thermocomp import Start, simulate
+    >>> (monday,) = simulate("hwang")
+    >>> print(Start("continued", earlier=(monday,), gap=600.0).told("tuesday"))  # starts=... of compare, fit, assess
+    tuesday: continued from hwang (goes on from an earlier file, and counts from the zero of that); stated
+    >>> Start("known", zero={"t_bed_front_C": 20.0}).content("tuesday")["zero_degC"]
+    {'t_bed_front_C': 20.0}
+    """
+
+    word: Word = "cold"
+    why: str = "stated"
+    earlier: tuple[Recording, ...] = ()
+    gap: float | None = None
+    zero: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.word not in WORDS:
+            raise InputError(f"start {self.word!r}: must be one of {', '.join(WORDS)}")
+        if self.word == "continued" and not self.earlier:
+            raise InputError("a test that is continued needs the earlier file: name it with --continues, or earlier=")
+        if self.earlier and self.word not in ("continued", "rezeroed"):
+            raise InputError(f"an earlier file goes with a start that is continued or rezeroed, not {self.word}")
+        if self.zero and self.word != "known":
+            raise InputError(f"temperatures of the zero go with a start that is known, not {self.word}")
+        if self.gap is not None and not 0 < self.gap < np.inf:
+            raise InputError(f"a gap of {self.gap:g} s between two files: must be longer than nothing")
+
+    def content(self, name: str) -> dict[str, object]:
+        """Return it for a program to read."""
+        return {
+            "recording": name,
+            "start": self.word,
+            "how_known": self.why,
+            "earlier": [r.source or r.name for r in self.earlier],
+            "zero_degC": dict(self.zero),
+        }
+
+    def told(self, name: str) -> str:
+        """Return it in words, such as ``b: continued from a (goes on from an earlier file ...); stated``."""
+        before = f" from {', '.join(r.name for r in self.earlier)}" if self.word == "continued" else ""
+        after = (
+            f"; what went before: {', '.join(r.name for r in self.earlier)}" if before == "" and self.earlier else ""
+        )
+        return f"{name}: {self.word}{before} ({WORDS[self.word]}{after}); {self.why}"
+
+
+#: zeroed at rest at its start, whatever the displacement says there
+COLD = Start()
+
+
+def bridge_files(start: Start, recording: Recording) -> tuple[Start, FloatArray]:
+    """Bridge the time between the files of a test.
+
+    Parameters
+    ----------
+    start : Start
+    recording : Recording
+        That goes on from the earlier files of `start`.
+
+    Returns
+    -------
+    start : Start
+        With its gaps told.
+    begins : ndarray of shape (n_earlier + 1,)
+        When each earlier file and the recording itself begin, since the first of them [s].
+
+    Raises
+    ------
+    InputError
+        By its time stamps a file begins before the one it follows has ended.
+    """
+    begins, words, every = [0.0], [], (*start.earlier, recording)
+    for before, after in pairwise(every):
+        stamped = _between(before, after)
+        if start.gap is not None:
+            gap, how = start.gap, "stated"
+        elif stamped is not None:
+            gap, how = stamped, "by their time stamps"
+        else:
+            gap, how = before.sampling_interval, "taken as one sampling interval: neither stamped nor stated"
+        if not gap > 0:
+            raise InputError(
+                f"{after.name} cannot continue {before.name}: by their time stamps it begins {-gap:g} s before its end"
+            )
+        begins.append(begins[-1] + float(before.time[-1]) + gap)
+        words.append(f"{after.name} begins {gap:g} s after the end of {before.name} ({how})")
+    why = "; ".join([start.why, *words])
+    return replace(start, why=why), np.array(begins)
+
+
+def find_starts(
+    recordings: Sequence[Recording],
+    targets: Sequence[Channel],
+    *,
+    zeroing: Zeroing = Zeroing(),
+    absolute: bool = False,
+) -> tuple[Start, ...]:
+    """Find out how tests begin.
+
+    A displacement that begins near zero was zeroed there. One that does not, and goes on from where the file before it
+    (by time stamps) ended, continues that. All else cannot be told.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        Given together.
+    targets : sequence of Channel
+        Displacements that are judged or learned from.
+    zeroing : Zeroing
+        What counts as the start.
+    absolute : bool
+        Temperatures are taken as they are: their zero is known.
+
+    Returns
+    -------
+    tuple of Start
+
+    Raises
+    ------
+    InputError
+        It cannot be told, and a model begun at zero would be wrong by it.
+    """
+    if absolute:
+        return tuple(Start("known", "temperatures are taken as they are") for _ in recordings)
+    found = {id(r): _found(r, [o for o in recordings if o is not r], targets, zeroing) for r in recordings}
+
+    def whole(start: Start) -> Start:
+        """Return a start with all that went before: what it continues may be a continuation itself."""
+        before = found[id(start.earlier[0])] if start.earlier else start
+        return replace(start, earlier=(*whole(before).earlier, *start.earlier)) if before.earlier else start
+
+    return tuple(whole(found[id(r)]) for r in recordings)
+
+
+def find_resting_rows(recording: Recording, zeroing: Zeroing) -> BoolArray:
+    """Return the rows in which the spindle is known to stand.
+
+    Parameters
+    ----------
+    recording : Recording
+    zeroing : Zeroing
+        Names the channel that tells it.
+
+    Returns
+    -------
+    ndarray of bool of shape (n_rows,)
+    """
+    speed = next((c for c in recording.channels if c.name == recording.aliases.get(zeroing.speed, zeroing.speed)), None)
+    if speed is None:
+        return np.zeros(len(recording), dtype=np.bool_)
+    return np.array([zeroing.stands(v) for v in recording.table[speed.name].tolist()], dtype=np.bool_)
+
+
+def level(recording: Recording, name: str, zeroing: Zeroing, *, end: bool = False) -> float:
+    """Return what a channel begins, or ends, with.
+
+    Parameters
+    ----------
+    recording : Recording
+    name : str
+        Of the channel.
+    zeroing : Zeroing
+        Over how long the start is averaged.
+    end : bool
+        The last value instead.
+
+    Returns
+    -------
+    float
+        In the channel's unit; nan if it has no value.
+    """
+    values = recording.table[recording.channel(name).name].to_numpy(dtype=np.float64)
+    there = np.flatnonzero(np.isfinite(values))
+    if not there.size:
+        return float("nan")
+    count, _ = first_rows(zeroing, recording.time[there], find_resting_rows(recording, zeroing)[there])
+    return float(robust_mean(values[there[-1:]] if end else values[there[:count]]))
+
+
+def _found(recording: Recording, others: Sequence[Recording], targets: Sequence[Channel], zeroing: Zeroing) -> Start:
+    levels = {c.name: level(recording, c.name, zeroing) for c in targets}
+    far = {c.name: c for c in targets if abs(levels[c.name]) > _tolerance(recording, c.name)}
+    before = next((o for o in others if 0 < (_between(o, recording) or 0.0) <= _soon(o)), None)
+    if not far:
+        if before is not None and any(
+            abs(level(before, c.name, zeroing, end=True)) > _tolerance(before, c.name) for c in targets
+        ):
+            return Start("rezeroed", f"it follows {before.name} by its time stamps, and begins near zero again")
+        return Start("cold", "taken so: what is measured begins near zero")
+    if before is not None and all(
+        abs(level(before, n, zeroing, end=True) - levels[n]) <= max(_tolerance(recording, n), _tolerance(before, n))
+        for n in far
+    ):
+        return Start("continued", "by time stamps and displacements", (before,))
+    name = max(far, key=lambda n: abs(levels[n]))
+    raise InputError(
+        f"{recording.source or recording.name}: {name} begins at {levels[name]:.1f} {far[name].unit}, so it was not "
+        "zeroed at the start of this file. Say how it begins: --continues EARLIER (the file before it), --start "
+        "rezeroed (count from its start), --start known --zero FILE or t1_C=20.1,t2_C=20.4 (the temperatures of its "
+        "zero), or --start cold if it was zeroed at rest all the same. In Python: starts=Start(...)"
+    )
+
+
+def _tolerance(recording: Recording, name: str) -> float:
+    values = recording.table[recording.channel(name).name].to_numpy(dtype=np.float64)
+    values = values[np.isfinite(values)]
+    if len(values) < 2:
+        return NEAR
+    noise = (
+        float(np.median(np.abs(np.diff(values)))) / 0.954
+    )  # of a normal law: the difference has sqrt(2) of its noise
+    return max(NEAR, SHARE * float(np.ptp(values)), LOUD * noise)
+
+
+def _between(before: Recording, after: Recording) -> float | None:
+    """Return the time from the end of one recording to the begin of another [s]; None without time stamps."""
+    if not (before.start and after.start):
+        return None
+    stamps = [datetime.fromisoformat(r.start) for r in (before, after)]
+    if (stamps[0].tzinfo is None) != (stamps[1].tzinfo is None):
+        return None
+    return (stamps[1] - stamps[0]).total_seconds() - float(before.time[-1])
+
+
+def _soon(recording: Recording) -> float:
+    return max(SOON, 10 * recording.sampling_interval)

@@ -1,0 +1,188 @@
+"""`VolumetricModel`: a machine's components stepped from reading to reading, or replayed over a recording."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.components import COMPONENTS
+from thermocomp.core.exceptions import InputError, ReadingError
+from thermocomp.core.machine import Machine
+from thermocomp.core.model import ErrorModel
+from thermocomp.core.position import PositionModel
+from thermocomp.core.stack import Stack, StackState
+from thermocomp.runtime.geometry.field import ErrorField
+from thermocomp.runtime.geometry.kinematics import INDEX, Kinematics
+
+FloatArray = NDArray[np.float64]
+
+#: all that a volumetric model remembers between two readings
+VolumetricState = StackState
+
+
+class VolumetricModel:
+    """The components of a machine in the course of time.
+
+    Parameters
+    ----------
+    machine : Machine
+        A component that it does not tell is zero.
+
+    Attributes
+    ----------
+    machine : Machine
+    stack : Stack
+        Every model of time in it.
+
+    Raises
+    ------
+    InputError
+        Two models take a channel of the same name for different quantities, or the do-no-harm gate refused one.
+    """
+
+    def __init__(self, machine: Machine) -> None:
+        self.machine = machine
+        self._kinematics = Kinematics(machine)
+        self._constants = np.zeros(len(COMPONENTS))
+        self._varying: list[tuple[int, PositionModel, slice]] = []
+        models: list[ErrorModel] = []
+        uniform: list[tuple[int, int]] = []  # component, model
+        for code, source in machine.components.items():
+            if isinstance(source, PositionModel):
+                self._varying.append((INDEX[code], source, slice(len(models), len(models) + len(source.models))))
+                models += source.models
+            elif isinstance(source, ErrorModel):
+                uniform.append((INDEX[code], len(models)))
+                models.append(source)
+            else:
+                self._constants[INDEX[code]] = source
+        self._of_time = [k for k, _ in uniform], [m for _, m in uniform]
+        for model in models:
+            if model.honest_error is not None:  # what was never judged runs in no compensator; here nothing runs
+                model.check_may_run()
+        self.stack = Stack(models)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the channels that it needs."""
+        return self.stack.inputs
+
+    def init(self) -> VolumetricState:
+        """Return the state of a machine that has just been zeroed."""
+        return self.stack.init()
+
+    def step(
+        self, state: VolumetricState, values: Mapping[str, float], dt: float
+    ) -> tuple[VolumetricState, ErrorField]:
+        """Take one reading in and give the errors at its instant.
+
+        Parameters
+        ----------
+        state : VolumetricState
+            From `init` or the previous `step`.
+        values : mapping of str to float
+            By channel; those of `inputs` have to be there.
+        dt : float
+            Time since the previous reading [s]; without meaning in the first step.
+
+        Returns
+        -------
+        state : VolumetricState
+        field : ErrorField
+
+        Raises
+        ------
+        ReadingError
+            A channel is missing or not finite, or `dt` is negative or not finite.
+        """
+        try:
+            reading = np.array([values[name] for name in self.inputs], dtype=np.float64)
+        except KeyError as e:
+            raise ReadingError(f"machine {self.machine.name}: channel {e.args[0]} is not in the reading") from None
+        state, deviations = self.stack.step(state, reading, dt)
+        return state, self.field(deviations)
+
+    def field(self, deviations: FloatArray) -> ErrorField:
+        """Return the errors of the machine in the state that the models of time tell.
+
+        Parameters
+        ----------
+        deviations : ndarray of shape (n_models,)
+            What the models of `stack` say.
+        """
+        uniform = self._constants.copy()
+        components, models = self._of_time
+        uniform[components] = deviations[models]
+        factors = deviations.tolist()
+        return ErrorField(self._kinematics, uniform, tuple((k, m, factors[at]) for k, m, at in self._varying))
+
+    def replay(self, time: FloatArray, table: Mapping[str, FloatArray]) -> "ThermalStates":
+        """Step through a recording, from the zero in its first row.
+
+        Parameters
+        ----------
+        time : ndarray of shape (n,)
+            [s]
+        table : mapping of str to ndarray of shape (n,)
+            Readings by channel; those of `inputs` have to be there.
+
+        Returns
+        -------
+        ThermalStates
+            One per row. In a row with a missing number the last state is held, as the gate does it live; before the
+            first usable row all models of time say 0.
+
+        Raises
+        ------
+        InputError
+            A channel is missing or has another length, or the time does not rise.
+        """
+        times = np.asarray(time, dtype=np.float64)
+        if not np.isfinite(times).all() or (np.diff(times) <= 0).any():
+            raise InputError(f"machine {self.machine.name}: the times of the recording must rise")
+        for name in self.inputs:
+            if name not in table:
+                there = ", ".join(table) or "none"
+                raise InputError(f"machine {self.machine.name}: there is no channel {name!r}; there are {there}")
+            if np.shape(table[name]) != times.shape:
+                raise InputError(f"channel {name}: {len(table[name])} numbers for {len(times)} times")
+        values = np.empty((len(times), len(self.inputs)))
+        for column, name in enumerate(self.inputs):
+            values[:, column] = table[name]
+        state, deviation = self.init(), np.zeros(len(self.stack.models))
+        deviations = np.empty((len(times), len(self.stack.models)))
+        usable = np.flatnonzero(np.isfinite(values).all(axis=1))
+        steps = dict(zip(usable.tolist(), np.diff(times[usable], prepend=times[usable][:1]).tolist(), strict=True))
+        for k in range(len(times)):
+            if k in steps:
+                state, deviation = self.stack.step(state, values[k], steps[k])
+            deviations[k] = deviation
+        return ThermalStates(self, times, deviations)
+
+
+@dataclass(frozen=True, eq=False)
+class ThermalStates:
+    """The thermal states of a machine in the rows of a recording: a sequence of `ErrorField`.
+
+    Parameters
+    ----------
+    model : VolumetricModel
+    time : ndarray of shape (n,)
+        [s]
+    deviations : ndarray of shape (n, n_models)
+        What the models of ``model.stack`` say.
+    """
+
+    model: VolumetricModel
+    time: FloatArray
+    deviations: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __getitem__(self, k: int) -> ErrorField:
+        return self.model.field(self.deviations[k])
+
+    def __iter__(self) -> Iterator[ErrorField]:
+        return (self[k] for k in range(len(self)))

@@ -1,0 +1,218 @@
+"""A virtual horizontal machining centre: reduced finite elements, friction, a chiller, joints."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.virtual.heat import HeatSources
+from thermocomp.virtual.joints import Joints, slide_with_friction
+from thermocomp.virtual.machine import Air, Drive, Truth, check, stretches
+from thermocomp.virtual.statespace import REFERENCE_TEMPERATURE, Operators, ReducedModel
+
+FloatArray = NDArray[np.float64]
+#: changes the state after a step of a drive, told what was watched before it and the air
+Correction = Callable[[FloatArray, list[float], FloatArray], object]
+
+#: places that friction and thermostat look at after every step
+_WATCHED = ("front_bearing", "rear_bearing", "shaft", "front_seat", "coolant", "bed_front")
+#: inputs that depend on them
+_FRICTION = ("front_bearing", "rear_bearing", "coolant")
+
+
+@dataclass(frozen=True, eq=False)
+class CentreState:
+    """All that the machine remembers.
+
+    Parameters
+    ----------
+    field : ndarray of shape (n_states,)
+        Of the reduced model.
+    chilling : bool
+        The chiller runs.
+    slid : float
+        How far the column's foot has slid on the bed [um].
+    """
+
+    field: FloatArray
+    chilling: bool
+    slid: float
+
+
+@dataclass(frozen=True, eq=False)
+class MachiningCentre:
+    """The virtual machine tool (X-01); fills `thermocomp.virtual.machine.VirtualMachine`.
+
+    Structure ``w X' b Z Y (C1) t``: the table moves along X on the bed's front, the column along Z on its rear, the
+    headstock along Y on the column's front, the spindle points towards -Z. Right is +X, front is -Z. Time constants
+    from half a minute (bearings) to days (foundation); heat that is nonlinear in speed and temperature; hysteresis by
+    the chiller's thermostat and by friction under the column.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        Of spindle, column, bed and screws by finite elements, and of the other parts as lumps.
+    heat : HeatSources
+    joints : Joints
+    longest_step : float
+        Friction and thermostat are looked at this often [s].
+    """
+
+    model: ReducedModel = field(default_factory=lambda: ReducedModel.load("centre"))
+    heat: HeatSources = field(default_factory=HeatSources)
+    joints: Joints = field(default_factory=Joints)
+    longest_step: float = 20.0
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """Names of the places whose temperatures are known."""
+        return self.model.places
+
+    @property
+    def observables(self) -> tuple[str, ...]:
+        """Names of the displacements and angles."""
+        return self.model.observables
+
+    def init(self, air: Air) -> CentreState:
+        """Return the state of a machine that was switched off for long, in this air."""
+        rest = Drive(powered=False)
+        state = self.model.steady(np.zeros(len(self.model.inputs)), air.values, self._theta(rest))
+        wish = self._observable("slide") @ (state - REFERENCE_TEMPERATURE * self.model.one)
+        return CentreState(state, chilling=False, slid=float(wish))
+
+    def run(self, state: CentreState, drives: Sequence[Drive], air: FloatArray, dt: float) -> tuple[CentreState, Truth]:
+        """Advance by one step of `dt` per drive, each in equal parts no longer than `longest_step`.
+
+        Parameters
+        ----------
+        state : CentreState
+        drives : sequence of Drive
+            Each holds during the whole of its step.
+        air : ndarray of shape (n_steps, 3)
+            `Air.values` of each step.
+        dt : float
+            [s]
+
+        Returns
+        -------
+        state : CentreState
+        truth : Truth
+
+        Raises
+        ------
+        InputError
+            `dt` is not positive, there is no drive, the air has another length or is not finite, a speed is beyond the
+            top speed, or a load is put in where there is no place for it.
+        """
+        check(drives, air, dt)
+        parts = math.ceil(dt / self.longest_step)
+        fields = np.empty((len(drives) * parts, len(self.model.one)))
+        ratio = np.empty(len(drives))
+        current, chilling = state.field, state.chilling
+        for first, last in stretches(drives):
+            drive = drives[first]
+            ratio[first:last] = abs(drive.speed) / self.heat.top_speed
+            rows = slice(first * parts, last * parts)
+            stretch = np.repeat(air[first:last], parts, axis=0)
+            chilling = self._advance(current, chilling, drive, stretch, dt / parts, fields[rows])
+            current = fields[rows.stop - 1].copy()
+        truth, slid = self._truth(fields, np.repeat(ratio, parts), state.slid)
+        ends = slice(parts - 1, None, parts)
+        return CentreState(current, chilling, slid), Truth(truth.temperatures[ends], truth.observables[ends])
+
+    def _advance(
+        self, now: FloatArray, chilling: bool, drive: Drive, air: FloatArray, dt: float, fields: FloatArray
+    ) -> bool:
+        """Fill in the fields after each step of one drive; return whether the chiller runs at the end."""
+        self._check(drive)
+        heat = self.heat
+        operators = self.model.operators(self._theta(drive), dt, self._watched)
+        correct = self._correction(operators, drive)
+        flow = drive.cooled and drive.powered
+        forcing = air @ operators.air.T + operators.heat @ self._given(drive)
+        variable = operators.heat[:, [self.model.inputs.index(n) for n in _FRICTION]]
+        seen = (self.model.rows(self._watched) @ now).tolist()
+        n = len(now)
+        power = np.zeros(len(_FRICTION))
+        turning = drive.speed != 0 and drive.powered
+        for k in range(len(fields)):
+            if turning:
+                power[0], power[1] = self._friction(drive, seen)
+            power[2] = -heat.chiller if flow and chilling else 0.0
+            after = operators.state @ now
+            after += forcing[k]
+            after += variable @ power
+            if correct:
+                correct(after, seen, air[k])
+            if flow:
+                end = after[n:].tolist()
+                share = heat.until_switch(chilling, seen[4] - seen[5], end[4] - end[5])
+                if share < 1.0:
+                    # The chiller runs a part of the step: without it the times of switching, and the step's length,
+                    # would matter.
+                    change = heat.chiller * (1.0 - share)
+                    after += variable[:, 2] * (change if chilling else -change)
+                    chilling = not chilling
+            seen = after[n:].tolist()
+            fields[k] = now = after[:n]
+        return chilling and flow
+
+    def _truth(self, fields: FloatArray, ratio: FloatArray, slid: float) -> tuple[Truth, float]:
+        temperatures = fields @ self.model.temperature.T
+        observables = (fields - REFERENCE_TEMPERATURE * self.model.one) @ self.model.observable.T
+        place = dict(zip(self.places, temperatures.T, strict=True))
+        index = {name: k for k, name in enumerate(self.observables)}
+        wish = observables[:, index["slide"]]
+        slide = slide_with_friction(slid, wish, self.joints.stiction)
+        shaft = self._shaft(place, ratio)
+        # What the foot does not slide, the column is pushed.
+        observables[:, index["z"]] += self.joints.share * (slide - wish) - shaft
+        observables[:, index["y"]] += self.joints.lift * ratio**2
+        observables[:, [index["nose"], index["tip"]]] += shaft[:, None]
+        observables[:, index["slide"]] = slide
+        return Truth(temperatures, observables), float(slide[-1])
+
+    @property
+    def _watched(self) -> tuple[str, ...]:
+        """Places looked at after every step; those of `_WATCHED` first."""
+        return _WATCHED
+
+    def _friction(self, drive: Drive, seen: list[float]) -> tuple[float, float]:
+        """Heat of the front and of the rear bearing, which floats on springs, at the temperatures watched [W]."""
+        front, rear, shaft, seat = seen[:4]
+        ratio = abs(drive.speed) / self.heat.top_speed
+        return self.heat.front.heat(ratio, front, shaft - seat), self.heat.rear.heat(ratio, rear, 0.0)
+
+    def _correction(self, _operators: Operators, _drive: Drive) -> Correction | None:
+        """Return what changes the state after a step beside the reduced model: nothing."""
+        return None
+
+    def _shaft(self, place: Mapping[str, FloatArray], ratio: FloatArray) -> FloatArray:
+        """Shift of the shaft towards the workpiece [um]."""
+        return self.joints.shaft(place["shaft"] - place["front_seat"], ratio)
+
+    def _theta(self, drive: Drive) -> tuple[float, ...]:
+        """Return what decides the conductances, in steps of a 64th: nobody knows them better."""
+        shares = {"rotation": self.heat.rotation(drive.speed), "flow": float(drive.cooled and drive.powered)}
+        shares |= {f"feed_{a}": self.heat.moving(f) for a, f in zip("xyz", drive.feed, strict=True)}
+        return tuple(round(64.0 * shares[name]) / 64.0 for name in self.model.theta)
+
+    def _given(self, drive: Drive) -> FloatArray:
+        given = self.heat.given(drive)
+        return np.array([given.get(name, 0.0) for name in self.model.inputs])
+
+    def _check(self, drive: Drive) -> None:
+        if not abs(drive.speed) <= self.heat.top_speed:
+            raise InputError(f"spindle speed {drive.speed} 1/min is beyond the machine's {self.heat.top_speed:g} 1/min")
+        for place in drive.loads:
+            if place not in self.model.inputs:
+                near = get_close_matches(place, self.model.inputs, n=3, cutoff=0.4) or self.model.inputs
+                raise InputError(f"no heat can be put in at {place!r}; the nearest are {', '.join(near)}")
+
+    def _observable(self, name: str) -> FloatArray:
+        row: FloatArray = self.model.observable[self.observables.index(name)]
+        return row

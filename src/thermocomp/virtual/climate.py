@@ -1,0 +1,157 @@
+"""The workshop's air: a day, slow wandering, layers, and a warmer side."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import SettingError
+from thermocomp.virtual.machine import Air
+
+FloatArray = NDArray[np.float64]
+DAY = 86400.0
+
+
+@dataclass(frozen=True)
+class Climate:
+    """What the air does over the days; plausible values of a workshop that is heated but not air-conditioned.
+
+    Parameters
+    ----------
+    mean : float
+        [degC]
+    daily : float
+        Amplitude of the day-night wave; warmest at 15 h [K].
+    wander : float
+        Standard deviation of what weather, doors and neighbours add [K].
+    memory : float
+        Time constant of that [s].
+    layers : float
+        Mean rise with height; it wanders and follows the day as well [K/m].
+    sun : float
+        Rise from left to right at noon, by day only [K/m].
+    draught : float
+        Standard deviation of what doors on either side change in that, three times as fast [K/m].
+    begin : float
+        Time of day at the start, after midnight [s].
+    """
+
+    mean: float = 22.0
+    daily: float = 1.8
+    wander: float = 0.6
+    memory: float = 5400.0
+    layers: float = 0.5
+    sun: float = 0.5
+    draught: float = 0.25
+    begin: float = 8 * 3600.0
+
+    def __post_init__(self) -> None:
+        if not self.memory > 0:
+            raise SettingError("must be positive", ("memory",))
+        if not -30.0 <= self.mean <= 60.0:
+            raise SettingError(f"{self.mean:g} degC: must be from -30 to 60", ("mean",))
+        for name in ("wander", "draught"):
+            if not getattr(self, name) >= 0:
+                raise SettingError("must not be negative", (name,))
+
+    @property
+    def middle(self) -> Air:
+        """The air on the whole."""
+        return Air(self.mean, self.layers)
+
+    def init(self, rng: np.random.Generator) -> FloatArray:
+        """Return what wanders before the first step: the state that `air` takes and gives back."""
+        first, second = rng.standard_normal((2, 3))
+        return np.array([math.sqrt(2.0) * first, first / math.sqrt(2.0) + second / math.sqrt(2.0)])
+
+    def air(
+        self, state: FloatArray, start: float, step: float, n_steps: int, rng: np.random.Generator
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the air at the end of each of some equal steps.
+
+        Parameters
+        ----------
+        state : ndarray of shape (2, 3)
+            From `init`, or from the steps before.
+        start : float
+            When the first step begins, since the start of the test [s].
+        step : float
+            [s]
+        n_steps : int
+        rng : Generator
+            Of the weather.
+
+        Returns
+        -------
+        state : ndarray of shape (2, 3)
+        air : ndarray of shape (n_steps, 3)
+            Rows of `Air.values`.
+        """
+        # Temperature, layers (slower) and sides (faster) wander on their own.
+        keep = np.exp(-step / (self.memory * np.array([1.0, 2.0, 1.0 / 3.0])))
+        state, path = wandering(state, keep, rng.standard_normal((n_steps, 3)))
+        day = 2.0 * math.pi * ((start + step * np.arange(1, n_steps + 1) + self.begin) / DAY)
+        wave = np.cos(day - 2.0 * math.pi * 15.0 / 24.0)
+        air = np.empty((n_steps, 3))
+        air[:, 0] = self.mean + self.daily * wave + self.wander * path[:, 0]
+        air[:, 1] = self.layers * (1.0 + 0.4 * wave + 0.3 * path[:, 1])
+        air[:, 2] = self.sun * np.maximum(0.0, -np.cos(day)) + self.draught * path[:, 2]
+        return state, air
+
+
+#: a room held at one temperature
+STILL = Climate(daily=0.0, wander=0.0, layers=0.0, sun=0.0, draught=0.0)
+#: a measuring room's small changes ("a relatively stable environment", P-05)
+STABLE = Climate(daily=0.25, wander=0.1, layers=0.2, sun=0.0, draught=0.05)
+#: by the names that protocols use
+CLIMATES: dict[str, Climate] = {"workshop": Climate(), "stable": STABLE, "still": STILL}
+
+
+def wandering(state: FloatArray, keep: FloatArray, kicks: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return smooth random paths of standard deviation 1: a first-order lag of a first-order process.
+
+    Without the second lag the air would jitter from row to row.
+
+    Parameters
+    ----------
+    state : ndarray of shape (2, n_paths)
+        The process and its lag before the first step.
+    keep : ndarray of shape (n_paths,)
+        Share that is left of both after a step.
+    kicks : ndarray of shape (n_steps, n_paths)
+        Standard normal numbers.
+
+    Returns
+    -------
+    state : ndarray of shape (2, n_paths)
+        After the last step.
+    paths : ndarray of shape (n_steps, n_paths)
+    """
+    first = filter_first_order(keep, np.sqrt((1.0 - keep**2) * (1.0 + keep) ** 2 / (1.0 + keep**2)) * kicks, state[0])
+    second = filter_first_order(keep, (1.0 - keep) * first, state[1])
+    return np.array([first[-1], second[-1]]), second
+
+
+def filter_first_order(keep: FloatArray, added: FloatArray, before: FloatArray) -> FloatArray:
+    """Return ``y[k] = keep y[k-1] + added[k]`` with ``y[-1] = before``, without a loop over the steps.
+
+    Parameters
+    ----------
+    keep : ndarray of shape (n,)
+        From 0 to 1.
+    added : ndarray of shape (n_steps, n)
+    before : ndarray of shape (n,)
+
+    Returns
+    -------
+    ndarray of shape (n_steps, n)
+    """
+    y = added.copy()
+    y[0] += keep * before
+    # Each pass lets the sums reach twice as far back, until what is left of a value is nothing.
+    reach, left = 1, keep
+    while reach < len(y) and np.any(left > 1e-18):
+        y[reach:] += left * y[:-reach]
+        reach, left = 2 * reach, left * left
+    return y

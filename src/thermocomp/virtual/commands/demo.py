@@ -1,0 +1,53 @@
+"""`thermocomp demo`: the main job on the virtual machine."""
+
+from pathlib import Path
+
+from thermocomp.cli.compare import compare
+from thermocomp.cli.fit import fit
+from thermocomp.cli.options import (
+    Output,
+    StudyOptions,
+    read_recordings,
+)
+from thermocomp.cli.terminal import console
+from thermocomp.core.exceptions import InputError
+from thermocomp.files.draft import refuse_existing
+from thermocomp.virtual.commands.simulate import simulate
+
+
+def demo(
+    *, output: Output = Path("thermocomp-demo"), seed: int = 0, overwrite: bool = False, json: bool = False
+) -> int:
+    """Do the main job on the virtual machine: record, fit, judge on unseen cycles, report.
+
+    Parameters
+    ----------
+    output : Path
+        Folder for recording, model and report.
+    seed : int
+        Of weather and noise.
+    overwrite : bool
+        Write over the files of an earlier run.
+    json : bool
+        Print results for a machine instead of a table.
+
+    Returns
+    -------
+    int
+        0 done, 1 a model was refused.
+    """
+    if output.exists() and not output.is_dir():
+        raise InputError(f"{output}: is a file; name a folder")
+    output.mkdir(parents=True, exist_ok=True)
+    recording, model, report = output / "recording.parquet", output / "model.json", output / "report.html"
+    refuse_existing([recording, model, report], overwrite)
+    if not json:
+        console.print("[bold]1. The virtual machine tool runs a drift test[/]")
+    simulate("demo", output=recording, seed=seed, overwrite=overwrite, quiet=json)
+    study = StudyOptions(target=[c.name for c in read_recordings([recording], None)[0].displacements])
+    if not json:
+        console.print("\n[bold]2. Five methods, judged on thermal cycles they have not seen[/]")
+    compare([recording], study=study, output=report, overwrite=overwrite, json=json)
+    if not json:
+        console.print("\n[bold]3. 'averaged', fitted to everything and frozen[/]")
+    return fit([recording], study=study, output=model, overwrite=overwrite, quiet=json)

@@ -1,0 +1,112 @@
+"""Recordings of the virtual machines."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import pandas as pd
+
+from thermocomp.core.exceptions import InputError, explain_unknown
+from thermocomp.recordings.cycles import find_cycles, make_single_cycle
+from thermocomp.recordings.recording import Recording
+from thermocomp.virtual.experiments import SimulatedTest, simulate
+from thermocomp.virtual.protocol import Experiment, Physics
+from thermocomp.virtual.protocolfile import read_protocol
+from thermocomp.virtual.sensors import Fault
+
+_FOLDER = Path(__file__).parent / "protocols"
+_FILES = {path.stem: path for path in sorted(_FOLDER.glob("*.toml"), key=lambda path: path.stem)}
+
+
+class _BuiltIn(Mapping[str, Experiment]):
+    """The experiments that come with the package; a file is read when it is asked for, once."""
+
+    def __getitem__(self, name: str) -> Experiment:
+        return _read(_FILES[name])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(_FILES)
+
+    def __len__(self) -> int:
+        return len(_FILES)
+
+
+_read = cache(read_protocol)
+#: the experiments that come with the package, by name
+EXPERIMENTS: Mapping[str, Experiment] = _BuiltIn()
+
+
+def find_experiment(experiment: str | Path) -> Experiment:
+    """Return an experiment by its name, or from a file of one's own.
+
+    Parameters
+    ----------
+    experiment : str or Path
+        A key of `EXPERIMENTS`, or the path of a protocol that ends in ``.toml``; see :doc:`/protocols`.
+
+    Raises
+    ------
+    InputError
+        There is no such experiment, or the file cannot be used.
+    """
+    if Path(experiment).suffix == ".toml":
+        return read_protocol(experiment)
+    if str(experiment) not in EXPERIMENTS:
+        message = explain_unknown("experiment", str(experiment), EXPERIMENTS)
+        raise InputError(f"{message}; a protocol of your own is named by its file, such as my_test.toml")
+    return EXPERIMENTS[str(experiment)]
+
+
+def record(
+    experiment: str | Path | Experiment,
+    *,
+    physics: Physics | None = None,
+    seed: int = 0,
+    sensor_noise: float | None = None,
+    faults: Sequence[Fault] = (),
+    progress: Callable[[str], None] = lambda _: None,
+) -> list[Recording]:
+    """Run an experiment on a virtual machine.
+
+    Parameters
+    ----------
+    experiment : str, Path or Experiment
+        See `find_experiment`.
+    physics : {'linear', 'nonlinear'}, optional
+        Of the machine; what the experiment says if not given. See :doc:`/virtual_machine`.
+    seed : int
+        Of weather, noise, and what is drawn by lot; the machine and its sensors stay the same ones.
+    sensor_noise : float, optional
+        Standard deviation of the temperature noise [degC]; the sensors' own if not given.
+    faults : sequence of Fault
+        Befall every test, beside those of the protocol.
+    progress : callable
+        Told the name of each test that is done.
+
+    Returns
+    -------
+    list of Recording
+        One per test.
+
+    Raises
+    ------
+    InputError
+        There is no such experiment or physics, or the file cannot be used.
+    """
+    found = experiment if isinstance(experiment, Experiment) else find_experiment(experiment)
+    if physics is not None:
+        found = replace(found, physics=physics)
+    recordings = []
+    for test in simulate(found, seed=seed, sensor_noise=sensor_noise, faults=faults):
+        recordings.append(make_recording(test))
+        progress(test.name)
+    return recordings
+
+
+def make_recording(test: SimulatedTest) -> Recording:
+    """Return a simulated test as a recording, split into its thermal cycles."""
+    table = pd.DataFrame(test.values, columns=[c.name for c in test.channels])
+    speeds = [c.name for c in test.channels if c.quantity == "spindle_speed"]
+    cycles = find_cycles(test.time, table[speeds[0]].to_numpy()) if speeds else make_single_cycle(len(table))
+    return Recording(test.name, test.time, table, test.channels, cycles)

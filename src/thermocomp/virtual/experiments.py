@@ -1,0 +1,255 @@
+"""Tests run on the virtual machines (X-01): from a protocol and a seed to what the instruments said."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import InputError, explain_unknown
+from thermocomp.core.machine import Channel
+from thermocomp.virtual.centre import MachiningCentre
+from thermocomp.virtual.instruments import Instrument
+from thermocomp.virtual.kits import Kit
+from thermocomp.virtual.machine import Truth, VirtualMachine
+from thermocomp.virtual.nonlinear import NonlinearCentre, NonlinearTool
+from thermocomp.virtual.protocol import FEED, SPEED, Experiment, Physics, Programme, make_seed
+from thermocomp.virtual.sensors import Fault, apply_lags, read, with_faults
+from thermocomp.virtual.toolsystem import RestingTool
+
+FloatArray = NDArray[np.float64]
+S = TypeVar("S")
+
+#: the machine is asked at least this often [s]
+LONGEST_TICK = 20.0
+#: ticks that are worked on at once: what is between machine and recording takes no more memory than these
+BLOCK = 4096
+#: quantities that count from the first row
+MOVEMENTS = ("displacement", "angle")
+#: by the names that protocols use for machine and physics
+MACHINES: dict[tuple[str, Physics], Callable[[], VirtualMachine[Any]]] = {
+    ("centre", "linear"): MachiningCentre,
+    ("tool", "linear"): RestingTool,
+    ("centre", "nonlinear"): NonlinearCentre,
+    ("tool", "nonlinear"): NonlinearTool,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedTest:
+    """A recorded test, in plain arrays.
+
+    Parameters
+    ----------
+    name : str
+    time : ndarray of shape (n_rows,)
+        [s], from 0
+    channels : tuple of Channel
+        Temperatures [degC]; displacements [um]; spindle speed [1/min], if there is a spindle; feed [mm/min], where axes
+        move.
+    values : ndarray of shape (n_rows, n_channels)
+        What sensors and probes said; displacements are zero at the start but for the probes' noise.
+    truth : ndarray of shape (n_rows, n_displacements)
+        The displacements without noise and faults, in the order of their channels [um].
+    observables : ndarray of shape (n_rows, n_observables) or None
+        All that the machine tells of itself, from 20 degC on, if that was asked for: see
+        `thermocomp.virtual.volume`.
+    """
+
+    name: str
+    time: FloatArray
+    channels: tuple[Channel, ...]
+    values: FloatArray
+    truth: FloatArray
+    observables: FloatArray | None = None
+
+    @property
+    def displacements(self) -> tuple[Channel, ...]:
+        """Channels that `truth` belongs to: displacements, and angles."""
+        return tuple(c for c in self.channels if c.quantity in MOVEMENTS)
+
+
+def simulate(
+    experiment: Experiment,
+    *,
+    seed: int = 0,
+    sensor_noise: float | None = None,
+    faults: Sequence[Fault] = (),
+    whole: bool = False,
+) -> Iterator[SimulatedTest]:
+    """Run the tests of an experiment, one after the other.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    seed : int
+        Of weather, noise, and what is drawn by lot; the machine and its sensors stay the same ones.
+    sensor_noise : float, optional
+        Standard deviation of the temperature noise [degC] (C-33: 0.4); the sensors' own if not given. The truth does
+        not depend on it.
+    faults : sequence of Fault
+        Befall every test, beside those of the protocol.
+    whole : bool
+        Keep all that the machine tells of itself.
+
+    Returns
+    -------
+    iterator of SimulatedTest
+        Each test is run when it is asked for; none depends on the others.
+
+    Raises
+    ------
+    InputError
+        A fault's channel is unknown, or seed or noise are negative.
+    """
+    if seed < 0:
+        raise InputError(f"seed {seed}: must not be negative")
+    if sensor_noise is not None and not (sensor_noise >= 0 and np.isfinite(sensor_noise)):
+        raise InputError(f"sensor noise {sensor_noise} degC: must be finite and not negative")
+    machine = MACHINES[experiment.machine, experiment.physics]()
+
+    def test(programme: Programme) -> SimulatedTest:
+        weather, noise = (np.random.default_rng(make_seed(seed, programme.name, what)) for what in ("weather", "noise"))
+        options: dict[str, Any] = {"sensor_noise": sensor_noise, "faults": faults, "whole": whole}
+        return run(machine, experiment.kit, programme, weather, noise, **options)
+
+    return map(test, experiment.programmes(seed))
+
+
+def run(
+    machine: VirtualMachine[S],
+    kit: Kit,
+    programme: Programme,
+    weather: np.random.Generator,
+    noise: np.random.Generator,
+    *,
+    sensor_noise: float | None = None,
+    faults: Sequence[Fault] = (),
+    whole: bool = False,
+) -> SimulatedTest:
+    """Run one test on a machine.
+
+    Parameters
+    ----------
+    machine : VirtualMachine
+    kit : Kit
+        What is mounted on it.
+    programme : Programme
+        What is done and what is recorded.
+    weather, noise : numpy.random.Generator
+        Of the air round the machine, and of sensors and probes.
+    sensor_noise : float, optional
+        Standard deviation of the temperature noise [degC]; the sensors' own if not given.
+    faults : sequence of Fault
+        Beside those of the programme.
+    whole : bool
+        Keep all that the machine tells of itself.
+
+    Returns
+    -------
+    SimulatedTest
+
+    Raises
+    ------
+    InputError
+        A place, a probe, or the channel of a fault is not there, or the machine refuses what it is asked to do.
+    """
+    instruments = programme.instruments(kit, sensor_noise)
+    sensors = [i.sensor for i in instruments]
+    weights = _weights(machine, instruments)
+    moves = np.array([s.channel.quantity in MOVEMENTS for s in sensors])
+    lags = np.array([s.lag for s in sensors])
+    channels, driven = _driven(programme, kit)
+    time: FloatArray = programme.sampling * np.arange(len(driven), dtype=np.float64)
+    every = math.ceil(programme.sampling / LONGEST_TICK)
+    tick = programme.sampling / every
+    drives = [s.drive for s in programme.segments for _ in range(round(s.duration / tick))]
+
+    state, sky, true, at_start = _soaked(machine, programme, weights, weather)
+    shift = np.array([i.cold for i in instruments]) - np.where([i.zeroed for i in instruments], true, 0.0)
+    recorded = np.empty((len(time), len(sensors) + len(channels)))
+    recorded[:, len(sensors) :] = driven
+    truth = np.empty((len(time), int(moves.sum())))
+    # Sensors have long felt what is true when the test begins.
+    felt = true
+    recorded[0, : len(sensors)] = read(sensors, (felt + shift)[None], time[:1], noise)
+    truth[0] = (true + shift)[moves]
+    told = np.tile(at_start, (len(time), 1)) if whole else None
+    block = max(BLOCK // every, 1) * every
+    for first in range(0, len(drives), block):
+        part = drives[first : first + block]
+        sky, air = programme.climate.air(sky, first * tick, tick, len(part), weather)
+        state, done = machine.run(state, part, air, tick)
+        values = _values(done, air, weights)
+        followed = apply_lags(lags, felt, true, values, tick)
+        felt, true = followed[-1], values[-1]
+        rows = slice(1 + first // every, 1 + (first + len(part)) // every)
+        recorded[rows, : len(sensors)] = read(sensors, followed[every - 1 :: every] + shift, time[rows], noise)
+        truth[rows] = (values[every - 1 :: every] + shift)[:, moves]
+        if told is not None:
+            told[rows] = done.observables[every - 1 :: every]
+
+    if programme.touch:
+        idle = ~programme.touch.rows(time, driven[:, 0] == 0.0)
+        recorded[np.ix_(idle, np.flatnonzero([i.touches for i in instruments]))] = np.nan
+    channels = [*(s.channel for s in sensors), *channels]
+    if programme.faults or faults:
+        recorded = with_faults(time, channels, recorded, [*programme.faults, *faults])
+    return SimulatedTest(programme.name, time, tuple(channels), recorded, truth, told)
+
+
+def _soaked(
+    machine: VirtualMachine[S], programme: Programme, weights: FloatArray, weather: np.random.Generator
+) -> tuple[S, FloatArray, FloatArray, FloatArray]:
+    """Return the state in which a test begins, that of the weather, what is true at each instrument, and the machine's.
+
+    The last are its observables.
+    """
+    climate = programme.climate
+    state, sky = machine.init(climate.middle), climate.init(weather)
+    begin = -sum(s.duration for s in programme.soak)
+    values, told = np.empty((1, weights.shape[1])), np.empty(0)
+    for segment in programme.soak:
+        n_ticks = math.ceil(segment.duration / LONGEST_TICK)
+        tick = segment.duration / n_ticks
+        for first in range(0, n_ticks, BLOCK):
+            n = min(BLOCK, n_ticks - first)
+            sky, air = climate.air(sky, begin + first * tick, tick, n, weather)
+            state, truth = machine.run(state, [segment.drive] * n, air, tick)
+            values, told = _values(truth, air, weights), truth.observables[-1].copy()
+        begin += segment.duration
+    return state, sky, values[-1], told
+
+
+def _weights(machine: VirtualMachine[S], instruments: Sequence[Instrument]) -> FloatArray:
+    """Return what each instrument reads of temperatures, observables and air, of shape (n_values, n_instruments)."""
+    names = {n: k for k, n in enumerate([*machine.places, *machine.observables])}
+    weights = np.zeros((len(names) + 3, len(instruments)))
+    for k, instrument in enumerate(instruments):
+        for name, weight in instrument.reads.items():
+            if name not in names:
+                raise explain_unknown("value", name, names)
+            weights[names[name], k] = weight
+        weights[-3:, k] = instrument.air
+    return weights
+
+
+def _values(truth: Truth, air: FloatArray, weights: FloatArray) -> FloatArray:
+    values: FloatArray = np.hstack([truth.temperatures, truth.observables, air]) @ weights
+    return values
+
+
+def _driven(programme: Programme, kit: Kit) -> tuple[list[Channel], FloatArray]:
+    """Return what is recorded of the drive; a row tells the one that led to it."""
+    segments = programme.segments
+    lengths = [1, *(round(s.duration / programme.sampling) for s in segments)]
+    channels, columns = [], []
+    if kit.top_speed:
+        channels.append(SPEED)
+        columns.append([0.0, *(s.drive.speed for s in segments)])
+    if any(any(s.drive.feed) for s in segments):
+        channels.append(FEED)
+        columns.append([0.0, *(math.hypot(*s.drive.feed) for s in segments)])
+    return channels, np.repeat(np.array(columns).reshape(len(columns), len(lengths)).T, lengths, axis=0)

@@ -1,0 +1,198 @@
+"""What instruments make of the truth; plausible values of their data sheets.
+
+Whatever an instrument reads is a weighted sum of what the machine tells (temperatures of places, displacements) and of
+the air: so all of them together are one matrix.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import SettingError
+from thermocomp.core.machine import Channel
+from thermocomp.virtual.axes import AXES, TRAVEL
+from thermocomp.virtual.kits import Kit, check_labels
+from thermocomp.virtual.machine import Air
+from thermocomp.virtual.probes import Probe, weigh_tool_point
+from thermocomp.virtual.sensors import Sensor
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Mounting:
+    """How the temperature sensor at a place is fixed: the same in every test, whatever its seed.
+
+    Parameters
+    ----------
+    lag : float
+        [s]
+    bias : float
+        [degC]
+    contact : float
+        Weight of the part's temperature in what it feels; the rest is the air round it.
+    drift : float
+        Of its zero [degC per day].
+    """
+
+    lag: float
+    bias: float
+    contact: float
+    drift: float
+
+
+def mounting(place: str) -> Mounting:
+    """Return how the sensor at a place is mounted."""
+    rng = np.random.default_rng([*place.encode()])
+    low, high = (20.0, -0.15, 0.88, -0.03), (60.0, 0.15, 0.97, 0.03)
+    lag, bias, contact, drift = (float(v) for v in rng.uniform(low, high))
+    return Mounting(lag, bias, 1.0 if place == "coolant" else contact, drift)
+
+
+@dataclass(frozen=True)
+class Instrument:
+    """A sensor, and the weights of what it reads.
+
+    Parameters
+    ----------
+    sensor : Sensor
+    reads : mapping of str to float
+        Weights by the machine's names of places and observables.
+    air : tuple of float
+        Of `Air.values`.
+    cold : float
+        Value in the state from which it counts [um].
+    zeroed : bool
+        It counts from the state in which the test begins; False: from what the machine and the air tell at zero.
+    touches : bool
+        It says something in probing cycles only.
+    """
+
+    sensor: Sensor
+    reads: Mapping[str, float] = field(default_factory=dict)
+    air: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    cold: float = 0.0
+    zeroed: bool = False
+    touches: bool = False
+
+
+def thermometer(kit: Kit, label: str, place: str, *, perfect: bool, noise: float | None) -> Instrument:
+    """Return the temperature sensor at a place.
+
+    Parameters
+    ----------
+    kit : Kit
+        Of the machine.
+    label : str
+        Its channel is ``t_LABEL_C``.
+    place : str
+    perfect : bool
+        Without lag, bias, drift and steps, and it feels nothing of the air.
+    noise : float or None
+        Standard deviation [degC]; None: the sensor's own.
+    """
+    channel = Channel(f"t_{label}_C", "temperature", "degC", kit.place(place, perfect=perfect))
+    mounted = mounting(place)
+    if perfect:
+        sensor = Sensor(channel, noise=noise or 0.0)
+    else:
+        own = 0.05 if noise is None else noise
+        sensor = Sensor(channel, own, mounted.lag, 0.02, mounted.bias, mounted.drift)
+    if place in kit.air:
+        return Instrument(sensor, air=(1.0, kit.air[place] - Air.REFERENCE_HEIGHT, 0.0))
+    contact = 1.0 if perfect else mounted.contact
+    return Instrument(sensor, {place: contact}, air=(1.0 - contact, 0.0, 0.0))
+
+
+def displacement(label: str, probe: Probe, *, perfect: bool) -> Instrument:
+    """Return a displacement probe, or a line of a laser; its channel is ``LABEL_um``, that of an angle ``LABEL_urad``.
+
+    Parameters
+    ----------
+    label : str
+    probe : Probe
+    perfect : bool
+        Without noise, drift and steps.
+    """
+    quantity = "angle" if probe.unit == "urad" else "displacement"
+    channel = Channel(f"{label}_{probe.unit}", quantity, probe.unit, probe.place)
+    drift = float(np.random.default_rng([*label.encode()]).uniform(-0.15, 0.15))
+    sensor = Sensor(channel) if perfect else Sensor(channel, noise=probe.noise, resolution=0.01, drift=drift)
+    return Instrument(sensor, probe.reads, cold=probe.cold, zeroed=probe.zeroed)
+
+
+@dataclass(frozen=True)
+class Touch:
+    """A probing cycle: a touch probe in the spindle measures points of an artefact on the table, again and again.
+
+    Each point gives three channels, ``x_LABEL_um``, ``y_LABEL_um`` and ``z_LABEL_um``: how far the tool point is off it
+    since the start, actual minus commanded; a spindle that grows towards the artefact reads a negative z. Between two
+    cycles they have no value. A cycle that is due while the spindle turns waits until it stands.
+
+    Parameters
+    ----------
+    every : float
+        [s]
+    points : mapping of str to tuple of float
+        Positions X, Y, Z of the axes at each point [mm].
+    noise : float
+        Repeatability of the probe, one standard deviation [um]; data sheets say 1 um for two.
+    resolution : float
+        Of the controller's reading [um].
+    """
+
+    every: float
+    points: Mapping[str, tuple[float, float, float]]
+    noise: float = 0.5
+    resolution: float = 0.1
+
+    def __post_init__(self) -> None:
+        if not self.every > 0:
+            raise SettingError("must be positive", ("every",))
+        for name in ("noise", "resolution"):
+            if not getattr(self, name) >= 0:
+                raise SettingError("must not be negative", (name,))
+        if not self.points:
+            raise SettingError("write at least one point, such as points = {p1 = [300, 250, 250]}", ("points",))
+        check_labels(self.points)
+        for label, point in self.points.items():
+            for k, axis in enumerate(AXES):
+                if not 0.0 <= point[k] <= TRAVEL[axis]:
+                    raise SettingError(f"is beyond the travel from 0 to {TRAVEL[axis]:g} mm", ("points", label, k))
+
+    def instruments(self, *, perfect: bool) -> list[Instrument]:
+        """Return an instrument for each axis of each point."""
+        return [
+            Instrument(
+                Sensor(
+                    Channel(f"{axis}_{label}_um", "displacement", "um", f"{axis.upper()} of the artefact's {label}"),
+                    noise=0.0 if perfect else self.noise,
+                    resolution=0.0 if perfect else self.resolution,
+                ),
+                weigh_tool_point(axis, dict(zip(AXES, point, strict=True))),
+                zeroed=True,
+                touches=True,
+            )
+            for label, point in self.points.items()
+            for k, axis in enumerate(AXES)
+        ]
+
+    def rows(self, time: FloatArray, still: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return the rows at which a cycle is run.
+
+        Parameters
+        ----------
+        time : ndarray of shape (n_rows,)
+            [s]
+        still : ndarray of shape (n_rows,)
+            The spindle stands.
+        """
+        run = np.zeros(len(time), dtype=np.bool_)
+        due = 0.0
+        for k in np.flatnonzero(still):
+            if time[k] >= due:
+                run[k] = True
+                due = (time[k] // self.every + 1.0) * self.every
+        return run

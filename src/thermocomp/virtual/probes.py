@@ -1,0 +1,249 @@
+"""What probes and lasers read of the virtual machining centre, as weights of what it tells of itself."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import SettingError
+from thermocomp.virtual.axes import AXES, STATIONS, TEST_POSITION, TRAVEL, weigh_stations
+from thermocomp.virtual.geometry import SQUARENESS, cold_profile, find_cold_component
+
+FloatArray = NDArray[np.float64]
+
+#: distance of the two probes of X, and of Y, along the test bar [m]
+PROBE_DISTANCE = 0.1
+
+
+@dataclass(frozen=True)
+class Probe:
+    """A displacement probe, a line of a laser, or a touch probe on an artefact.
+
+    Parameters
+    ----------
+    place : str
+        In words.
+    reads : mapping of str to float
+        Weights of the machine's observables in its value; the value is 1 um per um, 1 um per urad and m.
+    cold : float
+        Its value in the state in which the test begins, in its unit.
+    unit : {'um', 'urad'}
+    noise : float
+        Standard deviation, in its unit.
+    zeroed : bool
+        Its value is counted from the start of the test, where it is `cold`; False: from the machine at 20 degC.
+    """
+
+    place: str
+    reads: Mapping[str, float]
+    cold: float = 0.0
+    unit: str = "um"
+    noise: float = 0.15
+    zeroed: bool = True
+
+
+def positioning(axis: str, position: float) -> dict[str, float]:
+    """Return the weights of the observables in the positioning of an axis [um], linear between two stations.
+
+    Parameters
+    ----------
+    axis : {'x', 'y', 'z'}
+    position : float
+        [mm]
+
+    Raises
+    ------
+    SettingError
+        The position is beyond the travel.
+    """
+    return _between(axis, axis, position)
+
+
+def _between(along: str, axis: str, position: float) -> dict[str, float]:
+    """Return the weights of what an axis that stands at a position contributes along an axis."""
+    if not 0.0 <= position <= TRAVEL[axis]:
+        raise SettingError(f"{axis.upper()} = {position:g} mm is beyond the travel from 0 to {TRAVEL[axis]:g} mm")
+    stations = STATIONS[axis]
+    below = max(k for k in range(len(stations) - 1) if stations[k] <= position)
+    low, high = stations[below : below + 2]
+    share = (position - low) / (high - low)
+    return {f"{along}{axis}@{p}": w for p, w in ((low, 1.0 - share), (high, share)) if w}
+
+
+def station_name(axis: str, station: int) -> str:
+    """Return the name of the observable that is the positioning of an axis at a station."""
+    return f"{axis}{axis}@{station}"
+
+
+def _summed(*parts: tuple[float, Mapping[str, float]]) -> dict[str, float]:
+    """Return the sum of weights, each with its factor."""
+    total: dict[str, float] = {}
+    for factor, weights in parts:
+        for name, w in weights.items():
+            total[name] = total.get(name, 0.0) + factor * w
+    return {name: w for name, w in total.items() if w}
+
+
+def laser(axis: str, position: float) -> Probe:
+    """Return a laser that measures the positioning of an axis at a position [mm]."""
+    # The reflector stands at the tool point. A laser measures each profile from its first position: the shift of the
+    # origin is not in it.
+    reads = _summed((1.0, positioning(axis, position)), (-1.0, positioning(axis, 0.0)))
+    geometry = float(cold_profile(position)) if axis == "y" else 0.0
+    return Probe(f"positioning of {axis.upper()} at {position:g} mm, laser", reads, geometry)
+
+
+def pitch(position: int) -> Probe:
+    """Return a laser that measures the pitch of Y at one of its stations [mm]."""
+    words = f"pitch of Y at {position} mm: turn of the headstock about X, laser"
+    return Probe(words, {f"ay@{position}": 1.0, "ay@0": -1.0} if position else {}, unit="urad")
+
+
+def weigh_tool_point(axis: str, point: Mapping[str, float]) -> dict[str, float]:
+    """Return the weights of the observables in the tool point's deviation along an axis, wherever the axes stand.
+
+    What Z and X do across themselves is not in it: the machine does not tell.
+
+    Parameters
+    ----------
+    axis : {'x', 'y', 'z'}
+        Along which the deviation is.
+    point : mapping of str to float
+        Positions of the axes [mm]; one that is not named stands at `TEST_POSITION`.
+    """
+    parts = [(1.0, {axis: 1.0})]
+    for moved, lead in ((axis, axis), ("y", "z")) if axis == "z" else ((axis, axis),):
+        if moved in point:
+            parts += [(1.0, _between(lead, moved, point[moved])), (-1.0, _between(lead, moved, TEST_POSITION[moved]))]
+    return _summed(*parts)
+
+
+def at_position(axis: str, position: float) -> Probe:
+    """Return a displacement probe at the tip of the test bar, with the axis at a position [mm]."""
+    where = f"{axis.upper()} at the tip of the test bar with the {axis.upper()} axis at {position:g} mm"
+    return Probe(where, weigh_tool_point(axis, {axis: position}))
+
+
+#: what an axis does, along or about which axis; the codes of ISO 230-1 end with the axis
+MOTIONS = {
+    "EX": "motion along X",
+    "EY": "motion along Y",
+    "EZ": "motion along Z",
+    "EA": "turn about X",
+    "EB": "turn about Y",
+    "EC": "turn about Z",
+}
+#: the 18 components of the axes, in the order of ISO 230-1
+COMPONENTS = tuple(f"{motion}{axis.upper()}" for axis in AXES for motion in MOTIONS)
+#: noise of the laser with six degrees of freedom [um, urad]
+SIX_NOISE = {"um": 0.3, "urad": 0.5}
+#: what heat does not do: the bed knows no right and left, and at the test position X turns about X alone
+STILL = frozenset(f"{code}Z@{p}" for code in ("EX", "EB", "EC") for p in STATIONS["z"]) | {"EBX@300", "ECX@300"}
+
+
+def station(code: str, position: int) -> tuple[str, ...]:
+    """Return the name of the observable that is a component at a station [mm]; none if the machine does not do this."""
+    name = f"{code}@{position}"
+    return () if name in STILL else (name,)
+
+
+#: axes between each axis and the workpiece: the structure is ``w X' b Z Y (C1) t``
+NEARER = {"x": "", "z": "x", "y": "xz"}
+
+
+def component(code: str, position: float, z: float = TEST_POSITION["z"]) -> Probe:
+    """Return a component of an axis as a laser with six degrees of freedom between table and spindle reads it.
+
+    It is set to zero at the test position, in each run. The tool point is that of the test bar, and the other axes
+    stand at `TEST_POSITION`. Turns of the axes that stand nearer to the workpiece swing the way of the axis that moves;
+    the laser sees that too.
+
+    Parameters
+    ----------
+    code : str
+        Of ISO 230-1, such as ``EYX``.
+    position : float
+        Of its axis [mm].
+    z : float
+        Where Z stands instead [mm]; the bed gives way under the column. Only X can be measured so: what its turns do by
+        the lever is read too.
+
+    Raises
+    ------
+    SettingError
+        A position is beyond the travel, or Z stands elsewhere while another axis than X is measured.
+    """
+    axis, unit = code[2].lower(), "um" if code[1] in "XYZ" else "urad"
+    for a, p in ((axis, position), ("z", z)):
+        if not 0.0 <= p <= TRAVEL[a]:
+            raise SettingError(f"{a.upper()} = {p:g} mm is beyond the travel from 0 to {TRAVEL[a]:g} mm")
+    if axis != "x" and z != TEST_POSITION["z"]:
+        raise SettingError(f"{code} cannot be measured with Z at {z:g} mm: only X can")
+    test, point = (np.array([TEST_POSITION[a] for a in AXES], dtype=np.float64) for _ in range(2))
+    point[AXES.index(axis)], point[2] = position, position if axis == "z" else z
+    weights, geometry = _between_two(code, position), float(find_cold_component(code, point))
+    if unit == "um":
+        for turn, arm in swing(code[1], point - test):
+            # of the axes nearer to the workpiece, which stand still; of X itself if Z stands elsewhere
+            for nearer in NEARER[axis]:
+                weights = _summed((1.0, weights), (arm, _at_station(f"E{turn}{nearer.upper()}", TEST_POSITION[nearer])))
+        if axis == "x":
+            for turn, arm in swing(code[1], np.array([0.0, 0.0, z - TEST_POSITION["z"]])):
+                weights = _summed((1.0, weights), (arm, _between_two(f"E{turn}X", position)))
+                geometry += arm * float(find_cold_component(f"E{turn}X", point))
+    aside = "" if z == TEST_POSITION["z"] else f", Z at {z:g} mm"
+    words = f"{code}: {MOTIONS[code[:2]]} of {axis.upper()} at {position:g} mm{aside}"
+    return Probe(words, weights, geometry, unit, SIX_NOISE[unit], zeroed=False)
+
+
+def _between_two(code: str, position: float) -> dict[str, float]:
+    """Return the weights of the observables in what a component is at a position less that at the test position."""
+    axis = code[2].lower()
+    weights = weigh_stations(axis, [position])[0] - weigh_stations(axis, [TEST_POSITION[axis]])[0]
+    found = zip(STATIONS[axis], weights.tolist(), strict=True)
+    return {name: w for p, w in found if w for name in station(code, p)}
+
+
+def _at_station(code: str, position: int) -> dict[str, float]:
+    """Return the weight of the observable that is a component at a station."""
+    return dict.fromkeys(station(code, position), 1.0)
+
+
+def swing(along: str, way: FloatArray) -> list[tuple[str, float]]:
+    """Return which turns move the end of a way along an axis, and by how much: turn x way.
+
+    Parameters
+    ----------
+    along : {'X', 'Y', 'Z'}
+    way : ndarray of shape (3,)
+        [mm]
+
+    Returns
+    -------
+    list of (str, float)
+        A, B or C, and um per urad; those that do not move it are left out.
+    """
+    x, y, z = (1e-3 * way).tolist()
+    arms = {"X": (("B", z), ("C", -y)), "Y": (("C", x), ("A", -z)), "Z": (("A", y), ("B", -x))}
+    return [(turn, arm) for turn, arm in arms[along] if arm]
+
+
+def make_squareness_probe(code: str) -> Probe:
+    """Return the squareness of two axes at 20 degC, by an artefact; what heat does is in the lasers' straightness."""
+    return Probe(f"{code}: squareness at 20 degC, artefact", {}, SQUARENESS[code], "urad", SIX_NOISE["urad"])
+
+
+#: X1 and Y1 at the tip of the test bar, X2 and Y2 towards the spindle: tilts A = (y1 - y2) / L, B = (x2 - x1) / L
+NEST = {
+    "x1": Probe("X at the tip of the test bar", {"x": 1.0}),
+    "x2": Probe("X towards the spindle", {"x": 1.0, "b": PROBE_DISTANCE}),
+    "y1": Probe("Y at the tip of the test bar", {"y": 1.0}),
+    "y2": Probe("Y towards the spindle", {"y": 1.0, "a": -PROBE_DISTANCE}),
+    "z": Probe("Z at the tip of the test bar; negative: the tool nears the workpiece", {"z": 1.0}),
+}
+#: measured where nothing moves the spindle: in a calculation, or on the spindle itself
+SPINDLE = {
+    "nose": Probe("axial growth of the spindle nose from the housing's flange", {"nose": 1.0}),
+    "tip": Probe("axial growth of the tool's tip from the housing's flange", {"tip": 1.0}),
+}

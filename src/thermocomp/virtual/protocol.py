@@ -1,0 +1,277 @@
+"""Protocols: what is done to a virtual machine and what is recorded, as data.
+
+What is written (`Experiment`, `Plan`) may leave numbers and orders open, which a seed then draws by lot; what is run
+(`Programme`) is fixed.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, fields
+from typing import Literal, get_args
+
+import numpy as np
+
+from thermocomp.core.exceptions import SettingError, explain_unknown
+from thermocomp.core.machine import Channel
+from thermocomp.virtual.climate import Climate
+from thermocomp.virtual.instruments import Instrument, Touch, displacement, thermometer
+from thermocomp.virtual.kits import KITS, Kit, labelled
+from thermocomp.virtual.segments import Path, SteadySegment, Stretch, values
+from thermocomp.virtual.sensors import Fault
+
+HOUR = 3600.0
+#: what is recorded of the drive: of a machine with a spindle, and where axes move
+SPEED = Channel("spindle_rpm", "spindle_speed", "1/min", "spindle")
+FEED = Channel("feed_mm_min", "feed", "mm/min", "of the axes, along the path")
+
+
+#: how the machine is modelled: heat and joints by constant conductances, or as they depend on temperature and speed
+Physics = Literal["linear", "nonlinear"]
+#: what a protocol may ask for; more is a mistake, or would take for ever
+MOST_ROWS, MOST_COPIES = 10_000_000, 10_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordingSetup:
+    """What is recorded of a test, and where it stands.
+
+    Parameters
+    ----------
+    sampling : float
+        Time between two rows [s].
+    climate : Climate
+    places : tuple of str, or mapping of str to str
+        Where temperatures are measured, see `thermocomp.virtual.kits`; a mapping gives the channels other names.
+    probes : tuple of str, or mapping of str to str or mapping of str to float
+        Displacements, in the same way; a mapping of the machine's observables to weights is a probe of one's own.
+    perfect : bool
+        Sensors without lag, bias, drift, noise and steps: a calculation, not a measurement.
+    touch : Touch, optional
+        A probing cycle.
+    faults : tuple of Fault
+    """
+
+    sampling: float
+    climate: Climate = field(default_factory=Climate)
+    places: tuple[str, ...] | Mapping[str, str] = ("all",)
+    probes: tuple[str, ...] | Mapping[str, str | Mapping[str, float]] = ("nest",)
+    perfect: bool = False
+    touch: Touch | None = None
+    faults: tuple[Fault, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.sampling > 0:
+            raise SettingError("must be positive", ("sampling",))
+        if not (self.places or self.probes or self.touch):
+            raise SettingError("nothing is recorded: name a place or a probe", ("places",))
+
+    def instruments(self, kit: Kit, noise: float | None = None) -> list[Instrument]:
+        """Return what is mounted: temperatures, displacements, the points that are touched.
+
+        Parameters
+        ----------
+        kit : Kit
+            Of the machine.
+        noise : float, optional
+            Standard deviation of the temperature noise [degC]; the sensors' own if not given.
+
+        Raises
+        ------
+        SettingError
+            A place or probe is not there, or two channels have the same name.
+        """
+        perfect = self.perfect
+        with add_path("places"):
+            places = labelled(self.places, kit.outfits)
+            found = [thermometer(kit, n, p, perfect=perfect, noise=noise) for n, p in places.items()]
+        with add_path("probes"):
+            probes = labelled(self.probes, kit.nests)
+            found += [displacement(n, kit.probe(p), perfect=perfect) for n, p in probes.items()]
+        if self.touch:
+            if not kit.top_speed:
+                raise SettingError("the machine has no axes", ("touch",))
+            found += self.touch.instruments(perfect=perfect)
+        names = [i.sensor.channel.name for i in found]
+        for k, name in enumerate(names):
+            if name in names[:k]:
+                raise SettingError(f"two channels are named {name!r}: choose another name for one of them")
+        return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class Programme(RecordingSetup):
+    """One test that is ready to run; beside what `Setup` says of it.
+
+    Parameters
+    ----------
+    name : str
+    segments : tuple of SteadySegment
+        Each lasts a whole number of samplings.
+    soak : tuple of SteadySegment
+        What was done before, from a machine that was off for long; the test begins in the state it leads to.
+    """
+
+    name: str
+    segments: tuple[SteadySegment, ...]
+    soak: tuple[SteadySegment, ...] = (SteadySegment(12 * HOUR),)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for k, segment in enumerate(self.segments):
+            _check_duration((segment.duration,), ("segments", k, "duration"), self.sampling)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan(RecordingSetup, Stretch):
+    """One test as it is written, or several alike; beside what `Setup` and `Stretch` say of it.
+
+    Parameters
+    ----------
+    name : str
+        Appended to the experiment's; empty: its number, if there are several tests.
+    copies : int
+        So many tests, each with lots of its own.
+    soak : Stretch
+        What was done before, from a machine that was off for long; the test begins in the state it leads to. What the
+        test says of speed, coolant ... does not hold in it.
+    """
+
+    name: str = ""
+    copies: int = 1
+    soak: Stretch = field(default_factory=lambda: Stretch(duration=12 * HOUR))
+
+    def __post_init__(self) -> None:
+        RecordingSetup.__post_init__(self)
+        Stretch.__post_init__(self)
+        if not 1 <= self.copies <= MOST_COPIES:
+            raise SettingError(f"must be from 1 to {MOST_COPIES}", ("copies",))
+        if self.weight != 1.0:
+            raise SettingError('counts only inside segments whose order is "drawn"', ("weight",))
+        for path, given in self.leaves():
+            _check_duration(values(given.get("duration")), (*path, "duration"), self.sampling)
+        for path, given in self.soak.leaves():
+            _check_duration(values(given.get("duration")), ("soak", *path, "duration"))
+        for k, fault in enumerate(self.faults):
+            if not 0 <= fault.start <= self.longest:
+                last = f"{self.longest:g} s"
+                raise SettingError(
+                    f"{fault.start:g} s: must be from 0 to the end of the test, {last}", ("faults", k, "start")
+                )
+        if self.longest / self.sampling > MOST_ROWS:
+            rows = f"{self.longest / self.sampling:.3g} rows"
+            raise SettingError(
+                f"{self.longest:g} s every {self.sampling:g} s make {rows}; at most {MOST_ROWS:,}", ("segments",)
+            )
+
+    def programme(self, name: str, rng: np.random.Generator) -> Programme:
+        """Return a test that is ready to run, with all that is left open drawn by lot."""
+        setup = {f.name: getattr(self, f.name) for f in fields(RecordingSetup)}
+        return Programme(name=name, segments=tuple(self.draw(rng)), soak=tuple(self.soak.draw(rng)), **setup)
+
+    def check(self, kit: Kit) -> None:
+        """Raise `SettingError` if something is asked of a machine that it does not have."""
+        channels = [i.sensor.channel.name for i in self.instruments(kit)]
+        channels += [c.name for c in (SPEED, FEED) if kit.top_speed]
+        for k, fault in enumerate(self.faults):
+            if fault.channel not in channels:
+                raise explain_unknown("channel", fault.channel, channels, ("faults", k, "channel"))
+        for path, given in (*self.leaves(), *((("soak", *path), given) for path, given in self.soak.leaves())):
+            if given.get("speed") and not kit.top_speed:
+                raise SettingError("the machine has no spindle", (*path, "speed"))
+            for speed in values(given.get("speed")):
+                if not abs(speed) <= kit.top_speed:
+                    raise SettingError(
+                        f"{speed:g} 1/min: the spindle turns at most {kit.top_speed:g}", (*path, "speed")
+                    )
+            if given.get("feed") and not kit.top_speed:
+                raise SettingError("the machine has no axes", (*path, "feed"))
+            for place in given.get("loads", {}):
+                if place not in kit.loads:
+                    raise explain_unknown("load", place, kit.loads, (*path, "loads"))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Experiment:
+    """A named experiment: one test or several on one machine.
+
+    Parameters
+    ----------
+    name : str
+    tests : tuple of Plan
+    description : str
+        One line.
+    machine : str
+        A key of `thermocomp.virtual.kits.KITS`: the machining ``centre``, or the resting ``tool``.
+    physics : {'linear', 'nonlinear'}
+        See `thermocomp.virtual.nonlinear`.
+    """
+
+    name: str
+    tests: tuple[Plan, ...]
+    description: str = ""
+    machine: str = "centre"
+    physics: Physics = "linear"
+
+    def __post_init__(self) -> None:
+        if self.machine not in KITS:
+            raise explain_unknown("machine", self.machine, KITS, ("machine",))
+        if self.physics not in get_args(Physics):
+            raise explain_unknown("physics", self.physics, get_args(Physics), ("physics",))
+        if not self.tests:
+            raise SettingError("an experiment needs a test", ("tests",))
+        for k, plan in enumerate(self.tests):
+            with add_path("tests", k):
+                plan.check(self.kit)
+        names = self.names
+        for k, name in enumerate(names):
+            if name in names[:k]:
+                raise SettingError(f"two tests are named {name!r}: choose another name for one of them", ("tests",))
+
+    @property
+    def kit(self) -> Kit:
+        """What can be mounted on its machine."""
+        return KITS[self.machine]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the tests, in their order."""
+        found = []
+        for number, plan in enumerate(self.tests, start=1):
+            own = plan.name or (str(number) if len(self.tests) > 1 else "")
+            for copy in range(1, plan.copies + 1):
+                found.append("-".join(part for part in (self.name, own, str(copy) if plan.copies > 1 else "") if part))
+        return tuple(found)
+
+    def programmes(self, seed: int = 0) -> list[Programme]:
+        """Return the tests, with all that is left open drawn by lot; each test has lots of its own."""
+        plans = [plan for plan in self.tests for _ in range(plan.copies)]
+        return [
+            plan.programme(name, np.random.default_rng(make_seed(seed, name, "lots")))
+            for name, plan in zip(self.names, plans, strict=True)
+        ]
+
+
+def make_seed(seed: int, test: str, what: str) -> list[int]:
+    """Return the seed of one kind of chance in one test: no test, and no kind, depends on the others."""
+    return [seed, *f"{test}/{what}".encode()]
+
+
+@contextmanager
+def add_path(*path: str | int) -> Iterator[None]:
+    """Add where it stands to a `SettingError` that is raised inside."""
+    try:
+        yield
+    except SettingError as e:
+        raise SettingError(str(e), (*path, *e.path)) from None
+
+
+def _check_duration(durations: tuple[float, ...], path: Path, sampling: float | None = None) -> None:
+    """Refuse durations that are not there, not positive, or no whole number of samplings."""
+    if not durations:
+        raise SettingError('is missing: say how long it lasts, such as duration = "30 min"', path)
+    for duration in durations:
+        if not 0 < duration < math.inf:
+            raise SettingError(f"{duration:g} s: must be positive", path)
+        if sampling and abs(duration / sampling - round(duration / sampling)) > 1e-9:
+            raise SettingError(f"{duration:g} s is no multiple of the {sampling:g} s between two rows", path)

@@ -1,0 +1,239 @@
+"""What a test is made of: segments, and what a seed draws by lot."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from thermocomp.core.exceptions import SettingError
+from thermocomp.virtual.axes import AXES, TRAVEL
+from thermocomp.virtual.machine import Drive
+
+# Keys and positions that lead to something inside a protocol
+Path = tuple[str | int, ...]
+# A segment and what holds in it, with where it stands
+Leaf = tuple[Path, dict[str, Any]]
+
+
+#: what a protocol may ask for; more is a mistake, or would take for ever
+MOST_VALUES, MOST_REPEATS = 10_000, 10_000
+
+
+@dataclass(frozen=True)
+class SteadySegment:
+    """A stretch of a test in which everything stays as it is.
+
+    Parameters
+    ----------
+    duration : float
+        [s]
+    drive : Drive
+    """
+
+    duration: float
+    drive: Drive = field(default_factory=Drive)
+
+
+@dataclass(frozen=True)
+class Lot:
+    """Numbers of which one is drawn, each as likely as the others: either `one_of`, or `between` with `step`.
+
+    Parameters
+    ----------
+    between : tuple of float, optional
+        Lowest and highest.
+    step : float, optional
+    one_of : tuple of float
+    """
+
+    between: tuple[float, float] | None = None
+    step: float | None = None
+    one_of: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.one_of and self.between is None and self.step is None:
+            return
+        if self.one_of or self.between is None or self.step is None:
+            raise SettingError("write either one_of = [...], or between = [lowest, highest] and step")
+        low, high = self.between
+        if not (self.step > 0 and high > low) or abs(self._steps - round(self._steps)) > 1e-9:
+            raise SettingError("from the lowest to the highest there must be a whole number of steps")
+        if self._steps > MOST_VALUES:
+            raise SettingError(f"{self._steps:.3g} values to draw from; at most {MOST_VALUES}: take a larger step")
+
+    @property
+    def _steps(self) -> float:
+        (low, high), step = self.between or (0.0, 0.0), self.step or 1.0
+        return (high - low) / step
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """All that can be drawn."""
+        if self.between is None or self.step is None:
+            return self.one_of
+        return tuple(self.between[0] + k * self.step for k in range(round(self._steps) + 1))
+
+
+Number = float | Lot
+
+
+def values(number: Number | None) -> tuple[float, ...]:
+    """Return all that a number can be; nothing if it is not given."""
+    return () if number is None else number.values if isinstance(number, Lot) else (number,)
+
+
+@dataclass(frozen=True)
+class Feed:
+    """Mean feed rates of the axes [mm/min].
+
+    Parameters
+    ----------
+    x, y, z : float or Lot
+    """
+
+    x: Number = 0.0
+    y: Number = 0.0
+    z: Number = 0.0
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """From where to where the axes move [mm]; None: over the whole travel.
+
+    Parameters
+    ----------
+    x, y, z : tuple of float, optional
+    """
+
+    x: tuple[float, float] | None = None
+    y: tuple[float, float] | None = None
+    z: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        for axis in AXES:
+            stroke, travel = getattr(self, axis), TRAVEL[axis]
+            if stroke and not 0.0 <= stroke[0] <= stroke[1] <= travel:
+                raise SettingError(f"must rise, within the travel from 0 to {travel:g} mm", (axis,))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stretch:
+    """A part of a test as it is written: one segment, or several.
+
+    What it says of duration, speed, feed, stroke, loads, cooled and powered holds for the segments within it that do
+    not say otherwise.
+
+    Parameters
+    ----------
+    duration : float or Lot, optional
+        [s]
+    speed : float or Lot, optional
+        Of the spindle [1/min]; it stands if nobody says otherwise.
+    feed : Feed, optional
+        The axes stand if nobody says otherwise.
+    stroke : Stroke, optional
+    loads : mapping of str to float or Lot, optional
+        Further heat, by where it is put in [W].
+    cooled : bool, optional
+        The coolant loop runs; it does if nobody says otherwise.
+    powered : bool, optional
+        The machine is switched on; it is if nobody says otherwise.
+    segments : tuple of Stretch
+        What happens within it; none: it is a segment itself.
+    repeat : int
+        So often its `segments` are done; or so many draws.
+    order : {'given', 'shuffled', 'drawn'}
+        One after the other; all of them (`repeat` times each) in random order; or each time one of them drawn by lot.
+    weight : float
+        How likely this one is where the outer order is ``drawn``, against the others beside it.
+    """
+
+    duration: Number | None = None
+    speed: Number | None = None
+    feed: Feed | None = None
+    stroke: Stroke | None = None
+    loads: Mapping[str, Number] | None = None
+    cooled: bool | None = None
+    powered: bool | None = None
+    segments: tuple["Stretch", ...] = ()
+    repeat: int = 1
+    order: Literal["given", "shuffled", "drawn"] = "given"
+    weight: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.repeat <= MOST_REPEATS:
+            raise SettingError(f"must be from 1 to {MOST_REPEATS}", ("repeat",))
+        if not self.segments and (self.repeat > 1 or self.order != "given"):
+            key = "repeat" if self.repeat > 1 else "order"
+            raise SettingError("needs segments = [...], which it says how to do", (key,))
+        if not self.weight > 0:
+            raise SettingError("must be positive", ("weight",))
+        for k, s in enumerate(self.segments):
+            if s.weight != 1.0 and self.order != "drawn":
+                raise SettingError('counts only where the order is "drawn"', ("segments", k, "weight"))
+
+    @property
+    def longest(self) -> float:
+        """How long it may last, whatever is drawn [s]."""
+        return self._longest(0.0)
+
+    def _longest(self, outer: float) -> float:
+        own = max(values(self.duration), default=outer)
+        if not self.segments:
+            return own
+        parts = [s._longest(own) for s in self.segments]
+        return self.repeat * (max(parts) if self.order == "drawn" else sum(parts))
+
+    def leaves(self, outer: Mapping[str, Any] | None = None, path: Path = ()) -> Iterator[Leaf]:
+        """Yield where each segment stands, and what holds in it."""
+        given = self._given(outer or {})
+        if not self.segments:
+            yield path, given
+        for k, s in enumerate(self.segments):
+            yield from s.leaves(given, (*path, "segments", k))
+
+    def draw(self, rng: np.random.Generator, outer: Mapping[str, Any] | None = None) -> list[SteadySegment]:
+        """Return the segments, with all that is left open drawn by lot."""
+        given = self._given(outer or {})
+        if not self.segments:
+            return [_segment(given, rng)]
+        parts = list(self.segments)
+        if self.order == "drawn":
+            weights = np.array([p.weight for p in parts])
+            parts = [parts[k] for k in rng.choice(len(parts), size=self.repeat, p=weights / weights.sum())]
+        else:
+            parts *= self.repeat
+            if self.order == "shuffled":
+                parts = [parts[k] for k in rng.permutation(len(parts))]
+        return [s for p in parts for s in p.draw(rng, given)]
+
+    def _given(self, outer: Mapping[str, Any]) -> dict[str, Any]:
+        own = {key: getattr(self, key) for key in _HANDED_DOWN}
+        return {**outer, **{key: value for key, value in own.items() if value is not None}}
+
+
+_HANDED_DOWN = ("duration", "speed", "feed", "stroke", "loads", "cooled", "powered")
+
+
+def _drawn(number: Number, rng: np.random.Generator) -> float:
+    return number.values[rng.integers(len(number.values))] if isinstance(number, Lot) else number
+
+
+def _segment(given: Mapping[str, Any], rng: np.random.Generator) -> SteadySegment:
+    feed, stroke = given.get("feed", Feed()), given.get("stroke", Stroke())
+    # The order of the draws is part of the protocol: duration first.
+    duration = _drawn(given["duration"], rng)
+    speed = _drawn(given.get("speed", 0.0), rng)
+    feeds = (_drawn(feed.x, rng), _drawn(feed.y, rng), _drawn(feed.z, rng))
+    powered = given.get("powered", True)
+    # A machine that is switched off stands, whatever speed it has inherited.
+    drive = Drive(
+        speed=speed if powered else 0.0,
+        feed=feeds if powered else (0.0, 0.0, 0.0),
+        stroke=(stroke.x, stroke.y, stroke.z),
+        loads={place: _drawn(load, rng) for place, load in given.get("loads", {}).items()},
+        cooled=given.get("cooled", True),
+        powered=powered,
+    )
+    return SteadySegment(duration, drive)

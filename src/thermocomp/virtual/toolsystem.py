@@ -1,0 +1,153 @@
+"""A heated tool that rests in a fixed spindle shaft: the set-up of Wessel 2004, section IV (W-08)."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.virtual.joints import slide_with_friction
+from thermocomp.virtual.machine import Air, Drive, Truth, check, stretches
+from thermocomp.virtual.statespace import REFERENCE_TEMPERATURE, ReducedModel
+
+FloatArray = NDArray[np.float64]
+#: where heat can be put in
+LOADS = ("heater", "tip")
+
+
+@dataclass(frozen=True, eq=False)
+class ToolState:
+    """All that the tool remembers.
+
+    Parameters
+    ----------
+    field : ndarray of shape (n_states,)
+        Of the reduced model.
+    slipped : float
+        How far the shank has slipped in the chuck [um].
+    """
+
+    field: FloatArray
+    slipped: float
+
+
+@dataclass(frozen=True, eq=False)
+class RestingTool:
+    """A chuck with its tool on a fixed shaft; fills `thermocomp.virtual.machine.VirtualMachine`.
+
+    Heaters at the bearing's fit warm it from behind, hot air from the tip. Its heat loss grows faster than its
+    temperature (natural convection, radiation), and the shank slips in the chuck only when friction gives way.
+
+    Parameters
+    ----------
+    model : ReducedModel
+    stiction : float
+        How far the shank may want to slip in the chuck before it does [um]; an engineering value.
+    convection : float
+        Conductance by free convection that is in the model, at `usual_rise` [W/K]: half of what its films amount to.
+    usual_rise : float
+        Mean rise of the surface at which the films hold [K]; free convection goes with its power of 1/4 (laminar).
+    longest_step : float
+        The loss is looked at this often [s].
+    """
+
+    model: ReducedModel = field(default_factory=lambda: ReducedModel.load("tool"))
+    stiction: float = 0.8
+    convection: float = 0.35
+    usual_rise: float = 20.0
+    longest_step: float = 20.0
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """Names of the places whose temperatures are known."""
+        return self.model.places
+
+    @property
+    def observables(self) -> tuple[str, ...]:
+        """Names of the displacements."""
+        return self.model.observables
+
+    def init(self, air: Air) -> ToolState:
+        """Return the state of a tool that has long been at the temperature of the room."""
+        state = self.model.steady(np.zeros(len(self.model.inputs)), air.values, ())
+        return ToolState(state, self._wish(self._linear(state[None])).item())
+
+    def run(self, state: ToolState, drives: Sequence[Drive], air: FloatArray, dt: float) -> tuple[ToolState, Truth]:
+        """Advance by one step of `dt` per drive, each in equal parts no longer than `longest_step`.
+
+        Parameters
+        ----------
+        state : ToolState
+        drives : sequence of Drive
+            Only their loads count.
+        air : ndarray of shape (n_steps, 3)
+            `Air.values` of each step.
+        dt : float
+            [s]
+
+        Returns
+        -------
+        state : ToolState
+        truth : Truth
+
+        Raises
+        ------
+        InputError
+            `dt` is not positive, there is no drive, the air has another length or is not finite, the tool is asked to
+            turn, or a load is put in where there is no place for it.
+        """
+        check(drives, air, dt)
+        parts = math.ceil(dt / self.longest_step)
+        fields = np.empty((len(drives) * parts, len(self.model.one)))
+        self._advance(state.field, drives, air, dt / parts, fields)
+        observables, slipped = self._move(fields, state.slipped)
+        ends = slice(parts - 1, None, parts)
+        truth = Truth((fields @ self.model.temperature.T)[ends], observables[ends])
+        return ToolState(fields[-1].copy(), slipped), truth
+
+    def _advance(
+        self, now: FloatArray, drives: Sequence[Drive], air: FloatArray, dt: float, fields: FloatArray
+    ) -> None:
+        """Fill in the fields after each part of each step."""
+        parts = len(fields) // len(drives)
+        operators = self.model.operators((), dt, ("surface",))
+        surface = self.model.inputs.index("surface")
+        watched = float((self.model.rows(("surface",)) @ now).item())
+        for first, last in stretches(drives):
+            given = self._given(drives[first])
+            for k in range(first * parts, last * parts):
+                rise = watched - air[k // parts, 0]
+                given[surface] = -self.convection * rise * ((abs(rise) / self.usual_rise) ** 0.25 - 1.0)
+                after = operators.state @ now + operators.heat @ given + operators.air @ air[k // parts]
+                fields[k] = now = after[:-1]
+                watched = float(after[-1])
+
+    def _move(self, fields: FloatArray, slipped: float) -> tuple[FloatArray, float]:
+        """Return the displacements that temperatures make [um], and how far the shank has slipped at the end."""
+        observables = self._linear(fields)
+        wish = self._wish(observables)
+        slides = slide_with_friction(slipped, wish, self.stiction)
+        observables[:, self.observables.index("s1")] += slides - wish
+        return observables, float(slides[-1])
+
+    def _linear(self, fields: FloatArray) -> FloatArray:
+        result: FloatArray = (fields - REFERENCE_TEMPERATURE * self.model.one) @ self.model.observable.T
+        return result
+
+    def _wish(self, observables: FloatArray) -> FloatArray:
+        """Growth of the clamped shank [um], from the chuck's front to the tip: what friction holds back."""
+        s1, s2 = (self.observables.index(n) for n in ("s1", "s2"))
+        result: FloatArray = observables[:, s1] - observables[:, s2]
+        return result
+
+    def _given(self, drive: Drive) -> FloatArray:
+        if drive.speed or any(drive.feed):
+            raise InputError("the resting tool cannot turn or move: its protocol takes loads only")
+        given = np.zeros(len(self.model.inputs))
+        for place, load in drive.loads.items():
+            if place not in LOADS:
+                raise InputError(f"no heat can be put in at {place!r} but at {', '.join(LOADS)}")
+            given[self.model.inputs.index(place)] = load if drive.powered else 0.0
+        return given

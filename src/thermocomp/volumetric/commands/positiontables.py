@@ -1,0 +1,186 @@
+"""What ``thermocomp position`` found, for people."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+
+from thermocomp.cli.terminal import mark, marked, print_table, words
+from thermocomp.recordings.profiles import Profiles
+from thermocomp.recordings.readers.profiles import NOT_TAKEN
+from thermocomp.report import records
+from thermocomp.report.layout import Column, Layout, Toned, verdict
+from thermocomp.volumetric.judging.position import PositionStudy
+from thermocomp.volumetric.models.positionoptions import Setting
+from thermocomp.volumetric.position import Positioned
+
+#: cycles that are told one by one; of more, the `WORST`
+FEW, WORST = 12, 5
+#: characters of a formula that are told; --json has all
+FORMULA = 300
+
+
+def show_positioned(result: Positioned, file: Path | None, console: Console) -> None:
+    """Print what was found of one component, or of several, and where the models are."""
+    if result.several:
+        show_all(result.found, result.tests, result.left_open, console)
+    else:
+        show(result.found[0], result.tests[0], result.left_open, console)
+    if file is not None:
+        console.print(f"Model file: {words(file)}", soft_wrap=True)
+
+
+def show(found: PositionStudy, tests: Sequence[Profiles], left_open: Sequence[Setting], console: Console) -> None:
+    """Print all about one component."""
+    fit, judged = found.fit, found.assessment
+    model, unit = fit.model, fit.model.unit
+    low, high = model.travel
+    _show_notes([tests], console)
+    console.print(
+        f"[bold]{words(model.target)}[/]: {sum(len(t) for t in tests)} profiles of {len(tests[0].points)} points "
+        f"along {words(model.axis)}, {low:g} to {high:g} mm"
+    )
+    if fit.profile.tried:
+        chosen = (fit.profile.order, fit.profile.through)
+        columns = (
+            Column(
+                "order",
+                lambda t: (
+                    ("spline" if t.through else _order(t.order)) + ("!" if (t.order, t.through) == chosen else " ")
+                ),
+                ">",
+            ),
+            Column("terms", lambda t: t.n_terms, ">"),
+            Column("left out", lambda t: f"{t.left_out:.3f}", ">", unit),
+        )
+        title = "Cold profile: error at points left out"
+        print_table(Layout(columns, fit.profile.tried, title, caption="! = chosen"), console)
+    kind = f"{model.profile and model.profile.kind} of order {_order(fit.profile.order)}"
+    console.print(f"Cold profile: {words('natural spline through all points' if fit.profile.through else kind)}")
+    if fit.profile.words:
+        console.print(f"[yellow]but[/] it {words(fit.profile.words)}")
+    if left_open:
+        console.print(f"Chosen by the profiles: {words(_chosen(found, left_open))}")
+    for factor, errors, power in zip(model.models, fit.coefficient_errors, model.powers, strict=True):
+        formula = factor.formula()
+        console.print(words(f"k{power} [{factor.unit}] = {_shortened(formula)}"))
+        if errors and len(formula) <= FORMULA:
+            told = ", ".join(f"{name} {error:.2g}" for name, error in errors.items())
+            console.print(words(f"  standard errors: {told}"))
+    rest = ", ".join(f"m = {m}: {r:.2f}" for m, r in fit.remainders.items() if math.isfinite(r))
+    console.print(f"Beside the cold profile {fit.thermal_rms:.2f} {unit} RMS; beside powers up to {words(rest)} {unit}")
+    if model.powers and "slopes" not in left_open and fit.enough > max(model.powers):
+        console.print(f"[yellow]but[/] higher powers tell more: try --slopes {fit.enough}")
+    if model.slopes and "offset" not in left_open and fit.shifts:
+        console.print(
+            f"[yellow]but[/] the profiles do not turn about {model.reference_position:g} mm: with an offset "
+            f"{fit.offset_remainder:.2f} {unit} are left; try --offset, or another --reference-position"
+        )
+    _show_judging(found, left_open, console)
+    print_table(_cycle_table(found), console)
+    console.print(f"{marked(_verdict(found))} {words(model.target)}: {words(judged.reason)}")
+    if found.dropped:
+        console.print(f"[yellow]but[/] the cold profile alone; its thermal part is left out: {words(found.dropped)}")
+
+
+def show_all(
+    found: Sequence[PositionStudy],
+    tests: Sequence[Sequence[Profiles]],
+    left_open: Sequence[Setting],
+    console: Console,
+) -> None:
+    """Print several components, a line each."""
+    _show_notes(tests, console)
+    states = sum(len(t) for t in tests[0])
+    console.print(f"{len(found)} components, {states} profiles of each in {len(tests[0])} recording(s)")
+    caption = (
+        "order: of the cold profile; factors: k0 shift, k1 slope, k2 ..., of positions counted from 'at'; "
+        "RMS over all points of unseen profiles, um or urad: without compensation, less the cold profile, less the "
+        "model; profile: the cold profile alone is taken"
+    )
+    columns = (
+        Column("", lambda f: f"{f.fit.model.target}, {f.fit.model.unit}", whole=True),
+        Column("order", _orders, ">", whole=True),
+        Column("factors", lambda f: " ".join(f"k{k}" for k in f.fit.model.powers) or "-"),
+        Column("at", lambda f: f.fit.model.reference_position if f.fit.model.slopes else "", "g", whole=True),
+        Column("none", lambda f: f.assessment.overall.none, ".2f", whole=True),
+        Column("cold", lambda f: f.assessment.overall.geometric, ".2f", whole=True),
+        Column("model", lambda f: f.assessment.overall.model, ".2f", whole=True),
+        Column("verdict", lambda f: _verdict(f, "profile"), whole=True),
+    )
+    print_table(Layout(columns, found, caption=caption), console)
+    _show_judging(found[0], left_open, console)
+    for f in found:
+        if not f.assessment.accepted:
+            console.print(
+                f"{mark(f.assessment.verdict.word)} {words(f.fit.model.target)}: {words(f.assessment.reason)}",
+                soft_wrap=True,
+            )
+        elif f.dropped:
+            console.print(
+                f"[yellow]cold profile alone[/] {words(f.fit.model.target)}: thermal part: {words(f.dropped)}"
+            )
+
+
+def _show_notes(tests: Sequence[Sequence[Profiles]], console: Console) -> None:
+    notes = [note for mine in tests for t in mine for note in t.states.notes if note.startswith(NOT_TAKEN)]
+    for note in dict.fromkeys(notes):
+        console.print(f"[dim]note[/] {words(note)}", soft_wrap=True)
+
+
+def _show_judging(found: PositionStudy, left_open: Sequence[Setting], console: Console) -> None:
+    anew = "; settings are chosen anew in each" if left_open else ""
+    console.print(f"Judged on: {words(found.assessment.protocol)}{anew}")
+
+
+def _chosen(found: PositionStudy, left_open: Sequence[Setting]) -> str:
+    model = found.fit.model
+    told = {
+        "slopes": f"--slopes {len(model.slopes)}",
+        "offset": "--offset" if model.offset is not None else "--no-offset",
+        "reference_position": f"--reference-position {model.reference_position:g}" if model.slopes else "",
+    }
+    return " ".join(told[name] for name in left_open if told[name])
+
+
+def _cycle_table(found: PositionStudy) -> Layout:
+    judged = found.assessment
+    told, which = judged.cycles, ""
+    if len(told) > FEW:
+        told = tuple(sorted(told, key=lambda c: c.none and -c.model / c.none)[:WORST])
+        which = f"the {WORST} worst of {len(judged.cycles)}; "
+    columns = (
+        Column("unseen", "cycle"),
+        Column("profiles", "profiles", ">"),
+        Column("none", "none_rms", ".2f"),
+        Column("cold profile", "cold_profile_rms", ".2f"),
+        Column("model", "rms", ".2f"),
+        Column("none max", "none_max", ".2f"),
+        Column("model max", "max", ".2f"),
+    )
+    caption = f"{which}RMS over all points in {judged.unit}; max: largest error"
+    return Layout(columns, [records.cycle(c) for c in (*told, judged.overall)], caption=caption)
+
+
+def _orders(found: PositionStudy) -> str:
+    profile = found.fit.profile
+    return "spline" if profile.through else "+".join(str(o) for o in profile.order if o) or "0"
+
+
+def _shortened(formula: str) -> str:
+    """Return a formula of a few lines, cut between two terms."""
+    if len(formula) <= FORMULA:
+        return formula
+    cut = max(formula.rfind(" + ", 0, FORMULA), formula.rfind(" - ", 0, FORMULA))
+    more = formula[cut:].count(" + ") + formula[cut:].count(" - ")
+    return f"{formula[:cut]} ... and {more} terms more (--json has them)"
+
+
+def _verdict(found: PositionStudy, alone: str = "cold profile") -> Toned:
+    accepted = found.assessment.accepted
+    return Toned(alone, "doubtful") if accepted and found.dropped else verdict(found.assessment.verdict.word)
+
+
+def _order(order: tuple[int, int]) -> str:
+    return str(order[0]) if not order[1] else f"{order[0]} ({order[1]} in the others)"

@@ -1,0 +1,408 @@
+"""Judge models of position-dependent errors: whole profiles, in thermal cycles that were not learned from."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import FitError, InputError
+from thermocomp.core.learned import Learned
+from thermocomp.core.provenance import RULES, HonestError
+from thermocomp.core.size import Size
+from thermocomp.judging import do_no_harm, metrics
+from thermocomp.judging.replay import replay
+from thermocomp.judging.splits import Judging, Split, leave_one_cycle_out
+from thermocomp.recordings.profiles import Profiles
+from thermocomp.recordings.samples import Samples
+from thermocomp.volumetric.models.position import PositionFit, fit_position, slope_samples
+from thermocomp.volumetric.models.positionoptions import PositionOptions, Setting, fill_options, reference_position
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+#: with fewer thermal states there is nothing to learn from and to judge on
+FEWEST = 4
+#: fewer profiles of a cycle than this say nothing about it; each has many points, and they are far apart in time
+MIN_STATES = 8
+#: what a position model is held against
+BESIDE = ("no compensation", "the cold profile alone")
+
+
+@dataclass(frozen=True)
+class CycleErrors:
+    """Errors of the profiles of one thermal cycle, or of a whole test that was left out.
+
+    Parameters
+    ----------
+    cycle : str
+    n_states : int
+        Profiles that were judged.
+    none, geometric, model : float
+        RMS over their points [unit]: without compensation, with the cold profile alone, with the whole model.
+    none_max, model_max : float
+        Largest error [unit].
+    """
+
+    cycle: str
+    n_states: int
+    none: float
+    geometric: float
+    model: float
+    none_max: float
+    model_max: float
+
+
+@dataclass(frozen=True, eq=False)
+class PositionAssessment:
+    """How a position model does on cycles that it has not seen.
+
+    Parameters
+    ----------
+    protocol : str
+        How they were chosen.
+    cycles : tuple of CycleErrors
+    overall : CycleErrors
+        Of all of them together.
+    verdict : Verdict
+        Of the do-no-harm gate: beside no compensation and, if there is a thermal part, beside the cold profile alone;
+        by cycles or, if files were left out, by these.
+    factors : tuple of HonestError
+        Of each factor's model on the same states [unit/m^i]; verdict and reason are those of the whole.
+    unit : {'um', 'urad'}
+    """
+
+    protocol: str
+    cycles: tuple[CycleErrors, ...]
+    overall: CycleErrors
+    verdict: do_no_harm.Verdict
+    factors: tuple[HonestError, ...]
+    unit: str
+
+    @property
+    def accepted(self) -> bool:
+        """True if it may run."""
+        return self.verdict.accepted
+
+    @property
+    def reason(self) -> str:
+        """Why, and what would decide it."""
+        return self.verdict.told
+
+
+@dataclass(frozen=True, eq=False)
+class PositionStudy:
+    """A position model fitted to everything, with its error on what it had not seen.
+
+    Parameters
+    ----------
+    fit : PositionFit
+        The models of its factors carry the honest error.
+    options : PositionOptions
+        With what was left open filled in.
+    assessment : PositionAssessment
+    dropped : str
+        Why the thermal part was left out, if it was: its own verdict.
+    """
+
+    fit: PositionFit
+    options: PositionOptions
+    assessment: PositionAssessment
+    dropped: str = ""
+
+
+def study(
+    profiles: Profiles | Sequence[Profiles],
+    options: PositionOptions = PositionOptions(),  # noqa: B008 - frozen
+    *,
+    left_open: Sequence[Setting] = (),
+    judging: Callable[[Samples], Judging] = leave_one_cycle_out,
+    jobs: int = 1,
+    progress: Callable[[str], None] = lambda _: None,
+) -> PositionStudy:
+    """Judge how a position-dependent error is modelled on unseen cycles, then fit it to everything.
+
+    In each split everything is learned anew: settings left open, cold profile, its order, slopes. The cold profile of a
+    test of which only a part is left out is its zero: it is used, and not judged. A left-out test is judged by the cold
+    profiles of the others.
+
+    Parameters
+    ----------
+    profiles : Profiles or sequence of Profiles
+        Of one component, one per test.
+    options : PositionOptions
+    left_open : sequence of {'slopes', 'offset', 'reference_position'}
+        Settings that the profiles tell, in place of `options`; see
+        `thermocomp.volumetric.models.positionoptions.fill_options`. If it is open how many slopes there are and the thermal part is refused, the cold profile alone is judged and
+        taken.
+    judging : callable
+        Makes splits of the states, such as those of `thermocomp.judging.splits`.
+    jobs : int
+        Processes to share the work among; -1 takes all cores.
+    progress : callable
+        Called with a line of text after each fit.
+
+    Returns
+    -------
+    PositionStudy
+
+    Raises
+    ------
+    InputError
+        There is nothing to leave out, or an option cannot be.
+    FitError
+        It cannot be fitted, to all states or to those of a split, or nothing is left to judge on.
+    """
+    tests = (profiles,) if isinstance(profiles, Profiles) else profiles
+    (found,) = study_all([tests], options, left_open=left_open, judging=judging, jobs=jobs, progress=progress)
+    return found
+
+
+def study_all(
+    components: Sequence[Sequence[Profiles]],
+    options: PositionOptions = PositionOptions(),  # noqa: B008 - frozen
+    *,
+    left_open: Sequence[Setting] = (),
+    judging: Callable[[Samples], Judging] = leave_one_cycle_out,
+    jobs: int = 1,
+    progress: Callable[[str], None] = lambda _: None,
+) -> tuple[PositionStudy, ...]:
+    """Do `study` for several components at once.
+
+    Parameters
+    ----------
+    components : sequence of sequence of Profiles
+        The tests of each.
+    options, left_open, judging, jobs, progress
+        See `study`; `n_pieces` tells how often `progress` is called.
+
+    Returns
+    -------
+    tuple of PositionStudy
+        One per component.
+    """
+    whole = [_All(tuple(tests), *_splits(tests, options, judging)) for tests in components]
+    found = _studies(whole, options, left_open, jobs, progress)
+    if "slopes" not in left_open:
+        return tuple(found)
+    for k, (one, first) in enumerate(zip(whole, found, strict=True)):
+        if first.assessment.accepted and first.options.powers:
+            continue
+        (alone,) = _studies([one], replace(first.options, slopes=0, offset=False), (), 1, lambda _: None)
+        if alone.assessment.accepted:
+            found[k] = replace(alone, dropped=first.assessment.reason if first.options.powers else "it is noise")
+    return tuple(found)
+
+
+def _studies(
+    whole: Sequence["_All"],
+    options: PositionOptions,
+    left_open: Sequence[Setting],
+    jobs: int,
+    progress: Callable[[str], None],
+) -> list[PositionStudy]:
+    work = [
+        delayed(_piece)(one.tests, options, tuple(left_open), split)
+        for one in whole
+        for split in (*one.judging.splits, None)
+    ]
+    done: list[Any] = []
+    for text, found in Parallel(n_jobs=jobs, return_as="generator")(work):
+        progress(text)
+        done.append(found)
+    studies, start = [], 0
+    for one in whole:
+        stop = start + len(one.judging.splits)
+        studies.append(_study(one, done[start:stop], *done[stop]))
+        start = stop + 1
+    return studies
+
+
+def n_pieces(
+    components: Sequence[Sequence[Profiles]], options: PositionOptions, judging: Callable[[Samples], Judging]
+) -> int:
+    """Return the number of pieces of work of `study_all`."""
+    return sum(len(_splits(tests, options, judging)[1].splits) + 1 for tests in components)
+
+
+class _All(NamedTuple):
+    """A component: its tests, their states, and how they are split."""
+
+    tests: tuple[Profiles, ...]
+    samples: Samples
+    judging: Judging
+
+
+def _splits(
+    tests: Sequence[Profiles], options: PositionOptions, judging: Callable[[Samples], Judging]
+) -> tuple[Samples, Judging]:
+    if (states := sum(len(test) for test in tests)) < FEWEST:
+        raise InputError(
+            f"{tests[0].target}: {states} thermal state(s): one is the cold profile, slopes are learned from others "
+            f"and judged on others again; measure in {FEWEST} states or more, better in 20"
+        )
+    samples, _ = slope_samples(tests, options)
+    return samples, judging(samples)
+
+
+def _piece(
+    tests: tuple[Profiles, ...], options: PositionOptions, left_open: Sequence[Setting], split: Split | None
+) -> tuple[str, Any]:
+    """Judge one split; or, without one, fit everything."""
+    learn = None if split is None else split.learn
+    chosen = fill_options(tests, options, left_open, learn=learn) if left_open else options
+    fit = fit_position(tests, chosen, learn=learn)
+    if split is None:
+        return f"{tests[0].target} all states", (chosen, fit)
+    return f"{tests[0].target} {split.block}", _judged(tests, fit, chosen, split)
+
+
+def _study(one: _All, parts: Sequence["_Part"], options: PositionOptions, fit: PositionFit) -> PositionStudy:
+    assessment = _together(one, parts, options)
+    honest = assessment.factors
+    trained = tuple(
+        replace(t, model=replace(t.model, honest_error=h)) for t, h in zip(fit.trained, honest, strict=True)
+    )
+    models = [t.model for t in trained]
+    model = replace(
+        fit.model, offset=models[0] if options.offset else None, slopes=tuple(models[1:] if options.offset else models)
+    )
+    return PositionStudy(replace(fit, model=model, trained=trained), options, assessment)
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """What was judged in one split: errors of all points per state, and the predicted thermal parts."""
+
+    state: NDArray[np.intp]  # (n,) row of the samples
+    errors: tuple[tuple[FloatArray, FloatArray, FloatArray], ...]  # per state: none, cold profile alone, model
+    thermal: tuple[FloatArray, ...]  # per state, at all points of its test
+
+
+def _judged(tests: Sequence[Profiles], fit: PositionFit, options: PositionOptions, split: Split) -> _Part:
+    samples, model = fit.samples, fit.model
+    rows = split.judge.copy()
+    for k, test in enumerate(tests):
+        mine = np.flatnonzero(samples.test == k)
+        rows[mine[test.reference_rows(options.reference)]] &= not split.learn[mine].any()
+    state = np.flatnonzero(rows)
+    factors = np.array([replay(m, samples, rows)[0] for m in model.models]).reshape(-1, len(state)).T
+    assert model.profile is not None
+    errors, thermal = [], []
+    for row, factor in zip(state, factors, strict=True):
+        test = tests[int(samples.test[row])]
+        measured, profile = test.values[int(samples.row[row])], model.profile.at(test.points)
+        told = model.at(test.points, factor)
+        there = np.isfinite(measured)
+        errors.append((measured[there], (measured - profile)[there], (measured - told)[there]))
+        thermal.append(told - profile)
+    return _Part(state, tuple(errors), tuple(thermal))
+
+
+def _factors(one: _All, parts: Sequence[_Part], options: PositionOptions) -> tuple[FloatArray, FloatArray]:
+    """Return factors, measured and predicted, (n, n_factors): the predicted ones from what the model said everywhere.
+
+    A split may have chosen other powers; its thermal part is written in those of the whole.
+    """
+    samples, _ = slope_samples(one.tests, options)
+    turn = reference_position(one.tests, options)
+    predicted = []
+    for row, thermal in ((r, t) for p in parts for r, t in zip(p.state, p.thermal, strict=True)):
+        q = 1e-3 * (one.tests[int(samples.test[row])].position - turn)
+        reach = float(np.abs(q).max())
+        found = np.linalg.lstsq(np.stack([(q / reach) ** k for k in options.powers], axis=1), thermal)[0]
+        predicted.append(found / reach ** np.array(options.powers))
+    return samples.deviations[np.concatenate([p.state for p in parts])], np.array(predicted)
+
+
+def _together(one: _All, parts: Sequence[_Part], options: PositionOptions) -> PositionAssessment:
+    samples, tests, protocol = one.samples, one.tests, one.judging.name
+    unit = tests[0].unit
+    rows = np.concatenate([p.state for p in parts])
+    triples = [e for p in parts for e in p.errors]
+    filled = np.array([e[0].size > 0 for e in triples], dtype=np.bool_)
+    if not filled.any():
+        raise FitError(f"{tests[0].target}: no profile is left to judge on")
+    rms = np.array([[Size.of(e).rms for e in triple] for triple in triples])
+    segments: list[tuple[str, BoolArray]] = []
+    for split, part in zip(one.judging.splits, parts, strict=True):
+        mine = filled & np.isin(rows, part.state)
+        if split.whole:
+            segments.append((split.name, mine))
+        else:
+            cycle = samples.cycle[rows]
+            segments += [(samples.cycle_names[k], mine & (cycle == k)) for k in np.unique(cycle[mine])]
+    verdict = do_no_harm.Verdict(
+        units=tuple(
+            _unit(name, rms[mine], unit, thermal=bool(options.powers))
+            for name, mine in segments
+            if mine.sum() >= MIN_STATES
+        ),
+        unit=unit,
+        names=BESIDE,
+        caps=("judged on one stretch that goes on from what was learned",) if one.judging.splits[0].stretch else (),
+    )
+    measured, predicted = _factors(one, parts, options) if options.powers else (np.empty((len(rows), 0)),) * 2
+    factors = []
+    for j in range(measured.shape[1]):
+        m, p = measured[:, j], predicted[:, j]
+        there = np.isfinite(m)
+        known = [(name, mine & there) for name, mine in segments if (mine & there).any()]
+        m_there, p_there = m[there], p[there]
+        factors.append(
+            HonestError(
+                protocol=protocol,
+                mae=metrics.mae(m_there, p_there),
+                rms=metrics.rms(m_there, p_there),
+                max_abs=metrics.max_abs(m_there, p_there),
+                none_mae=metrics.mae(m_there, 0 * m_there),
+                none_rms=metrics.rms(m_there, 0 * m_there),
+                cycles={name: metrics.rms(m[mine], p[mine]) for name, mine in known},
+                verdict=verdict.word,
+                reason=verdict.told,
+                units=len(verdict.units),
+                rules=RULES,
+            )
+        )
+    return PositionAssessment(
+        protocol=protocol,
+        cycles=tuple(_errors(name, triples, mine) for name, mine in segments if mine.any()),
+        overall=_errors("all", triples, filled),
+        verdict=verdict,
+        factors=tuple(factors),
+        unit=unit,
+    )
+
+
+def _unit(name: str, rms: FloatArray, unit: str, *, thermal: bool) -> do_no_harm.JudgedUnit:
+    """Measure a cycle by the RMS of its profiles, (n, 3): without compensation, with the cold profile alone, model."""
+    none, geometric, left = np.sqrt(np.mean(rms**2, axis=0)).tolist()
+    largest = float(rms[:, 0].max())
+    return do_no_harm.JudgedUnit(
+        name=name,
+        rows=len(rms),
+        rms=left,
+        largest=float(rms[:, 2].max()),
+        baselines=(none, geometric) if thermal else (none,),
+        none_largest=largest,
+        noise=0.0,
+        margin=do_no_harm.margin_of(Learned(0.0, 0.0, 0.0, largest), unit),
+        moves=True,
+    )
+
+
+def _errors(name: str, triples: Sequence[tuple[FloatArray, FloatArray, FloatArray]], mine: BoolArray) -> CycleErrors:
+    none, geometric, left = (
+        Size.of(np.concatenate([t[j] for t, wanted in zip(triples, mine, strict=True) if wanted])) for j in range(3)
+    )
+    return CycleErrors(
+        cycle=name,
+        n_states=int(mine.sum()),
+        none=none.rms,
+        geometric=geometric.rms,
+        model=left.rms,
+        none_max=none.largest,
+        model_max=left.largest,
+    )

@@ -1,0 +1,341 @@
+"""The error of the tool point over time and over the work volume, before and after what a controller can correct."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.components import COMPONENTS
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.inputs import Input
+from thermocomp.core.machine import Machine, Source, Vector
+from thermocomp.core.model import ErrorModel
+from thermocomp.core.position import PositionModel
+from thermocomp.core.size import Size
+from thermocomp.recordings.recording import Recording
+from thermocomp.runtime.geometry.field import ErrorField
+from thermocomp.runtime.geometry.kinematics import Kinematics
+from thermocomp.runtime.geometry.straight import StraightLines, find_remaining_error, straight_lines
+from thermocomp.runtime.geometry.volumetric import ThermalStates, VolumetricModel
+from thermocomp.volumetric import notes
+
+FloatArray = NDArray[np.float64]
+
+#: points of a grid along each axis; more take memory and tell nothing new
+FINEST = 50
+#: rows in which the largest error is looked for
+_LOOKED_AT = 2000
+_START, _LARGEST, _END = "start", "largest", "end"
+_PICKED = (_START, _LARGEST, _END, f"{_START} = {_LARGEST}", f"{_END} = {_LARGEST}")
+
+
+@dataclass(frozen=True, eq=False)
+class PointCourse:
+    """What happens at one point while a recording is replayed.
+
+    Parameters
+    ----------
+    point : tuple of float
+        Positions of the axes [mm].
+    tool : tuple of float
+        From the gauge point to the tip [mm].
+    time : ndarray of shape (n_rows,)
+        Since the first row of the recording [s].
+    values : ndarray of shape (n_rows, 32)
+        Components at the point [um, urad].
+    error : ndarray of shape (n_rows, 3)
+        Of the tool's tip, actual minus commanded [um].
+    tilt : ndarray of shape (n_rows, 3)
+        Of the tool [urad].
+    sensitivity : ndarray of shape (32, 3)
+        What one um or urad of each component does to the tip [um].
+    """
+
+    point: Vector
+    tool: Vector
+    time: FloatArray
+    values: FloatArray
+    error: FloatArray
+    tilt: FloatArray
+    sensitivity: FloatArray
+
+    @property
+    def largest(self) -> int:
+        """The row with the largest error."""
+        return int(np.argmax(np.linalg.norm(self.error, axis=-1)))
+
+    def contributions(self, row: int) -> FloatArray:
+        """Return what each component adds to the error in one row, of shape (32, 3) [um]."""
+        return self.values[row, :, None] * self.sensitivity
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """The work volume in one thermal state.
+
+    Parameters
+    ----------
+    label : str
+        Why it was picked: ``start``, ``largest``, ``end``, ``reference state``, or the time that was asked for.
+    row : int
+        Of the course.
+    time : float
+        Since the first row of the recording [s].
+    field : ErrorField
+    straight : StraightLines
+        The best straight line of each axis through the point of the course: what controllers take.
+    tool : tuple of float
+        From the gauge point to the tip [mm].
+    grid : ndarray of shape (..., 3)
+        Where the numbers are judged [mm].
+    """
+
+    label: str
+    row: int
+    time: float
+    field: ErrorField
+    straight: StraightLines
+    tool: Vector
+    grid: FloatArray
+
+    @property
+    def name(self) -> str:
+        """The label, with its time if it is not the time itself."""
+        picked = self.label in _PICKED
+        return f"{self.label}, {self.time / 3600:.2f} h" if picked else self.label
+
+    def error(self, points: FloatArray) -> FloatArray:
+        """Return the error without correction, by exact transforms, of shape (..., 3) [um]."""
+        return self.field.error(points, self.tool, exact=True)
+
+    def after_lines(self, points: FloatArray) -> FloatArray:
+        """Return what is left after the straight lines of the axes, of shape (..., 3) [um]."""
+        lines = {line.axis: line.correction for line in self.straight.lines}
+        return find_remaining_error(self.field, points, lines, self.tool, exact=True)
+
+    def after_all(self, points: FloatArray) -> FloatArray:
+        """Return what is left after the whole correction, a vector at every point, of shape (..., 3) [um]."""
+        correction = self.field.correction(points, self.tool)
+        return self.error(points + 1e-3 * correction) + correction
+
+    @cached_property
+    def sizes(self) -> dict[str, Size]:
+        """Length of the error vector on the grid by what is corrected."""
+        everything = self.after_all(self.grid.reshape(-1, 3))
+        return {
+            "nothing": self.straight.before,
+            "straight lines": self.straight.after,
+            "everything": Size.of(np.linalg.norm(everything, axis=-1)),
+        }
+
+    @cached_property
+    def shares(self) -> FloatArray:
+        """What each component alone adds to the error on the grid: RMS of the vector's length, of shape (32,) [um]."""
+        points = self.grid.reshape(-1, 3)
+        values, shares = self.field.components(points), np.zeros(len(COMPONENTS))
+        for k in np.flatnonzero(values.any(axis=0)):
+            alone = np.zeros_like(values)
+            alone[:, k] = values[:, k]
+            error, _ = self.field.kinematics.synthesize(alone, points, self.tool)
+            shares[k] = np.sqrt(np.mean(np.sum(error**2, axis=-1)))
+        return shares
+
+
+@dataclass(frozen=True, eq=False)
+class Volumetric:
+    """A machine's volumetric error in its thermal states.
+
+    Parameters
+    ----------
+    machine : Machine
+    recording : Recording or None
+        What was replayed; None: the reference state.
+    course : PointCourse
+    moments : tuple of Moment
+    missing : int
+        Rows of the recording in which an input is missing: the state before is held there, as it would be live.
+    """
+
+    machine: Machine
+    recording: Recording | None
+    course: PointCourse
+    moments: tuple[Moment, ...]
+    missing: int = 0
+
+    @cached_property
+    def notes(self) -> tuple[str, ...]:
+        """What is to be said of the machine: see `thermocomp.volumetric.notes`."""
+        return notes.notes(replace(self.machine, tool=self.course.tool))
+
+    @property
+    def worst(self) -> Moment:
+        """The moment with the largest error on the grid."""
+        return max(self.moments, key=lambda m: m.straight.before.largest)
+
+
+#: tells how far the work is, as a share of it
+Progress = Callable[[float], None]
+
+
+def study(
+    machine: Machine,
+    recording: Recording | None = None,
+    *,
+    at: Vector | None = None,
+    grid: int = 5,
+    tool: Vector | None = None,
+    hours: Sequence[float] = (),
+    progress: Progress | None = None,
+) -> Volumetric:
+    """Replay a recording through a machine's models and look at its errors.
+
+    Parameters
+    ----------
+    machine : Machine
+    recording : Recording, optional
+        Without it the machine is taken in its reference state: constants and profiles.
+    at : tuple of float, optional
+        The point that is followed over time [mm]; without it the middle of the travels, and the largest error is
+        looked for at the corners too.
+    grid : int
+        Points along each axis.
+    tool : tuple of float, optional
+        From the gauge point to the tip [mm]; the machine's own if not given.
+    hours : sequence of float, optional
+        Times to look at [h]; without them the start, the largest error and the end.
+    progress : callable, optional
+
+    Returns
+    -------
+    Volumetric
+
+    Raises
+    ------
+    InputError
+        A point or a time is outside, the recording lacks a channel, or measures something else by it.
+    """
+    tip = machine.tool if tool is None else tool
+    if grid > FINEST:
+        raise InputError(f"a grid of {grid} points along each axis: at most {FINEST}, that tells the same")
+    if grid < 2:
+        raise InputError(f"a grid of {grid} points along an axis has no extent: want at least 2")
+    if recording is None and hours:
+        raise InputError("without a recording there is no time: name one, or leave the times out")
+    time, table, missing = _inputs(machine, recording) if recording is not None else (np.zeros(1), {}, 0)
+    replayed = machine if recording is not None else in_reference_state(machine)
+    point = middle(machine) if at is None else _inside(machine, at)
+    states = VolumetricModel(replayed).replay(time, table)
+    values = np.empty((len(time), len(COMPONENTS)))
+    for k, field in enumerate(states):
+        values[k] = field.components(point)
+        if progress is not None and k % 100 == 0:
+            progress(k / len(time))
+    levers = Kinematics(machine)
+    error, tilt = levers.synthesize(values, np.asarray(point), tip)
+    course = PointCourse(point, tip, time, values, error, tilt, levers.sensitivity(point, tip))
+    points, moments = lay_grid(machine, grid), []
+    for label, row in _rows(time, course.largest if at is not None else _largest(states, tip), hours):
+        lines = straight_lines(states[row], point, tip, grid=grid, exact=True)
+        moments.append(Moment(label, row, float(time[row]), states[row], lines, tip, points))
+    return Volumetric(machine, recording, course, tuple(moments), missing)
+
+
+def in_reference_state(machine: Machine) -> Machine:
+    """Return a machine whose models of time say nothing: constants and profiles alone."""
+    kept: dict[str, Source] = {}
+    for code, source in machine.components.items():
+        if isinstance(source, PositionModel):
+            kept[code] = replace(source, offset=None, slopes=())
+        elif not isinstance(source, ErrorModel):
+            kept[code] = source
+    return replace(machine, components=kept)
+
+
+def inputs_of(machine: Machine) -> dict[str, Input]:
+    """Return the inputs that the machine's models want, by name."""
+    return {i.name: i for source in machine.components.values() for m in models_of(source) for i in m.inputs}
+
+
+def models_of(source: Source | None) -> tuple[ErrorModel, ...]:
+    """Return the models of time in the source of a component."""
+    if isinstance(source, PositionModel):
+        return source.models
+    return (source,) if isinstance(source, ErrorModel) else ()
+
+
+def describe_source(source: Source | None) -> str:
+    """Say in a few words what tells the value of a component."""
+    if source is None:
+        return "nothing"
+    if isinstance(source, PositionModel):
+        terms = (["profile"] if source.profile is not None else []) + [f"k{p}" for p in source.powers]
+        return f"model: {' + '.join(terms)}" if source.models else "profile"
+    return f"model: {source.family}" if isinstance(source, ErrorModel) else "constant"
+
+
+def middle(machine: Machine) -> Vector:
+    """Return the middle of the travels; an axis that is not there stands at 0 [mm]."""
+    x, y, z = (0.5 * sum(machine.axis(a).travel) if a in machine.structure.axes else 0.0 for a in "XYZ")
+    return (x, y, z)
+
+
+def lay_grid(machine: Machine, n: int) -> FloatArray:
+    """Return a grid over the work volume, of shape (n_x, n_y, n_z, 3) [mm]; one point along an axis not there."""
+    along = [np.linspace(*machine.axis(a).travel, n) if a in machine.structure.axes else np.zeros(1) for a in "XYZ"]
+    return np.stack(np.meshgrid(*along, indexing="ij"), axis=-1)
+
+
+def _inside(machine: Machine, point: Vector) -> Vector:
+    for name, position in zip("XYZ", point, strict=True):
+        if name in machine.structure.axes:
+            low, high = machine.axis(name).travel
+            if not low <= position <= high:
+                raise InputError(f"{name} {position:g} mm: outside the travel of {name}, {low:g} to {high:g} mm")
+    return point
+
+
+def _inputs(machine: Machine, recording: Recording) -> tuple[FloatArray, dict[str, FloatArray], int]:
+    """Return times, inputs, and in how many rows one of them is missing."""
+    wanted, table = inputs_of(machine), {}
+    for name, model_input in wanted.items():
+        channel = recording.channel(name)
+        if channel.quantity != model_input.quantity:
+            raise InputError(
+                f"{recording.source or recording.name}: channel {name!r} is a {channel.quantity}; the models of "
+                f"{machine.name} want a {model_input.quantity}"
+            )
+        table[name] = recording.table[channel.name].to_numpy(dtype=np.float64)
+    missing = np.zeros(len(recording), dtype=np.bool_)
+    for values in table.values():
+        missing |= ~np.isfinite(values)
+    if missing.all():
+        raise InputError(f"{recording.source or recording.name}: in every row an input of the models is missing")
+    return recording.time, table, int(missing.sum())
+
+
+def _largest(states: ThermalStates, tool: Vector) -> int:
+    """Return the row with the largest error at the corners of the volume; of a long recording every n-th is seen."""
+    corners = lay_grid(states.model.machine, 2)
+    rows = range(0, len(states), 1 + len(states) // _LOOKED_AT)
+    return max(rows, key=lambda k: float(np.linalg.norm(states[k].error(corners, tool), axis=-1).max()))
+
+
+def _rows(time: FloatArray, largest: int, hours: Sequence[float]) -> Iterator[tuple[str, int]]:
+    """Yield the moments to look at with their labels, each row once."""
+    if len(time) == 1:
+        yield "reference state", 0
+        return
+    if not hours:
+        last = len(time) - 1
+        found = {0: _START, last: _END}
+        found[largest] = f"{found[largest]} = {_LARGEST}" if largest in found else _LARGEST
+        for row in sorted(found):
+            yield found[row], row
+        return
+    for hour in sorted(set(hours)):
+        if not 0 <= hour * 3600 <= time[-1] + 1e-6:
+            raise InputError(f"{hour:g} h: outside the recording, 0 to {time[-1] / 3600:.2f} h")
+        row = int(np.argmin(np.abs(time - hour * 3600)))
+        yield f"{time[row] / 3600:.2f} h", row

@@ -1,0 +1,399 @@
+"""The geometric part f_g of an error: a polynomial or a spline, its order chosen by points left out (C-04, C-06)."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline, CubicSpline, PPoly
+from scipy.stats import f as fisher
+
+from thermocomp.core.exceptions import FitError, InputError
+from thermocomp.core.profile import PolynomialProfile, Profile, SplineProfile
+from thermocomp.recordings.profiles import MIN_POSITIONS
+
+FloatArray = NDArray[np.float64]
+Kind = Literal["polynomial", "spline"]
+# of a polynomial: degree in the own coordinate and in the others; of a spline: inner knots and 0
+Order = tuple[int, int]
+
+#: beyond these no profile is told from noise
+HIGHEST, HIGHEST_OTHER, MOST_KNOTS = 9, 3, 12
+#: so many positions between the ends are needed to judge by them alone
+FEW = 3
+#: A spline through all means takes over if its mean square at points left out is below this share of a polynomial's.
+#: With so few positions, leaving one out doubles the spacing and judges it too hard: a larger share holds, or against
+#: a constant, which only noise may call for, all of it.
+CLEARLY, BARELY, FEW_POSITIONS = 0.5, 1.25, 8
+#: a fit that leaves more than repeated values differ is told from chance at this level
+LEVEL = 0.01
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A profile that was tried.
+
+    Parameters
+    ----------
+    order : (int, int)
+        Polynomial: degree in the axis' own coordinate and in the others. Spline: number of inner knots, and 0.
+    n_terms : int
+    left_out : float
+        RMS error at points that were left out, one after the other [unit]; inf if the others do not determine it.
+    margin : float
+        Standard error of its square [unit^2].
+    misfit : float
+        Probability that a fit which leaves nothing but noise leaves so much beyond what repeated values differ by (F
+        test for lack of fit); nan where the noise is not known.
+    through : bool
+        True for the natural spline through the means of all positions; its order is (positions - 2, 0).
+    """
+
+    order: Order
+    n_terms: int
+    left_out: float
+    margin: float
+    misfit: float = float("nan")
+    through: bool = False
+
+
+@dataclass(frozen=True)
+class ProfileFit:
+    """A geometric profile, and what it was chosen from.
+
+    Parameters
+    ----------
+    profile : Profile
+    order : (int, int)
+        See `Tried`.
+    tried : tuple of Tried
+        By rising number of terms; empty if the order was given.
+    rms : float
+        What the fit leaves [unit], per degree of freedom; nan if there is none.
+    noise : float
+        Standard deviation of the values at one point [unit]; nan where none comes twice, or only with the same number.
+    misfit : float
+        See `Tried`.
+    through : bool
+        True if it is the natural spline through the means of all positions.
+    """
+
+    profile: Profile
+    order: Order
+    tried: tuple[Tried, ...]
+    rms: float
+    noise: float = float("nan")
+    misfit: float = float("nan")
+    through: bool = False
+
+    @property
+    def leaves_more(self) -> bool:
+        """True if the fit leaves clearly more than the noise, which is known only where points come several times."""
+        return self.misfit < LEVEL
+
+    @property
+    def words(self) -> str:
+        """Say what a reader must know of it; empty if there is nothing."""
+        if self.leaves_more:
+            return (
+                f"leaves {self.rms:.3g} where repeated values differ by {self.noise:.3g}: it misses part of the shape"
+            )
+        return ""
+
+
+def fit_profile(
+    points: FloatArray,
+    values: FloatArray,
+    axis: str,
+    *,
+    kind: Kind = "polynomial",
+    order: int | Order | Literal["auto"] = "auto",
+    coordinates: str | None = None,
+) -> ProfileFit:
+    """Fit the geometric profile f_g(x, y, z) by least squares (C-04, C-06, C-22).
+
+    Without an order, those are tried that leave a third of the points to spare: every point between the ends of the
+    axis' travel is left out in turn, with all values that were measured there, and told from the others; of the orders
+    whose mean square is within one standard error of the smallest, the one with the fewest terms is taken. The ends are
+    not left out: a profile is never used beyond them, and what an order does there would decide alone. Only where there
+    are fewer than three positions between them, too few to judge by, they are left out too.
+
+    Where points come several times, the noise is known: orders that leave clearly more are not taken (`LEVEL`).
+
+    With 5 to 8 positions no order may follow the profile. Along one coordinate a natural spline through the means of
+    all positions therefore competes, from 4 positions on. It takes over if no order fits, or if it tells points that
+    were left out clearly better (`CLEARLY`); with few positions, where the noise is not known, already if about as well
+    (`BARELY`), or better than a constant. It follows the noise, but misses little of the shape.
+
+    Parameters
+    ----------
+    points : ndarray of shape (n, 3)
+        x, y, z [mm]; a point may come several times.
+    values : ndarray of shape (n,)
+        [unit]; nan where a point was missed.
+    axis : {'X', 'Y', 'Z'}
+        The own one.
+    kind : {'polynomial', 'spline'}
+        A polynomial in all coordinates, or a cubic spline along the own one.
+    order : int, (int, int) or 'auto'
+        Degree in the own coordinate, or that and the degree in the others; or the number of inner knots of a spline.
+    coordinates : str, optional
+        Axes that the profile may depend on, such as ``YX``; all whose position varies if not given.
+
+    Returns
+    -------
+    ProfileFit
+
+    Raises
+    ------
+    InputError
+        Kind, order or coordinates cannot be.
+    FitError
+        There are too few points.
+    """
+    there = np.isfinite(values)
+    points, values = points[there], values[there]
+    others, n_own = _suited(points, axis, kind, coordinates)
+    place = np.unique(points, axis=0, return_inverse=True)[1].ravel()
+    shape = _Spline(points, axis) if kind == "spline" else _Polynomial(points, axis, others)
+    tried: list[Tried] = []
+    through = False
+    if order == "auto":
+        n_places = int(place.max()) + 1
+        tried = [_try(shape.columns(o), values, place, points, axis, o) for o in shape.orders(n_places)]
+        if n_own > MIN_POSITIONS and (kind == "spline" or not others):
+            tried.append(_try_through(_Through(points, axis), values, place, points, axis))
+        if not tried or not np.isfinite(min(t.left_out for t in tried)):
+            raise FitError(f"profile along {axis}: {n_places} points are too few to choose an order; give it")
+        tried.sort(key=lambda t: (t.n_terms, t.order))
+        best = _choose(tried, n_own)
+        chosen, through = best.order, best.through
+    else:
+        chosen = order if isinstance(order, tuple) else (order, 1 if others and order and kind == "polynomial" else 0)
+        if min(chosen) < 0:
+            raise InputError(f"order {order}: must not be negative")
+    taken = _Through(points, axis) if through else shape
+    columns = taken.columns(chosen)
+    n_terms = columns.shape[1]
+    if np.linalg.matrix_rank(columns) < n_terms:
+        raise FitError(f"profile along {axis}: {len(np.unique(place))} points do not determine {n_terms} terms")
+    found: FloatArray = np.asarray(np.linalg.lstsq(columns, values)[0], dtype=np.float64)
+    left = values - columns @ found
+    spare = len(values) - n_terms
+    return ProfileFit(
+        profile=taken.profile(chosen, found),
+        order=chosen,
+        tried=tuple(tried),
+        rms=float(np.sqrt(left @ left / spare)) if spare > 0 else float("nan"),
+        noise=float(np.sqrt(_noise(values, place)[0])),
+        misfit=_misfit(left, values, place, n_terms),
+        through=through,
+    )
+
+
+def _suited(points: FloatArray, axis: str, kind: Kind, coordinates: str | None) -> tuple[str, int]:
+    """Refuse what no profile can be fitted to; return the other axes it depends on, and its positions along its own."""
+    varying = "".join(a for k, a in enumerate("XYZ") if points.size and np.ptp(points[:, k]) > 0)
+    used = varying if coordinates is None else coordinates
+    if axis not in varying:
+        raise FitError(f"profile along {axis}: all positions along {axis} are the same")
+    if kind not in ("polynomial", "spline"):
+        raise InputError(f"profile {kind!r}: choose polynomial or spline")
+    if any(a not in "XYZ" for a in used) or (coordinates is not None and axis not in used):
+        raise InputError(f"coordinates {used!r}: name the own axis {axis} and, if wanted, others of X, Y, Z")
+    others = "".join(a for a in used if a != axis and a in varying)
+    if kind == "spline" and others and coordinates is not None:
+        raise InputError(f"a spline is one along {axis} alone: for {used} choose a polynomial")
+    n_own = len(np.unique(points[:, "XYZ".index(axis)]))
+    if n_own < MIN_POSITIONS:
+        raise FitError(f"profile along {axis}: values at {n_own} positions; at least {MIN_POSITIONS} are needed")
+    return others, n_own
+
+
+def _choose(tried: Sequence[Tried], n_own: int) -> Tried:
+    """Choose among what was tried, sorted by the number of terms."""
+    through = next((t for t in tried if t.through), None)
+    orders = [t for t in tried if not t.through and np.isfinite(t.left_out)]
+    fitting = [t for t in orders if not t.misfit < LEVEL]
+    if through is not None and np.isfinite(through.left_out) and not fitting:
+        return through
+    best = min(fitting or orders, key=lambda t: t.left_out)
+    chosen = next(t for t in fitting or orders if t.left_out**2 <= best.left_out**2 + best.margin)
+    if through is None:
+        return chosen
+    hard = n_own <= FEW_POSITIONS and np.isnan(chosen.misfit)
+    share = CLEARLY if not hard else BARELY if chosen.n_terms > 1 else 1.0
+    return through if through.left_out**2 < share * chosen.left_out**2 else chosen
+
+
+def _noise(values: FloatArray, place: NDArray[np.intp]) -> tuple[float, int]:
+    """Return the variance of values at one place, and its degrees of freedom; nan and 0 if it is not known."""
+    count = np.bincount(place)
+    within = values - (np.bincount(place, values) / count)[place]
+    spare = len(values) - len(count)
+    # the same numbers again are copies of one measurement, not repeated ones
+    if np.abs(within).max() <= 1e-9 * np.abs(values).max():
+        return float("nan"), 0
+    return float(within @ within / spare), spare
+
+
+def _misfit(left: FloatArray, values: FloatArray, place: NDArray[np.intp], n_terms: int) -> float:
+    """Return the probability of the F test for lack of fit, from what a fit leaves."""
+    noise, spare = _noise(values, place)
+    free = int(place.max()) + 1 - n_terms
+    if not spare or free <= 0:
+        return 1.0 if spare else float("nan")
+    lack = max(float(left @ left) - noise * spare, 0.0) / free
+    return float(fisher.sf(lack / noise, free, spare))
+
+
+def _left_out(points: FloatArray, place: NDArray[np.intp], axis: str) -> NDArray[np.intp]:
+    """Return the places to leave out: those between the ends."""
+    own = points[:, "XYZ".index(axis)]
+    inside = (own > own.min()) & (own < own.max())
+    return np.unique(place[inside] if len(np.unique(own[inside])) >= FEW else place)
+
+
+def _try(
+    columns: FloatArray, values: FloatArray, place: NDArray[np.intp], points: FloatArray, axis: str, order: Order
+) -> Tried:
+    """Leave out each point between the ends in turn; by the hat matrix, without fitting anew."""
+    n_terms = columns.shape[1]
+    Q, R = np.linalg.qr(columns)
+    sizes = np.abs(np.diag(R))
+    if sizes.min() <= 1e-10 * sizes.max():
+        return Tried(order, n_terms, np.inf, np.inf)
+    residual = values - Q @ (Q.T @ values)
+    squares = []
+    for k in _left_out(points, place, axis):
+        rows = np.flatnonzero(place == k)
+        free = np.eye(len(rows)) - Q[rows] @ Q[rows].T
+        if np.linalg.cond(free) > 1e10:
+            return Tried(order, n_terms, np.inf, np.inf)
+        squares.append(float(np.mean(np.linalg.solve(free, residual[rows]) ** 2)))
+    return Tried(order, n_terms, *_mean(squares), _misfit(residual, values, place, n_terms))
+
+
+def _try_through(
+    spline: "_Through", values: FloatArray, place: NDArray[np.intp], points: FloatArray, axis: str
+) -> Tried:
+    """Leave out each point between the ends in turn, and lay the spline through the others."""
+    squares = []
+    for k in _left_out(points, place, axis):
+        out = place == k
+        told = spline.through(values, ~out)(spline.position[out])
+        squares.append(float(np.mean((values[out] - told) ** 2)))
+    n_terms = len(spline.places)
+    residual = values - spline.through(values)(spline.position)
+    misfit = _misfit(residual, values, place, n_terms)
+    return Tried((n_terms - 2, 0), n_terms, *_mean(squares), misfit, through=True)
+
+
+def _mean(squares: Sequence[float]) -> tuple[float, float]:
+    """Return the root of their mean, and the standard error of the mean."""
+    return float(np.mean(squares) ** 0.5), float(np.std(squares, ddof=1) / len(squares) ** 0.5)
+
+
+class _Polynomial:
+    """Terms u^i v^j w^k: i up to the own degree, j + k up to the others', i + j + k up to the larger of the two."""
+
+    def __init__(self, points: FloatArray, axis: str, others: str) -> None:
+        low, high = self.low, self.high = points.min(axis=0), points.max(axis=0)
+        self.centre = (low + high) / 2
+        self.scale = np.where(high > low, (high - low) / 2, 1.0)
+        self.scaled = (points - self.centre) / self.scale
+        self.own = "XYZ".index(axis)
+        self.others = ["XYZ".index(a) for a in others]
+        self.distinct = [len(np.unique(points[:, a])) for a in range(3)]
+
+    def orders(self, n_places: int) -> Iterator[Order]:
+        """Give the orders that leave a third of the points to spare, and no degree that a coordinate cannot tell."""
+        # Least squares on equidistant positions swings between them where the degree is above 2 sqrt(n).
+        n_own = self.distinct[self.own]
+        highest = min(n_own - 2, int(2 * n_own**0.5), HIGHEST)
+        other = min(max((self.distinct[a] - 1 for a in self.others), default=0), HIGHEST_OTHER)
+        for i in range(highest + 1):
+            for j in range(min(other, i) + 1 if i else 1):
+                if 3 * len(self.exponents((i, j))) <= 2 * n_places:
+                    yield i, j
+
+    def exponents(self, order: Order) -> list[tuple[int, int, int]]:
+        limits = [0, 0, 0]
+        limits[self.own] = order[0]
+        for a in self.others:
+            limits[a] = min(order[1], self.distinct[a] - 1)
+        possible = np.ndindex(limits[0] + 1, limits[1] + 1, limits[2] + 1)
+        return [e for e in possible if sum(e) - e[self.own] <= order[1] and sum(e) <= max(order)]
+
+    def columns(self, order: Order) -> FloatArray:
+        return np.stack([np.prod(self.scaled ** np.array(e), axis=1) for e in self.exponents(order)], axis=1)
+
+    def profile(self, order: Order, found: FloatArray) -> PolynomialProfile:
+        def three(a: FloatArray) -> tuple[float, float, float]:
+            return float(a[0]), float(a[1]), float(a[2])
+
+        return PolynomialProfile(
+            exponents=tuple(self.exponents(order)),
+            coefficients=tuple(found.tolist()),
+            centre=three(self.centre),
+            scale=three(self.scale),
+            low=three(self.low),
+            high=three(self.high),
+        )
+
+
+class _Along:
+    """A profile along its own axis alone."""
+
+    def __init__(self, points: FloatArray, axis: str) -> None:
+        self.axis = axis
+        self.position = points[:, "XYZ".index(axis)]
+        self.places = np.unique(self.position)
+
+
+class _Spline(_Along):
+    """Cubic spline whose inner knots part the positions into equal numbers."""
+
+    def orders(self, n_places: int) -> Iterator[Order]:  # noqa: ARG002 - only positions along the axis count
+        """Give the numbers of knots that leave two positions to spare."""
+        for n in range(min(len(self.places) - 6, MOST_KNOTS) + 1):
+            yield n, 0
+
+    def knots(self, order: Order) -> FloatArray:
+        inner = np.quantile(self.places, np.linspace(0, 1, order[0] + 2))
+        return np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
+
+    def columns(self, order: Order) -> FloatArray:
+        return np.asarray(BSpline.design_matrix(self.position, self.knots(order), 3).toarray())
+
+    def profile(self, order: Order, found: FloatArray) -> SplineProfile:
+        knots = self.knots(order)
+        pieces = PPoly.from_spline(BSpline(knots, found, 3))
+        return _pieces(self.axis, knots[3:-3], pieces.c[:, 3:-3])
+
+
+class _Through(_Along):
+    """Natural cubic spline through the means of all positions."""
+
+    def through(self, values: FloatArray, rows: NDArray[np.bool_] | slice = slice(None)) -> CubicSpline:
+        """Return the spline through the means of some rows."""
+        places, which = np.unique(self.position[rows], return_inverse=True)
+        means = np.bincount(which, values[rows]) / np.bincount(which)
+        return CubicSpline(places, means, bc_type="natural")
+
+    def columns(self, order: Order) -> FloatArray:  # noqa: ARG002 - there is one
+        return np.asarray(self.position[:, None] == self.places, dtype=np.float64)
+
+    def profile(self, order: Order, found: FloatArray) -> SplineProfile:  # noqa: ARG002
+        return _pieces(self.axis, self.places, CubicSpline(self.places, found, bc_type="natural").c)
+
+
+def _pieces(axis: str, knots: FloatArray, falling: FloatArray) -> SplineProfile:
+    """Return a spline profile from the coefficients of its pieces by falling power [unit/mm^k], (4, n_pieces)."""
+    scaled = falling[::-1] * np.diff(knots) ** np.arange(4)[:, None]
+    return SplineProfile(
+        axis=axis,
+        knots=tuple(knots.tolist()),
+        pieces=tuple((float(a), float(b), float(c), float(d)) for a, b, c, d in scaled.T),
+    )

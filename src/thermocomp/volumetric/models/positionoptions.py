@@ -1,0 +1,262 @@
+"""How a position-dependent error is modelled, and what of that its own profiles tell."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import FitError, InputError
+from thermocomp.core.inputs import Support
+from thermocomp.models.base import ThermalRegressor
+from thermocomp.recordings.profiles import Profiles
+from thermocomp.volumetric.models.geometric import Kind, Order
+
+BoolArray = NDArray[np.bool_]
+Setting = Literal["slopes", "offset", "reference_position"]
+
+#: all that profiles tell
+SETTINGS: tuple[Setting, ...] = ("slopes", "offset", "reference_position")
+#: powers whose remainder is told (C-05)
+POWERS = (1, 2, 3)
+#: one more power is worth it if it takes away this share of what is left, and this share of the thermal part
+WORTH_OF_REST, WORTH_OF_THERMAL = 0.1, 0.05
+
+
+@dataclass(frozen=True, kw_only=True)
+class PositionOptions:
+    """How a position-dependent error is modelled.
+
+    Parameters
+    ----------
+    method : str or ThermalRegressor
+        Of the slopes: any method of `thermocomp.models.methods`, or an estimator with settings of its own.
+    inputs : sequence of str, optional
+        Channels to predict the slopes from; all temperatures and the spindle speed if not given.
+    slopes : int
+        m, the highest power of the position; Chen finds 1 enough (C-05). 0 without an offset: the cold profile alone.
+    offset : bool
+        Model a k_0(t) too; without it the thermal part is zero at the reference position, as Chen's.
+    profile : {'polynomial', 'spline'}
+    order : int, (int, int) or 'auto'
+        Of the profile; see `thermocomp.volumetric.models.geometric.fit_profile`.
+    coordinates : str, optional
+        Axes the profile may depend on (C-06).
+    reference : int or sequence of int
+        States that count as cold, in each test; of several, the mean (C-07). Temperatures are counted from them too.
+    reference_position : float, optional
+        Where q is zero [mm]. If not given: the axis' zero, or the end of the measured travel that is next to it.
+    rezero : bool
+        False: all tests count from one cold state, the mean of their reference states, and so does the model live:
+        temperatures are absolute. For a machine whose cold profile is not the same every morning.
+    support : Support
+        What the models of the slopes do outside their trained range.
+    """
+
+    method: str | ThermalRegressor = "mra"
+    inputs: Sequence[str] | None = None
+    slopes: int = 1
+    offset: bool = False
+    profile: Kind = "polynomial"
+    order: int | Order | Literal["auto"] = "auto"
+    coordinates: str | None = None
+    reference: int | Sequence[int] = 0
+    reference_position: float | None = None
+    rezero: bool = True
+    support: Support = Support()
+
+    def __post_init__(self) -> None:
+        if self.reference_position is not None and not np.isfinite(self.reference_position):
+            raise InputError(f"reference position {self.reference_position} mm: must be a finite number")
+
+    @property
+    def powers(self) -> tuple[int, ...]:
+        """Powers of q whose factors are modelled."""
+        return tuple(range(0 if self.offset else 1, self.slopes + 1))
+
+
+def fill_options(
+    profiles: Profiles | Sequence[Profiles],
+    options: PositionOptions = PositionOptions(),
+    left_open: Sequence[Setting] = SETTINGS,
+    *,
+    learn: BoolArray | None = None,
+) -> PositionOptions:
+    """Fill in what the profiles tell of themselves; temperatures are not looked at.
+
+    - Reference position: the measured one where the thermal part is smallest: powers that are zero there leave least. A
+      laser counts from where it was set to zero, a screw grows from its fixed bearing.
+    - Offset: if the thermal part is more than noise even there: one takes away a tenth of what powers alone leave.
+    - Slopes: the fewest powers to which one more adds little, as `PositionFit.enough`; none, if the thermal part is
+      noise.
+
+    Parameters
+    ----------
+    profiles : Profiles or sequence of Profiles
+        Of one component, one per test.
+    options : PositionOptions
+        What is not left open stays.
+    left_open : sequence of {'slopes', 'offset', 'reference_position'}
+    learn : ndarray of bool of shape (n_states,), optional
+        States that may be looked at; see `thermocomp.volumetric.models.position.fit_position`.
+
+    Returns
+    -------
+    PositionOptions
+
+    Raises
+    ------
+    FitError
+        No state may be looked at.
+    """
+    tests = set_cold_profiles((profiles,) if isinstance(profiles, Profiles) else tuple(profiles), options, learn)
+    tests = blank_unlearned(tests, options, learn)
+    thermal = remainder(tests, replace(options, offset=False), 0)
+    shifted = {m: remainder(tests, replace(options, offset=True), m) for m in POWERS}
+    if "reference_position" in left_open:
+        m = choose_power(shifted, thermal) or 1 if "slopes" in left_open else options.slopes
+        options = replace(options, reference_position=_quietest(tests, options, m))
+    if "offset" in left_open:
+        # beside all powers, lest a bent profile is taken for a shifted one
+        known = [m for m in POWERS if np.isfinite(shifted[m])]
+        m = max(known, default=1) if "slopes" in left_open else options.slopes
+        without, with_it = (remainder(tests, replace(options, offset=o), m) for o in (False, True))
+        options = replace(options, offset=is_worthwhile(without, with_it, 0.0))
+    if "slopes" in left_open:
+        rests = {m: remainder(tests, options, m) for m in (0, *POWERS)}
+        options = replace(options, slopes=choose_power(rests, thermal) or 0)
+    return options
+
+
+def reference_position(tests: Sequence[Profiles], options: PositionOptions) -> float:
+    """Return where q is zero [mm]: see `PositionOptions`.
+
+    Parameters
+    ----------
+    tests : sequence of Profiles
+    options : PositionOptions
+    """
+    if options.reference_position is not None:
+        return options.reference_position
+    low, high = min(t.position.min() for t in tests), max(t.position.max() for t in tests)
+    return float(min(max(0.0, low), high))
+
+
+def set_cold_profiles(
+    tests: Sequence[Profiles], options: PositionOptions, learn: BoolArray | None = None
+) -> tuple[Profiles, ...]:
+    """Return the tests with the profile that counts as cold: each its own, or all the mean (`PositionOptions.rezero`).
+
+    Parameters
+    ----------
+    tests : sequence of Profiles
+    options : PositionOptions
+    learn : ndarray of bool of shape (n_states,), optional
+        The mean is that of the tests of which a state may be learned from; see `blank_unlearned`.
+
+    Raises
+    ------
+    InputError
+        There is to be one cold profile for tests that were not measured at the same points.
+    """
+    if options.rezero:
+        return tuple(tests)
+    for test in tests[1:]:
+        if not np.array_equal(test.points, tests[0].points):
+            raise InputError(
+                f"profiles of {test.target}: to count from one cold state all tests need the same positions"
+            )
+    zero = np.mean([test.cold(options.reference) for test in blank_unlearned(tests, options, learn)], axis=0)
+    return tuple(replace(test, zero=zero) for test in tests)
+
+
+def blank_unlearned(
+    tests: Sequence[Profiles], options: PositionOptions, learn: BoolArray | None = None
+) -> tuple[Profiles, ...]:
+    """Return what may be learned from: the other states are blank, tests of which there is none are left out.
+
+    Parameters
+    ----------
+    tests : sequence of Profiles
+    options : PositionOptions
+        Its reference states stay, wherever one state of the test may be learned from.
+    learn : ndarray of bool of shape (n_states,), optional
+        Over all tests; all if not given.
+
+    Returns
+    -------
+    tuple of Profiles
+
+    Raises
+    ------
+    FitError
+        None is left.
+    """
+    if learn is None:
+        return tuple(tests)
+    found = []
+    for test, mine in zip(tests, np.split(learn, np.cumsum([len(test) for test in tests])[:-1]), strict=True):
+        if mine.any():
+            kept = mine.copy()
+            kept[test.reference_rows(options.reference)] = True
+            found.append(replace(test, values=np.where(kept[:, None], test.values, np.nan)))
+    if not found:
+        raise FitError(f"{tests[0].target}: no state is left to learn from")
+    return tuple(found)
+
+
+def remainder(tests: Sequence[Profiles], options: PositionOptions, m: int) -> float:
+    """Return what powers up to m leave of the thermal part, RMS per degree of freedom; reference states do not count.
+
+    Parameters
+    ----------
+    tests : sequence of Profiles
+    options : PositionOptions
+        Tells whether there is an offset too, and where q is zero.
+    m : int
+        0 without an offset: nothing is fitted, the thermal part itself is told.
+
+    Returns
+    -------
+    float
+        [unit]; nan if there are not enough positions.
+    """
+    if not m and not options.offset:
+        warm = [np.delete(t.thermal(options.reference), t.reference_rows(options.reference), axis=0) for t in tests]
+        thermal = np.concatenate([w[np.isfinite(w)] for w in warm])
+        return float(np.sqrt(np.mean(thermal**2))) if thermal.size else 0.0
+    turn = reference_position(tests, options)
+    try:
+        fits = [t.slopes(m, offset=options.offset, reference=options.reference, reference_position=turn) for t in tests]
+    except InputError:
+        return float("nan")
+    return float(np.sqrt(np.mean([f.remainder**2 for f in fits])))
+
+
+def is_worthwhile(before: float, after: float, thermal: float) -> bool:
+    """Return whether a term is worth it that leaves less of a thermal part: a tenth of the rest, a twentieth of it."""
+    return before - after > max(WORTH_OF_REST * before, WORTH_OF_THERMAL * thermal)
+
+
+def choose_power(remainders: Mapping[int, float], thermal: float) -> int | None:
+    """Return the smallest m to which a higher one adds little; None if nothing is known.
+
+    Parameters
+    ----------
+    remainders : mapping of int to float
+        What powers up to m leave [unit], by m.
+    thermal : float
+        The thermal part itself [unit].
+    """
+    known = {m: rest for m, rest in remainders.items() if np.isfinite(rest)}
+    return next(
+        (m for m in known if not is_worthwhile(known[m], min(known[k] for k in known if k >= m), thermal)), None
+    )
+
+
+def _quietest(tests: Sequence[Profiles], options: PositionOptions, m: int) -> float:
+    """Return the measured position about which powers up to m leave least [mm]."""
+    alone = replace(options, offset=False)
+    places = np.unique(np.concatenate([test.position for test in tests])).tolist()
+    return float(min(places, key=lambda p: remainder(tests, replace(alone, reference_position=p), m)))
