@@ -51,10 +51,10 @@ assert len(codes) == 18
 # ------------------------------
 #
 # `~thermocomp.volumetric.models.positionoptions.fill_options` looks at the profiles, never at a temperature, and says
-# what each of them asks for: how many powers of the position move with the temperatures (none, if heat does nothing but noise),
-# whether the profile shifts as a whole, and about which position it turns. Then the cold profile is fitted, and
-# the slopes are learned from the temperatures. These are absolute: a laser reads the machine as it is that
-# morning, and mornings differ.
+# what each of them asks for: how many powers of the position move with the temperatures (none, if heat does nothing but
+# noise), whether the profile shifts as a whole, and about which position it turns. Then the cold profile is fitted, and
+# the slopes are learned from the temperatures. These are absolute: a laser reads the machine as it is that morning, and
+# mornings differ.
 
 fits = {}
 for code in codes:

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from thermocomp.api.inputs import read, training_table
     from thermocomp.api.plan import may_stop, plan
-    from thermocomp.api.verbs import assess, compare, fit, select, simulate
+    from thermocomp.api.verbs import assess, compare, fit, select
     from thermocomp.core.correction import Correction, Deviation, Limits
     from thermocomp.core.exceptions import ThermocompError
+    from thermocomp.core.explained import explain
     from thermocomp.core.lineardynamic import LinearDynamic
     from thermocomp.core.model import ErrorModel
     from thermocomp.core.polynomial import Polynomial
@@ -42,13 +43,14 @@ if TYPE_CHECKING:
     from thermocomp.nc.revise import revise
     from thermocomp.recordings.recording import Recording
     from thermocomp.recordings.starts import Start
+    from thermocomp.virtual.verbs import simulate
 
 __version__ = version("thermocomp")
 
 _PUBLIC = {
     # the main job
     "read": "thermocomp.api.inputs",
-    "simulate": "thermocomp.api.verbs",
+    "simulate": "thermocomp.virtual.verbs",
     "select": "thermocomp.api.verbs",
     "compare": "thermocomp.api.verbs",
     "fit": "thermocomp.api.verbs",
@@ -56,6 +58,7 @@ _PUBLIC = {
     "revise": "thermocomp.nc.revise",
     "plan": "thermocomp.api.plan",
     "may_stop": "thermocomp.api.plan",
+    "explain": "thermocomp.core.explained",
     "freeze": "thermocomp.models.pipelines",
     "training_table": "thermocomp.api.inputs",
     "Recording": "thermocomp.recordings.recording",
@@ -130,6 +133,7 @@ __all__ = [
     "__version__",
     "assess",
     "compare",
+    "explain",
     "fit",
     "freeze",
     "may_stop",

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from thermocomp.core.exceptions import RecordingError, UnitError
 from thermocomp.recordings.checks.quality import check
 from thermocomp.recordings.cycles import Cycle, make_single_cycle
-from thermocomp.recordings.readers.headings import understand
+from thermocomp.recordings.headings import understand
 from thermocomp.recordings.readers.mapping import ColumnMap, CycleRule, Mapping, ReadOptions, TimeColumn, read_mapping
 from thermocomp.recordings.readers.recordings import read
 

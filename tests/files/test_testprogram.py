@@ -7,10 +7,10 @@ from typing import get_args
 
 import pytest
 
+from thermocomp.api.testprogram import Dialect, stretches, write_program, write_sheet, write_test
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
 from thermocomp.judging.planning.planning import make_grid
-from thermocomp.judging.planning.testprogram import Dialect, stretches, write_program, write_sheet, write_test
 from thermocomp.judging.planning.trial import Trial
 from thermocomp.nc.interpreter.block import Setup
 from thermocomp.nc.interpreter.interpret import follow_program

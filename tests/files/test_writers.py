@@ -45,7 +45,7 @@ WRITING = {
     "live/commands/serve.py",  # the configuration of its demo: a text, never over another
     "files/jsonfile.py",
     "recordings/readers/recordings.py",
-    "judging/planning/testprogram.py",
+    "api/testprogram.py",
     "report/assessed.py",
     "report/checks.py",
     "report/html.py",

@@ -17,6 +17,7 @@ from linuxcncmill import write_linuxcnc_mill
 from reviseruns import PLATE, judged
 from smallmachine import small_machine
 
+from thermocomp.api import testprogram
 from thermocomp.cli.app import run
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
@@ -24,7 +25,6 @@ from thermocomp.core.position import PositionModel
 from thermocomp.core.profile import SplineProfile
 from thermocomp.files import modelfile, positionfile
 from thermocomp.iso230.report import iso230 as iso230pages
-from thermocomp.judging.planning import testprogram
 from thermocomp.judging.planning.trial import Trial
 from thermocomp.live.adapters.linuxcnc import halsetup
 from thermocomp.live.adapters.linuxcnc.halsetup import COMPONENT_NAME, HAL_NAME, HalSettings

@@ -13,8 +13,8 @@ from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.core.machine import Channel
 from thermocomp.recordings.checks.quality import check
 from thermocomp.recordings.compensated import beside, refuse_compensated
+from thermocomp.recordings.headings import understand
 from thermocomp.recordings.readers import recordings
-from thermocomp.recordings.readers.headings import understand
 from thermocomp.recordings.readers.mapping import Mapping, read_mapping
 from thermocomp.recordings.recording import Recording
 

@@ -7,14 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from thermocomp.api import testprogram
 from thermocomp.api.inputs import Given, Prepared, Starts, judging_of, prepare, recordings_of
 from thermocomp.api.results import Result
+from thermocomp.api.testprogram import Dialect
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
-from thermocomp.judging.planning import learningcurve, planning, testprogram
+from thermocomp.judging.planning import learningcurve, planning
 from thermocomp.judging.planning.learningcurve import LearningCurve
 from thermocomp.judging.planning.planning import Candidate, Plan
-from thermocomp.judging.planning.testprogram import Dialect
 from thermocomp.judging.settling.stopping import Running, judge_running
 from thermocomp.judging.splits import Judging
 from thermocomp.recordings.readers.mapping import Mapping

@@ -1,4 +1,4 @@
-"""The main job in Python: simulate, select, compare, fit, assess. The commands' words are the keywords."""
+"""The main job in Python: select, compare, fit, assess. The commands' words are the keywords."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
@@ -20,9 +20,6 @@ from thermocomp.judging.probing import Probings
 from thermocomp.judging.results import Assessment, Rules
 from thermocomp.judging.sharing import shared_among
 from thermocomp.recordings.readers.mapping import Mapping
-from thermocomp.recordings.recording import Recording
-from thermocomp.virtual import datasets as virtual
-from thermocomp.virtual.protocol import Physics
 
 DEFAULT_MODELS = ("ols", "partial-f", "mra", "dynamic", "averaged")
 SelectionMethod = Literal["pareto", "subsets", "grouping", "partial-f", "stepwise", "ace"]
@@ -31,46 +28,6 @@ Policy = Literal["clip", "hold", "fade"]
 
 def _silent(_: str, steps: int = 1) -> None:
     """Say nothing."""
-
-
-def simulate(
-    experiment: str | Path = "demo",
-    *,
-    physics: Physics | None = None,
-    seed: int = 0,
-    noise: float | None = None,
-) -> list[Recording]:
-    """Record an experiment on a virtual machine.
-
-    Parameters
-    ----------
-    experiment : str or Path
-        One that comes with the package, such as ``demo``, or a protocol of one's own (.toml).
-    physics : {'linear', 'nonlinear'}, optional
-        Of the machine; what the experiment says without it.
-    seed : int
-        Of weather and noise.
-    noise : float, optional
-        Standard deviation of the temperature noise [degC]; the sensor's own without it.
-
-    Returns
-    -------
-    list of Recording
-        One per test.
-
-    Raises
-    ------
-    InputError
-        There is no such experiment.
-
-    Examples
-    --------
-    >>> import thermocomp as tc
-    >>> (recording,) = tc.simulate("hwang", seed=1)
-    >>> recording
-    <Recording hwang: 37 rows, 6.0 h, 14 temperatures, 1 displacements, 4 thermal cycle(s)>
-    """
-    return virtual.record(experiment, physics=physics, seed=seed, sensor_noise=noise)
 
 
 def compare(

@@ -4,13 +4,9 @@ from pathlib import Path
 
 from thermocomp.cli import loudness
 from thermocomp.cli.beginning import Beginning
-from thermocomp.cli.options import (
-    CompensatorOptions,
-    OptionalOutput,
-    read_recordings,
-    tell_trouble,
-)
+from thermocomp.cli.options import CompensatorOptions, OptionalOutput
 from thermocomp.cli.progress import show_steps
+from thermocomp.cli.reading import read_recordings, tell_trouble
 from thermocomp.cli.terminal import console
 from thermocomp.files.draft import refuse_existing
 

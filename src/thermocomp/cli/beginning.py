@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 from cyclopts import Parameter
 
-from thermocomp.cli.options import read_recordings
+from thermocomp.cli.reading import read_recordings
 from thermocomp.core.exceptions import InputError
 
 if TYPE_CHECKING:

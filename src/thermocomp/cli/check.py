@@ -2,10 +2,8 @@
 
 from pathlib import Path
 
-from thermocomp.cli.options import (
-    OptionalOutput,
-    read_recordings,
-)
+from thermocomp.cli.options import OptionalOutput
+from thermocomp.cli.reading import read_recordings
 from thermocomp.cli.terminal import console
 from thermocomp.files.draft import refuse_existing
 

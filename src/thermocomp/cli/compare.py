@@ -4,11 +4,7 @@ from pathlib import Path
 
 from thermocomp.cli.beginning import Beginning
 from thermocomp.cli.exits import STOPPED
-from thermocomp.cli.options import (
-    CompensatorOptions,
-    OptionalOutput,
-    StudyOptions,
-)
+from thermocomp.cli.options import CompensatorOptions, OptionalOutput, StudyOptions
 from thermocomp.cli.progress import show_steps
 from thermocomp.cli.terminal import console
 

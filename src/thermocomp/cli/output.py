@@ -24,7 +24,6 @@ from thermocomp.report.losses import describe_losses
 from thermocomp.report.probings import describe_probings
 from thermocomp.report.running import describe_running
 from thermocomp.report.summary import cautions, describe_unlike
-from thermocomp.virtual.protocol import Experiment
 
 
 def show_comparison(
@@ -228,34 +227,6 @@ def _tell_starts(begins: Sequence[tuple[str, Start]], console: Console) -> None:
 
 def _starts(begins: Sequence[tuple[str, Start]]) -> list[dict[str, object]]:
     return [start.content(name) for name, start in begins]
-
-
-def show_simulated(tests: Sequence[Recording], paths: Sequence[Path], console: Console, *, as_json: bool) -> None:
-    """Print what was recorded on the virtual machine."""
-    if as_json:
-        content = [{"file": str(p), **records.recording(r, ())} for r, p in zip(tests, paths, strict=True)]
-        print_json({"recordings": content})
-        return
-    for r, p in zip(tests, paths, strict=True):
-        hours = (r.time[-1] - r.time[0]) / 3600
-        console.print(
-            f"{words(p)}: {len(r)} rows, {hours:.1f} h, {len(r.temperatures)} temperatures, "
-            f"{len(r.displacements)} displacements, {len(r.cycles)} thermal cycle(s)"
-        )
-
-
-def show_experiments(experiments: Sequence[Experiment], console: Console, *, as_json: bool) -> None:
-    """Print what can be recorded on the virtual machines."""
-    if as_json:
-        content = [{"name": e.name, "description": e.description, "tests": len(e.tests)} for e in experiments]
-        print_json({"experiments": content})
-        return
-    columns = (
-        Column("experiment", lambda e: e.name),
-        Column("tests", lambda e: len(e.tests), ">"),
-        Column("what it is", lambda e: e.description),
-    )
-    print_table(Layout(columns, experiments), console, box=None)
 
 
 def _robustness(assessments: Sequence[Assessment]) -> Layout:

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 from cyclopts import Parameter
 
+from thermocomp.api.testprogram import Dialect, picture_of, sheet_of
 from thermocomp.cli.beginning import Beginning
 from thermocomp.cli.jsonoutput import print_json
-from thermocomp.cli.options import OptionalOutput, StudyOptions, read_recordings, tell_trouble
+from thermocomp.cli.options import OptionalOutput, StudyOptions
 from thermocomp.cli.progress import show_steps
+from thermocomp.cli.reading import read_recordings, tell_trouble
 from thermocomp.cli.terminal import console, print_table, words
 from thermocomp.core.exceptions import InputError
-from thermocomp.judging.planning.testprogram import Dialect, picture_of, sheet_of
 
 if TYPE_CHECKING:
     from thermocomp.api.plan import Planned

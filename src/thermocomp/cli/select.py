@@ -4,11 +4,7 @@ from pathlib import Path
 from typing import Literal
 
 from thermocomp.cli.beginning import Beginning
-from thermocomp.cli.options import (
-    OptionalOutput,
-    Selector,
-    StudyOptions,
-)
+from thermocomp.cli.options import OptionalOutput, Selector, StudyOptions
 from thermocomp.cli.progress import show_steps
 from thermocomp.cli.terminal import console
 

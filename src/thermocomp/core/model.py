@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, ClassVar, NamedTuple, Self
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,9 +28,6 @@ from thermocomp.core.provenance import HonestError, Provenance
 from thermocomp.core.validity import Validity
 from thermocomp.core.watch import Watch
 from thermocomp.core.zero import FIRST_READING, Zeroing, find_zero
-
-if TYPE_CHECKING:
-    from thermocomp.core.explained import Explanation
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -460,12 +457,6 @@ class ErrorModel(ABC):
     def formula(self) -> str:
         """Return the model as one line of text."""
         return format_node(self.expression())
-
-    def explain(self) -> "Explanation":
-        """Return what it predicts from what, how good it is, and what a failure of each sensor does: print it."""
-        from thermocomp.core.explained import explain
-
-        return explain(self)
 
     @property
     def accepted(self) -> bool:

@@ -16,9 +16,9 @@ from thermocomp.core.ports import Confirming, Probe, Sink, Source, Suspending
 from thermocomp.core.reading import Measurement, Reading
 from thermocomp.live import statefile
 from thermocomp.live.clock import Clock
+from thermocomp.live.events import Events
 from thermocomp.live.latest import Latest
 from thermocomp.live.links import TIMEOUT, Inlet, Link, Outlet, within
-from thermocomp.live.page.events import Events
 from thermocomp.live.probe import KEPT, Checked, check
 from thermocomp.live.recorder import CONFIRM_WITHIN, Recorder
 from thermocomp.runtime.adaptation import Adaptation, Probing

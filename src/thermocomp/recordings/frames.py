@@ -13,7 +13,7 @@ from thermocomp.core.instants import seconds
 from thermocomp.core.machine import Channel
 from thermocomp.core.units import find_unit
 from thermocomp.recordings.cycles import Cycle, find_cycles, make_single_cycle, split_by_labels
-from thermocomp.recordings.readers.headings import Meaning, understand
+from thermocomp.recordings.headings import Meaning, understand
 
 FloatArray = NDArray[np.float64]
 

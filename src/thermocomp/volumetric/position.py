@@ -16,12 +16,12 @@ from thermocomp.recordings.readers import mapping as mappings
 from thermocomp.recordings.readers import profiles as tables
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
-from thermocomp.report import records
 from thermocomp.volumetric.judging import position as assessing
 from thermocomp.volumetric.judging.position import PositionStudy
 from thermocomp.volumetric.models.position import PositionOptions
 from thermocomp.volumetric.models.positionoptions import Setting
 from thermocomp.volumetric.positionsettings import PositionSettings
+from thermocomp.volumetric.report import records
 
 #: stands for every component that has columns of its own
 ALL = "all"

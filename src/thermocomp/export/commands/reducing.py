@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 from cyclopts import Parameter
 
 from thermocomp.cli.beginning import Beginning
-from thermocomp.cli.options import read_recordings, tell_trouble
 from thermocomp.cli.progress import show_steps
+from thermocomp.cli.reading import read_recordings, tell_trouble
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel

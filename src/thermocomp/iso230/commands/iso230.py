@@ -7,12 +7,8 @@ from cyclopts import Parameter
 
 from thermocomp.cli.beginning import Beginning
 from thermocomp.cli.jsonoutput import print_json
-from thermocomp.cli.options import (
-    CompensatorOptions,
-    OptionalOutput,
-    read_recordings,
-    tell_trouble,
-)
+from thermocomp.cli.options import CompensatorOptions, OptionalOutput
+from thermocomp.cli.reading import read_recordings, tell_trouble
 from thermocomp.cli.terminal import console, make_console, print_table, words
 from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.files.draft import refuse_existing

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from thermocomp.core.exceptions import InputError, UnitError
 from thermocomp.core.units import Unit
-from thermocomp.recordings.readers.headings import understand
+from thermocomp.recordings.headings import understand
 from thermocomp.recordings.readers.leftout import why_left_out
 from thermocomp.recordings.readers.limits import Limits, check_file
 

@@ -8,12 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from thermocomp.cli.jsonoutput import print_json
-from thermocomp.cli.options import (
-    OptionalOutput,
-    read_recordings,
-    tell_trouble,
-)
+from thermocomp.cli.options import OptionalOutput
 from thermocomp.cli.progress import show_share
+from thermocomp.cli.reading import read_recordings, tell_trouble
 from thermocomp.cli.terminal import console, make_console, marked, print_table, words
 from thermocomp.core.exceptions import InputError
 from thermocomp.files.draft import refuse_existing

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from thermocomp.core.exceptions import RecordingError, UnitError
 from thermocomp.core.machine import Channel
 from thermocomp.core.units import Unit, find_unit
+from thermocomp.recordings.headings import Meaning, understand
 from thermocomp.recordings.readers.cellkinds import Kinds
-from thermocomp.recordings.readers.headings import Meaning, understand
 from thermocomp.recordings.readers.mapping import ColumnMap, Mapping, Place
 from thermocomp.recordings.readers.tables import tell_places
 from thermocomp.recordings.readers.timecolumns import find_position, find_time

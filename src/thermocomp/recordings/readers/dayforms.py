@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from thermocomp.recordings.headings import plain_name
 from thermocomp.recordings.readers.cellkinds import find_kind, plain_dates
-from thermocomp.recordings.readers.headings import plain_name
 from thermocomp.recordings.readers.numbers import is_filler
 from thermocomp.recordings.readers.stamps import parse, read_days
 from thermocomp.recordings.readers.tables import FileTable

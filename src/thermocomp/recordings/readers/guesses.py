@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError, Remedy, UnitError
 from thermocomp.core.units import HOUSE_UNITS
+from thermocomp.recordings.headings import HOUSE_SUFFIX, Meaning, understand
 from thermocomp.recordings.readers.dayforms import find_day_columns
-from thermocomp.recordings.readers.headings import HOUSE_SUFFIX, Meaning, understand
 from thermocomp.recordings.readers.mapping import Mapping
 from thermocomp.recordings.readers.tables import FileTable
 from thermocomp.recordings.readers.times import find_likely_units

@@ -6,13 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from thermocomp.core.units import is_unit
-from thermocomp.recordings.readers.headings import (
-    BRACKETS,
-    find_date_order,
-    is_foreign_unit,
-    is_time_name,
-    is_understood,
-)
+from thermocomp.recordings.headings import BRACKETS, find_date_order, is_foreign_unit, is_time_name, is_understood
 from thermocomp.recordings.readers.numbers import is_filler, is_number_like
 
 #: dates and times of day, in all their habits

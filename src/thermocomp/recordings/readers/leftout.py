@@ -5,7 +5,7 @@ from difflib import get_close_matches
 
 from thermocomp.core.exceptions import RecordingError, UnitError
 from thermocomp.core.units import find_unit
-from thermocomp.recordings.readers.headings import BRACKETS, HOUSE_SUFFIX, SUFFIXES, find_named_quantity
+from thermocomp.recordings.headings import BRACKETS, HOUSE_SUFFIX, SUFFIXES, find_named_quantity
 
 
 def refuse_nameless(headings: Sequence[str], source: str) -> None:

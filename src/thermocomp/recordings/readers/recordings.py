@@ -19,12 +19,12 @@ from thermocomp.core.exceptions import InputError, RecordingError, TwoReadingsEr
 from thermocomp.files.draft import draft
 from thermocomp.recordings.cleaning import clean
 from thermocomp.recordings.cycles import Cycle, find_cycles, make_single_cycle, split_by_labels
+from thermocomp.recordings.headings import understand
 from thermocomp.recordings.readers.cellkinds import find_kind
 from thermocomp.recordings.readers.columns import Column, ColumnPlan, plan
 from thermocomp.recordings.readers.datecheck import check_dates
 from thermocomp.recordings.readers.dayforms import find_day_columns
 from thermocomp.recordings.readers.guesses import guess
-from thermocomp.recordings.readers.headings import understand
 from thermocomp.recordings.readers.leftout import refuse_nameless, why_left_out
 from thermocomp.recordings.readers.limits import Limits, check_file
 from thermocomp.recordings.readers.mapping import ADAPTER, ColumnMap, Mapping, ReadOptions, TimeColumn

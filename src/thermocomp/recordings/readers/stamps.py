@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from thermocomp.recordings.headings import find_date_order
 from thermocomp.recordings.readers.dateorder import Choice, IntArray, find_longest_step, find_order, rises
-from thermocomp.recordings.readers.headings import find_date_order
 
 _CHUNK = 100_000
 #: steps of rows that only a wrong order makes [d]: of a day and month, of a day and year

@@ -6,8 +6,8 @@ from difflib import get_close_matches
 from typing import NamedTuple
 
 from thermocomp.core.exceptions import RecordingError
+from thermocomp.recordings.headings import BRACKETS, Meaning, is_time_name, plain_name
 from thermocomp.recordings.readers.cellkinds import Kinds
-from thermocomp.recordings.readers.headings import BRACKETS, Meaning, is_time_name, plain_name
 from thermocomp.recordings.readers.mapping import Mapping, Place
 
 #: headings of a time without unit, those that say more first

@@ -4,11 +4,8 @@ from pathlib import Path
 
 from thermocomp.cli.compare import compare
 from thermocomp.cli.fit import fit
-from thermocomp.cli.options import (
-    Output,
-    StudyOptions,
-    read_recordings,
-)
+from thermocomp.cli.options import Output, StudyOptions
+from thermocomp.cli.reading import read_recordings
 from thermocomp.cli.terminal import console
 from thermocomp.core.exceptions import InputError
 from thermocomp.files.draft import refuse_existing

@@ -4,10 +4,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from thermocomp.cli.options import (
-    OptionalOutput,
-    Quiet,
-)
+from thermocomp.cli.options import OptionalOutput, Quiet
 from thermocomp.cli.progress import show_steps
 from thermocomp.cli.terminal import console
 from thermocomp.core.exceptions import InputError
@@ -56,9 +53,9 @@ def simulate(
     int
         0 done.
     """
-    from thermocomp.cli import output as out
     from thermocomp.recordings.readers import recordings
     from thermocomp.virtual import datasets as virtual
+    from thermocomp.virtual.commands import output as out
 
     if list_:
         out.show_experiments([virtual.find_experiment(name) for name in virtual.EXPERIMENTS], console, as_json=json)

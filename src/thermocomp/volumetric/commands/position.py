@@ -8,10 +8,8 @@ from cyclopts import Parameter
 
 from thermocomp.cli import loudness, progress
 from thermocomp.cli.jsonoutput import print_json
-from thermocomp.cli.options import (
-    OptionalOutput,
-    tell_trouble,
-)
+from thermocomp.cli.options import OptionalOutput
+from thermocomp.cli.reading import tell_trouble
 from thermocomp.cli.terminal import console
 from thermocomp.core.exceptions import InputError
 from thermocomp.files.draft import refuse_existing

@@ -9,11 +9,11 @@ from rich.console import Console
 from thermocomp.cli.terminal import mark, marked, print_table, words
 from thermocomp.recordings.profiles import Profiles
 from thermocomp.recordings.readers.profiles import NOT_TAKEN
-from thermocomp.report import records
 from thermocomp.report.layout import Column, Layout, Toned, verdict
 from thermocomp.volumetric.judging.position import PositionStudy
 from thermocomp.volumetric.models.positionoptions import Setting
 from thermocomp.volumetric.position import Positioned
+from thermocomp.volumetric.report import records
 
 #: cycles that are told one by one; of more, the `WORST`
 FEW, WORST = 12, 5

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import RecordingError, UnitError
 from thermocomp.core.units import Unit, find_unit
-from thermocomp.recordings.readers.headings import understand
+from thermocomp.recordings.headings import understand
 from thermocomp.recordings.readers.limits import Limits, check_file
 from thermocomp.recordings.readers.mapping import ReadOptions
 from thermocomp.recordings.readers.textfile import CsvTable, open_csv

@@ -135,8 +135,8 @@ def study(
     options : PositionOptions
     left_open : sequence of {'slopes', 'offset', 'reference_position'}
         Settings that the profiles tell, in place of `options`; see
-        `thermocomp.volumetric.models.positionoptions.fill_options`. If it is open how many slopes there are and the thermal part is refused, the cold profile alone is judged and
-        taken.
+        `thermocomp.volumetric.models.positionoptions.fill_options`. If it is open how many slopes there are and the
+        thermal part is refused, the cold profile alone is judged and taken.
     judging : callable
         Makes splits of the states, such as those of `thermocomp.judging.splits`.
     jobs : int

@@ -1,0 +1,76 @@
+"""Recordings that the command line names: read, and what is wrong with them said on stderr."""
+
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from thermocomp.cli import loudness
+from thermocomp.cli.exits import STDIN
+from thermocomp.cli.terminal import make_console, words
+from thermocomp.core.exceptions import InputError
+from thermocomp.files.scratch import scratch
+
+if TYPE_CHECKING:
+    from thermocomp.recordings.recording import Recording
+
+_stderr = make_console(stderr=True)
+
+
+def read_recordings(paths: list[Path], mapping: Path | None, *, tell: bool = True) -> "list[Recording]":
+    """Read the recordings named on the command line; ``-`` is a CSV file on standard input.
+
+    What a mapping changes in the values is told on stderr, unless `tell` is False: then it is shown elsewhere.
+    """
+    if not paths:
+        raise InputError("no recording given: name at least one CSV, XLSX or Parquet file")
+    from thermocomp.recordings.readers import mapping as mappings
+    from thermocomp.recordings.readers.mending import read_or_offer
+
+    columns = mappings.read_mapping(mapping) if mapping is not None else None
+    found = _read_all(paths, lambda named: [read_or_offer(p, columns) for p in named])
+    loudness.tell_read(found)
+    for r in found if tell and not loudness.quiet else ():
+        for change in r.changed:
+            _stderr.print(f"[dim]note[/] {words(f'{r.name}: {change}')}", soft_wrap=True)
+    return found
+
+
+def _read_all(paths: list[Path], read: "Callable[[list[Path]], list[Recording]]") -> "list[Recording]":
+    if STDIN not in paths:
+        return read(paths)
+    from thermocomp.recordings.readers.limits import Limits as FileLimits
+
+    if paths.count(STDIN) > 1:
+        raise InputError("-: there is one standard input")
+    with scratch() as folder:
+        typed = folder / "stdin.csv"
+        with typed.open("wb") as file:
+            while block := sys.stdin.buffer.read(1 << 20):
+                FileLimits().check("file_bytes", file.tell() + len(block), "standard input")
+                file.write(block)
+        return read([typed if p == STDIN else p for p in paths])
+
+
+def tell_trouble(tests: "Sequence[Recording]") -> list[str]:
+    """Say on stderr what is wrong with recordings that are about to be used, and give it back.
+
+    Parameters
+    ----------
+    tests : sequence of Recording
+
+    Returns
+    -------
+    list of str
+        One line per trouble, and per column that was left out.
+    """
+    from thermocomp.api.inputs import trouble_of
+
+    return print_trouble(trouble_of(tests))
+
+
+def print_trouble(lines: list[str]) -> list[str]:
+    """Print lines of trouble on stderr, and give them back."""
+    for line in () if loudness.quiet else lines:
+        _stderr.print(f"[bold yellow]trouble[/] {words(line)}", soft_wrap=True)
+    return lines
