@@ -32,7 +32,7 @@ def watched(model: ErrorModel) -> Watch:
 
 
 def test_every_number_is_that_of_the_model(model: ErrorModel) -> None:
-    told = model.explain()
+    told = explain(model)
     known = {g.name: g for g in gains(model, 60.0)}
     assert [s.name for s in told.sensors] == list(known)
     for s in told.sensors:
@@ -52,14 +52,14 @@ def test_every_number_is_that_of_the_model(model: ErrorModel) -> None:
 def test_a_drift_shifts_the_answer_whichever_way_it_counts(model: ErrorModel) -> None:
     assert isinstance(model, PacedDynamic)
     turned = tuple(replace(t, direct=-t.direct, lagged=tuple(-w for w in t.lagged)) for t in model.temperatures)
-    shifts = [{s.name: s.undetected for s in m.explain().sensors} for m in (model, replace(model, temperatures=turned))]
+    shifts = [{s.name: s.undetected for s in explain(m).sensors} for m in (model, replace(model, temperatures=turned))]
     assert shifts[0] == pytest.approx(shifts[1])
 
 
 def test_a_dozen_lines_say_it(model: ErrorModel) -> None:
     band = Band(0.9, "assumption", 4, 0.5, 2.0, 1.0)
     covered = Validity(4, 3, 0.2, (0.0, 3000.0), (19.0, 24.0), "t3_C", (20.0, 21.0), 2, 13.3)
-    lines = str(replace(model, band=band, validity=covered).explain()).splitlines()
+    lines = str(explain(replace(model, band=band, validity=covered))).splitlines()
     assert len(lines) == 14
     text = "\n".join(lines)
     assert "z_um: averaged predicts it [um] from 3 temperatures and spindle_rpm: these and their past." in lines
@@ -80,7 +80,7 @@ def test_a_drift_that_is_found_late_wants_a_spare(model: ErrorModel) -> None:
     sensors = tuple(
         replace(s, off=off, still=GAP) for s, off in zip(watched(model).sensors, (FAR, 3.1, 1.0), strict=True)
     )
-    late = replace(model, watch=replace(watched(model), sensors=sensors)).explain()
+    late = explain(replace(model, watch=replace(watched(model), sensors=sensors)))
     spare = {s.name: s.spare for s in late.sensors}
     assert spare["t1_C"] == ""
     assert spare["t2_C"] == "its slow drift is found only from 3.1 degC on"
@@ -91,7 +91,7 @@ def test_a_drift_that_is_found_late_wants_a_spare(model: ErrorModel) -> None:
 
 def test_what_is_not_known_is_not_made_up(model: ErrorModel) -> None:
     bare = replace(model, watch=None, honest_error=None, band=None, validity=None)
-    told = bare.explain()
+    told = explain(bare)
     assert told.word == "unjudged"
     assert told.rms is None
     assert not any(s.watched or s.runs_on for s in told.sensors)
@@ -104,7 +104,7 @@ def test_what_is_not_known_is_not_made_up(model: ErrorModel) -> None:
     assert "None" not in text
     assert "nan" not in text
     # judged without a sensor, but with no watch to say what stands in: nothing runs on
-    assert not any(s.runs_on for s in replace(model, watch=None).explain().sensors)
+    assert not any(s.runs_on for s in explain(replace(model, watch=None)).sensors)
 
 
 def test_other_families_say_no_contributions() -> None:
@@ -118,10 +118,10 @@ def test_other_families_say_no_contributions() -> None:
 
 
 def test_inputs_without_an_influence_are_not_its_sensors(model: ErrorModel) -> None:
-    told = model.explain()
+    told = explain(model)
     assert {s.name for s in told.sensors} == set(model.sensors)
     constant = replace(lags(), direct=(0.0, 0.0), lagged=(0.0, 0.0, 0.0))
-    assert "from nothing" in str(constant.explain())
+    assert "from nothing" in str(explain(constant))
 
 
 def test_the_command_shows_all_targets(model: ErrorModel, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

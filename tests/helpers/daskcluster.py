@@ -14,7 +14,7 @@ from typing import Any
 
 import thermocomp
 
-_FOLDERS = [Path(thermocomp.__file__).parent.parent, Path(__file__).parent, Path(__file__).parent.parent / "assessment"]
+_FOLDERS = [Path(thermocomp.__file__).parent.parent, Path(__file__).parent, Path(__file__).parent.parent / "judging"]
 _SOON = 30.0
 
 
