@@ -30,20 +30,20 @@ COMMANDS = {name for name in app if not name.startswith("-")}
 MODULES = sorted(
     ".".join(("thermocomp", *path.relative_to(SOURCE).with_suffix("").parts))
     for path in SOURCE.rglob("[!_]*.py")
-    if path.relative_to(SOURCE).parts[0] != "cli"
+    if not {"cli", "commands"} & set(path.relative_to(SOURCE).parts)
 )
 NOUNS = {
     "Machine": "core.machine",
     "Axis": "core.machine",
     "Channel": "core.machine",
-    "Recording": "recording.recording",
+    "Recording": "recordings.recording",
     "ErrorComponent": "core.components",
     "ErrorModel": "core.model",
     "Deviation": "core.correction",
     "Reading": "core.reading",
     "Correction": "core.correction",
     "Limits": "core.correction",
-    "Assessment": "assessment.compare",
+    "Assessment": "judging.compare",
 }
 VERBS = ["read", "select", "fit", "freeze", "assess", "compare"]
 VERBS += ["synthesize", "compensate", "revise", "export", "report", "serve"]

@@ -28,7 +28,8 @@ from thermocomp.judging.replay import replay
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.gp import GaussianProcess
 from thermocomp.models.lasso import ElasticNet, Lasso
-from thermocomp.models.methods import METHODS, Method
+from thermocomp.models.method import Method
+from thermocomp.models.methods import METHODS
 from thermocomp.models.numerics import moments
 from thermocomp.models.ols import LeastSquares
 from thermocomp.models.pcr import PrincipalComponents

@@ -17,7 +17,8 @@ from thermocomp.files import modelfile
 from thermocomp.judging import splits
 from thermocomp.judging.compare import compare
 from thermocomp.models import ppr
-from thermocomp.models.methods import METHODS, Method
+from thermocomp.models.method import Method
+from thermocomp.models.methods import METHODS
 from thermocomp.models.ppr import ProjectionPursuit
 from thermocomp.recordings.samples import Samples
 

@@ -13,6 +13,7 @@ from thermocomp.cli.exits import FAULT, STDIN, STOPPED
 from thermocomp.cli.extras import needs
 from thermocomp.cli.terminal import make_console, words
 from thermocomp.core.exceptions import ThermocompError
+from thermocomp.core.plugins import describe_plugin, find_plugins, read_summary
 
 app = App(
     name="thermocomp",
@@ -26,33 +27,18 @@ app = App(
     default_parameter=Parameter(negative=(), consume_multiple=True),
 )
 
-#: a file each; it is read when its command is called, so this line of its docstring stands here too (a test compares)
-COMMANDS = {
-    "demo": "Do the main job on the virtual machine: record, fit, judge on unseen cycles, report.",
-    "simulate": "Record an experiment on a virtual machine.",
-    "check": "Tell what recordings hold and what is wrong with them; of more than three files, a line each.",
-    "map": "Write how a logger's file is to be read and cleaned, asking what cannot be seen.",
-    "select": "Choose the few temperature sensors that a model needs.",
-    "fit": "Fit a model, judge it on thermal cycles it has not seen, and write it with its honest error.",
-    "explain": "Say what the models of a file are made of, how good they are, and what a failure of each sensor does.",
-    "assess": "Judge a model file on recordings: per cycle, with noise, with each sensor lost, outside its range.",
-    "compare": "Compare methods on thermal cycles they have not seen, beside no compensation.",
-    "plan": "Say how much test is enough, and write the test that would teach most next as an NC program.",
-    "position": "Fit position-dependent errors: cold profiles and thermal slopes, judged on what they have not seen.",
-    "iso230": "Evaluate thermal tests after ISO 230-3 and positioning tests after ISO 230-2, and the time constants of "
-    "channels.",
-    "volumetric": "Tell the error of the tool's tip at a point and all over the work volume, and what corrections "
-    "leave of it.",
-    "revise": "Correct an NC program by the drift it will cause, before it is run.",
-    "export": "Write the models of a file as code for another controller, with test vectors and how to use it.",
-    "serve": "Run the compensator live: sensors in, corrections out, with a page to watch.",
-    "journal": "Tell what a journal of the live compensator holds, or export it as a recording.",
-    "linuxcnc": "Write what a LinuxCNC needs to be corrected, and say what to change in its configuration.",
-    "papers": "Redo the papers' studies on the virtual machine: their number, ours, and whether their claim holds "
-    "here.",
-}
-for command, summary in COMMANDS.items():
-    app.command(f"thermocomp.cli.{command}:{command}", name=command, help=summary)
+
+def _skip(message: str) -> None:
+    make_console(stderr=True).print(f"[bold yellow]trouble[/] {words(message)}", soft_wrap=True)
+
+
+#: by name; what one does is imported when it is called
+COMMANDS = find_plugins("commands", _skip)
+for command, entry in COMMANDS.items():
+    if (summary := read_summary(entry)) is None:
+        _skip(f"{describe_plugin(entry)} is skipped: there is no {entry.value}")
+    else:
+        app.command(entry.value, name=command, help=summary)
 for flag, summary in loudness.FLAGS.items():  # for the help: `run` takes them off before anything is looked up
     app.command(lambda: None, name=flag, help=summary)
 app.register_install_completion_command()

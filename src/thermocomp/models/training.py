@@ -24,7 +24,8 @@ from thermocomp.models.bands import find_band
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.covering import find_joint_support
 from thermocomp.models.foreign import adopt_estimator, catch_failures, check_numbers, title
-from thermocomp.models.methods import Method, NamedEstimator, find_method, make_method
+from thermocomp.models.method import Method
+from thermocomp.models.methods import NamedEstimator, find_method, make_method
 from thermocomp.models.timed import TimedRegressor
 from thermocomp.models.unfrozen import UnfrozenRegressor
 from thermocomp.recordings.fingerprints import fingerprint

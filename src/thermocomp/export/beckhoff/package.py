@@ -7,6 +7,7 @@ from thermocomp.export.block.tables import gather
 from thermocomp.export.c99.c99 import identifier
 from thermocomp.export.facts import Facts
 from thermocomp.export.st.package import write_blocks
+from thermocomp.export.target import Target
 from thermocomp.runtime.compensator import Compensator
 
 #: P-AXIS-00273, P-AXIS-00274, P-AXIS-00272
@@ -73,3 +74,7 @@ def write_package(
         rate=compensator.limits.rate,
     )
     return write_blocks(compensator, name, facts, "twincat", [more], page)
+
+
+#: it counts 0.1 um in whole numbers of 32 bits
+TARGET = Target(write=write_package, axes=True, magnitude=2e8)

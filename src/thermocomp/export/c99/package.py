@@ -14,6 +14,7 @@ from thermocomp.export.c99.c99 import translate
 from thermocomp.export.c99.ctest import write_test
 from thermocomp.export.facts import Facts
 from thermocomp.export.pages import describe
+from thermocomp.export.target import Target
 from thermocomp.export.vectors import Answers, FloatArray, Readings, find_tolerance, make_readings, replay, round_all
 from thermocomp.runtime.compensator import Compensator
 
@@ -159,3 +160,6 @@ def _shifted(values: FloatArray, way: int, kind: type[np.floating[Any]] = np.flo
         last = np.where(np.isfinite(values), np.spacing(values.astype(kind)).astype(np.float64), 0.0)
         odd = np.where(last != 0.0, values / np.where(last == 0.0, 1.0, last), 0.0) % 2.0 >= 1.0
     return values + way * _DIGITS * np.where(odd, last, -last)
+
+
+TARGET = Target(write=write_package)

@@ -8,7 +8,6 @@ from datetime import UTC, datetime
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
-from typing import Literal
 
 from thermocomp import __version__
 from thermocomp.cli.beginning import Beginning
@@ -21,34 +20,13 @@ from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.position import PositionModel
-from thermocomp.export.beckhoff import package as beckhoff
-from thermocomp.export.c99 import package as cpackage
 from thermocomp.export.commands import reducing
 from thermocomp.export.facts import Facts
-from thermocomp.export.linuxcnc import package as linuxcncpackage
-from thermocomp.export.onnx import package as onnxpackage
-from thermocomp.export.siemens import package as siemens
-from thermocomp.export.st import package as stpackage
 from thermocomp.export.st.ststatements import Dialect
+from thermocomp.export.target import Target, find_target
 from thermocomp.files.draft import drafts
 from thermocomp.files.machines import read_models
 from thermocomp.runtime.compensator import Compensator
-
-Target = Literal["c99", "st", "siemens", "beckhoff", "linuxcnc", "onnx", "klipper", "heidenhain", "fanuc"]
-
-#: all files of an export by their names, the page how to use it the last
-WRITERS: dict[Target, Callable[..., dict[str, bytes]]] = {
-    "c99": cpackage.write_package,
-    "st": stpackage.write_package,
-    "siemens": siemens.write_package,
-    "beckhoff": beckhoff.write_package,
-    "linuxcnc": linuxcncpackage.write_package,
-    "onnx": onnxpackage.write_package,
-}
-
-
-#: largest correction that a target counts in whole numbers of 32 bits: of 0.01 um, of 0.1 um [um]
-MOST_UM = {"linuxcnc": 2e7, "beckhoff": 2e8}
 
 
 def export(
@@ -56,7 +34,7 @@ def export(
     recordings: list[Path] | None = None,
     /,
     *,
-    to: Target,
+    to: str,
     output: Output,
     name: str = "thermal",
     dialect: Dialect | None = None,
@@ -124,17 +102,18 @@ def export(
         0 done, 1 a model was refused and left out, 2 unusable input.
     """
     limits = replace(compensator.limits(), hold=hold, fade=fade, reading_age=reading_age)
-    _check(to, name, date, limits)
-    if dialect is not None and to != "st":
-        raise InputError(f"--dialect {dialect}: only --to st takes it")
-    if recordings and to not in reducing.WRITERS:
-        raise InputError(f"{to} holds the whole model: it wants no recording, found {recordings[0]}")
-    _check_reduction(to, reduction)
+    target = find_target(to)
+    _check(to, target, name, date, limits)
+    if dialect is not None and dialect not in target.dialects:
+        raise InputError(f"--dialect {dialect}: {to} does not take it; --to st does")
+    if recordings and target.shape is None:
+        raise InputError(f"{to} holds the whole model and takes no recordings, found {recordings[0]}")
+    _check_reduction(to, target, reduction)
     models = [m.taken(accept_unproven) for m in read_models(model)]
     reasons = {m.target: why for m in models if (why := _refusal(m))}
     texts = dict[str, bytes]()
     elsewhere = {}
-    if to not in reducing.WRITERS:
+    if target.shape is None:
         elsewhere = {m.target: f"it predicts {m.unit}, and a correction is in um" for m in models if m.unit != "um"}
     left = [m for m in models if m.target not in reasons and m.target not in elsewhere]
     if left:
@@ -145,9 +124,10 @@ def export(
             date or datetime.now(UTC).astimezone().date().isoformat(),
             reasons | elsewhere,
         )
-        if to in reducing.WRITERS:
+        if target.shape is not None:
             texts, more, others = reducing.export_reduced(
                 to,
+                target,
                 _constant(left, to),
                 recordings or [],
                 reduction,
@@ -161,11 +141,11 @@ def export(
             reasons |= more
             elsewhere |= others
         else:
-            writer = _writer(to, left, dialect, reduction.named())
-            if to == "linuxcnc":
-                left, axes, others = reducing.along_axes(left, reduction, to, "XYZ")
+            writer = _writer(target, left, dialect, reduction.named())
+            if target.corrected:
+                left, axes, others = reducing.along_axes(left, reduction, to, target.corrected)
                 elsewhere |= others
-                writer = partial(linuxcncpackage.write_package, axes=axes)
+                writer = partial(target.write, axes=axes)
             with needs("onnx"):  # one of them does
                 texts = writer(Compensator.of(left, limits, watching=True), name, facts)
     if texts:
@@ -173,10 +153,10 @@ def export(
     if json:
         print_json({"files": [str(output / file) for file in texts], "refused": reasons | elsewhere})
         return 1 if reasons else 0
-    for target, why in reasons.items():
-        console.print(f"[red]refused[/] {words(f'{target} is left out: {why}')}", soft_wrap=True)
-    for target, why in elsewhere.items():
-        console.print(words(f"{target} is left out: {why}"), soft_wrap=True)
+    for left_out, why in reasons.items():
+        console.print(f"[red]refused[/] {words(f'{left_out} is left out: {why}')}", soft_wrap=True)
+    for left_out, why in elsewhere.items():
+        console.print(words(f"{left_out} is left out: {why}"), soft_wrap=True)
     if texts:
         console.print(words(texts[list(texts)[-1]].decode().split("  \n", 1)[0]), soft_wrap=True)
         console.print(words(f"Written: {', '.join(str(output / file) for file in texts)}"), soft_wrap=True)
@@ -184,11 +164,11 @@ def export(
     return 1 if reasons else 0
 
 
-def _check(to: str, name: str, date: str | None, limits: Limits) -> None:
+def _check(to: str, target: Target, name: str, date: str | None, limits: Limits) -> None:
     """Refuse what would make no file, or one that no controller takes."""
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
         raise InputError(f"--name {name!r}: want letters, digits and _, a letter first, such as mill_3")
-    most = {"magnitude": MOST_UM.get(to, RANGE), "rate": RANGE, "hold": GAP, "fade": GAP, "reading_age": GAP}
+    most = {"magnitude": target.magnitude, "rate": RANGE, "hold": GAP, "fade": GAP, "reading_age": GAP}
     for option, end in most.items():
         value, named = getattr(limits, option), f"--{option.replace('_', '-')}"
         if not math.isfinite(value):
@@ -202,27 +182,27 @@ def _check(to: str, name: str, date: str | None, limits: Limits) -> None:
             raise InputError(f"--date {date}: want a date such as 2026-01-31") from e
 
 
-def _check_reduction(to: str, found: reducing.ReductionOptions) -> None:
-    """Refuse options that a target would pass over."""
-    if to in reducing.WRITERS:
+def _check_reduction(to: str, target: Target, found: reducing.ReductionOptions) -> None:
+    """Reject options that a target ignores."""
+    if target.shape is not None:
         return
-    plain = reducing.ReductionOptions(axes=found.axes if to in ("siemens", "beckhoff", "linuxcnc") else None)
+    plain = reducing.ReductionOptions(axes=found.axes if target.axes else None)
     for option in fields(plain):
         if getattr(found, option.name) != getattr(plain, option.name):
-            raise InputError(f"--{option.name.replace('_', '-')}: {to} has no use for it")
+            raise InputError(f"--{option.name.replace('_', '-')}: {to} does not support this option")
 
 
 def _writer(
-    to: Target, models: Sequence[ErrorModel | PositionModel], dialect: Dialect | None, named: Mapping[str, str]
+    target: Target, models: Sequence[ErrorModel | PositionModel], dialect: Dialect | None, named: Mapping[str, str]
 ) -> Callable[..., dict[str, bytes]]:
-    """Return the writer of a target, with what it wants to know beside the compensator."""
-    if to in ("siemens", "beckhoff"):
+    """Return the writer of a target, with what it takes beside the compensator."""
+    if target.axes and not target.corrected:
         along = {m.target: m.axis for m in models if isinstance(m, PositionModel)}
-        for target, axis in named.items():
-            if along.get(target, axis) != axis:
-                raise InputError(f"--axes {target}={axis}: {target} was measured along {along[target]}")
-        return partial(WRITERS[to], axes={**along, **named})
-    return partial(WRITERS[to], dialect=dialect) if dialect else WRITERS[to]
+        for name, axis in named.items():
+            if along.get(name, axis) != axis:
+                raise InputError(f"--axes {name}={axis}: {name} was measured along {along[name]}")
+        return partial(target.write, axes={**along, **named})
+    return partial(target.write, dialect=dialect) if dialect else target.write
 
 
 def _constant(models: Sequence[ErrorModel | PositionModel], to: str) -> list[ErrorModel]:

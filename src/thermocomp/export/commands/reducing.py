@@ -1,6 +1,6 @@
 """What `thermocomp export` writes for controllers that hold less than a model."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
@@ -15,21 +15,13 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.position import PositionModel
 from thermocomp.export.facts import Facts
-from thermocomp.export.fanuc.package import write_fanuc
-from thermocomp.export.heidenhain.package import write_heidenhain
-from thermocomp.export.klipper.package import write_klipper
-from thermocomp.export.reduction.reduced import SHAPES, Reduced, as_it_is, find_axis, fits, mark
+from thermocomp.export.reduction.reduced import Reduced, Shape, as_it_is, find_axis, fits, mark
+from thermocomp.export.target import Target
 
 if TYPE_CHECKING:
     from thermocomp.export.reduction.judging import Reduction
 
 _Model = TypeVar("_Model", bound=ErrorModel | PositionModel)
-
-WRITERS: dict[str, Callable[..., dict[str, bytes]]] = {
-    "klipper": write_klipper,
-    "heidenhain": write_heidenhain,
-    "fanuc": write_fanuc,
-}
 
 
 @Parameter(name="*")
@@ -82,6 +74,7 @@ class Outcome(NamedTuple):
 
 def export_reduced(
     to: str,
+    target: Target,
     models: Sequence[ErrorModel],
     recordings: list[Path],
     options: ReductionOptions,
@@ -98,7 +91,9 @@ def export_reduced(
     Parameters
     ----------
     to : str
-        A key of `WRITERS`.
+        Name of the target.
+    target : Target
+        With a shape.
     models : sequence of ErrorModel
     recordings : list of Path
         That they are reduced on.
@@ -120,7 +115,8 @@ def export_reduced(
         None goes along an axis that the controller corrects, or two along one; a model has to be reduced, and there is
         no recording; or the correction would run into its limit.
     """
-    shape = SHAPES[to]
+    assert target.shape is not None
+    shape = target.shape
     wanted, axes, elsewhere = along_axes(models, options, to, shape.axes)
     more = [m for m in wanted if not fits(m, shape) or not _has(options, m)]
     if more and not recordings:
@@ -129,7 +125,7 @@ def export_reduced(
             f"{held}, and the model of {', '.join(m.target for m in more)} is more than that: name recordings to "
             f"reduce it on, such as: thermocomp export {facts.source} drift.csv --to {to}"
         )
-    reductions = _reduce(more, axes, recordings, options, beginning, to, hidden=hidden) if more else {}
+    reductions = _reduce(more, axes, recordings, options, beginning, shape, hidden=hidden) if more else {}
     refused, found = dict[str, str](), list[Reduced]()
     for m in wanted:
         r = reductions[m.target].reduced if m.target in reductions else as_it_is(m, axes[m.target])
@@ -138,13 +134,14 @@ def export_reduced(
             refused[m.target] = why
         else:
             found.append(r)
-            _check_limit(r, limits, to)
+            if target.limited:
+                _check_limit(r, limits, to)
     if not found:
         return Outcome({}, refused, elsewhere)
     name = f"tc_{mark(name)}"
     drawn = [reductions[r.model.target] for r in found if r.model.target in reductions]
     figure = f"{name}_reduced.svg" if drawn else ""
-    texts = WRITERS[to](found, limits, name, facts, figure=figure)
+    texts = target.write(found, limits, name, facts, figure=figure)
     return Outcome((_figure(figure, drawn) if drawn else {}) | texts, refused, elsewhere)
 
 
@@ -202,7 +199,7 @@ def _refuse_twice(wanted: Sequence[tuple[str, str]]) -> None:
 
 def _check_limit(r: Reduced, limits: Limits, to: str) -> None:
     """Refuse a limit that the reduced model, which was judged without one, would run into."""
-    if to != "heidenhain" and r.most > limits.magnitude:
+    if r.most > limits.magnitude:
         raise InputError(
             f"{r.model.target}: the reduced model corrects by up to {r.most:.0f} um in these recordings, and was "
             f"judged so; {to} would stop at {limits.magnitude:g} um: give --magnitude {1.2 * r.most:.0f}, if it may"
@@ -224,7 +221,7 @@ def _reduce(
     paths: list[Path],
     options: ReductionOptions,
     beginning: Beginning,
-    to: str,
+    shape: Shape,
     *,
     hidden: bool,
 ) -> "dict[str, Reduction]":
@@ -238,7 +235,7 @@ def _reduce(
     with show_steps(len(models), hidden=hidden) as progress:
         for m in models:
             found[m.target] = reduce_model(
-                m, axes[m.target], tests, SHAPES[to],
+                m, axes[m.target], tests, shape,
                 sensors=options.sensors, starts=starts, rules=Rules(options.harm_margin), jobs=options.jobs,
             )  # fmt: skip
             progress(f"{m.target} reduced")

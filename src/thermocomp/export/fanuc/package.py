@@ -9,8 +9,9 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.export.checkscript import FANUC, write_script
 from thermocomp.export.facts import Facts
 from thermocomp.export.heidenhain.package import find_marks
-from thermocomp.export.reduction.reduced import Reduced, head, in_mm, in_um, shorten, vectors
+from thermocomp.export.reduction.reduced import SHAPES, Reduced, head, in_mm, in_um, shorten, vectors
 from thermocomp.export.reduction.reducedpage import write_page
+from thermocomp.export.target import Target
 from thermocomp.runtime.gate import DAY, MIN_SPAN, PLAUSIBLE
 
 SIGN = (
@@ -216,3 +217,6 @@ def _comment(text: str) -> str:
     """Return what may stand in a comment: no brackets, no small letters, nothing beyond ASCII."""
     plain = text.upper().encode("ascii", "replace").decode()
     return re.sub(r"[^-+#*/=:,. 0-9A-Z_]", ".", plain.replace("(", " ").replace(")", " "))
+
+
+TARGET = Target(write=write_fanuc, shape=SHAPES["fanuc"])

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from thermocomp.core.correction import Limits
 from thermocomp.export.checkscript import HEIDENHAIN, write_script
 from thermocomp.export.facts import Facts
-from thermocomp.export.reduction.reduced import Reduced, head, in_mm, in_um, mark, vectors
+from thermocomp.export.reduction.reduced import SHAPES, Reduced, head, in_mm, in_um, mark, vectors
 from thermocomp.export.reduction.reducedpage import write_page
+from thermocomp.export.target import Target
 
 SIGN = (
     "Sign: a formula is a dimension as it is: present dimension <L> plus the deviation (actual minus commanded) in mm; "
@@ -158,3 +159,6 @@ def write_vectors(reductions: Sequence[Reduced], marks: dict[str, str], toleranc
 
 def _signed(text: str) -> str:
     return text if text.startswith("-") else f"+{text}"
+
+
+TARGET = Target(write=write_heidenhain, shape=SHAPES["heidenhain"], limited=False)

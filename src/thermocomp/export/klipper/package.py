@@ -7,8 +7,9 @@ from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.export.checkscript import KLIPPER, write_script
 from thermocomp.export.facts import Facts
-from thermocomp.export.reduction.reduced import Reduced, head, in_mm, vectors
+from thermocomp.export.reduction.reduced import SHAPES, Reduced, head, in_mm, vectors
 from thermocomp.export.reduction.reducedpage import write_page
+from thermocomp.export.target import Target
 
 SIGN = (
     "Sign: Klipper adds -temp_coeff x (temperature - temperature at homing) to the commanded Z: a positive temp_coeff "
@@ -153,3 +154,6 @@ def _vectors(r: Reduced, limits: Limits) -> str:
         said = factor * (home - now)
         rows.append(f"{home:g},{now:g},{min(max(said, -limits.magnitude), limits.magnitude):.4f},0.01")
     return "\n".join(rows) + "\n"
+
+
+TARGET = Target(write=write_klipper, shape=SHAPES["klipper"])

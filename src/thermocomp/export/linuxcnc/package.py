@@ -11,6 +11,7 @@ from thermocomp.export.facts import Facts
 from thermocomp.export.linuxcnc.component import name_component, write_component, write_hal
 from thermocomp.export.pages import describe
 from thermocomp.export.reduction.reduced import find_axis
+from thermocomp.export.target import Target
 from thermocomp.runtime.compensator import Compensator
 
 _README = """{facts}
@@ -129,3 +130,7 @@ def write_package(
 
 def _joined(words: list[str]) -> str:
     return f"{', '.join(words[:-1])} and {words[-1]}" if len(words) > 1 else words[0]
+
+
+#: it counts 0.01 um in whole numbers of 32 bits
+TARGET = Target(write=write_package, axes=True, corrected="XYZ", magnitude=2e7)

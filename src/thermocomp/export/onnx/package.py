@@ -7,6 +7,7 @@ from thermocomp.export.facts import Facts
 from thermocomp.export.onnx.graph import Block, translate
 from thermocomp.export.onnx.nodes import IR, OPSET, serialize
 from thermocomp.export.onnx.vectors import PROGRAM, answer, pick_readings, pick_zero, without_watch, write_vectors
+from thermocomp.export.target import Target
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.gate import DAY
 
@@ -198,3 +199,6 @@ def _plausible(tables: Tables, r: int) -> str:
         return f"{max(least, t['reference'][r] + low):g} to {min(most, t['reference'][r] + high):g}"
     about = f"zero {low:+g} to zero {high:+g}"
     return f"{about}, within {least:g} to {most:g}" if t["temperature"][r] else about
+
+
+TARGET = Target(write=write_package)

@@ -7,6 +7,7 @@ from thermocomp.export.block.tables import gather
 from thermocomp.export.c99.c99 import identifier
 from thermocomp.export.facts import Facts
 from thermocomp.export.st.package import write_blocks
+from thermocomp.export.target import Target
 from thermocomp.runtime.compensator import Compensator
 
 #: SD43900, SD43910, SD43920: K0 [mm], tan beta, P0 [mm]
@@ -94,3 +95,6 @@ def _type(drive: Drive) -> str:
 def _slope(drive: Drive, magnitude: float) -> str:
     low, high = drive.travel
     return f"{2e-3 * magnitude / (high - low):.2g} for tan beta" if low < high else "as it is"
+
+
+TARGET = Target(write=write_package, axes=True)

@@ -1,6 +1,7 @@
 """All files of an export to structured text: the blocks, their test, and how to use them."""
 
 from collections.abc import Sequence
+from typing import get_args
 from uuid import NAMESPACE_URL, uuid5
 
 from thermocomp.export.block.tables import Tables, gather
@@ -10,6 +11,7 @@ from thermocomp.export.pages import describe
 from thermocomp.export.st.structuredtext import Unit, comment, translate
 from thermocomp.export.st.ststatements import Dialect
 from thermocomp.export.st.sttest import allow, write_test
+from thermocomp.export.target import Target
 from thermocomp.export.vectors import make_readings, replay
 from thermocomp.runtime.compensator import Compensator
 
@@ -180,3 +182,6 @@ def _object(unit: Unit, head: str) -> tuple[str, str]:
         implementation=body,
     )
     return f"{unit.name}.Tc{kind}", text
+
+
+TARGET = Target(write=write_package, dialects=get_args(Dialect))

@@ -1,0 +1,70 @@
+"""Parts that are found by entry points: those of this package, and those that other packages bring."""
+
+import re
+from collections.abc import Callable
+from importlib.metadata import EntryPoint, entry_points
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, Literal
+
+from thermocomp.core.exceptions import InputError
+
+Group = Literal["commands", "methods", "exporters", "sources", "sinks", "pages"]
+
+
+def find_plugins(group: Group, report: Callable[[str], object] = lambda _: None) -> dict[str, EntryPoint]:
+    """Return the entry points of ``thermocomp.GROUP`` by name; nothing is imported.
+
+    Parameters
+    ----------
+    group : {'commands', 'methods', 'exporters', 'sources', 'sinks', 'pages'}
+    report : callable, optional
+        Called with a line of text for each one that is skipped: this package's own name is taken.
+    """
+    found: dict[str, EntryPoint] = {}
+    # own ones first: nobody takes their names
+    for entry in sorted(entry_points(group=f"thermocomp.{group}"), key=lambda e: not e.value.startswith("thermocomp.")):
+        if (first := found.setdefault(entry.name, entry)).value != entry.value:
+            report(f"{describe_plugin(entry)} is skipped: {entry.name} is there already, {first.value}")
+    return found
+
+
+def describe_plugin(entry: EntryPoint) -> str:
+    """Return what names a plug-in in messages."""
+    package = f" of the package {entry.dist.name}" if entry.dist is not None else ""
+    return f"plug-in {entry.name} ({entry.group}){package}"
+
+
+def load_plugin(entry: EntryPoint) -> Any:
+    """Import what an entry point names.
+
+    Raises
+    ------
+    InputError
+        It cannot be imported: which plug-in, and why.
+    """
+    try:
+        return entry.load()
+    except Exception as e:
+        raise InputError(
+            f"{describe_plugin(entry)} cannot be loaded: {type(e).__name__}: {e}; update or remove its package"
+        ) from e
+
+
+def read_summary(entry: EntryPoint) -> str | None:
+    """Return the first paragraph of a function's docstring, read from its file: nothing of it is imported.
+
+    Returns
+    -------
+    str or None
+        None if there is no such module; empty if the function or its docstring is not found in the file.
+    """
+    try:
+        spec = find_spec(entry.module)
+    except Exception:  # noqa: BLE001 - a package above it that cannot be imported
+        return None
+    if spec is None or spec.origin is None:
+        return None
+    text = Path(spec.origin).read_text(encoding="utf-8", errors="replace")
+    found = re.search(rf'^def {entry.attr}\(.*?"""(.*?)(?:\n\s*\n|""")', text, re.DOTALL | re.MULTILINE)
+    return " ".join(found[1].split()) if found else ""

@@ -1,0 +1,61 @@
+"""What an export is: a writer, and what its controller takes."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+from thermocomp.core.bounds import RANGE
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.plugins import find_plugins, load_plugin
+from thermocomp.export.reduction.reduced import Shape
+
+
+@dataclass(frozen=True, kw_only=True)
+class Target:
+    """A kind of controller that models are written for; an entry point of ``thermocomp.exporters`` names one.
+
+    Parameters
+    ----------
+    write : callable
+        Returns the files by their names, the page how to use them the last. Gets a compensator, a name and `Facts`;
+        with `shape` reduced models, limits, a name, `Facts` and ``figure``.
+    shape : Shape or None
+        What the controller holds, if that is less than a model: the best reduced one is fitted to recordings.
+    axes : bool
+        `write` takes ``axes``, letters by target.
+    corrected : str
+        Axes that the controller corrects; empty: any.
+    dialects : tuple of str
+        `write` takes ``dialect``, one of these.
+    magnitude : float
+        Largest correction that it can count [um].
+    limited : bool
+        It stops at the magnitude of the limits.
+    """
+
+    write: Callable[..., dict[str, bytes]]
+    shape: Shape | None = None
+    axes: bool = False
+    corrected: str = ""
+    dialects: tuple[str, ...] = ()
+    magnitude: float = RANGE
+    limited: bool = True
+
+
+def find_target(name: str) -> Target:
+    """Return the target of a name.
+
+    Raises
+    ------
+    InputError
+        There is none, or what brings it cannot be loaded.
+    """
+    known = find_plugins("exporters")
+    if name not in known:
+        near = get_close_matches(name, known, n=1, cutoff=0.4)
+        hint = f"; did you mean {near[0]}?" if near else "."
+        raise InputError(f"--to {name!r}: no such target{hint} Known are {', '.join(known)}")
+    found = load_plugin(known[name])
+    if not isinstance(found, Target):
+        raise InputError(f"--to {name}: {known[name].value} is no thermocomp.export.target.Target")
+    return found

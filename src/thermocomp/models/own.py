@@ -1,0 +1,80 @@
+"""The methods that come with the package."""
+
+from thermocomp.models.method import Method
+
+OWN = (
+    Method("ols", "least squares on all temperatures", "thermocomp.models.ols:LeastSquares"),
+    Method("partial-f", "stepwise by partial F, 100 to enter and 50 to delete", "thermocomp.models.partial_f:PartialF"),
+    Method("mra", "Chen's stepwise second-order regression", "thermocomp.models.second_order:SecondOrderRegression"),
+    Method(
+        "averaged",
+        "average of many ridges on lagged temperatures and states of the spindle speed",
+        "thermocomp.models.averaged:AveragedDynamic",
+        speed="speed",
+        takes=("dt", "cycle"),
+    ),
+    Method(
+        "dynamic",
+        "ridge on temperatures, their lagged copies and the lagged spindle speed",
+        "thermocomp.models.dynamic:DynamicRidge",
+        speed="speed",
+        takes=("dt", "cycle"),
+    ),
+    Method(
+        "grouping",
+        "Hwang's correlation grouping and successive regression",
+        "thermocomp.models.grouping:CorrelationGrouping",
+    ),
+    Method(
+        "subsets", "exact best subset of the temperatures", "thermocomp.models.subsets:BestSubset", takes=("cycle",)
+    ),
+    Method("ace", "Wessel's optimal transformations as printed, for a few temperatures", "thermocomp.models.ace:ACE"),
+    Method(
+        "ace-monotone",
+        "the same with a transformation that can be inverted",
+        "thermocomp.models.ace_monotone:MonotoneACE",
+    ),
+    Method(
+        "mlp", "Chen's sigmoid net of 20 hidden nodes, trained by back-propagation", "thermocomp.models.mlp:SigmoidNet"
+    ),
+    Method("mlp-sklearn", "scikit-learn's net with one hidden layer", "thermocomp.models.mlp_sklearn:SklearnNet"),
+    Method(
+        "arx",
+        "autoregression on the spindle speed alone, orders by final prediction error",
+        "thermocomp.models.arx:ARX",
+        speed="inputs",
+        takes=("dt", "cycle"),
+    ),
+    Method(
+        "arx-free-run",
+        "the same, fitted to the free run, orders by cycles left out",
+        "thermocomp.models.arx:ARX",
+        speed="inputs",
+        takes=("dt", "cycle"),
+        settings={"criterion": "free-run", "k_max": 2, "m_max": 2},
+    ),
+    Method(
+        "arx-net",
+        "a sigmoid net in place of the linear recursion",
+        "thermocomp.models.arx_net:NetARX",
+        speed="inputs",
+        takes=("dt", "cycle"),
+    ),
+    Method("ridge", "ridge regression on all temperatures", "thermocomp.models.ridge:Ridge", takes=("cycle",)),
+    Method(
+        "pcr",
+        "regression on the first principal components",
+        "thermocomp.models.pcr:PrincipalComponents",
+        takes=("cycle",),
+    ),
+    Method("pls", "partial least squares", "thermocomp.models.pls:PartialLeastSquares", takes=("cycle",)),
+    Method("lasso", "regression that drops temperatures by itself", "thermocomp.models.lasso:Lasso", takes=("cycle",)),
+    Method(
+        "elastic-net",
+        "a lasso that keeps or drops collinear temperatures together",
+        "thermocomp.models.lasso:ElasticNet",
+        takes=("cycle",),
+    ),
+    Method("ppr", "projection pursuit regression", "thermocomp.models.ppr:ProjectionPursuit", takes=("cycle",)),
+    Method("gp", "Gaussian process; for comparison only, cannot be deployed", "thermocomp.models.gp:GaussianProcess"),
+)
