@@ -1,6 +1,5 @@
 """What all commands share: help, version, standard input, what programs read, errors."""
 
-import importlib
 import io
 import json
 import subprocess
@@ -12,15 +11,15 @@ from smallmachine import small_machine
 
 from thermocomp import __version__
 from thermocomp.cli.app import COMMANDS, app, run
+from thermocomp.core.plugins import read_summary
 from thermocomp.recordings.readers import recordings
 from thermocomp.virtual import datasets as virtual
 
 
 def test_the_line_of_a_command_is_that_of_its_docstring() -> None:
     assert set(COMMANDS) == {name for name in app if not name.startswith("-")}
-    for name, line in COMMANDS.items():
-        command = getattr(importlib.import_module(f"thermocomp.cli.{name}"), name)
-        assert " ".join(command.__doc__.split("\n\n")[0].split()) == line
+    for entry in COMMANDS.values():
+        assert " ".join(entry.load().__doc__.split("\n\n")[0].split()) == read_summary(entry)
 
 
 def test_help_loads_nothing_but_the_door() -> None:

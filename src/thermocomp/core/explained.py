@@ -158,6 +158,25 @@ def explain(model: ErrorModel) -> Explanation:
     Returns
     -------
     Explanation
+
+    Examples
+    --------
+    >>> from thermocomp import Polynomial, explain
+    >>> from thermocomp.core.inputs import Input
+    >>> from thermocomp.core.terms import Variable
+    >>> front = Input("t_front_C", "temperature", "degC", reference=20.0, rezero=True, low=0.0, high=15.0)
+    >>> told = explain(
+    ...     Polynomial(
+    ...         target="z_um",
+    ...         unit="um",
+    ...         inputs=(front,),
+    ...         variables=(Variable.single("t_front_C", 0),),
+    ...         terms=((0,),),
+    ...         coefficients=(2.5,),
+    ...     )
+    ... )
+    >>> [s.name for s in told.sensors], len(told.sensors), told.word
+    (['t_front_C'], 1, 'unjudged')
     """
     known = {g.name: g for g in gains(model, _ANY)} if isinstance(model, PacedDynamic) else {}
     order = list(known) if known else [i.name for i in model.inputs]
