@@ -161,6 +161,8 @@ def test_what_can_be_asked_is_described() -> None:
         b'{"target": NaN, "do": Infinity}',
         b'{"target": "\\u0000\\u202e", "do": "hold"}',
         b"\xff\xfe\xff",
+        *(json.dumps(HOLD).encode(e) for e in ("utf-16", "utf-16-le", "utf-32-be", "utf-8-sig")),
+        b'{"target": "z_um", "do": "hold", "do": "run"}',
         b'"\\ud800"',
         b"[" * 1900,
         b'{"target": ' + b"9" * 1900 + b', "do": "hold"}',

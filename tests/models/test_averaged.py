@@ -176,6 +176,13 @@ def test_temperatures_alone_or_the_speed_alone_will_do(samples: Samples) -> None
     for estimator, columns in ((warm, frame.drop(columns="spindle_rpm")), (fast, frame[["spindle_rpm"]])):
         residual = estimator.predict(columns, dt=dt) - y
         assert np.sqrt(np.mean(residual**2)) < 0.2 * np.sqrt(np.mean(y**2))
+        model = estimator.freeze(target="z_um")
+        assert {i.name for i in model.inputs} <= set(columns)
+        kept, expected = columns[[i.name for i in model.inputs]].to_numpy(), estimator.predict(columns, dt=dt)
+        state = model.init(np.zeros(len(model.inputs)))
+        for row, step, wanted in zip(kept[:300], dt[:300], expected[:300], strict=True):
+            state, found = model.step(state, row, step if np.isfinite(step) else 0.0)
+            assert found == pytest.approx(wanted, abs=1e-6)
 
 
 def test_a_dead_sensor_has_no_weight(samples: Samples) -> None:

@@ -228,11 +228,11 @@ class AveragedDynamic(TimedRegressor):
         return (*labels, *states)
 
     def _frozen(self, inputs: Sequence[Input], header: dict[str, Any]) -> PacedDynamic:
-        of, copies = self._features, self._copies().T.tolist()
-        temperatures = [(i, w) for i, w in zip(of.temperatures, copies, strict=True) if any(w)]
+        of, copies = self._features, self._copies()
+        temperatures = [(i, w) for i, w in zip(of.temperatures, copies.T.tolist(), strict=True) if any(w)]
         weights = self.coef_[len(self.coef_) - len(of.states) :].tolist()
         states = [(state, w) for state, w in zip(of.states, weights, strict=True) if w != 0]
-        kept = np.append(np.tile(np.any(copies, axis=1), of.copies), np.array(weights) != 0)
+        kept = np.append(np.tile(np.any(copies, axis=0), of.copies), np.array(weights) != 0)
         used = sorted({i for i, _ in temperatures} | {state[0] for state, _ in states})
         return PacedDynamic(
             **header,

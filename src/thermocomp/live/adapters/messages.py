@@ -9,6 +9,7 @@ from thermocomp.core.correction import Correction
 from thermocomp.core.exceptions import ReadingError
 from thermocomp.core.reading import Measurement, Reading
 from thermocomp.core.shown import escape, explain_unfit
+from thermocomp.core.strictjson import parse_json
 
 #: bytes of a message, and values in it, at most
 MOST_BYTES, MOST_VALUES = 65_536, 1_000
@@ -101,9 +102,8 @@ def _table(payload: bytes | str, example: str) -> dict[str, Any]:
     if len(payload) > MOST_BYTES:
         raise ReadingError(f"a message of {len(payload):,} bytes; at most {MOST_BYTES:,}")
     try:
-        # json would guess other encodings, and let half a surrogate pair pass
-        content = json.loads(payload.decode("utf-8") if isinstance(payload, bytes) else payload)
-    except (ValueError, RecursionError) as e:
+        content = parse_json(payload)
+    except ValueError as e:
         raise ReadingError(f"a message that is no JSON: {escape(e, 80)}") from e
     if not isinstance(content, dict):
         raise ReadingError(f"a message that is no table of values: {escape(content, 40)}; want {example}")

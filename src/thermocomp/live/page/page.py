@@ -8,15 +8,15 @@ from typing import Annotated, Literal
 
 import jinja2
 from fastapi import Depends, FastAPI, HTTPException, Request
-from fastapi.exceptions import RequestValidationError
 from fastapi.responses import HTMLResponse, StreamingResponse
 from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 from fastapi.staticfiles import StaticFiles
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from starlette.exceptions import HTTPException as AnyHTTPException
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.shown import shorten
+from thermocomp.core.shown import escape, shorten
+from thermocomp.core.strictjson import parse_json
 from thermocomp.live.loop import Service
 from thermocomp.live.page.connections import Guarded
 from thermocomp.live.page.doors import Door, Doorkeeper, Json, write_json
@@ -100,11 +100,6 @@ def make_app(service: Service, token: str = "", settled: float = 1.0, hosts: tup
     async def refuse(_: Request, error: AnyHTTPException) -> Json:
         return Json({"detail": error.detail}, error.status_code, error.headers)
 
-    @app.exception_handler(RequestValidationError)
-    async def mend(_: Request, error: RequestValidationError) -> Json:
-        found = (f"{'.'.join(map(str, e['loc'][1:])) or 'body'}: {e['msg']}" for e in error.errors())
-        return Json({"detail": shorten("; ".join(found), 400)}, 422)
-
     def allowed(given: Annotated[HTTPAuthorizationCredentials | None, Depends(HTTPBearer(auto_error=False))]) -> None:
         door.check(given.credentials.strip() if given else "")
 
@@ -126,7 +121,8 @@ def make_app(service: Service, token: str = "", settled: float = 1.0, hosts: tup
         return StreamingResponse(messages, media_type="text/event-stream", headers={"Cache-Control": "no-store"})
 
     @app.post("/api/order", dependencies=[Depends(allowed)])
-    async def order(wanted: Order) -> Json:
+    async def order(request: Request) -> Json:
+        wanted = read_order(await request.body())
         if wanted.target not in service.compensator.lines:
             known = ", ".join(service.compensator.lines)
             raise HTTPException(404, f"no target is named {shorten(wanted.target, 80)}; there are {known}")
@@ -139,6 +135,25 @@ def make_app(service: Service, token: str = "", settled: float = 1.0, hosts: tup
         return Json({"done": wanted.do, "target": wanted.target})
 
     return app
+
+
+def read_order(body: bytes) -> Order:
+    """Return the order in the body of a request.
+
+    Raises
+    ------
+    HTTPException
+        It is no JSON in UTF-8 (400), or not such an order (422).
+    """
+    try:
+        content = parse_json(body)
+    except ValueError as e:
+        raise HTTPException(400, f"body: want JSON in UTF-8: {escape(e, 200)}") from e
+    try:
+        return Order.model_validate(content)
+    except ValidationError as e:
+        found = (f"{'.'.join(map(str, p['loc'])) or 'body'}: {p['msg']}" for p in e.errors(include_url=False))
+        raise HTTPException(422, escape("; ".join(found), 400)) from e
 
 
 def give(service: Service, wanted: Order) -> str:

@@ -1,0 +1,31 @@
+"""JSON as it comes through doors: UTF-8, and each key once."""
+
+import json
+from typing import Any
+
+
+def parse_json(text: bytes | str) -> Any:
+    """Return the content of a JSON text.
+
+    Parameters
+    ----------
+    text : bytes or str
+
+    Raises
+    ------
+    ValueError
+        It is not UTF-8, not JSON, nested too deeply, or an object has a key twice.
+    """
+    try:
+        # json would guess UTF-16 and UTF-32, and take the last of two values
+        return json.loads(text.decode("utf-8") if isinstance(text, bytes) else text, object_pairs_hook=_once)
+    except RecursionError as e:
+        raise ValueError("nested too deeply") from e
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        keys = [key for key, _ in pairs]
+        raise ValueError(f"the key {next(k for k in keys if keys.count(k) > 1)!r} is there twice")
+    return found
