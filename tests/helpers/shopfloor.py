@@ -28,7 +28,7 @@ from thermocomp.core.correction import Limits
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.reading import Reading
 from thermocomp.files import modelfile
-from thermocomp.live.build import find_experiment
+from thermocomp.live.adapters.plain import find_experiment
 from thermocomp.models.training import train
 from thermocomp.models.watching import find_watch
 from thermocomp.recordings.stacking import stack

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from thermocomp.core.exceptions import InputError
+from thermocomp.live.adapters.network import MqttIn
 from thermocomp.live.config import Page, read_config
-from thermocomp.live.network import MqttIn
 
 GOOD = """
 models = ["model.json"]
@@ -60,7 +60,7 @@ def test_what_it_says(tmp_path: Path) -> None:
         ("magnitude = 80.0", "magnitude = -1.0", "limits: limit magnitude = -1.0: must be positive"),
         ("magnitude = 80.0", 'magnitude = "80 um"', "limits.magnitude: Input should be a valid number"),
         ("rate = 0.05", "rates = 0.05", "limits.rates is no key that is known"),
-        ('kind = "mqtt"', 'kind = "mqqt"', "sources.1: kind = 'mqqt' is none of 'mqtt', 'simulated', 'replay'"),
+        ('kind = "mqtt"', 'kind = "mqqt"', "sources.1: kind = 'mqqt' is none of 'mqtt', 'replay', 'simulated'"),
         ('kind = "mqtt"', "", 'sources.1 has no kind: write kind = "..."'),
         ('topic = "machine/7/temperatures"', "", "sources.1.topic is missing"),
         ('topic = "machine/7/temperatures"', "topic = 7", "sources.1.topic: Input should be a valid string"),

@@ -3,116 +3,28 @@
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from copy import deepcopy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, make_dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple, Union
 
 from pydantic import ConfigDict, Discriminator, Field, TypeAdapter, ValidationError, with_config
 from pydantic_core import ErrorDetails
 
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError, SettingError
+from thermocomp.core.plugins import find_plugins, load_plugin
 from thermocomp.core.shown import explain_unfit
 from thermocomp.core.units import HOUSE_UNITS
 from thermocomp.files.tomlfile import as_json, read_toml
-from thermocomp.live.network import MqttIn, MqttOut, MqttProbing, Names, OnBroker, explain_host_name
-
-
-@dataclass(frozen=True, kw_only=True)
-class SimulatedIn:
-    """The virtual machine.
-
-    Parameters
-    ----------
-    kind : {'simulated'}
-    experiment : str
-        What it does: one that comes with the package, or a protocol (.toml).
-    seed : int
-        Of weather and noise.
-    """
-
-    kind: Literal["simulated"]
-    experiment: str = "demo"
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        if self.seed < 0:
-            raise SettingError(f"seed = {self.seed}: want 0 or more")
-
-
-@dataclass(frozen=True, kw_only=True)
-class ReplayIn:
-    """A recording played back.
-
-    Parameters
-    ----------
-    kind : {'replay'}
-    file : str
-        In thermocomp's own CSV.
-    """
-
-    kind: Literal["replay"]
-    file: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class SimulatedProbing:
-    """Probings of the virtual machine.
-
-    Parameters
-    ----------
-    kind : {'simulated'}
-    every : float
-        Time of the machine between two [s].
-    repeatability : float
-        Of the probe, standard deviation [um].
-    """
-
-    kind: Literal["simulated"]
-    every: float = 7200.0
-    repeatability: float = 0.5
-
-    def __post_init__(self) -> None:
-        if not self.every > 0 or not self.repeatability >= 0:
-            raise SettingError(f"every = {self.every:g}, repeatability = {self.repeatability:g}: want more than 0 s")
-
-
-@dataclass(frozen=True, kw_only=True)
-class LinuxCncOut:
-    """Corrections to a LinuxCNC on this computer.
-
-    Parameters
-    ----------
-    kind : {'linuxcnc'}
-    socket : str
-        Of the HAL component that ``thermocomp linuxcnc setup`` puts there.
-    axes : dict of str to str
-        Axis by target, such as ``{z_um = "Z"}``.
-    """
-
-    kind: Literal["linuxcnc"]
-    socket: str
-    axes: Names
-
-    def __post_init__(self) -> None:
-        letters = [a.upper() for a in self.axes.values()]
-        if not letters or set(letters) - set("XYZUVW") or len(set(letters)) < len(letters):
-            raise SettingError(f'axes = {self.axes}: want a straight axis per target, such as {{z_um = "Z"}}')
-
-
-@dataclass(frozen=True, kw_only=True)
-class FileOut:
-    """Corrections to a file.
-
-    Parameters
-    ----------
-    kind : {'file'}
-    file : str
-        Replaced as a whole each time.
-    """
-
-    kind: Literal["file"]
-    file: str
+from thermocomp.live.adapters.network import MqttIn, MqttOut, MqttProbing, OnBroker, explain_host_name
+from thermocomp.live.adapters.sections import (
+    LinuxCncOut,
+    Names,
+    SimulatedIn,
+    SimulatedProbing,
+    SinkSection,
+    SourceSection,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -195,8 +107,6 @@ class JournalOut:
             raise SettingError(f"size_mb = {self.size_mb:g}, files = {self.files}: want 0.1 or more, and 2 or more")
 
 
-In = Annotated[MqttIn | SimulatedIn | ReplayIn, Discriminator("kind")]
-Out = Annotated[MqttOut | FileOut | LinuxCncOut, Discriminator("kind")]
 Probings = Annotated[MqttProbing | SimulatedProbing, Discriminator("kind")]
 
 
@@ -228,8 +138,8 @@ class Config:
         When it is stopped corrections stay as they are, or go to zero first, within the limits.
     """
 
-    sources: tuple[In, ...]
-    sinks: tuple[Out, ...] = ()
+    sources: tuple[SourceSection, ...]
+    sinks: tuple[SinkSection, ...] = ()
     models: tuple[str, ...] = ()
     machine: MachineOf | None = None
     probes: tuple[Probings, ...] = ()
@@ -287,7 +197,7 @@ class Config:
             )
 
 
-def _place(one: In | Out | Probings) -> str:
+def _place(one: SourceSection | SinkSection | Probings) -> str:
     """Return what two links must not share."""
     if isinstance(one, OnBroker):
         return f"topic = {one.topic!r} of {one.host}:{one.port}"
@@ -302,9 +212,8 @@ class Settings(NamedTuple):
     folder: Path
 
 
-_ADAPTER: TypeAdapter[Config] = TypeAdapter(
-    with_config(ConfigDict(strict=True, extra="forbid", allow_inf_nan=False))(Config)
-)
+#: tables whose ``kind`` is the name of an entry point of ``thermocomp.sources`` and ``thermocomp.sinks``
+_KINDS: tuple[Literal["sources", "sinks"], ...] = ("sources", "sinks")
 _PLAIN = {
     "missing": "is missing",
     "unexpected_keyword_argument": "is no key that is known",
@@ -331,13 +240,31 @@ def read_config(path: str | Path) -> Settings:
     content = read_toml(path, "configuration of the service")
     if unfit := list(_unfit(content)):
         raise InputError("\n".join([f"{path}: {len(unfit)} to mend:", *(f"  {line}" for line in unfit)]))
+    adapter = _adapter(content)
     try:
-        config = _ADAPTER.validate_json(as_json(content))
+        config = adapter.validate_json(as_json(content))
     except ValidationError as e:
         errors = e.errors(include_url=False)
-        lines = [line for error in [*errors, *_behind(content, errors)] for line in _tell(dict(error)).splitlines()]
+        lines = [
+            line for error in [*errors, *_behind(adapter, content, errors)] for line in _tell(dict(error)).splitlines()
+        ]
         raise InputError("\n".join([f"{path}: {len(lines)} to mend:", *(f"  {line}" for line in lines)])) from e
     return Settings(config, Path(path).resolve().parent)
+
+
+def _adapter(content: dict[str, Any]) -> TypeAdapter[Config]:
+    """Return what validates a configuration: with this package's sections, and those of others that it names."""
+    fields = [(group, tuple[_section_of(group, content.get(group)), ...], ()) for group in _KINDS]  # type: ignore[misc]
+    made = make_dataclass("Config", [fields[0][:2], fields[1]], bases=(Config,), frozen=True, kw_only=True)
+    return TypeAdapter(with_config(ConfigDict(strict=True, extra="forbid", allow_inf_nan=False))(made))
+
+
+def _section_of(group: Literal["sources", "sinks"], tables: Any) -> Any:
+    found_kinds = (t.get("kind") for t in tables if isinstance(t, dict)) if isinstance(tables, list) else ()
+    named = {kind for kind in found_kinds if isinstance(kind, str)}
+    known = find_plugins(group)
+    found = [load_plugin(e) for name, e in known.items() if e.value.startswith("thermocomp.") or name in named]
+    return Annotated[Union[tuple(found)], Discriminator("kind")]  # noqa: UP007 - made of a list
 
 
 def _unfit(value: Any, place: str = "") -> Iterator[str]:
@@ -352,7 +279,9 @@ def _unfit(value: Any, place: str = "") -> Iterator[str]:
             yield from _unfit(inner, f"{place}.{key}" if place else str(key))
 
 
-def _behind(content: dict[str, Any], errors: Sequence[ErrorDetails]) -> list[ErrorDetails]:
+def _behind(
+    adapter: TypeAdapter[Config], content: dict[str, Any], errors: Sequence[ErrorDetails]
+) -> list[ErrorDetails]:
     """Return what else is wrong in tables that have a key of a wrong type: they are not judged as a whole then."""
     content = deepcopy(content)
     tables = set[tuple[int | str, ...]]()
@@ -365,7 +294,7 @@ def _behind(content: dict[str, Any], errors: Sequence[ErrorDetails]) -> list[Err
             if isinstance(table, dict) and table.pop(keys[-1], None) is not None:
                 tables.add(keys[:-1])
     try:
-        _ADAPTER.validate_json(as_json(content))
+        adapter.validate_json(as_json(content))
     except ValidationError as e:
         return [x for x in e.errors(include_url=False) if x["type"] == "value_error" and _keys(x["loc"]) in tables]
     return []
@@ -373,7 +302,7 @@ def _behind(content: dict[str, Any], errors: Sequence[ErrorDetails]) -> list[Err
 
 def _keys(loc: tuple[int | str, ...]) -> tuple[int | str, ...]:
     """Return the keys and places in lists that lead to an error: the kind of an entry, behind its place, is none."""
-    kinds = ("mqtt", "simulated", "replay", "file", "linuxcnc")
+    kinds = {"mqtt", "simulated", *find_plugins("sources"), *find_plugins("sinks")}
     pairs = zip((None, *loc), loc, strict=False)
     return tuple(k for before, k in pairs if not (k in kinds and isinstance(before, int)))
 
@@ -384,6 +313,7 @@ def _tell(error: dict[str, Any]) -> str:
     if error["type"] == "value_error":
         return str(context["error"]) if place == "file" else f"{place}: {context['error']}"
     if error["type"] == "union_tag_invalid":
-        return f"{place}: kind = {context['tag']!r} is none of {context['expected_tags']}"
+        known = next((", ".join(map(repr, find_plugins(g))) for g in _KINDS if place.startswith(g)), "")
+        return f"{place}: kind = {context['tag']!r} is none of {known or context['expected_tags']}"
     message = _PLAIN.get(error["type"])
     return f"{place} {message}" if message else f"{place}: {error['msg']}, found {error['input']!r:.60}"

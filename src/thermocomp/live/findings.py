@@ -10,7 +10,8 @@ from thermocomp.core.alone import alone
 from thermocomp.core.exceptions import InputError
 from thermocomp.live.adapters.linuxcnc.halsetup import HAL_NAME, LONGEST
 from thermocomp.live.adapters.plain import read_rows
-from thermocomp.live.config import FileOut, LinuxCncOut, Page, ReplayIn, Settings, SimulatedIn
+from thermocomp.live.adapters.sections import FileOut, LinuxCncOut, ReplayIn, SimulatedIn
+from thermocomp.live.config import Page, Settings
 from thermocomp.live.page import web
 
 #: bytes of a file's name on a disk

@@ -7,6 +7,7 @@ import math
 import time
 from collections.abc import AsyncIterator, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib.resources import as_file, files
 from pathlib import Path
 from typing import BinaryIO
 
@@ -20,6 +21,7 @@ from thermocomp.live.adapters.connection import Connection
 from thermocomp.live.adapters.messages import write_message
 from thermocomp.virtual.experiments import simulate
 from thermocomp.virtual.protocol import Experiment
+from thermocomp.virtual.protocolfile import read_protocol
 
 
 @dataclass(kw_only=True)
@@ -238,3 +240,21 @@ def _parsed(row: Sequence[str], place: int) -> float | None:
     except (ValueError, IndexError):
         return None
     return value if math.isfinite(value) else None
+
+
+def find_experiment(name: str, folder: Path) -> Experiment:
+    """Return an experiment of the virtual machine: one that comes with the package, or a protocol of one's own.
+
+    Raises
+    ------
+    InputError
+        There is none, or it cannot be used.
+    """
+    if name.endswith(".toml"):
+        return read_protocol(folder / name)
+    home = files("thermocomp.virtual") / "protocols"
+    known = sorted(p.name.removesuffix(".toml") for p in home.iterdir() if p.name.endswith(".toml"))
+    if name not in known:
+        raise InputError(f"experiment {name!r}: want a path that ends in .toml, or one of {', '.join(known)}")
+    with as_file(home / f"{name}.toml") as path:
+        return read_protocol(path)

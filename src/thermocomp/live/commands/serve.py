@@ -136,7 +136,9 @@ def _demo(folder: Path) -> Path:
     if not model.exists():
         console.print("A model of the virtual machine is fitted to a recording of it, a minute or more ...")
         with needs("study"):
-            from thermocomp.api.verbs import fit, simulate
+            from thermocomp.api.verbs import fit
+        from thermocomp.virtual.verbs import simulate
+
         fit(simulate("demo"), _TARGETS, inputs=_INPUTS, jobs=-1).save(model)
     if not config.exists():
         text = _CONFIG.format(speed=_SPEED)

@@ -4,9 +4,11 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from ipaddress import ip_address
+from pathlib import Path
 from typing import ClassVar, Literal
 
 from thermocomp.core.exceptions import SettingError
+from thermocomp.core.ports import Sink, Source
 
 Names = dict[str, str]
 #: bytes of a topic, as MQTT counts them; characters of a host name, and of what stands between two dots
@@ -70,6 +72,12 @@ class MqttIn(OnBroker):
         if twice := [name for name, count in Counter(self.names.values()).items() if count > 1]:
             raise SettingError(f"names: several values for {', '.join(sorted(twice))}: want one for each channel")
 
+    def open(self, folder: Path, speed: float) -> Source:  # noqa: ARG002 - of a section
+        """Make the source."""
+        from thermocomp.live.adapters.mqtt import MqttSource
+
+        return MqttSource(topic=self.topic, host=self.host, port=self.port, names=dict(self.names))
+
 
 @dataclass(frozen=True, kw_only=True)
 class MqttProbing(OnBroker):
@@ -98,6 +106,12 @@ class MqttOut(OnBroker):
 
     published: ClassVar[bool] = True
     kind: Literal["mqtt"]
+
+    def open(self, folder: Path) -> Sink:  # noqa: ARG002 - of a section
+        """Make the sink."""
+        from thermocomp.live.adapters.mqtt import MqttSink
+
+        return MqttSink(topic=self.topic, host=self.host, port=self.port)
 
 
 def explain_topic(topic: str, *, published: bool) -> str:

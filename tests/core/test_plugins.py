@@ -1,0 +1,177 @@
+"""What another package brings is found by its entry points, used like our own, and skipped with a reason."""
+
+import json
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+from driftmodels import lags
+from reviseruns import judged, write_models
+from smallmachine import small_machine
+
+from thermocomp.recordings.readers import recordings
+
+CODE = '''
+"""A method, an export, a source and a command."""
+from dataclasses import dataclass
+from typing import Literal
+from sklearn.linear_model import LinearRegression
+from thermocomp.core.ports import Status
+from thermocomp.core.reading import Reading
+from thermocomp.export.target import Target
+from thermocomp.models.method import Method
+from thermocomp.models.ols import LeastSquares
+
+
+class Halved(LeastSquares):
+    """Least squares, halved: worse on purpose."""
+
+    def fit(self, X, y):
+        super().fit(X, y)
+        self.coef_ = self.coef_ / 2
+        return self
+
+
+METHODS = (Method("halved", "least squares, halved", "tinyplug:Halved"),)
+
+
+def write(compensator, name, facts):
+    return {f"{name}.txt": "\\n".join(compensator.lines).encode(), "README.md": b"# A list of targets  \\nRead it.\\n"}
+
+
+TARGET = Target(write=write)
+
+
+class Counting:
+    """A source that counts."""
+
+    async def connect(self, timeout):
+        pass
+
+    async def readings(self):
+        for k in range(3):
+            yield Reading(float(k), {"t": 20.0 + k})
+
+    def status(self):
+        return Status("connected")
+
+    async def close(self):
+        pass
+
+
+@dataclass(frozen=True, kw_only=True)
+class CountingIn:
+    """Its table."""
+
+    kind: Literal["counting"]
+    by: float = 1.0
+
+    def open(self, folder, speed):
+        return Counting()
+
+
+def greet(who: str = "machine") -> int:
+    """Greet somebody.
+
+    Parameters
+    ----------
+    who : str
+        Whom.
+    """
+    print(f"hello {who}")
+    return 0
+'''
+ENTRIES = """
+[thermocomp.commands]
+greet = tinyplug:greet
+absent = nowhere.at_all:run
+fit = tinyplug:greet
+[thermocomp.methods]
+tiny = tinyplug:METHODS
+broken = tinyplug:NOTHING
+[thermocomp.exporters]
+list = tinyplug:TARGET
+broken = tinyplug:NOTHING
+[thermocomp.sources]
+counting = tinyplug:CountingIn
+broken = tinyplug:NOTHING
+"""
+CONFIG = 'models = ["model.json"]\nown_compensation = "off"\nshadow = true\n[[sources]]\nkind = "counting"\n{}\n'
+READ = """
+import asyncio, sys
+sys.path.insert(0, {path!r})
+from thermocomp.live.build import build
+from thermocomp.live.config import read_config
+(source,) = build(read_config("live.toml")).sources
+async def read():
+    return [r.values["t"] async for r in source.readings()]
+print(asyncio.run(read()))
+"""
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder into which pip has installed the package."""
+    folder = tmp_path_factory.mktemp("plugin")
+    wheel, info = folder / "tinyplug-1.0-py3-none-any.whl", "tinyplug-1.0.dist-info"
+    with zipfile.ZipFile(wheel, "w") as file:
+        file.writestr("tinyplug.py", CODE)
+        file.writestr(f"{info}/METADATA", "Metadata-Version: 2.1\nName: tinyplug\nVersion: 1.0\n")
+        file.writestr(
+            f"{info}/WHEEL", "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
+        )
+        file.writestr(f"{info}/entry_points.txt", ENTRIES)
+        file.writestr(f"{info}/RECORD", "")
+    site = folder / "site"
+    words = ["-m", "pip", "install", "--quiet", "--no-index", "--no-deps", "--target", str(site), str(wheel)]
+    subprocess.run([sys.executable, *words], check=True, capture_output=True)
+    return site
+
+
+def thermocomp(installed: Path, *words: str, code: int = 0, cwd: Path | None = None) -> tuple[str, str]:
+    """Run a command with the package on the path; return what it prints."""
+    start = f"import sys; sys.path.insert(0, {str(installed)!r}); from thermocomp.cli.app import main; main()"
+    done = subprocess.run([sys.executable, "-c", start, *words], capture_output=True, text=True, cwd=cwd, check=False)
+    assert done.returncode == code, done.stderr
+    return done.stdout, " ".join(done.stderr.split())
+
+
+def test_a_command(installed: Path) -> None:
+    out, err = thermocomp(installed, "greet", "shop")
+    assert out == "hello shop\n"
+    assert "plug-in absent (thermocomp.commands) of the package tinyplug is skipped: there is no nowhere.at_all" in err
+    assert "plug-in fit (thermocomp.commands) of the package tinyplug is skipped: fit is there already" in err
+    out, _ = thermocomp(installed, "--help")
+    assert "Greet somebody." in out
+    assert "Fit a model" in out
+
+
+def test_a_method_and_an_export(installed: Path, tmp_path: Path) -> None:
+    recordings.write(small_machine(), tmp_path / "drift.csv")
+    words = ["compare", "drift.csv", "--target", "z_um", "--models", "ols", "halved", "--json", "--jobs", "1"]
+    out, err = thermocomp(installed, *words, cwd=tmp_path)
+    judged = {a["model"]: a["rms_um"] for a in json.loads(out)["results"] if a["block"] == "all unseen cycles"}
+    assert judged["halved"] > 1.5 * judged["ols"]
+    assert "plug-in broken (thermocomp.methods) of the package tinyplug cannot be loaded" in err
+    thermocomp(installed, "fit", "drift.csv", "--target", "z_um", "--model", "ols", "-o", "model.json", cwd=tmp_path)
+    thermocomp(installed, "export", "model.json", "--to", "list", "-o", "out", cwd=tmp_path)
+    assert (tmp_path / "out" / "thermal.txt").read_text() == "z_um"
+    _, err = thermocomp(installed, "export", "model.json", "--to", "broken", "-o", "out2", cwd=tmp_path, code=2)
+    assert "plug-in broken (thermocomp.exporters) of the package tinyplug cannot be loaded: AttributeError" in err
+
+
+def test_a_source(installed: Path, tmp_path: Path) -> None:
+    write_models([judged(lags("z_um", 1.0))], str(tmp_path / "model.json"))
+    (tmp_path / "live.toml").write_text(CONFIG.format("by = 2.0"), encoding="utf-8")
+    words = [sys.executable, "-c", READ.format(path=str(installed))]
+    done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path, check=False)
+    assert done.stdout == "[20.0, 21.0, 22.0]\n", done.stderr
+    thermocomp(installed, "serve", "live.toml", "--check", cwd=tmp_path)
+    (tmp_path / "live.toml").write_text(CONFIG.format("to = 2.0"), encoding="utf-8")
+    _, err = thermocomp(installed, "serve", "live.toml", "--check", cwd=tmp_path, code=2)
+    assert "sources.1.to is no key that is known" in err
+    (tmp_path / "live.toml").write_text(CONFIG.format("").replace("counting", "broken"), encoding="utf-8")
+    _, err = thermocomp(installed, "serve", "live.toml", "--check", cwd=tmp_path, code=2)
+    assert "plug-in broken (thermocomp.sources) of the package tinyplug cannot be loaded" in err
