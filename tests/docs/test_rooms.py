@@ -1,0 +1,39 @@
+"""Rooms know each other as little as the decision on them says."""
+
+import ast
+from collections import Counter
+from pathlib import Path
+
+import thermocomp
+
+PACKAGE = Path(thermocomp.__file__).parent
+MAIN = {"core", "files", "recordings", "runtime", "models", "judging", "report", "api", "cli"}
+#: without the studies of the papers, which show all of them
+SATELLITES = {"live", "nc", "export", "volumetric", "iso230", "virtual"}
+
+
+def arrows() -> Counter[tuple[str, str]]:
+    """Return how many imports lead from a room to another."""
+    found: Counter[tuple[str, str]] = Counter()
+    for path in PACKAGE.rglob("*/*.py"):
+        room = path.relative_to(PACKAGE).parts[0]
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("thermocomp."):
+                other = (node.module or "").split(".")[1]
+                found[room, other] += other != room
+    return +found
+
+
+def test_each_room_is_a_main_room_or_a_satellite() -> None:
+    assert {p.name for p in PACKAGE.iterdir() if p.is_dir() and p.name != "__pycache__"} == MAIN | SATELLITES | {
+        "papers"
+    }
+
+
+def test_arrows_are_few() -> None:
+    found = arrows()
+    assert not [a for a in found if a[0] in MAIN and a[1] not in MAIN]
+    assert len([a for a in found if set(a) <= MAIN]) <= 27  # 22 are wanted
+    assert {a for a in found if set(a) <= SATELLITES} == {("live", "nc"), ("live", "virtual"), ("iso230", "volumetric")}
+    known = Counter(a for a, b in found if a in SATELLITES and b in MAIN)
+    assert {room for room, n in known.items() if n > 6} == {"volumetric", "export"}  # none is wanted
