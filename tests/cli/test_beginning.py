@@ -207,4 +207,4 @@ def test_iso230_says_it(folder: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert run(["iso230", b, "--start", "cold", "--positioning", b]) in (0, 2)
     capsys.readouterr()
     assert run(["iso230", "--start", "cold", "--positioning", b]) == 2
-    assert "is told of a recording; name one" in told(capsys)
+    assert "applies to a single recording; name one" in told(capsys)

@@ -98,12 +98,12 @@ def test_what_is_refused() -> None:
         LAG.predict({"t": [1.0]}, [0.0, 1.0])
     with pytest.raises(InputError, match="time must be finite"):
         LAG.predict({"t": [1.0]}, [np.nan])
-    with pytest.raises(InputError, match=r"model of z: column 't' holds something that is no number: .*'warm'"):
+    with pytest.raises(InputError, match=r"model of z: column 't' contains a non-numeric value: .*'warm'"):
         LAG.predict({"t": ["warm"]}, [0.0])
-    with pytest.raises(InputError, match="column 't' holds something that is no number: found times"):
+    with pytest.raises(InputError, match="column 't' contains a non-numeric value: found times"):
         LAG.predict({"t": [np.datetime64("2026-01-01")]}, [0.0])
     with pytest.raises(InputError, match=r"the time in column 'clock' must be numbers .* or datetimes: .*'noon'"):
         LAG.predict({"t": [1.0], "clock": ["noon"]}, "clock")
     timed = replace(LAG, zeroing=Zeroing(speed="rpm"))
-    with pytest.raises(InputError, match="column 'rpm' holds something that is no number"):
+    with pytest.raises(InputError, match="column 'rpm' contains a non-numeric value"):
         timed.predict({"t": [1.0], "rpm": ["fast"]}, [0.0])

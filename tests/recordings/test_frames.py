@@ -127,7 +127,7 @@ def test_there_and_back(recording: Recording) -> None:
         (TABLE, {"cycles": "day"}, InputError, "no column is named 'day'"),
         (TABLE, {"cycles": [1]}, InputError, "1 labels for 3 rows"),
         (TABLE[["time_min", "n"]], {}, RecordingError, "none of the columns time_min, n is understood"),
-        (TABLE.assign(T1="warm"), {"units": UNITS}, RecordingError, "column 'T1' holds something that is no number"),
+        (TABLE.assign(T1="warm"), {"units": UNITS}, RecordingError, "column 'T1' contains a non-numeric value"),
         (TABLE.iloc[:0], {}, RecordingError, "has no row"),
         (TABLE.assign(drift_um=0.0), {}, RecordingError, "two columns would become the same channel"),
         (pd.DataFrame([[0.0, 1.0]], columns=["a_C", "a_C"]), {}, RecordingError, "two columns are named 'a_C'"),

@@ -201,7 +201,7 @@ def plan_from(
     Planned
     """
     found = planning.plan(ready.samples, top_speed, hours=hours, swing=swing)
-    progress("tests foretold")
+    progress("test errors predicted")
     judging = units_of(ready) if curve else Judging("", ())
     learned = None
     if len(judging.splits) > 2:

@@ -84,7 +84,7 @@ def compare(
     primary : str, optional
         Method that is named beforehand, see `thermocomp.judging.results.Rules`.
     harm_margin : float, optional
-        Harm in a single unit that is let pass, stated before judging [um].
+        Tolerated degradation in a single unit, stated before judging [um].
     limits : Limits or None
         Of the compensator that is judged with the models; None: the models alone.
     jobs : int
@@ -242,7 +242,7 @@ def assess(
     mapping : str, Path or Mapping, optional
         What the columns of files are.
     harm_margin : float, optional
-        Harm in a single unit that is let pass, stated before judging [um].
+        Tolerated degradation in a single unit, stated before judging [um].
     limits : Limits
         Of the compensator that is judged with the models.
     probing : str or Probings, optional

@@ -39,7 +39,7 @@ def assess(
     mapping : Path
         TOML file that says what the columns are.
     harm_margin : float
-        Harm in a single cycle that is let pass [um]; as in ``thermocomp fit`` if not given.
+        Tolerated degradation in a single cycle [um]; as in ``thermocomp fit`` if not given.
     probing : str
         The tool point is probed while it runs, such as ``every 2 h``, or ``every 30 min, 0.3 um`` with the probe's
         repeatability (standard deviation; 0.5 um if not given): what it says corrects the model from then on.

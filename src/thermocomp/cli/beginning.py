@@ -1,4 +1,4 @@
-"""How recordings begin, as said on the command line."""
+"""Initial thermal state of recordings: command-line options."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -62,7 +62,7 @@ class Beginning:
         if word is None:
             return None
         if not tests:
-            raise InputError(f"--start {word}: is told of a recording; name one")
+            raise InputError(f"--start {word}: applies to a single recording; name one")
         earlier = tuple(read_recordings(self.continues, mapping)) if self.continues else ()
         for e in earlier:
             if e.fingerprint == tests[0].fingerprint:

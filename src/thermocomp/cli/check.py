@@ -17,7 +17,7 @@ def check(
     overwrite: bool = False,
     json: bool = False,
 ) -> int:
-    """Tell what recordings hold and what is wrong with them; of more than three files, a line each.
+    """Summarise recordings and report data-quality problems; of more than three files, a line each.
 
     Parameters
     ----------

@@ -52,8 +52,8 @@ def fit(
     margin : float
         Share of each input's trained span by which its range is widened.
     accept_unproven : str
-        Who takes an unproven model all the same, and why: "NAME, REASON". It is written into the model file and said
-        wherever the model is shown. A refused one is never taken.
+        Person who approves the use of an unproven model, and the reason: "NAME, REASON". Kept in the model file, and shown
+        wherever the model is. A refused one is never taken.
     compensator : CompensatorOptions
         Its limits: what would run is judged, not the model alone.
     beginning : Beginning

@@ -49,7 +49,7 @@ class StudyOptions:
     absolute : bool
         Take temperatures as they are; without it they are counted from the start of each test.
     harm_margin : float
-        Harm in a single cycle, day or file that is let pass [um]. If not given: three times the probe's noise or 5 % of
+        Tolerated degradation in a single cycle, day or file [um]. If not given: three times the probe's noise or 5 % of
         the largest drift, at most 2 um.
     zero_over : float
         Average that start over so long, while the spindle stands [s]; 0: it is the first row.

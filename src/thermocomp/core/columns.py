@@ -41,7 +41,7 @@ def read_numbers(table: Columns, name: str, owner: str) -> FloatArray:
             raise TypeError("found times")
         return values.astype(np.float64)
     except (TypeError, ValueError) as e:
-        raise InputError(f"{owner}: column {name!r} holds something that is no number: {e}") from e
+        raise InputError(f"{owner}: column {name!r} contains a non-numeric value: {e}") from e
 
 
 def count_rows(table: Columns) -> int:

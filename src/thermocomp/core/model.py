@@ -35,7 +35,7 @@ _UNIT = re.compile(r"(um|urad)(/m(\^[2-9])?)?")
 
 
 class State(NamedTuple):
-    """All that a model remembers between two steps.
+    """Model state between two steps.
 
     Leading axes, if any, are a batch of independent runs.
     """
@@ -75,9 +75,9 @@ class ErrorModel(ABC):
     zeroing : Zeroing
         Over how long a compensator averages what the inputs with ``rezero`` count from, as in its training.
     band : Band or None
-        How far it may be off; None: nothing is known of that.
+        Uncertainty band; None if not estimated.
     watch : Watch or None
-        Over its temperatures: which of them are to be believed, and what stands in for one that is not.
+        Over its temperatures: which are believed, and a substitute value for each that is rejected.
 
     Examples
     --------
@@ -304,7 +304,7 @@ class ErrorModel(ABC):
         return self._directions(memory, change)
 
     def change(self, state: State, inputs: FloatArray) -> FloatArray:
-        """Return what the model makes of a reading: inputs minus their reference, within the trained range."""
+        """Return a reading relative to its reference, clipped to the training range."""
         return self.clip(_bounded(inputs) - state.reference)[0]
 
     def _supported(
@@ -347,7 +347,7 @@ class ErrorModel(ABC):
         Raises
         ------
         InputError
-            A column is missing or holds something that is no number; or the time is missing for a model with a memory.
+            A column is missing or contains a non-numeric value; or the time is missing for a model with a memory.
         """
         said = [state.deviation for state, _ in self.walk(table, time, reference=reference)]
         return np.array(said, dtype=np.float64)

@@ -23,7 +23,7 @@ class Source(Protocol):
     """Where readings come from."""
 
     async def connect(self, timeout: float) -> None:
-        """Connect within so long [s], or raise `ThermocompError` with the reason."""
+        """Connect, or raise `ThermocompError` with the reason after `timeout` seconds."""
         ...
 
     def readings(self) -> AsyncIterator[Reading]:
@@ -31,11 +31,11 @@ class Source(Protocol):
         ...
 
     def status(self) -> Status:
-        """Return how the connection is, at once."""
+        """Return the connection status without blocking."""
         ...
 
     async def close(self) -> None:
-        """Give back what was taken; a second time does nothing."""
+        """Close the connection; idempotent."""
         ...
 
 
@@ -44,7 +44,7 @@ class Probe(Protocol):
     """Where measurements of the tool point come from while the machine runs."""
 
     async def connect(self, timeout: float) -> None:
-        """Connect within so long [s], or raise `ThermocompError` with the reason."""
+        """Connect, or raise `ThermocompError` with the reason after `timeout` seconds."""
         ...
 
     def measurements(self) -> AsyncIterator[Measurement]:
@@ -52,11 +52,11 @@ class Probe(Protocol):
         ...
 
     def status(self) -> Status:
-        """Return how the connection is, at once."""
+        """Return the connection status without blocking."""
         ...
 
     async def close(self) -> None:
-        """Give back what was taken; a second time does nothing."""
+        """Close the connection; idempotent."""
         ...
 
 
@@ -87,7 +87,7 @@ class Sink(Protocol):
     """Where corrections go."""
 
     async def connect(self, timeout: float) -> None:
-        """Connect within so long [s], or raise `ThermocompError` with the reason."""
+        """Connect, or raise `ThermocompError` with the reason after `timeout` seconds."""
         ...
 
     async def apply(self, corrections: Mapping[str, Correction]) -> None:
@@ -95,9 +95,9 @@ class Sink(Protocol):
         ...
 
     def status(self) -> Status:
-        """Return how the connection is, at once."""
+        """Return the connection status without blocking."""
         ...
 
     async def close(self) -> None:
-        """Give back what was taken; a second time does nothing. What was applied stays in force."""
+        """Close the connection; idempotent. What was applied stays in force."""
         ...

@@ -81,7 +81,7 @@ class HonestError:
     rules : int
         By which it was judged, see `RULES`; older ones prove nothing.
     taken : str
-        Who takes an unproven model all the same, and why; empty without that.
+        Person who approved the use of an unproven model, and the reason; empty without.
     harm_margin : float or None
         Harm in a single cycle that was let pass, as it was stated before judging; None: by rule.
     lost : dict of str to float

@@ -19,7 +19,7 @@ BoolArray = NDArray[np.bool_]
 
 #: readings that are averaged at most, however fast they come: noise is gone by then, and memory is bounded
 MOST = 600
-#: a spindle that turns no faster than this stands: what a tachometer reads at rest [1/min]
+#: below this speed the spindle counts as stopped: what a tachometer reads at rest [1/min]
 STANDS = 10.0
 #: a value further from the median than this many median deviations is an outlier (four sigma of a normal law)
 FAR = 6.0

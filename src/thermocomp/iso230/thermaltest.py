@@ -78,7 +78,7 @@ class Pair:
 
 @dataclass(frozen=True)
 class Figures:
-    """What is told of one curve; counted from the start of the test, in the curve's unit. The symbols are ours.
+    """Characteristic values of one curve; counted from the start of the test, in the curve's unit.
 
     Parameters
     ----------

@@ -21,7 +21,7 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 Word = Literal["accepted", "unproven", "refused"]
 
-#: units below which nothing is shown: two of them agree too easily
+#: fewest units: below, too few for a significance test
 MIN_UNITS = 3
 #: noise that a probe has at least [um]
 NO_NOISE = 1e-3

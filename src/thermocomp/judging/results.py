@@ -29,7 +29,7 @@ class Rules:
     Parameters
     ----------
     margin : float or None
-        Harm in a single unit that is let pass [unit of the target]; None takes that of `do_no_harm.margin_of`.
+        Tolerated degradation in a single unit [unit of the target]; None takes that of `do_no_harm.margin_of`.
     primary : str or None
         Method that the judging is about: it is not corrected for the number of methods, all others are.
     """

@@ -32,7 +32,7 @@ def build(settings: Settings) -> Service:
     """
     config, folder = settings
     if missing := list(find_faults(settings)):
-        raise InputError("\n".join(["what the configuration names cannot be used:", *(f"  {m}" for m in missing)]))
+        raise InputError("\n".join(["invalid configuration:", *(f"  {m}" for m in missing)]))
     if (own := config.machine) is not None:
         machine = read_machine(folder / own.file)
         compensator = Compensator.of_machine(machine, own.at, own.tool, config.limits)

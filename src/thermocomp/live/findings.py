@@ -125,7 +125,7 @@ def _unwritable(path: Path) -> str:
     if not path.parent.is_dir():
         return f"there is no folder {path.parent}"
     if not os.access(path.parent, os.W_OK):
-        return f"nothing can be written in {path.parent}"
+        return f"directory not writable: {path.parent}"
     return "is read-only" if path.exists() and not os.access(path, os.W_OK) else ""
 
 

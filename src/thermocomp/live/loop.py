@@ -133,7 +133,7 @@ class Service:
         self._chart(said, probings, learned)
 
     def order(self, target: str, status: Status | None) -> None:
-        """Take a target out, or let it run again; see `thermocomp.runtime.orders.order`."""
+        """Suspend or resume a target; see `thermocomp.runtime.orders.order`."""
         before = self.state.orders.get(target)
         self.state = order(self.compensator, self.state, target, status)
         if before == status:  # it is so: no news
@@ -147,7 +147,7 @@ class Service:
         self.state = order(self.compensator, self.state, target, Status("shadow", CONFIGURED))
 
     def rezero(self, target: str, why: str, in_force: Correction | None = None) -> None:
-        """Let a target count anew from now; see `thermocomp.runtime.orders.rezero`."""
+        """Reset the reference of a target; see `thermocomp.runtime.orders.rezero`."""
         self.state = rezero(self.compensator, self.state, target, self.clock.now(), why, in_force)
         for counted_before in (self.before, self.probings):  # from the zero before
             counted_before.pop(target, None)

@@ -143,7 +143,7 @@ def _numbers(values: Any, what: str) -> FloatArray:
     try:
         found = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError) as e:
-        raise RecordingError(f"{what} holds something that is no number: {e}") from e
+        raise RecordingError(f"{what} contains a non-numeric value: {e}") from e
     return np.where(np.isinf(found), np.nan, found)
 
 

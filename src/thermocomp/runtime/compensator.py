@@ -1,8 +1,8 @@
 """The compensator: one reading in, one correction per axis or target out. State in, state out.
 
-The way of a reading: in time? -> watch (which temperatures are to be believed; what stands in for the others) -> gate
+Processing chain of a reading: in time? -> watch (which temperatures are believed; substitutes) -> gate
 (complete? finite? plausible?) -> minus the zero and `ErrorModel.step` per model -> offset and slope per axis -> minus
-sign -> limits -> `Correction`. What the gate turns away changes nothing: every correction stays where it was, for
+sign -> limits -> `Correction`. Rejected readings leave the state unchanged: every correction stays where it was, for
 `Limits.hold`, and fades after that; so does one whose model was never judged without the sensors that failed. The first
 readings after a start are averaged: they are what temperatures count from, and the corrections stay zero until it is
 known, as long as the spindle stands (`ErrorModel.zeroing`). A probing comes with a reading and counts from the next one

@@ -1,4 +1,4 @@
-"""The watch over the temperatures, reading by reading: which is believed, and what stands in for one that is not.
+"""The watch over the temperatures, reading by reading: which is believed, and substitutes for the others.
 
 State in, state out; leading axes are a batch of independent runs with the same clock. Only the past is used. A sensor
 that is missing is replaced at once by its prediction from the others and the speed; one that jumped, that is stuck or

@@ -76,7 +76,7 @@ def export(
     dialect : {'codesys', 'twincat', 'scl'}
         Of structured text; codesys if not given.
     hold : float
-        So long a correction stays without a usable reading [s].
+        Hold time of a correction without valid readings [s].
     fade : float
         Time constant with which it goes to zero after that [s].
     reading_age : float
@@ -88,7 +88,7 @@ def export(
     beginning : Beginning
         How the recordings begin.
     accept_unproven : str
-        Who takes an unproven model all the same, and why: "NAME, REASON".
+        Person who approves the use of an unproven model, and the reason: "NAME, REASON".
     date : str
         For the first lines, such as 2026-01-31; today if not given.
     overwrite : bool
@@ -160,7 +160,7 @@ def export(
     if texts:
         console.print(words(texts[list(texts)[-1]].decode().split("  \n", 1)[0]), soft_wrap=True)
         console.print(words(f"Written: {', '.join(str(output / file) for file in texts)}"), soft_wrap=True)
-        console.print(words(f"Prove it as {output / list(texts)[-1]} says."), soft_wrap=True)
+        console.print(words(f"Verify it as described in {output / list(texts)[-1]}."), soft_wrap=True)
     return 1 if reasons else 0
 
 
@@ -208,7 +208,7 @@ def _writer(
 def _constant(models: Sequence[ErrorModel | PositionModel], to: str) -> list[ErrorModel]:
     """Return models that say the same at every position."""
     if along := [m.target for m in models if isinstance(m, PositionModel)]:
-        raise InputError(f"{to} holds nothing that changes along an axis, as {along[0]} does")
+        raise InputError(f"{to} supports position-independent corrections only, unlike {along[0]} does")
     return [m for m in models if isinstance(m, ErrorModel)]
 
 
@@ -221,7 +221,7 @@ def _refusal(model: ErrorModel | PositionModel) -> str:
 
 def _write(output: Path, texts: Mapping[str, bytes], overwrite: bool) -> None:
     if output.exists() and not output.is_dir():
-        raise InputError(f"{output}: is no folder")
+        raise InputError(f"{output}: is not a directory")
     output.mkdir(parents=True, exist_ok=True)
     with drafts([output / file for file in texts], overwrite=overwrite) as written:
         for file, text in texts.items():

@@ -41,7 +41,7 @@ class ReductionOptions:
     mapping : Path
         TOML file that says what the columns of the recordings are.
     harm_margin : float
-        Harm in a single cycle that is let pass [um]; as in ``thermocomp fit`` if not given.
+        Tolerated degradation in a single cycle [um]; as in ``thermocomp fit`` if not given.
     jobs : int
         Processes to share the work among; -1 takes all cores.
     """

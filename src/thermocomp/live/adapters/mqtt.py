@@ -35,7 +35,7 @@ class Broker:
     _connection: Connection = field(default_factory=Connection, init=False, repr=False)
 
     async def connect(self, timeout: float) -> None:
-        """Connect within so long [s], or raise `ThermocompError` with the reason."""
+        """Connect, or raise `ThermocompError` with the reason after `timeout` seconds."""
         await self.close()
         self._connection.to("connecting")
         try:
@@ -50,11 +50,11 @@ class Broker:
         self._connection.to("connected")
 
     def status(self) -> Status:
-        """Return how the connection is, at once."""
+        """Return the connection status without blocking."""
         return self._connection.now
 
     async def close(self) -> None:
-        """Give back what was taken; a second time does nothing."""
+        """Close the connection; idempotent."""
         client, self._client = self._client, None
         if client is not None:
             with suppress(aiomqtt.MqttError, OSError, TimeoutError):  # it was lost before

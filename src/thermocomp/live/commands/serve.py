@@ -85,7 +85,7 @@ def _serve(settings: "Settings", port: int | None, *, check: bool) -> int:
     if port is not None:
         page = replace(page or Page(), port=port)
     if check and (found := [*find_faults(settings), *find_faults_now(settings, page)]):
-        raise InputError("\n".join(["what the configuration names cannot be used:", *(f"  {f}" for f in found)]))
+        raise InputError("\n".join(["invalid configuration:", *(f"  {f}" for f in found)]))
     service = build(settings)
     for target in service.compensator.lines:
         order = service.state.orders.get(target)

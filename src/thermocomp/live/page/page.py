@@ -31,7 +31,7 @@ MOST_PAGES = 100
 
 
 class Order(BaseModel):
-    """What a button says."""
+    """Request body of an order."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
     target: Annotated[str, Field(max_length=200)]

@@ -115,7 +115,7 @@ class File:
             return found[0]
         if found:
             lines = " and ".join(str(p.start + 1) for p in found[:2])
-            raise ProgramError(line, f"{who}: O{number} stands in lines {lines}; remove the one that is not meant")
+            raise ProgramError(line, f"{who}: O{number} stands in lines {lines}; delete the duplicate")
         raise ProgramError(
             line,
             f"{who}: O{number:04d} is not in this file; put it behind the program, with its O number and M99, or have "

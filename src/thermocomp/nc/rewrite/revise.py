@@ -239,7 +239,7 @@ class Revision:
                 )
             )
         if not headed:
-            raise ProgramError(max(self.lines, 1), "there is nothing in this program")
+            raise ProgramError(max(self.lines, 1), "the program is empty")
         self._refuse_open(ended, carried)
 
     def _cut(self, block: Block, samples: list[Sample], knots: list[tuple[float, Vector]], demand: Vector) -> Cut:

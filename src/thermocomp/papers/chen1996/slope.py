@@ -50,7 +50,7 @@ class LearnedPositioning:
     linear : PositionFit
         By stepwise regression on first-order terms alone.
     law : Law
-        What became of a law that was planted.
+        Recovery of a known (synthetic) law.
     """
 
     learned: Profiles

@@ -52,7 +52,8 @@ def position(
     settings : Fitting
         How it is fitted and judged.
     accept_unproven : str
-        Who takes an unproven model all the same, and why: "NAME, REASON". It is written into the model file.
+        Person who approves the use of an unproven model, and the reason: "NAME, REASON"; kept in
+        the model file.
     output : Path
         File to write the models to (.json).
     overwrite : bool

@@ -74,7 +74,7 @@ class LinuxCncSink:
             raise SettingError(f'axes = {self.axes}: want a straight axis per target, such as {{"z_um": "Z"}}')
 
     async def connect(self, timeout: float) -> None:
-        """Connect within so long [s], or raise `ThermocompError` with the reason."""
+        """Connect, or raise `ThermocompError` with the reason after `timeout` seconds."""
         await self.close()
         self._connection.to("connecting")
         try:
@@ -116,7 +116,7 @@ class LinuxCncSink:
         return {target: self._reports[letter.upper()].correction for target, letter in self.axes.items()}
 
     def status(self) -> Status:
-        """Return how the connection is, at once."""
+        """Return the connection status without blocking."""
         return self._connection.now
 
     def suspended(self) -> dict[str, str]:
@@ -135,7 +135,7 @@ class LinuxCncSink:
         return dict(self._reports)
 
     async def close(self) -> None:
-        """Give back what was taken; a second time does nothing. What was applied stays in force."""
+        """Close the connection; idempotent. What was applied stays in force."""
         beating, self._beating = self._beating, None
         if beating is not None and beating is not asyncio.current_task():
             beating.cancel()
