@@ -267,13 +267,14 @@ class _Scan:
             self._sign("fanuc", "an expression without brackets, which only a Fanuc or Haas takes")
 
     def _words(self, words: list[tuple[str, str]], *, runs: bool) -> None:
+        values = {letter: value for letter, value in words if letter not in "GM"}
         line = LineWords(
             self._code,
             [read_number(value) for letter, value in words if letter == "G"],
             [read_number(value) for letter, value in words if letter == "M"],
             next((letter + value for letter, value in words if letter in "GM" and not _is_plain(value)), ""),
-            {letter: value for letter, value in words if letter not in "GM"},
-            find_owner_of_p((letter, read_number(value)) for letter, value in words),
+            values,
+            find_owner_of_p((letter, read_number(value)) for letter, value in words) if "P" in values else "",
         )
         self.force.take(line)
         self._signs(line)
