@@ -49,6 +49,11 @@ def question(text: str, **stated: Any) -> str:
         "G90 X1. Z2.",
         "#1=#100\nX[#1+#999]",
         "G95 F0.2",
+        "M19\nM3",
+        "G91 G28 Z0\nG90",
+        "G98 G82 X1. Z-1. R1. P0\nX2.\nG82 X3.\nG80",
+        "G2 X10. Y0 I5. J0 P1",
+        "G18 G8\nG17",
     ],
 )
 def test_what_both_read_alike_is_not_asked_for(text: str) -> None:
@@ -109,6 +114,36 @@ def test_what_both_read_alike_is_not_asked_for(text: str) -> None:
         ("X#[#1+5000]", "#[..] from #1000 on"),
         ("X##1", "##1 from #1000 on"),
         ("X1. ; G4 P1", "';G4P1' is a comment for LinuxCNC, and the next block for a Fanuc"),
+        ("G07 X0.", "G7 takes X as a diameter in LinuxCNC, and begins or ends hypothetical-axis interpolation"),
+        ("G7", "G7 takes X as a diameter"),
+        ("G08", "G8 takes X as a radius in LinuxCNC, and looks ahead in a Fanuc"),
+        *((f"M{n}", f"M{n} is for LinuxCNC: ") for n in (*range(50, 54), 60, *range(62, 66), *range(70, 74))),
+        ("M53 P1", "on a Fanuc or Haas it does what the machine's maker has made of it (pallets, clamps, outputs)"),
+        ("M61 Q1", "M61 is for LinuxCNC: tells the number of the tool; on a Fanuc"),
+        ("M66 P1 L0", "M66 is for LinuxCNC: inputs and outputs"),
+        ("M67 E1 Q1.", "M67 is for LinuxCNC"),
+        ("M68 E0 Q1.", "M68 is for LinuxCNC"),
+        ("M19 R90.", "M19 R90. has R for the angle"),
+        ("M19 P1", "M19 P1 has R for the angle"),
+        ("G28", "G28 without axes moves all in LinuxCNC, and none in a Fanuc"),
+        ("G30", "G30 without axes"),
+        ("G28.1", "G28.1 stores in LinuxCNC where the tool is"),
+        ("G30.1 Z0", "G30.1 stores in LinuxCNC where the tool is, and moves in a Fanuc"),
+        ("G33 Z-1. K1.", "G33 takes the way per turn from K in LinuxCNC, and from F in a Fanuc"),
+        ("G41.1 D1.", "G41.1 takes D for the cutter's diameter in LinuxCNC, and turns an axis"),
+        ("G43.1 Z1.", "G43.1 makes its words the tool's length in LinuxCNC"),
+        ("G43.2 H1", "G43.2 adds a tool's length"),
+        ("G43 H00", "G43 H00 is the length of the tool in the spindle for LinuxCNC, and none for a Fanuc"),
+        ("G70 P1 Q2", "G70 is another cycle"),
+        ("G71 P1 Q2", "G71 is another cycle"),
+        ("G72 I5. J0 L6.", "G72 is another cycle"),
+        ("G98 G86 X1. Z-1. R1. P1.", "G86 P1. dwells in LinuxCNC, and a Fanuc's G86 has no dwell"),
+        ("G98 G86 X1. Z-1. R1.", "G86 without P is refused by LinuxCNC where the cycle begins"),
+        ("G98 G89 X1. Z-1. R1.", "G89 without P is refused by LinuxCNC"),
+        ("G2 I5. J0 P2", "P2 counts the turns of an arc in LinuxCNC"),
+        ("G64 G4 P500", "G4 P500 is 500 s for LinuxCNC, and 0.5 s for a Fanuc"),
+        ("G54 P3 G64", "P3 is G64's in LinuxCNC, and may be G54's in a Fanuc: put the two on lines of their own"),
+        ("G64 M98 P1000", "M98 is taken by LinuxCNC from files of its own"),
     ],
 )
 def test_a_word_with_two_readings_is_asked_for(text: str, asked: str) -> None:
@@ -167,6 +202,9 @@ def test_every_kind_of_word_is_named_with_its_first_line() -> None:
         "@1. ^30.",
         "#1=[#2+1] #3=2",
         "G96 D2000 S100",
+        "G17 G40 G54 G64 P0.01 G80",
+        "G54 G64 G17 P1",
+        "G5 X1. Y1. I1. J1. P1. Q1.",
     ],
 )
 def test_what_only_linuxcnc_takes_decides(text: str) -> None:
@@ -196,6 +234,15 @@ def test_what_only_linuxcnc_takes_decides(text: str) -> None:
         "G54.1 P1",
         "G5.1 Q1",
         "G05 P10000",
+        "G5.1 Q1 X0 Y0 Z0",
+        "G08 P1",
+        "G07.1 C20.",
+        "G107 C20.",
+        "G91 G30 Z0. P2",
+        "G54 P3",
+        "G0 X1. G54 P3",
+        "G33 Z-1. F1.",
+        "G4",
         "POPEN",
     ],
 )
@@ -213,6 +260,30 @@ def test_habits_answer_for_lengths_only() -> None:
     arc = "G2 X10 Y0. I5. J0\n"
     assert "X10 is 10 mm" in question(f"{BEGIN}{arc}{END}")  # a point may be forgotten once
     assert question(f"{BEGIN}{arc}G2 X0 Y0 I-5 J0.\n{END}") == ""
+
+
+def test_habits_answer_for_a_radius_and_stored_codes_but_not_for_the_makers_codes() -> None:
+    comment = f"; the plate\n{BEGIN}"
+    assert question(f"{comment}G8\nM70\nM72\n{END}") == ""
+    assert "G7 takes X as a diameter" in question(f"{comment}G7\n{END}")
+    assert "M62 is for LinuxCNC" in question(f"{comment}M62 P1\n{END}")
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("G1 X1O.", "column 6: an O-word has to be at the beginning of the line; in a number write the digit 0"),
+        ("G1 XO.", ""),
+        ("G1 X1,5", "column 6: found ',', which begins no word; numbers have a decimal point"),
+        ("X50\nG1 X1O. G4 P5", "column 6: an O-word has to be at the beginning"),
+    ],
+)
+def test_a_slip_of_the_pen_is_no_word_with_two_readings(text: str, fault: str) -> None:
+    found = question(f"{BEGIN}{text}\n{END}")
+    assert fault in found
+    assert "write the point" not in found
+    if fault:
+        assert found.startswith(f"line {5 + text.count(chr(10))}: column ")
 
 
 def test_behind_the_end_nothing_is_asked_for_but_numbers_count() -> None:

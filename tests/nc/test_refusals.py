@@ -195,6 +195,14 @@ def test_a_speed_that_was_never_told() -> None:
         ("G50 S2500", "a lathe program"),
         ("G0 X1. Z1.\nG50 X200. Z100.", "a lathe program"),
         ("G54 P1", "write G54.1 P1"),
+        ("G64 G54 P1", "write G54.1 P1"),
+        (
+            "G17 G54 G64 P0.01",
+            "G64 with P is LinuxCNC's, and a Fanuc's G64 has none: remove P, or say --controller linuxcnc",
+        ),
+        ("G2 X1. Y0. I0.5 P2", "G2 with P is LinuxCNC's"),
+        ("M19 R90.", "the line has R, and no code that uses it; remove it"),
+        ("G107 C10", "cylindrical"),
         ("G0 X1.\nG5.1 Q1 X5.", "on a line of its own"),
         ("G0 G8 P1 X5.", "on a line of its own"),
         ("G99 G81 X1. Z-1. R1. F100 K0", "X beside K0"),
@@ -236,6 +244,12 @@ def test_fanuc_refusals(text: str, reason: str) -> None:
     assert reason in caught.value.reason
     assert "--expand" not in caught.value.reason  # which is LinuxCNC's
     assert caught.value.line == 2 + text.count("\n")
+
+
+@pytest.mark.parametrize("text", ["G30 P2 Z0.", "G91 G30 Z0. P2", "G54 P3", "G49 H0", "G0 X1. E2."])
+def test_a_letter_that_linuxcnc_has_no_use_for_may_be_a_fanucs(text: str) -> None:
+    with pytest.raises(ProgramError, match=r"no code that uses it in LinuxCNC.*say --controller fanuc if"):
+        run(START + text + "\n")
 
 
 @pytest.mark.parametrize("text", ["IF [#1 EQ 1] GOTO 10", "WHILE [#1 LT 2] DO1", "M98 P1000", "M97 P10", "G65 P9000"])

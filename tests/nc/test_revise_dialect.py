@@ -39,13 +39,33 @@ def test_a_program_number_counts_wherever_it_is(
     assert set(job_folder.iterdir()) == before
 
 
-@pytest.mark.parametrize("word", ["G4 P500", "X50", "G92 X0", "G81 X1. Z-2. R1.", "G10 L20 P1 X0", "G53 Z0"])
+@pytest.mark.parametrize("word", ["G4 P500", "X50", "G92 X0", "G81 X1. Z-2. R1.", "G10 L20 P1 X0", "G53 Z0", "M62 P1"])
 def test_a_word_with_two_readings_is_not_taken_for_linuxcnc(
     job_folder: Path, word: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     Path("part.nc").write_text(BODY.format(word + "\n"), encoding="ascii")
     assert revise(program="part.nc", dialect=False) == 2
     assert "part.nc: line 6: " + word.split(maxsplit=1)[0] in said(capsys)
+
+
+def test_what_makers_and_fanuc_have_made_of_a_code_is_asked_and_may_be_stated(
+    job_folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for word, shown in [("G07 X0.", "G7 takes"), ("M50", "M50 is"), ("M65 P1", "M65 is"), ("M19 R90.", "M19 R90. has")]:
+        Path("part.nc").write_text(BODY.format(word + "\n"), encoding="ascii")
+        assert revise(program="part.nc", dialect=False) == 2
+        message = said(capsys)
+        assert f"part.nc: line 6: {shown}" in message
+        assert "or say --controller linuxcnc or --controller fanuc" in message
+        assert revise(program="part.nc", out=f"{word.replace(' ', '')}.nc") == 0, capsys.readouterr().err
+
+
+def test_a_slip_of_the_pen_is_named(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("part.nc").write_text(BODY.format("X1O.\n"), encoding="ascii")
+    for dialect in (True, False):
+        assert revise(program="part.nc", dialect=dialect) == 2
+        assert "line 6: column 3: an O-word" in (message := said(capsys))
+        assert "write the digit 0, not the letter O" in message
 
 
 def test_what_is_certain_or_stated_is_revised(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

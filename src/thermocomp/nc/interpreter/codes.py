@@ -3,6 +3,7 @@
 Everything that is not in these tables is unknown, and a program with it is refused.
 """
 
+from collections.abc import Iterable
 from typing import Final, Literal, NamedTuple
 
 Controller = Literal["linuxcnc", "fanuc"]
@@ -161,6 +162,7 @@ _FANUC_G: Final = (
     Code("G87", "motion", "back boring", "it shifts the tool by a parameter of the control; not supported"),
     Code("G92.1", "once", "no G92"),
     Code("G103", "look ahead", "limits how far the control looks ahead"),
+    Code("G107", "once", "cylindrical interpolation", "cylindrical interpolation is not supported; write X Y Z"),
     *(
         Code(code, "system", "one of the additional work coordinate systems of a Haas")
         for code in ("G154", *HAAS_SYSTEMS)
@@ -278,3 +280,31 @@ def find_code(letter: str, number: float, controller: Controller) -> Code | None
     """
     table = (G_CODES if letter == "G" else M_CODES)[controller]
     return table.get(round(number, 3))
+
+
+_USERS_OF_P: Final = (
+    USED_BY["linuxcnc"]["P"] | USED_BY["fanuc"]["P"] | {"G54", "G51", "G65", "G66", "M97", "M98", "M99", "M198"}
+)
+
+
+def find_owner_of_p(words: Iterable[tuple[str, float]]) -> str:
+    """Return the code that a P belongs to: the last before it that can have one, or else the first behind it.
+
+    Parameters
+    ----------
+    words : iterable of tuple
+        Letter and number of the words of a line, in their order.
+
+    Returns
+    -------
+    str
+        Empty if the line has no P, or no such code.
+    """
+    owner, there = "", False
+    for letter, number in words:
+        there = there or letter == "P"
+        if letter in "GM" and (name := f"{letter}{number:g}") in _USERS_OF_P:
+            owner = name
+        if there and owner:
+            return owner
+    return ""

@@ -14,8 +14,9 @@ from dataclasses import dataclass, field
 from typing import Final, Literal, NamedTuple
 
 from thermocomp.core.exceptions import ProgramError
-from thermocomp.nc.interpreter.codes import G_CODES, M_CODES
+from thermocomp.nc.interpreter.codes import G_CODES, M_CODES, find_owner_of_p
 from thermocomp.nc.interpreter.openwords import DOUBTS, DRILLS, InForce, LineWords, list_open_words, read_number
+from thermocomp.nc.parser.tokens import read_line
 
 Whose = Literal["linuxcnc", "fanuc"]
 
@@ -54,7 +55,7 @@ _FANUC_M: Final = M_CODES["fanuc"].keys() - M_CODES["linuxcnc"].keys()
 #: no code of a Fanuc or a Haas, whatever its options; others of LinuxCNC are (G7, G28.1, G33, G43.1, M60 ...)
 _LINUXCNC_G: Final = frozenset((5.2, 5.3, 33.1, 38.2, 38.3, 38.4, 38.5, 59.1, 59.2, 59.3, 90.1, 91.1, 92.2, 92.3))
 #: kinds of open words that a hint decides
-_USUAL: Final = ("length", "feed", "g43", "exact", "behind")
+_USUAL: Final = ("length", "feed", "g43", "exact", "radius", "state", "behind")
 #: kinds of open words that are named
 _NAMED: Final = 5
 
@@ -85,6 +86,8 @@ class Judgement:
         The first word of each kind that is read in two ways: its readings, and what to write instead.
     count : dict of str to int
         How many lines have one.
+    fault : Place or None
+        The first such word on a line that neither can read, and why: a slip of the pen has made it.
     """
 
     linuxcnc: Place | None = None
@@ -92,6 +95,7 @@ class Judgement:
     hint: Place | None = None
     open: dict[str, Place] = field(default_factory=dict)
     count: dict[str, int] = field(default_factory=dict)
+    fault: Place | None = None
 
 
 def check_dialect(lines: Iterable[str], *, whole: bool = False, startup: str = "") -> None:
@@ -126,6 +130,8 @@ def check_dialect(lines: Iterable[str], *, whole: bool = False, startup: str = "
             f"{other.text!r} is {other.what}: say --controller fanuc (dwells, cycles and lengths are others there), or "
             "--controller linuxcnc",
         )
+    if found.fault is not None and not mine:
+        raise ProgramError(found.fault.line, found.fault.what)
     if mine or not found.open:
         return
     kinds = sorted(found.open, key=lambda kind: found.open[kind].line)
@@ -169,7 +175,7 @@ class _Scan:
         self.force = force
         self._began = self._ended = False
         self._line = 0
-        self._text = self._code = ""
+        self._whole = self._text = self._code = ""
 
     def pass_plain(self, text: str) -> bool:
         """Return whether a line has nothing to judge, and take in how it moves."""
@@ -189,7 +195,7 @@ class _Scan:
 
     def take(self, number: int, text: str) -> None:
         """Take a line in."""
-        self._line, self._text = number, text.strip()[:40]
+        self._line, self._whole, self._text = number, text, text.strip()[:40]
         for mark in _MARKS:
             text = text.removeprefix(mark)
         text = text.upper()
@@ -217,8 +223,16 @@ class _Scan:
             self.found.hint = self.found.hint or Place(self._line, self._text, what)
 
     def _ask(self, kind: str, text: str, what: str) -> None:
+        if kind not in self.found.open and (fault := self._fault()):
+            self.found.fault = self.found.fault or Place(self._line, text, fault)
+            return
         self.found.open.setdefault(kind, Place(self._line, text, what))
         self.found.count[kind] = self.found.count.get(kind, 0) + 1
+
+    def _fault(self) -> str:
+        """Return why neither reads the line; empty if one does."""
+        fault = read_line(self._whole, self._line).error
+        return fault if fault and read_line(self._whole, self._line, "fanuc").error else ""
 
     def _block(self, text: str) -> None:
         head = _HEAD.match(text)
@@ -253,15 +267,17 @@ class _Scan:
             self._sign("fanuc", "an expression without brackets, which only a Fanuc or Haas takes")
 
     def _words(self, words: list[tuple[str, str]], *, runs: bool) -> None:
+        values = {letter: value for letter, value in words if letter not in "GM"}
         line = LineWords(
             self._code,
             [read_number(value) for letter, value in words if letter == "G"],
             [read_number(value) for letter, value in words if letter == "M"],
             next((letter + value for letter, value in words if letter in "GM" and not _is_plain(value)), ""),
-            {letter: value for letter, value in words if letter not in "GM"},
+            values,
+            find_owner_of_p((letter, read_number(value)) for letter, value in words) if "P" in values else "",
         )
-        self._signs(line)
         self.force.take(line)
+        self._signs(line)
         if not self._ended:
             for kind, text, readings in list_open_words(line, self.force):
                 self._ask(kind, text.replace("{}", "[..]"), readings)
@@ -273,15 +289,22 @@ class _Scan:
     def _signs(self, line: LineWords) -> None:
         g, m, values = line.g, line.m, line.values
         theirs = [f"G{n:g}" for n in g if n in _FANUC_G] + [f"M{n:g}" for n in m if n in _FANUC_M]
-        own = [f"G{n:g}" for n in g if n in _LINUXCNC_G] + ["G64 P"] * (64.0 in g and "P" in values)
+        owner = "" if self.force.takes_p(line) else line.p_of
+        own = [f"G{n:g}" for n in g if n in _LINUXCNC_G] + ["G64 P"] * (owner == "G64")
         own += ["G96 D"] * (96.0 in g and "D" in values)
-        if 4.0 in g and "P" not in values and not values.keys().isdisjoint("XU"):
-            theirs.append("G4 X or U")
-        if not {5.0, 5.1, 8.0}.isdisjoint(g):  # they smooth the path of the one, and are splines of the other
-            if values.keys().isdisjoint("XYIJ") and not values.keys().isdisjoint("PQ"):
-                theirs.append(f"G{g[0]:g} without X and Y")
-            elif 8.0 not in g and not values.keys().isdisjoint("XY"):
-                own.append(f"G{g[0]:g} with X and Y")
+        if 4.0 in g and "P" not in values:
+            theirs.append("G4 without P")
+        if owner == "G30" or (owner in ("G8", "G54") and not line.linuxcncs_user_of_p()):
+            theirs.append(f"{owner} with P")
+        if 33.0 in g and "K" not in values:
+            theirs.append("G33 without K")
+        moves = not values.keys().isdisjoint("XYIJ")
+        if 5.0 in g:  # smooths the path of the one, and is a spline of the other, as is G5.1
+            theirs += ["G5 without X and Y"] * (not moves and not values.keys().isdisjoint("PQ"))
+            own += ["G5 with X, Y, P and Q"] * (moves and values.keys() >= {"P", "Q"})
+        if 5.1 in g:
+            theirs += ["G5.1 with Q"] * ("Q" in values)
+            own += ["G5.1 with I or J"] * ("Q" not in values and not values.keys().isdisjoint("IJ"))
         if theirs:
             self._sign("fanuc", f"a Fanuc's or Haas's ({theirs[0]})")
         if own:

@@ -5,13 +5,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
-from thermocomp.nc.interpreter.codes import CYCLES
+from thermocomp.nc.interpreter.codes import CYCLES, M_CODES, USED_BY
 
 DRILLS: Final = frozenset(float(code[1:]) for code in CYCLES)
 _DWELLS: Final = (74.0, 82.0, 84.0, 86.0, 89.0)
+#: LinuxCNC does not begin them without P
+_WANT_P: Final = (82.0, 86.0, 89.0)
 _TAPS: Final = (74.0, 84.0)
 _PECKS: Final = (73.0, 83.0)
 _OTHER_CYCLES: Final = (76.0, 87.0, 88.0)
+_LATHE_CYCLES: Final = (70.0, 71.0, 71.1, 71.2, 72.0, 72.1, 72.2)
 _TAKES_AXES: Final = frozenset((4.0, 10.0, 28.0, 30.0, 52.0, 53.0, 92.0))
 _TURNS: Final = (7.0, 8.0, 18.0, 33.0, 76.0, 96.0)
 _ARCS: Final = (2.0, 3.0)
@@ -28,10 +31,25 @@ _SHIFT = (
     "which forgets it: shift by G54 to G59"
 )
 _OTHER = "is another cycle in LinuxCNC than in a Fanuc: write its moves out"
+_TILTED = "makes its words the tool's length in LinuxCNC, and takes the length along a tilted tool in a Fanuc"
+_NORMAL = (
+    "takes D for the cutter's diameter in LinuxCNC, and turns an axis along the path in a Fanuc (normal direction)"
+)
+_STORES = "stores in LinuxCNC where the tool is, and moves in a Fanuc (to a floating reference point)"
 #: codes that are open wherever they are: the kind, and the readings
 _OPEN_CODES: Final = {
     **dict.fromkeys((52.0, 92.0, 92.1), ("shift", _SHIFT)),
-    **dict.fromkeys(_OTHER_CYCLES, ("other cycle", _OTHER)),
+    **dict.fromkeys((*_OTHER_CYCLES, *_LATHE_CYCLES), ("other cycle", _OTHER)),
+    7.0: (
+        "diameter",
+        "takes X as a diameter in LinuxCNC, and begins or ends hypothetical-axis interpolation in a Fanuc, where the "
+        "axis does not move (G7 X0 to G7 X1)",
+    ),
+    **dict.fromkeys((28.1, 30.1), ("stored home", _STORES)),
+    33.0: ("thread", "takes the way per turn from K in LinuxCNC, and from F in a Fanuc"),
+    **dict.fromkeys((41.1, 42.1), ("normal", _NORMAL)),
+    43.1: ("tilted", _TILTED),
+    43.2: ("tilted", "adds a tool's length to that in force in LinuxCNC, and takes it along a tilted tool in a Fanuc"),
     61.0: ("exact", "goes through the corners exactly in LinuxCNC, and stops there in a Fanuc: write G64"),
     61.1: ("exact", "stops in the corners in LinuxCNC, and smooths them in a Fanuc: write G64"),
 }
@@ -40,6 +58,9 @@ _G10 = (
     "force) than in a Fanuc (L10 to L13: tool offsets; L20: G54.1; P0: the external offset): write G10 L2 P1 to P6, in "
     "G90 and without R"
 )
+#: LinuxCNC's, and of a Fanuc's machine what its maker has made of them
+_MAKERS_M: Final = {n: code.does for n, code in M_CODES["linuxcnc"].items() if n not in M_CODES["fanuc"]}
+_STATE: Final = (70.0, 71.0, 72.0, 73.0)
 _CALL = "is taken by LinuxCNC from files of its own, and by a Fanuc from its memory: write the moves out"
 
 
@@ -55,6 +76,8 @@ class InForce:
         It is stated whether G98 or G99 is in force.
     motion : float
         Its G code; -1 before the first one.
+    begins : bool
+        The line has put it in force.
     absolute : bool
     unit : str
         With a blank before it; empty if it is not known.
@@ -69,6 +92,7 @@ class InForce:
     whole: bool
     retract: bool = False
     motion: float = -1.0
+    begins: bool = False
     absolute: bool = True
     unit: str = ""
     per_turn: bool = False
@@ -83,6 +107,11 @@ class InForce:
         """Whether it is no lathe."""
         return self.milled and not self.lathe
 
+    def takes_p(self, line: "LineWords") -> bool:
+        """Return whether a P may belong to the motion of a line, which has been taken in."""
+        moves = not line.values.keys().isdisjoint(_ARC_WORDS)
+        return moves and self.motion in (*_ARCS, *DRILLS) and _TAKES_AXES.isdisjoint(line.g)
+
     @property
     def feed(self) -> bool:
         """Whether a feed without a point is read in two ways."""
@@ -91,9 +120,11 @@ class InForce:
     def take(self, line: "LineWords") -> None:
         """Take the codes of a line in."""
         codes = set(line.g)
+        before = self.motion
         for code in (*_MOTIONS, 80.0):
             if code in codes:
                 self.motion = code
+        self.begins = self.motion != before
         if 90.0 in codes or 91.0 in codes:
             self.absolute = 90.0 in codes
         if 20.0 in codes or 21.0 in codes:
@@ -132,6 +163,8 @@ class LineWords:
         The first of these; empty if there is none.
     values : dict of str to str
         All others, as they are written.
+    p_of : str
+        The code that P belongs to; empty if there is none.
     """
 
     code: str
@@ -139,6 +172,12 @@ class LineWords:
     m: list[float]
     computed: str
     values: dict[str, str]
+    p_of: str = ""
+
+    def linuxcncs_user_of_p(self) -> str:
+        """Return the first code that P may belong to in LinuxCNC; empty if there is none."""
+        codes = (*(f"G{n:g}" for n in self.g), *(f"M{n:g}" for n in self.m))
+        return next((code for code in codes if code in USED_BY["linuxcnc"]["P"]), "")
 
 
 def list_open_words(line: LineWords, force: InForce) -> Iterator[OpenWord]:
@@ -155,15 +194,22 @@ def list_open_words(line: LineWords, force: InForce) -> Iterator[OpenWord]:
         yield from _open_dwell(values)
     yield from (OpenWord(_OPEN_CODES[n][0], f"G{n:g}", _OPEN_CODES[n][1]) for n in line.g if n in _OPEN_CODES)
     yield from (OpenWord("call", f"M{n:g}", _CALL) for n in line.m if n in (98.0, 99.0))
+    if line.p_of in ("G8", "G54") and (user := line.linuxcncs_user_of_p()):
+        what = f"is {user}'s in LinuxCNC, and may be {line.p_of}'s in a Fanuc: put the two on lines of their own"
+        yield OpenWord("whose P", f"P{values['P']}", what)
+    if line.g == [8.0]:  # a Fanuc wants it in a block of its own
+        yield OpenWord("radius", "G8", "takes X as a radius in LinuxCNC, and looks ahead in a Fanuc, which gives it P")
+    yield from _open_machine(line)
     if 10.0 in codes and not _sets_origin(values, force):
         words = "".join(f" {letter}{values[letter]}" for letter in "LP" if letter in values)
         yield OpenWord("g10", f"G10{words}", _G10)
     if 53.0 in codes and force.motion in (1.0, *_ARCS):
         what = "moves by the feed in LinuxCNC under G1, and as a rapid in a Fanuc: write G53 G0"
         yield OpenWord("g53", "G53", what)
-    if 43.0 in codes and "H" not in values:
-        what = "is the tool in the spindle for LinuxCNC, and the last H for a Fanuc: write H"
-        yield OpenWord("g43", "G43 without H", what)
+    yield from _open_places(codes, values)
+    if force.motion in _ARCS and force.takes_p(line) and read_number(values.get("P", "1")) != 1.0:
+        what = "counts the turns of an arc in LinuxCNC, and nothing in a Fanuc: write each turn on a line of its own"
+        yield OpenWord("turns", f"P{values['P']}", what)
     for letter in "UVW":
         if letter in values and 4.0 not in codes:
             what = "is an axis of its own in LinuxCNC, and a way of X, Y or Z for a Fanuc: write X, Y and Z"
@@ -186,6 +232,35 @@ def _open_dwell(values: dict[str, str]) -> Iterator[OpenWord]:
     if beside := [letter for letter in _AXES if letter in values]:
         what = "moves in LinuxCNC, and a Fanuc takes X or U for the time: write the move on a line of its own"
         yield OpenWord("dwell and move", f"{beside[0]}{values[beside[0]]} beside G4", what)
+
+
+def _open_places(codes: set[float], values: dict[str, str]) -> Iterator[OpenWord]:
+    if not codes.isdisjoint((28.0, 30.0)) and values.keys().isdisjoint(_AXES):
+        code = "G28" if 28.0 in codes else "G30"
+        yield OpenWord("home", code, "without axes moves all in LinuxCNC, and none in a Fanuc: name the axes")
+    if 43.0 in codes and "H" not in values:
+        what = "is the tool in the spindle for LinuxCNC, and the last H for a Fanuc: write H"
+        yield OpenWord("g43", "G43 without H", what)
+    if 43.0 in codes and read_number(values.get("H", "")) == 0.0:
+        what = "is the length of the tool in the spindle for LinuxCNC, and none for a Fanuc: write its number, or G49"
+        yield OpenWord("g43", f"G43 H{values['H']}", what)
+
+
+def _open_machine(line: LineWords) -> Iterator[OpenWord]:
+    """Yield the M codes that do something of their own on a Fanuc's machine."""
+    for number in line.m:
+        if number in _MAKERS_M:
+            what = (
+                f"is for LinuxCNC: {_MAKERS_M[number]}; on a Fanuc or Haas it does what the machine's maker has made of"
+            )
+            kind = "state" if number in _STATE else "maker"
+            yield OpenWord(kind, f"M{number:g}", f"{what} it (pallets, clamps, outputs)")
+    beside = next((letter for letter in "RPQ" if letter in line.values), None)
+    if 19.0 in line.m and beside:
+        what = (
+            "has R for the angle, P for the way round and Q for a time in LinuxCNC, and what the maker wants on a Fanuc"
+        )
+        yield OpenWord("orient", f"M19 {beside}{line.values[beside]}", f"{what} or Haas (P is an angle, too)")
 
 
 def _open_expressions(line: LineWords) -> Iterator[OpenWord]:
@@ -246,6 +321,12 @@ def _open_cycle(codes: set[float], values: dict[str, str], force: InForce) -> It
     motion, code = force.motion, f"G{force.motion:g}"
     if motion in _DWELLS and _counts(values.get("P")):
         yield OpenWord("cycle dwell", f"{code} P{values['P']}", _seconds(values["P"]))
+    elif motion in _WANT_P and force.begins and "P" not in values:
+        what = "is refused by LinuxCNC where the cycle begins, and dwells by no word in a Fanuc: write P0, or how long"
+        yield OpenWord("no dwell", f"{code} without P", what)
+    elif motion == 86.0 and read_number(values.get("P", "0")) != 0.0:
+        what = "dwells in LinuxCNC, and a Fanuc's G86 has no dwell: write P0, or the moves out"
+        yield OpenWord("cycle dwell", f"G86 P{values['P']}", what)
     if "L" in values or ("K" in values and motion not in _OTHER_CYCLES):
         letter = "L" if "L" in values else "K"
         what = "repeats: in L for LinuxCNC and a Haas, in K for a Fanuc: write the holes out"

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from thermocomp.core.exceptions import InputError, ProgramError
 from thermocomp.nc.interpreter.block import Setup
-from thermocomp.nc.interpreter.codes import FREE, REFUSED_LETTERS, USED_BY, Code, find_code
+from thermocomp.nc.interpreter.codes import FREE, REFUSED_LETTERS, USED_BY, Code, find_code, find_owner_of_p
 from thermocomp.nc.parser.expressions import Parameters, evaluate
 from thermocomp.nc.parser.line import Line, Word
 
@@ -110,10 +110,32 @@ class Reader:
             users = self._used_by.get(letter, frozenset())
             if letter in "PQ" and not self._harmless.isdisjoint(words.codes):
                 continue
-            if letter == "P" and "G54" in words.codes and self._controller == "fanuc":
-                raise words.error(f"G54 with P: write G54.1 P{words.values['P']:g} for an additional coordinate system")
             if motion not in users and users.isdisjoint(words.codes):
-                raise words.error(f"the line has {letter}, and no code that uses it; remove it, or add the code")
+                raise words.error(self._unused(words, letter))
+
+    def _unused(self, words: BlockWords, letter: str) -> str:
+        """Say that no code of a line uses a letter, and which control has one that does."""
+        owner = ""
+        if letter == "P":
+            codes = iter(words.codes)
+            owner = find_owner_of_p(
+                (word.letter, float(next(codes)[1:]) if word.letter in "GM" else 0.0) for word in words.line.words
+            )
+        if self._controller == "fanuc":
+            if owner == "G54":
+                return f"G54 with P: write G54.1 P{words.values['P']:g} for an additional coordinate system"
+            other = USED_BY["linuxcnc"].get(letter, frozenset())
+            theirs = owner if owner in other else next((c for c in words.codes if c in other and c[0] == "G"), "")
+            if theirs:
+                return (
+                    f"{theirs} with {letter} is LinuxCNC's, and a Fanuc's {theirs} has none: remove {letter}, or say "
+                    "--controller linuxcnc if the program is for that"
+                )
+            return f"the line has {letter}, and no code that uses it; remove it, or add the code"
+        return (
+            f"the line has {letter}, and no code that uses it in LinuxCNC, but it may act on a Fanuc or Haas: say "
+            "--controller fanuc if the program is for one; else remove it, or add the code"
+        )
 
     def _evaluate(self, line: Line, word: Word) -> float:
         try:

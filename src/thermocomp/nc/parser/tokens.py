@@ -331,12 +331,12 @@ def _complaint(text: str, place: int) -> str:
     if letter == "N":
         return "the line number N has to be a whole number, at the beginning of the line"
     if letter == "O":
-        return "an O-word has to be at the beginning of the line"
+        return "an O-word has to be at the beginning of the line; in a number write the digit 0, not the letter O"
     if letter == "/":
         return "block delete '/' has to be at the beginning of the line"
     if letter == "%":
         return "'%' has to be alone on its line"
-    return f"found {letter!r}, which begins no word"
+    return f"found {letter!r}, which begins no word{'; numbers have a decimal point' * (letter == ',')}"
 
 
 def _value(text: str, place: int, letter: str, controller: Controller) -> int:
@@ -355,6 +355,8 @@ def _value(text: str, place: int, letter: str, controller: Controller) -> int:
         place = _closed(text, found.end())
         return _closed(text, place + 1) if found.group() == "ATAN" and text.startswith("/[", place) else place
     what = f"found {head!r}" if head and head != "(" else "found nothing"
+    if head == "O":
+        what = "found the letter O, not the digit 0,"
     raise _NotUnderstoodError(place, f"{what} where the value of {letter} should be")
 
 
