@@ -52,7 +52,7 @@ def fit(
     margin : float
         Share of each input's trained span by which its range is widened.
     accept_unproven : str
-        Person who approves the use of an unproven model, and the reason: "NAME, REASON". Kept in the model file, and shown
+        Person who approves the use of an unproven model, and the reason: "NAME, REASON". Kept in the model file, shown
         wherever the model is. A refused one is never taken.
     compensator : CompensatorOptions
         Its limits: what would run is judged, not the model alone.
