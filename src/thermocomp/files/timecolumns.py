@@ -1,13 +1,15 @@
 """Which columns of a file hold the time: found by headings, and by what the cells hold."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from difflib import get_close_matches
 from typing import NamedTuple
 
 from thermocomp.core.exceptions import RecordingError
 from thermocomp.core.headings import BRACKETS, Meaning, is_time_name, plain_name
 from thermocomp.files.cellkinds import Kinds
+from thermocomp.files.dayforms import names_day
+from thermocomp.files.dayhalves import are_halves
 from thermocomp.files.mapping import Mapping, Place
 
 #: headings of a time without unit, those that say more first
@@ -34,13 +36,19 @@ class TimePlan(NamedTuple):
 
     time: int
     date: int | None  #: of the dates, where `time` holds a time of day
+    half: int | None  #: of AM and PM, where `time` holds times of day
     fraction: int | None  #: of milliseconds that go with whole seconds
     unused: tuple[int, ...]  #: further columns that hold dates
     notes: tuple[str, ...]
 
 
 def find_time(
-    headings: Sequence[str], meanings: Sequence[Meaning | None], mapping: Mapping, source: str, kinds: Kinds
+    headings: Sequence[str],
+    meanings: Sequence[Meaning | None],
+    mapping: Mapping,
+    source: str,
+    kinds: Kinds,
+    head: Callable[[int], list[str]] = lambda _: [],
 ) -> TimePlan:
     """Find the time column, and the column of dates where the time column holds only a time of day.
 
@@ -54,6 +62,8 @@ def find_time(
         The file, for messages.
     kinds : callable
         Tells what a column holds.
+    head : callable
+        Returns the first filled cells of a column.
 
     Raises
     ------
@@ -71,10 +81,14 @@ def find_time(
         if date is not None:
             notes.append(_tell_pair(headings, time, date))
     fraction = None if mapping.time.column else _find_fraction(headings, time)
-    used = (time, date, fraction)
+    half = None
+    if kinds(time) in ("clock", "stamp"):
+        found = (k for k, h in enumerate(headings) if k not in (time, date) and not is_ignored(h, k, mapping))
+        half = next((k for k in found if kinds(k) == "other" and are_halves(head(k), headings[k])), None)
+    used = (time, date, half, fraction)
     twins = {k for k, heading in enumerate(headings) if heading and heading == headings[time]}
     unused = [k for k in range(len(headings)) if k not in used and k not in twins and kinds(k) in ("date", "stamp")]
-    return TimePlan(time, date, fraction, tuple(unused), tuple(notes))
+    return TimePlan(time, date, half, fraction, tuple(unused), tuple(notes))
 
 
 def find_position(place: Place, headings: Sequence[str], table: str, source: str) -> int:
@@ -178,7 +192,8 @@ def _paired(time: int, headings: Sequence[str], mapping: Mapping, kinds: Kinds) 
 
     kind = kinds(time)
     if kind == "clock" and not has_passed(headings[time]):
-        return time, next(iter(others("date", _DATES)), None)
+        compact = [k for k in others("compact", _DATES) if names_day(headings[k])]
+        return time, next(iter((*others("date", _DATES), *compact)), None)
     if kind == "date" and not mapping.time.column and (clocks := others("clock", _CLOCKS)):
         return clocks[0], time
     return time, None
