@@ -23,7 +23,8 @@ _WEEKDAY = re.compile(r"^[^\W\d_]{2,10}\.?,? +(?=\d{1,4}[-./]|\d{1,2}\.? +[^\W\d
 #: a date of digits alone
 _COMPACT = re.compile(r"(?:19|20)\d\d(?:0[1-9]|1[0-2])(?:0[1-9]|[12]\d|3[01])")
 
-#: ``compact``: dates of digits alone, which may be numbers; ``passed``: hours beyond a day, or days before them; ``other``: words; empty: nothing
+#: ``compact``: dates of digits alone, which may be numbers
+#: ``passed``: hours beyond a day, or days before them; ``other``: words; empty: nothing
 Kind = Literal["number", "compact", "date", "clock", "passed", "stamp", "other", ""]
 #: what the column of a number holds
 Kinds = Callable[[int], Kind]

@@ -107,7 +107,7 @@ def check_dates(
     # a number has no date even where the mapping names the column of one
     ignores = not is_stamp or (mapping.time.format and not has_day(mapping.time.format))
     more = (columns.date,) if columns.date is not None and ignores else ()
-    clock = _find_clock(time, cells, columns, mapping, table) if is_stamp else None
+    clock = _find_clock(cells, columns, mapping, table) if is_stamp else None
     others = (*others, *more) if clock is not None else others
     for k in dict.fromkeys((*columns.unused, *more, *others)):
         name, ignored = table.headings[k] or k + 1, is_ignored(table.headings[k], k, mapping)
@@ -196,9 +196,7 @@ def _runs_on(days: IntArray, t: FloatArray) -> bool:
     return bool((np.diff(t)[np.diff(days) != 0] <= 2 * _usual(t)).all())
 
 
-def _find_clock(
-    time: FloatArray, cells: pd.DataFrame, columns: ColumnPlan, mapping: Mapping, table: FileTable
-) -> float | None:
+def _find_clock(cells: pd.DataFrame, columns: ColumnPlan, mapping: Mapping, table: FileTable) -> float | None:
     """Return the time of day of the first row [s]; None where the times are not known to be of a day."""
     form, texts = mapping.time.format, cells[columns.time].astype(str).str.strip()
     if has_passed(table.headings[columns.time]):

@@ -108,6 +108,8 @@ def read_other_days(cells: "pd.Series[Any]", heading: str, *, beside_clock: bool
     numbers = pd.to_numeric(texts.str.replace(",", ".", regex=False), errors="coerce").to_numpy(dtype=np.float64)
     if np.isfinite(numbers).all() and not texts.str.fullmatch(r"\d{1,2}\.\d{1,2}\.").all():
         return _read_numbers(numbers, named=named)
+    if texts.str.fullmatch(_COUNTED).all():  # day 1
+        return [texts.str.extract(r"(\d+)", expand=False).astype(np.int64).to_numpy()]
     found = _read_texts(texts, named=named, beside_clock=beside_clock)
     if not found and beside_clock and named and plain_name(heading) not in _NO_DAY:
         # whatever form that is: where it changes another day begins
@@ -139,8 +141,6 @@ def _read_numbers(numbers: NDArray[np.float64], *, named: bool) -> list[IntArray
 
 
 def _read_texts(texts: "pd.Series[str]", *, named: bool, beside_clock: bool) -> list[IntArray]:
-    if texts.str.fullmatch(_COUNTED).all():  # day 1
-        return [texts.str.extract(r"(\d+)", expand=False).astype(np.int64).to_numpy()]
     plain = texts.str.replace(r"(?<=\d)\s*[년月월年_]\s*(?=\d)", "-", regex=True).str.replace(
         r"\s*[日일]", "", regex=True
     )
@@ -155,11 +155,13 @@ def _read_texts(texts: "pd.Series[str]", *, named: bool, beside_clock: bool) -> 
         return [_unwrap(d, 366) for d in _read_forms(bare, "%d-%m-%Y", "%m-%d-%Y")]
     if _MONTH.fullmatch(first):
         return [_unwrap(d, 366) for d in read_days(plain.str.replace(r"[-. ]+", " ", regex=True).str.strip() + " 2000")]
+    return _read_weekdays(texts) or read_days(plain)
+
+
+def _read_weekdays(texts: "pd.Series[str]") -> list[IntArray]:
     words = texts.str.casefold().str.rstrip(".")
-    for names in map(str.split, _DAYS):
-        if words.isin(names).all():
-            return [_unwrap(words.map(names.index).to_numpy(dtype=np.int64), 7)]
-    return read_days(plain)
+    fitting = (names for names in map(str.split, _DAYS) if words.isin(names).all())
+    return [_unwrap(words.map(names.index).to_numpy(dtype=np.int64), 7) for names in fitting]
 
 
 def _read_forms(texts: "pd.Series[str]", *forms: str) -> list[IntArray]:

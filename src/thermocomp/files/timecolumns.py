@@ -22,6 +22,15 @@ _NEEDS_UNIT = ("t", "data", "tag", "day")
 #: headings of a date, and of the time of day beside it
 _DATES = ("date", "datum", "fecha", "data", "tag", "day")
 _CLOCKS = ("time", "uhrzeit", "zeit", "heure", "hora", "ora", "clock", "time of day", "tijd", "čas", "czas")
+#: headings of year, month, day, hour, minute and second in columns of their own
+_PARTS = (
+    ("year", "jahr", "année", "anno", "año", "yyyy", "yr"),
+    ("month", "monat", "mois", "mese", "mes", "mon", "mm"),
+    ("day", "tag", "jour", "giorno", "día", "dd"),
+    ("hour", "hours", "stunde", "heure", "ora", "hora", "hh", "hr"),
+    ("minute", "minutes", "minuto", "min", "mi"),
+    ("second", "seconds", "sekunde", "seconde", "secondo", "segundo", "sec", "ss"),
+)
 #: milliseconds beside a time of whole seconds
 _FRACTIONS = ("ms", "msec", "millisecond", "milliseconds", "millisekunden")
 #: names of a time that counts from the start of a test, even where it is written as a time of day
@@ -126,6 +135,13 @@ def is_ignored(heading: str, index: int, mapping: Mapping) -> bool:
     return any(rule.role == "ignore" and (rule.column or name) in (heading, index + 1) for name, rule in rules)
 
 
+def find_parts(headings: Sequence[str]) -> list[str]:
+    """Return the headings of columns that hold year, month, day, hour, minute and second of one time; or none."""
+    found = {next((k for k, words in enumerate(_PARTS) if _bare_name(h) in words), -1): h for h in reversed(headings)}
+    parts = [found[k] for k in range(len(_PARTS)) if k in found]
+    return parts if len(parts) > 2 or {3, 4} <= found.keys() else []
+
+
 def has_passed(heading: str) -> bool:
     """Return whether a heading speaks of time that passed, no time of day."""
     return _PASSED.search(heading.casefold()) is not None
@@ -154,6 +170,11 @@ def _by_name(
     if len(timed) == 1:
         index = next(iter(timed))
         return index, None, [f"{headings[index]!r} is taken as the time"]
+    if len(parts := find_parts(headings)) > 1:
+        raise RecordingError(
+            f"{source}: the time stands in {len(parts)} columns, {', '.join(parts)}: write it into one, such as "
+            "2024-03-13 08:00:00 below the heading timestamp"
+        )
     if held := _by_cells(headings, kinds):
         return held
     raise RecordingError(
