@@ -26,12 +26,13 @@ _EPOCH, _PARTS = (946_684_800, 2_240_611_200), (1, 10**3, 10**6, 10**9)
 _SERIAL = (36_526, 73_050)
 #: headings of a date or a day, below which numbers may be one that are not dates at sight
 _NAMED = re.compile(
-    r"(?:^|[\W_])(?:\w*(?:date|datum|tag|day|stamp|stempel)|dat|doy|fecha|jour|giorno|d[ií]a|dag|data)(?:$|[\W_])"
+    r"(?:^|[\W_])(?:\w*(?:date|datum|tag|day|stamp|stempel)|dat|doy|dow|fecha|jour|giorno|d[ií]a|dag|data)(?:$|[\W_])"
 )
 _ORDINAL, _WEEK = r"(\d{4})-?(\d{3})", r"(\d{4})-?W(\d\d)-?([1-7])"
 _NO_YEAR = re.compile(r"\d{1,2}[./-]\d{1,2}[./]?")
 _MONTH = re.compile(r"\d{1,2}[-. ]{1,2}[^\W\d_]{3,9}\.?|[^\W\d_]{3,9}\.?[- ]\d{1,2}")
 _COUNTED = re.compile(r"(?:day|tag|jour|giorno|d[ií]a|dag|dia|nap|den|dzień|gün)\W{0,3}\d{1,4}\.?", re.IGNORECASE)
+_DAY_WORD = re.compile(r"(?:day|tag|jour|giorno|d[ií]a|dia)\W+\w+", re.IGNORECASE)
 #: headings that name a day in one language and something else in another
 _NO_DAY = ("tag", "data", "stamp", "stempel", "dag", "dat")
 _DAYS = (
@@ -109,11 +110,12 @@ def read_other_days(cells: "pd.Series[Any]", heading: str, *, beside_clock: bool
     if np.isfinite(numbers).all() and not texts.str.fullmatch(r"\d{1,2}\.\d{1,2}\.").all():
         return _read_numbers(numbers, named=named)
     if texts.str.fullmatch(_COUNTED).all():  # day 1
-        return [texts.str.extract(r"(\d+)", expand=False).astype(np.int64).to_numpy()]
+        return [texts.str.extract(r"(\d+)", expand=False).to_numpy(dtype=np.int64)]
     found = _read_texts(texts, named=named, beside_clock=beside_clock)
-    if not found and beside_clock and named and plain_name(heading) not in _NO_DAY:
+    words = texts.str.fullmatch(_DAY_WORD).all() or (named and plain_name(heading) not in _NO_DAY)
+    if not found and beside_clock and words:
         # whatever form that is: where it changes another day begins
-        return [(texts != texts.shift()).cumsum().to_numpy(dtype=np.int64)]
+        return [np.asarray((texts != texts.shift()).cumsum(), dtype=np.int64)]
     return found
 
 

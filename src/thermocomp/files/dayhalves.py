@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from thermocomp.core.exceptions import RecordingError, Remedy, TwoReadingsError
+from thermocomp.files.numbers import is_number_like
 from thermocomp.files.tables import FileTable, skip_row
 
 #: words for the two halves of a day, in small letters without points and blanks: those that say nothing else first
@@ -23,8 +24,11 @@ _MAYBE = (
 _LETTERS = (("a",), ("p",))
 _BEFORE, _AFTER = ({*c, *m, *x} for c, m, x in zip(_CERTAIN, _MAYBE, _LETTERS, strict=True))
 _HEADING = re.compile(
-    r"\ba[ ._]?m\.?[ /_|\\-]*p[ ._]?m\b|meridi[ea]m?|tageshälfte|half[ _]?(of[ _])?day", re.IGNORECASE
+    r"\ba[ ._]?m\.?[ /_|\\-]*p[ ._]?m\b|meridi[ea]m?|tageshälfte|half[ _]?(of[ _])?day",
+    re.IGNORECASE,
 )
+#: and one that may, if two words stand below it
+_SHORT = re.compile(r"[ap]\.?m\.?|half", re.IGNORECASE)
 _HOUR = re.compile(r"(?<![\d:])(\d{1,2})(?=:\d\d)")
 
 
@@ -43,7 +47,9 @@ def are_halves(cells: Sequence[str], heading: str) -> bool:
     """
     words = {_plain(cell) for cell in cells}
     known = (*_CERTAIN[0], *_CERTAIN[1], *_MAYBE[0], *_MAYBE[1])
-    return bool(words) and (words.issubset(known) or says_halves(heading))
+    if words.issubset(known) or says_halves(heading):
+        return bool(words)
+    return _SHORT.fullmatch(heading) is not None and len(words) == 2 and not any(map(is_number_like, words))
 
 
 def says_halves(heading: str) -> bool:
@@ -80,7 +86,9 @@ def join_halves(
     there = clocks.notna()
     words = halves.map(_plain, na_action="ignore")
     after, before = words.isin(_AFTER), words.isin(_BEFORE)
-    certain = says_halves(half) or bool(words.isin((*_CERTAIN[0], *_CERTAIN[1])).any())
+    certain = (
+        says_halves(half) or _SHORT.fullmatch(half) is not None or bool(words.isin((*_CERTAIN[0], *_CERTAIN[1])).any())
+    )
     ignore: Remedy = {"columns": {half: {"role": "ignore"}}}
     unknown = np.flatnonzero(there & ~(after | before))
     if unknown.size and not certain:

@@ -9,7 +9,7 @@ from thermocomp.core.exceptions import RecordingError
 from thermocomp.core.headings import BRACKETS, Meaning, is_time_name, plain_name
 from thermocomp.files.cellkinds import Kinds
 from thermocomp.files.dayforms import names_day
-from thermocomp.files.dayhalves import are_halves
+from thermocomp.files.dayhalves import are_halves, says_halves
 from thermocomp.files.mapping import Mapping, Place
 
 #: headings of a time without unit, those that say more first
@@ -93,7 +93,8 @@ def find_time(
     half = None
     if kinds(time) in ("clock", "stamp"):
         found = (k for k, h in enumerate(headings) if k not in (time, date) and not is_ignored(h, k, mapping))
-        half = next((k for k in found if kinds(k) == "other" and are_halves(head(k), headings[k])), None)
+        named = (k for k in found if meanings[k] is None and headings[k] not in mapping.columns)
+        half = next((k for k in named if says_halves(headings[k]) or are_halves(head(k), headings[k])), None)
     used = (time, date, half, fraction)
     twins = {k for k, heading in enumerate(headings) if heading and heading == headings[time]}
     unused = [k for k in range(len(headings)) if k not in used and k not in twins and kinds(k) in ("date", "stamp")]
