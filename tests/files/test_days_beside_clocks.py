@@ -156,10 +156,10 @@ def test_days_that_change_at_midnight_are_not_asked_for(days: tuple[str, str], h
 def test_a_counter_of_days_counts_and_one_of_runs_does_not(tmp_path: Path) -> None:
     with pytest.raises(TwoReadingsError, match="which is not the day"):
         read(write(tmp_path / "d.csv", "Test day,Time", two("1,#", "2,#")))
-    for heading, first, second in (("Run", "1", "2"), ("Step", "Step 1", "Step 2"), ("Tag", "warm", "cold")):
+    other = [("Run", "1", "2"), ("Step", "Step 1", "Step 2"), ("Part", "1/2", "2/2"), ("Update", "ok", "late")]
+    for heading, first, second in (*other, ("Datum X", "A", "B"), ("Phase", "warm-up", "cool-down")):
         path = write(tmp_path / "r.csv", f"Time,{heading}", two(f"#,{first}", f"#,{second}"))
-        if heading != "Tag":  # a heading of dates is taken for one
-            assert read(path).time[-1] == SAME_DAY
+        assert read(path).time[-1] == SAME_DAY
 
 
 def test_times_that_passed_may_run_on_through_a_day(tmp_path: Path) -> None:

@@ -112,7 +112,9 @@ def read_other_days(cells: "pd.Series[Any]", heading: str, *, beside_clock: bool
     if texts.str.fullmatch(_COUNTED).all():  # day 1
         return [texts.str.extract(r"(\d+)", expand=False).to_numpy(dtype=np.int64)]
     found = _read_texts(texts, named=named, beside_clock=beside_clock)
-    words = texts.str.fullmatch(_DAY_WORD).all() or (named and plain_name(heading) not in _NO_DAY)
+    words = texts.str.fullmatch(_DAY_WORD).all() or (
+        named and plain_name(heading) not in _NO_DAY and texts.str.contains(r"\d").all()
+    )
     if not found and beside_clock and words:
         # whatever form that is: where it changes another day begins
         return [np.asarray((texts != texts.shift()).cumsum(), dtype=np.int64)]
@@ -152,12 +154,18 @@ def _read_texts(texts: "pd.Series[str]", *, named: bool, beside_clock: bool) -> 
         return _read_forms(plain.str.replace("-", "", regex=False), "%GW%V%u" if "W" in first else "%Y%j")
     if re.fullmatch(r"W\d\d-?[1-7]", first):
         return [_unwrap(d, 364) for d in _read_forms("2020" + plain.str.replace("-", "", regex=False), "%GW%V%u")]
-    if _NO_YEAR.fullmatch(first) and (named or beside_clock or first.endswith(".")):
+    if _NO_YEAR.fullmatch(first) and (named or first.endswith(".") or (beside_clock and not _are_parts(plain))):
         bare = plain.str.rstrip("./").str.replace(r"[./]", "-", regex=True) + "-2000"
         return [_unwrap(d, 366) for d in _read_forms(bare, "%d-%m-%Y", "%m-%d-%Y")]
     if _MONTH.fullmatch(first):
         return [_unwrap(d, 366) for d in read_days(plain.str.replace(r"[-. ]+", " ", regex=True).str.strip() + " 2000")]
     return _read_weekdays(texts) or read_days(plain)
+
+
+def _are_parts(texts: "pd.Series[str]") -> bool:
+    """Return whether texts count the parts of something: 1/3, 2/3, 3/3."""
+    parts = texts.str.extract(r"^([1-9]\d?)/([1-9]\d?)$")
+    return parts[0].iloc[0] == "1" and parts[0].notna().all() and parts[1].nunique() == 1
 
 
 def _read_weekdays(texts: "pd.Series[str]") -> list[IntArray]:
