@@ -14,6 +14,7 @@ from thermocomp.core.units import HOUSE_UNITS
 from thermocomp.files.dayforms import find_day_columns
 from thermocomp.files.mapping import Mapping
 from thermocomp.files.tables import FileTable
+from thermocomp.files.timecolumns import find_parts
 from thermocomp.files.times import find_likely_units
 
 FloatArray = NDArray[np.float64]
@@ -55,6 +56,8 @@ def guess(table: FileTable, mapping: Mapping) -> tuple[Remedy, ...]:
     tuple of Remedy
         With everything that can be guessed, one for each unit the time may have; empty if there is nothing.
     """
+    if find_parts(table.headings):
+        return ()  # none of them is the time alone
     columns: dict[str, Any] = {}
     for _, options in guess_columns(table, mapping):
         columns.update(options[0]["columns"])
