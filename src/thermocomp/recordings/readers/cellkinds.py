@@ -23,8 +23,9 @@ _WEEKDAY = re.compile(r"^[^\W\d_]{2,10}\.?,? +(?=\d{1,4}[-./]|\d{1,2}\.? +[^\W\d
 #: a date of digits alone
 _COMPACT = re.compile(r"(?:19|20)\d\d(?:0[1-9]|1[0-2])(?:0[1-9]|[12]\d|3[01])")
 
+#: ``compact``: dates of digits alone, which may be numbers
 #: ``passed``: hours beyond a day, or days before them; ``other``: words; empty: nothing
-Kind = Literal["number", "date", "clock", "passed", "stamp", "other", ""]
+Kind = Literal["number", "compact", "date", "clock", "passed", "stamp", "other", ""]
 #: what the column of a number holds
 Kinds = Callable[[int], Kind]
 
@@ -54,18 +55,23 @@ def find_kind(cells: Sequence[str]) -> Kind:
         clocks = [found for t in texts if (found := CLOCK.fullmatch(t))]
         return "passed" if any(c["days"] or int(c["hours"]) > 23 for c in clocks) else "clock"
     if are(is_number_like):
-        return "number"
+        return "compact" if is_compact_date(texts) else "number"
     texts = [_WEEKDAY.sub("", text) for text in texts]
     if are(lambda t: is_stamp(t) and ":" in _MIDNIGHT.sub("", t)):
         return "stamp" if len(texts) == 1 or len(set(texts)) > 1 else "other"
     return "date" if are(is_stamp) else "other"
 
 
+def is_compact_date(cells: Sequence[str]) -> bool:
+    """Return whether all cells are dates of digits alone, the year first: 20240313."""
+    return bool(cells) and all(_COMPACT.fullmatch(cell.strip().removesuffix(".0")) for cell in cells)
+
+
 def plain_dates(cells: "pd.Series[Any]") -> "pd.Series[str]":
     """Return dates without a day of the week, a midnight of a spreadsheet, and with signs between their parts."""
     plain = cells.astype(str).str.strip().str.replace(_MIDNIGHT, "", regex=True).str.replace(_WEEKDAY, "", regex=True)
-    if _COMPACT.fullmatch(plain.iloc[0]):
-        return plain.str.replace(r"^(\d{4})(\d\d)(\d\d)$", r"\1-\2-\3", regex=True)
+    if is_compact_date([plain.iloc[0]]):
+        return plain.str.replace(r"^(\d{4})(\d\d)(\d\d)(?:\.0)?$", r"\1-\2-\3", regex=True)
     return plain
 
 

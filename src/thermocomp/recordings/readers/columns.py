@@ -106,6 +106,8 @@ class ColumnPlan:
         A unit of time, ``timestamp``, or empty if neither heading nor mapping says.
     date : int or None
         Position of a column of dates that goes with a time of day.
+    half : int or None
+        Position of a column of AM and PM.
     fraction : int or None
         Position of a column of milliseconds that goes with whole seconds.
     unused : tuple of int
@@ -126,6 +128,7 @@ class ColumnPlan:
     time: int
     time_unit: str
     date: int | None
+    half: int | None
     fraction: int | None
     unused: tuple[int, ...]
     beside: tuple[int, ...]
@@ -136,7 +139,13 @@ class ColumnPlan:
     notes: tuple[str, ...] = ()
 
 
-def plan(headings: Sequence[str], mapping: Mapping, source: str, kinds: Kinds) -> ColumnPlan:
+def plan(
+    headings: Sequence[str],
+    mapping: Mapping,
+    source: str,
+    kinds: Kinds,
+    head: Callable[[int], list[str]] = lambda _: [],
+) -> ColumnPlan:
     """Decide which columns are read, and as what.
 
     Parameters
@@ -148,6 +157,8 @@ def plan(headings: Sequence[str], mapping: Mapping, source: str, kinds: Kinds) -
         The file, for messages.
     kinds : callable
         Tells what the cells of a column hold.
+    head : callable
+        Returns the first filled ones of a column.
 
     Raises
     ------
@@ -159,7 +170,7 @@ def plan(headings: Sequence[str], mapping: Mapping, source: str, kinds: Kinds) -
     """
     meanings = _understand_all(headings, mapping, source)
     try:
-        time, date, fraction, unused, told = find_time(headings, meanings, mapping, source, kinds)
+        time, date, half, fraction, unused, told = find_time(headings, meanings, mapping, source, kinds, head)
     except RecordingError:
         _refuse_twins(headings, mapping, source)
         raise
@@ -170,7 +181,7 @@ def plan(headings: Sequence[str], mapping: Mapping, source: str, kinds: Kinds) -
     cycle = _find_cycle(headings, mapping, source)
     columns: list[Column] = []
     tables: dict[int, str] = {}
-    ignored = {k for k in (time, date, fraction, cycle, *beside) if k is not None}
+    ignored = {k for k in (time, date, half, fraction, cycle, *beside) if k is not None}
     for name, rule in mapping.columns.items():
         place = rule.column or name
         if rule.role == "ignore" and isinstance(place, str) and place not in headings:
@@ -208,7 +219,7 @@ def plan(headings: Sequence[str], mapping: Mapping, source: str, kinds: Kinds) -
     notes.extend([note] if note else [])
     aliases = _aliases(columns, headings, meanings)
     found = tuple(columns), tuple(left_out), aliases, tuple(notes)
-    return ColumnPlan(time, time_unit, date, fraction, unused, beside, cycle, *found)
+    return ColumnPlan(time, time_unit, date, half, fraction, unused, beside, cycle, *found)
 
 
 def _meant(rule: ColumnMap, meaning: Meaning | None, where: str, heading: str) -> tuple[Unit, str]:

@@ -10,12 +10,12 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import Remedy, TwoReadingsError
-from thermocomp.recordings.readers.cellkinds import find_kind, plain_dates
+from thermocomp.recordings.readers.cellkinds import CLOCK, find_kind, is_compact_date, plain_clocks, plain_dates
 from thermocomp.recordings.readers.columns import ColumnPlan
 from thermocomp.recordings.readers.dayforms import IntArray, read_other_days
 from thermocomp.recordings.readers.mapping import Mapping
 from thermocomp.recordings.readers.numbers import is_filler
-from thermocomp.recordings.readers.stamps import read_days
+from thermocomp.recordings.readers.stamps import has_day, read_days
 from thermocomp.recordings.readers.tables import FileTable
 from thermocomp.recordings.readers.timecolumns import has_passed, is_ignored
 
@@ -105,13 +105,16 @@ def check_dates(
     notes = []
     heading = table.headings[columns.time]
     # a number has no date even where the mapping names the column of one
-    more = (columns.date,) if columns.date is not None and not is_stamp else ()
-    for k in (*columns.unused, *more, *others):
+    ignores = not is_stamp or (mapping.time.format and not has_day(mapping.time.format))
+    more = (columns.date,) if columns.date is not None and ignores else ()
+    clock = _find_clock(cells, columns, mapping, table) if is_stamp else None
+    others = (*others, *more) if clock is not None else others
+    for k in dict.fromkeys((*columns.unused, *more, *others)):
         name, ignored = table.headings[k] or k + 1, is_ignored(table.headings[k], k, mapping)
         row = (
-            _find_other(time, cells[k], heading=table.headings[k])
+            _find_other(time, cells[k], table.headings[k], clock, is_stamp=is_stamp)
             if k in others
-            else _find_contradiction(time, cells[k])
+            else _find_contradiction(time, cells[k], clock)
         )
         if row is None:
             if is_stamp and k not in others and columns.date is None and not has_passed(heading) and not ignored:
@@ -128,7 +131,9 @@ def check_dates(
             notes.append(f"left out, as the mapping says: {said}; the times between the rows may be wrong by days")
             continue
         use: Remedy = {"time": {"column": heading, "date": name, **({"format": ""} if mapping.time.format else {})}}
-        usable = is_stamp and k not in others
+        usable = (
+            is_stamp and k != columns.date and (k not in others or is_compact_date([str(cells[k].dropna().iloc[0])]))
+        )
         mend = f"name it in a mapping, [time] column = {_quoted(heading)} and date = {_quoted(name)}"
         raise TwoReadingsError(
             f"{source}: column {said}; if it holds the dates of the rows, "
@@ -146,31 +151,70 @@ def _quoted(place: str | int) -> str:
     return f'"{place}"' if isinstance(place, str) else str(place)
 
 
-def _find_contradiction(time: FloatArray, cells: "pd.Series[Any]") -> int | None:
+def _find_contradiction(time: FloatArray, cells: "pd.Series[Any]", clock: float | None) -> int | None:
     """Return the first row whose date no time of day at the first row explains; None if there is none."""
     there = np.flatnonzero(cells.notna())
     texts = plain_dates(cells.iloc[there])
     if texts.nunique() < 2:
         return None  # a date of the test, or of the sensor
-    wrong = [_find_wrong(days, time[there]) for days in read_days(texts)]
+    wrong = [_find_wrong(days, time[there], clock) for days in read_days(texts)]
     if not wrong:
         return int(there[np.flatnonzero(texts != texts.iloc[0])[0]])
     return None if None in wrong else int(there[max(k for k in wrong if k is not None)])
 
 
-def _find_other(time: FloatArray, cells: "pd.Series[Any]", heading: str) -> int | None:
+def _find_other(
+    time: FloatArray, cells: "pd.Series[Any]", heading: str, clock: float | None, *, is_stamp: bool
+) -> int | None:
     """Return the first row whose date, in a form that no timestamp has, goes not with the time."""
     filled = cells.notna() & ~cells.astype(str).map(is_filler)
     there = np.flatnonzero(filled)
     texts = cells.iloc[there].astype(str)
     if texts.nunique() < 2:
         return None
-    wrong = [_find_wrong(days, time[there]) for days in read_other_days(texts, heading)]
+    read = read_other_days(texts, heading, beside_clock=is_stamp)
+    wrong = [_find_wrong(days, time[there], clock) for days in read]
     return None if not wrong or None in wrong else int(there[max(k for k in wrong if k is not None)])
 
 
-def _find_wrong(days: IntArray, t: FloatArray) -> int | None:
+def _find_wrong(days: IntArray, t: FloatArray, clock: float | None) -> int | None:
     since = (days - days[0]) * _DAY - (t - t[0])
     # what the first row may be after midnight at least, and at most
-    wrong = np.flatnonzero(np.maximum.accumulate(since) >= np.minimum.accumulate(since) + _DAY + _SET)
-    return int(wrong[0]) if wrong.size else None
+    wrong = np.maximum.accumulate(since) >= np.minimum.accumulate(since) + _DAY + _SET
+    if clock is not None and not wrong.any() and not (clock <= _usual(t) and _runs_on(days, t)):
+        wrong = days - days[0] != (clock + t) // _DAY - (clock + t[0]) // _DAY
+    rows = np.flatnonzero(wrong)
+    return int(rows[0]) if rows.size else None
+
+
+def _usual(t: FloatArray) -> float:
+    return float(np.median(np.diff(t))) if len(t) > 1 else 0.0
+
+
+def _runs_on(days: IntArray, t: FloatArray) -> bool:
+    """Return whether no pause is where the date changes: times that begin with zero may have passed."""
+    return bool((np.diff(t)[np.diff(days) != 0] <= 2 * _usual(t)).all())
+
+
+def _find_clock(cells: pd.DataFrame, columns: ColumnPlan, mapping: Mapping, table: FileTable) -> float | None:
+    """Return the time of day of the first row [s]; None where the times are not known to be of a day."""
+    form, texts = mapping.time.format, cells[columns.time].astype(str).str.strip()
+    if has_passed(table.headings[columns.time]):
+        return None
+    if form:
+        if not re.search(r"%[HIXTRc]", form):
+            return None
+        shown = texts.iloc[0] if columns.date is None else f"{cells[columns.date].iloc[0]} {texts.iloc[0]}"
+        first = pd.to_datetime(shown, format=form, errors="coerce")
+    elif columns.date is not None:
+        return None
+    else:
+        parts = plain_clocks(texts).str.extract(CLOCK)
+        if parts["days"].notna().any() or (pd.to_numeric(parts["hours"]) > 23).any():
+            return None
+        first = pd.to_datetime(plain_clocks(texts).iloc[0].replace(".", ""), errors="coerce")
+    return (
+        None
+        if pd.isna(first)
+        else float((first.tz_localize(None) - first.tz_localize(None).normalize()).total_seconds())
+    )

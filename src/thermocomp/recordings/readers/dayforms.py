@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from thermocomp.recordings.headings import plain_name
-from thermocomp.recordings.readers.cellkinds import find_kind, plain_dates
+from thermocomp.recordings.readers.cellkinds import Kind, find_kind, plain_dates
 from thermocomp.recordings.readers.numbers import is_filler
 from thermocomp.recordings.readers.stamps import parse, read_days
 from thermocomp.recordings.readers.tables import FileTable
@@ -26,19 +26,30 @@ _EPOCH, _PARTS = (946_684_800, 2_240_611_200), (1, 10**3, 10**6, 10**9)
 _SERIAL = (36_526, 73_050)
 #: headings of a date or a day, below which numbers may be one that are not dates at sight
 _NAMED = re.compile(
-    r"(?:^|[\W_])(?:\w*(?:date|datum|tag|day|stamp|stempel)|dat|doy|fecha|jour|giorno|d[ií]a|dag|data)(?:$|[\W_])"
+    r"(?:^|[\W_])(?:\w*(?:date|datum|tag|day|stamp|stempel)|dat|doy|dow|fecha|jour|giorno|d[ií]a|dag|data)(?:$|[\W_])"
 )
 _ORDINAL, _WEEK = r"(\d{4})-?(\d{3})", r"(\d{4})-?W(\d\d)-?([1-7])"
 _NO_YEAR = re.compile(r"\d{1,2}[./-]\d{1,2}[./]?")
 _MONTH = re.compile(r"\d{1,2}[-. ]{1,2}[^\W\d_]{3,9}\.?|[^\W\d_]{3,9}\.?[- ]\d{1,2}")
+_COUNTED = re.compile(r"(?:day|tag|jour|giorno|d[ií]a|dag|dia|nap|den|dzień|gün)\W{0,3}\d{1,4}\.?", re.IGNORECASE)
+_DAY_WORD = re.compile(r"(?:day|tag|jour|giorno|d[ií]a|dia)\W+\w+", re.IGNORECASE)
+#: headings that name a day in one language and something else in another
+_NO_DAY = ("tag", "data", "stamp", "stempel", "dag", "dat")
 _DAYS = (
     *("monday tuesday wednesday thursday friday saturday sunday", "mon tue wed thu fri sat sun"),
     *("montag dienstag mittwoch donnerstag freitag samstag sonntag", "mo di mi do fr sa so"),
+    *("lunedì martedì mercoledì giovedì venerdì sabato domenica", "lun mar mer gio ven sab dom"),
+    *("lunes martes miércoles jueves viernes sábado domingo", "lun mar mié jue vie sáb dom"),
+    *("maandag dinsdag woensdag donderdag vrijdag zaterdag zondag", "ma di wo do vr za zo"),
+    *("segunda terça quarta quinta sexta sábado domingo", "seg ter qua qui sex sáb dom"),
+    *("poniedziałek wtorek środa czwartek piątek sobota niedziela", "pon wt śr czw pt sob ndz"),
+    *("pondělí úterý středa čtvrtek pátek sobota neděle", "po út st čt pá so ne"),
+    *("måndag tisdag onsdag torsdag fredag lördag söndag", "mån tis ons tors fre lör sön"),
     *("lundi mardi mercredi jeudi vendredi samedi dimanche", "lun mar mer jeu ven sam dim"),
 )
 
 
-def find_day_columns(table: FileTable, columns: Sequence[int]) -> list[int]:
+def find_day_columns(table: FileTable, columns: Sequence[int], *, beside_clock: bool = False) -> list[int]:
     """Find the columns whose first cells are dates in a form that no timestamp has.
 
     Parameters
@@ -46,37 +57,68 @@ def find_day_columns(table: FileTable, columns: Sequence[int]) -> list[int]:
     table : FileTable
     columns : sequence of int
         To look into.
+    beside_clock : bool
+        The times of the rows are no numbers: what then changes below a heading of a date may be one in any form.
     """
     found, typed = [], []
     for k in columns:
         head = table.head(k)
         if not head:
             typed += [k] if table.is_number(k, empty=False) else []
-        elif find_kind(head) not in ("date", "stamp", "clock", "passed") and _read_filled(head, table.headings[k]):
+        elif find_kind(head) not in ("date", "stamp", "clock", "passed") and _read_filled(
+            head, table.headings[k], beside_clock
+        ):
             found.append(k)
     if typed := typed[:_MOST]:
         cells = table.load([], typed)[0]
-        found += [k for k in typed if _read_filled(cells[k].dropna().tolist(), table.headings[k])]
+        found += [k for k in typed if _read_filled(cells[k].dropna().tolist(), table.headings[k], beside_clock)]
     return sorted(found)
 
 
-def _read_filled(cells: Sequence[Any], heading: str) -> list[IntArray]:
+def find_column_kind(table: FileTable, column: int) -> Kind:
+    """Return what a column holds, also one that holds numbers by its type."""
+    head = table.head(column)
+    if not head and names_day(table.headings[column]) and table.is_number(column, empty=False):
+        head = [str(cell).removesuffix(".0") for cell in table.load([], [column])[0][column].dropna().iloc[:100]]
+        return "compact" if find_kind(head) == "compact" else ""
+    return find_kind(head)
+
+
+def names_day(heading: str) -> bool:
+    """Return whether a heading names a date or a day."""
+    return _NAMED.search(plain_name(heading)) is not None
+
+
+def _read_filled(cells: Sequence[Any], heading: str, beside_clock: bool) -> list[IntArray]:
     filled = pd.Series([str(cell) for cell in cells if not is_filler(str(cell))], dtype=object)
-    return read_other_days(filled, heading) if len(filled) else []
+    return read_other_days(filled, heading, beside_clock=beside_clock) if len(filled) else []
 
 
-def read_other_days(cells: "pd.Series[Any]", heading: str) -> list[IntArray]:
+def read_other_days(cells: "pd.Series[Any]", heading: str, *, beside_clock: bool = False) -> list[IntArray]:
     """Return the days that cells may be, counted from any one, in each form that all of them have.
 
     Parameters
     ----------
     cells : Series of str
     heading : str
+    beside_clock : bool
+        See `find_day_columns`.
     """
     texts = cells.str.strip().str.lstrip("'")
-    named = _NAMED.search(plain_name(heading)) is not None
+    named = names_day(heading)
     numbers = pd.to_numeric(texts.str.replace(",", ".", regex=False), errors="coerce").to_numpy(dtype=np.float64)
-    return _read_numbers(numbers, named=named) if np.isfinite(numbers).all() else _read_texts(texts, named=named)
+    if np.isfinite(numbers).all() and not texts.str.fullmatch(r"\d{1,2}\.\d{1,2}\.").all():
+        return _read_numbers(numbers, named=named)
+    if texts.str.fullmatch(_COUNTED).all():  # day 1
+        return [texts.str.extract(r"(\d+)", expand=False).to_numpy(dtype=np.int64)]
+    found = _read_texts(texts, named=named, beside_clock=beside_clock)
+    words = texts.str.fullmatch(_DAY_WORD).all() or (
+        named and plain_name(heading) not in _NO_DAY and texts.str.contains(r"\d").all()
+    )
+    if not found and beside_clock and words:
+        # whatever form that is: where it changes another day begins
+        return [np.asarray((texts != texts.shift()).cumsum(), dtype=np.int64)]
+    return found
 
 
 def _read_numbers(numbers: NDArray[np.float64], *, named: bool) -> list[IntArray]:
@@ -102,7 +144,7 @@ def _read_numbers(numbers: NDArray[np.float64], *, named: bool) -> list[IntArray
     return found
 
 
-def _read_texts(texts: "pd.Series[str]", *, named: bool) -> list[IntArray]:
+def _read_texts(texts: "pd.Series[str]", *, named: bool, beside_clock: bool) -> list[IntArray]:
     plain = texts.str.replace(r"(?<=\d)\s*[년月월年_]\s*(?=\d)", "-", regex=True).str.replace(
         r"\s*[日일]", "", regex=True
     )
@@ -112,16 +154,24 @@ def _read_texts(texts: "pd.Series[str]", *, named: bool) -> list[IntArray]:
         return _read_forms(plain.str.replace("-", "", regex=False), "%GW%V%u" if "W" in first else "%Y%j")
     if re.fullmatch(r"W\d\d-?[1-7]", first):
         return [_unwrap(d, 364) for d in _read_forms("2020" + plain.str.replace("-", "", regex=False), "%GW%V%u")]
-    if _NO_YEAR.fullmatch(first) and (named or first.endswith(".")):
+    if _NO_YEAR.fullmatch(first) and (named or first.endswith(".") or (beside_clock and not _are_parts(plain))):
         bare = plain.str.rstrip("./").str.replace(r"[./]", "-", regex=True) + "-2000"
         return [_unwrap(d, 366) for d in _read_forms(bare, "%d-%m-%Y", "%m-%d-%Y")]
     if _MONTH.fullmatch(first):
         return [_unwrap(d, 366) for d in read_days(plain.str.replace(r"[-. ]+", " ", regex=True).str.strip() + " 2000")]
+    return _read_weekdays(texts) or read_days(plain)
+
+
+def _are_parts(texts: "pd.Series[str]") -> bool:
+    """Return whether texts count the parts of something: 1/3, 2/3, 3/3."""
+    parts = texts.str.extract(r"^([1-9]\d?)/([1-9]\d?)$")
+    return parts[0].iloc[0] == "1" and parts[0].notna().all() and parts[1].nunique() == 1
+
+
+def _read_weekdays(texts: "pd.Series[str]") -> list[IntArray]:
     words = texts.str.casefold().str.rstrip(".")
-    for names in map(str.split, _DAYS):
-        if words.isin(names).all():
-            return [_unwrap(words.map(names.index).to_numpy(dtype=np.int64), 7)]
-    return read_days(plain)
+    fitting = (names for names in map(str.split, _DAYS) if words.isin(names).all())
+    return [_unwrap(words.map(names.index).to_numpy(dtype=np.int64), 7) for names in fitting]
 
 
 def _read_forms(texts: "pd.Series[str]", *forms: str) -> list[IntArray]:

@@ -14,6 +14,7 @@ from thermocomp.recordings.headings import HOUSE_SUFFIX, Meaning, understand
 from thermocomp.recordings.readers.dayforms import find_day_columns
 from thermocomp.recordings.readers.mapping import Mapping
 from thermocomp.recordings.readers.tables import FileTable
+from thermocomp.recordings.readers.timecolumns import find_parts
 from thermocomp.recordings.readers.times import find_likely_units
 
 FloatArray = NDArray[np.float64]
@@ -55,6 +56,8 @@ def guess(table: FileTable, mapping: Mapping) -> tuple[Remedy, ...]:
     tuple of Remedy
         With everything that can be guessed, one for each unit the time may have; empty if there is nothing.
     """
+    if find_parts(table.headings):
+        return ()  # none of them is the time alone
     columns: dict[str, Any] = {}
     for _, options in guess_columns(table, mapping):
         columns.update(options[0]["columns"])

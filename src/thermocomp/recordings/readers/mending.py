@@ -278,6 +278,7 @@ class _Dialogue:
         self.draft = draft
         self.decide = decide
         self.path = path
+        self.first: RecordingError | UnitError | None = None  #: that a row would be passed over for
         self.decided: list[tuple[Question, Remedy | None]] = []
 
     def ask(self, question: Question) -> bool:
@@ -307,8 +308,12 @@ class _Dialogue:
             try:
                 return action()
             except (RecordingError, UnitError) as e:
-                if not e.remedies or (_skips(e.remedies[0]) and self._skipped() >= MOST_SKIPPED):
+                if not e.remedies:
                     raise
+                if _skips(e.remedies[0]):
+                    self.first = self.first or e
+                    if self._skipped() >= MOST_SKIPPED:
+                        raise self.first from None  # as reading without a mapping tells it
                 may_guess = not (isinstance(e, TwoReadingsError) or self._skips_date(e))
                 if not self.ask(Question(str(e), e.remedies, "error", may_guess)):
                     raise

@@ -20,10 +20,10 @@ from thermocomp.files.draft import draft
 from thermocomp.recordings.cleaning import clean
 from thermocomp.recordings.cycles import Cycle, find_cycles, make_single_cycle, split_by_labels
 from thermocomp.recordings.headings import understand
-from thermocomp.recordings.readers.cellkinds import find_kind
 from thermocomp.recordings.readers.columns import Column, ColumnPlan, plan
 from thermocomp.recordings.readers.datecheck import check_dates
-from thermocomp.recordings.readers.dayforms import find_day_columns
+from thermocomp.recordings.readers.dayforms import find_column_kind, find_day_columns
+from thermocomp.recordings.readers.dayhalves import join_halves
 from thermocomp.recordings.readers.guesses import guess
 from thermocomp.recordings.readers.leftout import refuse_nameless, why_left_out
 from thermocomp.recordings.readers.limits import Limits, check_file
@@ -116,7 +116,7 @@ def _read_rows(source: Path, mapping: Mapping, *, rising: bool, extra: Sequence[
         mapping = mapping.over(described)
         notes.extend(note)
     with _guessing(table, mapping):
-        columns = plan(table.headings, mapping, str(source), cache(lambda k: find_kind(table.head(k))))
+        columns = plan(table.headings, mapping, str(source), cache(lambda k: find_column_kind(table, k)), table.head)
     notes.extend(columns.notes)
     is_stamp = columns.time_unit == "timestamp" or not (columns.time_unit or table.is_number(columns.time))
     numbers = [c.index for c in columns.columns]
@@ -124,13 +124,28 @@ def _read_rows(source: Path, mapping: Mapping, *, rising: bool, extra: Sequence[
     if is_stamp and columns.fraction is not None:
         numbers.append(columns.fraction)
     times = [columns.time, *columns.beside]
-    known = {*numbers, *times, columns.date, columns.fraction, *columns.unused}
-    others = find_day_columns(table, [k for k, h in enumerate(table.headings) if h and k not in known])
+    known = {*numbers, *times, columns.date, columns.half, columns.fraction, *columns.unused}
+    others = find_day_columns(
+        table, [k for k, h in enumerate(table.headings) if h and k not in known], beside_clock=is_stamp
+    )
     numbers += [] if is_stamp else times
-    maybe = (*(times if is_stamp else ()), columns.date, *columns.unused, *others, columns.cycle, *more.values())
+    maybe = (
+        *(times if is_stamp else ()),
+        columns.date,
+        columns.half,
+        *columns.unused,
+        *others,
+        columns.cycle,
+        *more.values(),
+    )
     texts = [k for k in maybe if k is not None]
     cells, told = table.load(list(dict.fromkeys(numbers)), list(dict.fromkeys(t for t in texts if t not in numbers)))
     notes.extend(told)
+    if is_stamp and columns.half is not None:
+        names = table.headings[columns.time], table.headings[columns.half]
+        clocks, halves = cells[columns.time], cells[columns.half]
+        cells[columns.time], told = join_halves(clocks, halves, mapping.time.format, table, str(source), names)
+        notes.extend(told)
     time, start, told = _times(cells, columns, mapping, table, source, is_stamp=is_stamp, rising=rising)
     notes.extend(told)
     if not start or columns.date is not None:

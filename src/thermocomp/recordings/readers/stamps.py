@@ -140,6 +140,11 @@ def parse_stamps(text: "pd.Series[Any]", heading: str) -> Parsed | None:
     return _parsed(read[best], plain.iloc[0], _format(shape, best), notes)
 
 
+def has_day(form: str) -> bool:
+    """Return whether a format reads the day, and not only the time of day."""
+    return re.search(r"%[djxcDFeG]", form) is not None
+
+
 def parse(text: "pd.Series[Any]", form: str) -> "pd.Series[pd.Timestamp]":
     """Read timestamps in a known form, in UTC; NaT where a cell is not in it."""
     # in parts, and without a cache of the texts seen: pandas makes objects of them, far bigger than the times

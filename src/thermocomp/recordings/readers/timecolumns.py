@@ -1,13 +1,15 @@
 """Which columns of a file hold the time: found by headings, and by what the cells hold."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from difflib import get_close_matches
 from typing import NamedTuple
 
 from thermocomp.core.exceptions import RecordingError
 from thermocomp.recordings.headings import BRACKETS, Meaning, is_time_name, plain_name
 from thermocomp.recordings.readers.cellkinds import Kinds
+from thermocomp.recordings.readers.dayforms import names_day
+from thermocomp.recordings.readers.dayhalves import are_halves, says_halves
 from thermocomp.recordings.readers.mapping import Mapping, Place
 
 #: headings of a time without unit, those that say more first
@@ -20,6 +22,15 @@ _NEEDS_UNIT = ("t", "data", "tag", "day")
 #: headings of a date, and of the time of day beside it
 _DATES = ("date", "datum", "fecha", "data", "tag", "day")
 _CLOCKS = ("time", "uhrzeit", "zeit", "heure", "hora", "ora", "clock", "time of day", "tijd", "čas", "czas")
+#: headings of year, month, day, hour, minute and second in columns of their own
+_PARTS = (
+    ("year", "jahr", "année", "anno", "año", "yyyy", "yr"),
+    ("month", "monat", "mois", "mese", "mes", "mon", "mm"),
+    ("day", "tag", "jour", "giorno", "día", "dd"),
+    ("hour", "hours", "stunde", "heure", "ora", "hora", "hh", "hr"),
+    ("minute", "minutes", "minuto", "min", "mi"),
+    ("second", "seconds", "sekunde", "seconde", "secondo", "segundo", "sec", "ss"),
+)
 #: milliseconds beside a time of whole seconds
 _FRACTIONS = ("ms", "msec", "millisecond", "milliseconds", "millisekunden")
 #: names of a time that counts from the start of a test, even where it is written as a time of day
@@ -34,13 +45,19 @@ class TimePlan(NamedTuple):
 
     time: int
     date: int | None  #: of the dates, where `time` holds a time of day
+    half: int | None  #: of AM and PM, where `time` holds times of day
     fraction: int | None  #: of milliseconds that go with whole seconds
     unused: tuple[int, ...]  #: further columns that hold dates
     notes: tuple[str, ...]
 
 
 def find_time(
-    headings: Sequence[str], meanings: Sequence[Meaning | None], mapping: Mapping, source: str, kinds: Kinds
+    headings: Sequence[str],
+    meanings: Sequence[Meaning | None],
+    mapping: Mapping,
+    source: str,
+    kinds: Kinds,
+    head: Callable[[int], list[str]] = lambda _: [],
 ) -> TimePlan:
     """Find the time column, and the column of dates where the time column holds only a time of day.
 
@@ -54,6 +71,8 @@ def find_time(
         The file, for messages.
     kinds : callable
         Tells what a column holds.
+    head : callable
+        Returns the first filled cells of a column.
 
     Raises
     ------
@@ -71,10 +90,15 @@ def find_time(
         if date is not None:
             notes.append(_tell_pair(headings, time, date))
     fraction = None if mapping.time.column else _find_fraction(headings, time)
-    used = (time, date, fraction)
+    half = None
+    if kinds(time) in ("clock", "stamp"):
+        found = (k for k, h in enumerate(headings) if k not in (time, date) and not is_ignored(h, k, mapping))
+        named = (k for k in found if meanings[k] is None and headings[k] not in mapping.columns)
+        half = next((k for k in named if says_halves(headings[k]) or are_halves(head(k), headings[k])), None)
+    used = (time, date, half, fraction)
     twins = {k for k, heading in enumerate(headings) if heading and heading == headings[time]}
     unused = [k for k in range(len(headings)) if k not in used and k not in twins and kinds(k) in ("date", "stamp")]
-    return TimePlan(time, date, fraction, tuple(unused), tuple(notes))
+    return TimePlan(time, date, half, fraction, tuple(unused), tuple(notes))
 
 
 def find_position(place: Place, headings: Sequence[str], table: str, source: str) -> int:
@@ -112,6 +136,13 @@ def is_ignored(heading: str, index: int, mapping: Mapping) -> bool:
     return any(rule.role == "ignore" and (rule.column or name) in (heading, index + 1) for name, rule in rules)
 
 
+def find_parts(headings: Sequence[str]) -> list[str]:
+    """Return the headings of columns that hold year, month, day, hour, minute and second of one time; or none."""
+    found = {next((k for k, words in enumerate(_PARTS) if _bare_name(h) in words), -1): h for h in reversed(headings)}
+    parts = [found[k] for k in range(len(_PARTS)) if k in found]
+    return parts if len(parts) > 2 or {3, 4} <= found.keys() else []
+
+
 def has_passed(heading: str) -> bool:
     """Return whether a heading speaks of time that passed, no time of day."""
     return _PASSED.search(heading.casefold()) is not None
@@ -140,6 +171,11 @@ def _by_name(
     if len(timed) == 1:
         index = next(iter(timed))
         return index, None, [f"{headings[index]!r} is taken as the time"]
+    if len(parts := find_parts(headings)) > 1:
+        raise RecordingError(
+            f"{source}: the time stands in {len(parts)} columns, {', '.join(parts)}: write it into one, such as "
+            "2024-03-13 08:00:00 below the heading timestamp"
+        )
     if held := _by_cells(headings, kinds):
         return held
     raise RecordingError(
@@ -178,7 +214,8 @@ def _paired(time: int, headings: Sequence[str], mapping: Mapping, kinds: Kinds) 
 
     kind = kinds(time)
     if kind == "clock" and not has_passed(headings[time]):
-        return time, next(iter(others("date", _DATES)), None)
+        compact = [k for k in others("compact", _DATES) if names_day(headings[k])]
+        return time, next(iter((*others("date", _DATES), *compact)), None)
     if kind == "date" and not mapping.time.column and (clocks := others("clock", _CLOCKS)):
         return clocks[0], time
     return time, None

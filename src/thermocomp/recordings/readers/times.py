@@ -1,5 +1,6 @@
 """Times of a recording: numbers with a unit, timestamps, or times of day."""
 
+import re
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -12,8 +13,10 @@ from thermocomp.core.units import find_unit
 from thermocomp.recordings.readers.cellkinds import CLOCK, HALF, plain_clocks, plain_dates
 from thermocomp.recordings.readers.columns import ColumnPlan
 from thermocomp.recordings.readers.mapping import Mapping
-from thermocomp.recordings.readers.stamps import AmbiguousDatesError, Parsed, parse, parse_stamps
+from thermocomp.recordings.readers.stamps import AmbiguousDatesError, Parsed, has_day, parse, parse_stamps
 from thermocomp.recordings.readers.tables import FileTable, skip_row, tell_places
+from thermocomp.recordings.readers.timefaults import refuse_falling, refuse_passed, refuse_set_forward
+from thermocomp.recordings.readers.timehints import find_formats
 
 FloatArray = NDArray[np.float64]
 
@@ -25,12 +28,6 @@ _SERIAL = 36526.0, 73050.0
 _SERIAL_BEGIN = -25569 * 86400
 _DATE_WORDS = ("date", "datum", "dat", "stamp", "stempel", "fecha")
 _DAY = 86_400_000_000_000  # [ns]
-
-
-_ZONE = (
-    'use UTC or timestamps with an offset, or name the zone in a mapping, [time] zone = "Europe/Berlin" ("UTC": a '
-    "clock that is never set)"
-)
 
 
 def read_times(
@@ -92,9 +89,9 @@ def read_times(
         )
     if is_stamp:
         if columns.date is not None:
-            shown = plain_dates(cells[columns.date]) + " " + plain_clocks(shown)
+            shown = _join_dates(cells, columns, mapping, table, source)
         time, start, found = _read_stamps(shown, columns, mapping, table, source)
-        _refuse_passed(time, start, cells, columns, mapping, table, source)
+        refuse_passed(time, start, cells, columns, mapping, table, source)
     else:
         raw = shown.to_numpy(dtype=np.float64)
         missing = np.flatnonzero(~np.isfinite(raw))
@@ -113,10 +110,10 @@ def read_times(
     steps = np.diff(time)
     wrong = np.flatnonzero(~(steps > 0) if rising else steps < 0) + 1
     if wrong.size:
-        local = is_stamp and pd.Timestamp(start).tzinfo is None
-        _refuse_falling(wrong, time, shown, table, f"{source}: {{}}, column {heading!r}", local=local)
+        where = f"{source}: {{}}, column {heading!r}"
+        refuse_falling(wrong, time, shown, table, where, start, is_stamp=is_stamp)
     if is_stamp and start and pd.Timestamp(start).tzinfo is None:
-        _refuse_set_forward(time, steps, start, table, source, heading)
+        refuse_set_forward(time, steps, start, table, source, heading)
     return time, start, notes
 
 
@@ -137,7 +134,7 @@ def _read_stamps(
         return _read_clock(text, table, source, heading)
     if wanted:
         begin = pd.to_datetime(text.iloc[:1], format=wanted, errors="coerce").iloc[0]
-        dated = any(letter in wanted for letter in ("%d", "%j", "%x", "%c", "%D", "%F")) and not pd.isna(begin)
+        dated = has_day(wanted) and re.search("%[YycxDFG]", wanted) is not None and not pd.isna(begin)
         found: Parsed | None = Parsed(parse(text, wanted), begin.isoformat() if dated else "", ())
     else:
         titles = [table.headings[k] for k in (columns.date, columns.time) if k is not None]
@@ -155,11 +152,7 @@ def _read_stamps(
                 [{"time": {**place, "format": form}} for form in e.readings],
             ) from e
     if found is None or pd.isna(found.stamps.iloc[0]):
-        hint = f"does not fit the format {wanted!r}" if wanted else "is not an ISO timestamp"
-        raise RecordingError(
-            f"{source}: {table.place(0)}, column {heading!r}: {first!r} {hint}; say how it is written in a "
-            f'mapping: [time] column = "{heading}" and format = "%d/%m/%Y %H:%M:%S"'
-        )
+        _refuse_form(text, columns, wanted, table, source)
     stamps, start, notes = found
     bad = np.flatnonzero(stamps.isna())
     if bad.size:
@@ -170,6 +163,49 @@ def _read_stamps(
             [skip_row(table, row)],
         )
     return _seconds(stamps - stamps.iloc[0]), start, notes
+
+
+def _join_dates(
+    cells: pd.DataFrame, columns: ColumnPlan, mapping: Mapping, table: FileTable, source: Path
+) -> "pd.Series[str]":
+    """Return dates with their times of day behind them; where a format is given, as they stand in the file."""
+    dates, clocks = cells[columns.date], cells[columns.time]
+    lost = np.flatnonzero(dates.isna() & clocks.notna())
+    if lost.size:
+        row, name = int(lost[0]), table.headings[columns.date or 0]
+        more = f" (in {lost.size} rows, of {len(dates)})" if lost.size > 1 else ""
+        raise RecordingError(
+            f"{source}: {table.place(row)}, column {name!r}: the date is missing{more}; the time of day "
+            f"{clocks.iloc[row]} is there: write its date into every row",
+            [skip_row(table, row)] if 4 * lost.size <= len(dates) else [],
+        )
+    there = dates.notna() & clocks.notna()
+    form, plain = mapping.time.format, plain_dates(dates) + " " + plain_clocks(clocks)
+    if form and pd.isna(pd.to_datetime(plain.iloc[0], format=form, utc=True, errors="coerce")):
+        written = dates.astype(str).str.strip().str.removesuffix(".0") + " " + clocks.astype(str).str.strip()
+        return written.where(there)
+    return plain.where(there)
+
+
+def _refuse_form(text: "pd.Series[str]", columns: ColumnPlan, wanted: str, table: FileTable, source: Path) -> NoReturn:
+    """Refuse times in a form that is not known, with formats that fit."""
+    heading, first = table.headings[columns.time], text.iloc[0].strip()
+    place = {"column": heading}
+    if columns.date is not None:
+        place["date"] = table.headings[columns.date]
+    forms = find_formats(text)
+    where = ", ".join(f'{key} = "{title}"' for key, title in place.items())
+    ways = " or ".join(f'format = "{form}"' for form in forms) or "format, in the letters of strptime"
+    hint = f"does not fit the format {wanted!r}" if wanted else "is not an ISO timestamp"
+    if columns.date is not None and not forms:
+        ways += f'; if {place["date"]!r} holds no dates, leave it out: role = "ignore"'
+    # minutes and seconds alone: the hours may be lost
+    doubtful = len(forms) > 1 or not any(map(has_day, forms))
+    raise (TwoReadingsError if doubtful and forms else RecordingError)(
+        f"{source}: {table.place(0)}, column {heading!r}: {first!r} {hint}; say how it is written in a mapping: [time] "
+        f"{where} and {ways}",
+        [{"time": {**place, "format": form}} for form in forms],
+    )
 
 
 def _read_clock(
@@ -273,73 +309,6 @@ def find_likely_units(raw: FloatArray) -> tuple[str, ...]:
     step, span = float(np.median(np.diff(raw))), float(raw[-1] - raw[0])
     scales = {unit: find_unit(unit, "time").scale for unit in ("s", "min", "h", "d", "ms")}
     return tuple(u for u, s in scales.items() if 0.05 <= step * s <= 3600 and (span * s >= 60 or len(raw) < 10))
-
-
-def _refuse_falling(
-    wrong: NDArray[np.intp], time: FloatArray, shown: "pd.Series[Any]", table: FileTable, where: str, *, local: bool
-) -> NoReturn:
-    """Refuse times that do not rise."""
-    row = int(wrong[0])
-    what = "comes twice" if time[row] == time[row - 1] else f"is before {shown.iloc[row - 1]}"
-    more = f" ({wrong.size} rows like this)" if wrong.size > 1 else ""
-    text = f"{where.format(table.place(row))}: time {shown.iloc[row]} {what}, in {table.place(row - 1)}{more}"
-    steps = np.diff(time)
-    if len(steps) > 1 and (steps < 0).all():
-        raise RecordingError(f"{text}: the newest row comes first; sort the rows by time, the oldest first")
-    # a clock that is set back falls by an hour less one interval
-    if local and abs(steps[row - 1] - np.median(steps) + 3600) < 300:
-        raise RecordingError(f"{text}, perhaps as the clock was set back (daylight saving): {_ZONE}")
-    raise RecordingError(
-        f"{text}; time must rise: delete or correct the row, or split the file into tests", [skip_row(table, row)]
-    )
-
-
-def _refuse_passed(
-    time: FloatArray,
-    start: str,
-    cells: pd.DataFrame,
-    columns: ColumnPlan,
-    mapping: Mapping,
-    table: FileTable,
-    source: Path,
-) -> None:
-    """Refuse times that begin with zero and run on where the date changes: they passed, and are none of the day."""
-    if columns.date is None or mapping.time.format or not start:
-        return
-    dates, begin = cells[columns.date], pd.Timestamp(start)
-    changes = (dates != dates.shift()).to_numpy(dtype=np.bool_)[1:]
-    steps = np.diff(time)
-    usual = float(np.median(steps[~changes])) if not changes.all() else 0.0
-    more = steps - _DAY / 1e9
-    rows = np.flatnonzero(changes & (more > 0) & (more <= 2 * usual)) + 1
-    if rows.size and (begin - begin.normalize()).total_seconds() <= usual:
-        heading, name = table.headings[columns.time], table.headings[columns.date]
-        raise TwoReadingsError(
-            f"{source}: {table.place(int(rows[0]))}: {name!r} changes, and {heading!r}, which begins with zero, runs "
-            f"on by {more[rows[0] - 1]:g} s: time that passed, or a pause of a whole day? If it is time that passed, "
-            f'leave out {name!r} in a mapping: [time] column = "{heading}" and [columns."{name}"] role = "ignore"; if '
-            "not, say how both are written: [time] column, date and format",
-            [{"time": {"column": heading}, "columns": {name: {"role": "ignore"}}}],
-        )
-
-
-def _refuse_set_forward(
-    time: FloatArray, steps: FloatArray, start: str, table: FileTable, source: Path, heading: str
-) -> None:
-    """Refuse a gap of an hour where clocks are set forward: the file does not say whether an hour passed."""
-    usual = float(np.median(steps)) if steps.size else np.inf
-    if not usual <= 900:
-        return
-    for row in np.flatnonzero(np.abs(steps - usual - 3600) < min(usual, 60)) + 1:
-        before, after = (pd.Timestamp(start) + pd.Timedelta(seconds=time[k]) for k in (row - 1, row))
-        spring = after.month in (3, 4, 9, 10, 11) and after.weekday() in (4, 5, 6) and before.hour <= 3
-        if spring and after.hour == before.hour + (1 if after.minute >= before.minute else 2):
-            raise TwoReadingsError(
-                f"{source}: {table.place(int(row))}, column {heading!r}: an hour is missing between {before} and "
-                f"{after}, perhaps as the clock was set forward (daylight saving), perhaps as nothing was recorded: "
-                f"{_ZONE}",
-                [{"time": {"zone": "UTC"}}],
-            )
 
 
 def _in_zone(time: FloatArray, start: str, zone: str, where: str) -> tuple[FloatArray, str]:

@@ -1,0 +1,124 @@
+"""AM and PM in a column of their own, beside a clock of twelve hours."""
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from thermocomp.core.exceptions import RecordingError, Remedy, TwoReadingsError
+from thermocomp.recordings.readers.numbers import is_number_like
+from thermocomp.recordings.readers.tables import FileTable, skip_row
+
+#: words for the two halves of a day, in small letters without points and blanks: those that say nothing else first
+_CERTAIN = (
+    ("am", "vorm", "vormittag", "vormittags", "πμ", "上午", "午前", "오전"),
+    ("pm", "nachm", "nachmittag", "nachmittags", "μμ", "下午", "午後", "오후"),
+)
+#: and those that shifts are called by, too; letters alone
+_MAYBE = (
+    ("früh", "morgens", "matin", "mattina", "mañana", "manhã", "dop", "morning"),
+    ("abends", "après-midi", "soir", "pomeriggio", "tarde", "odp", "afternoon"),
+)
+_LETTERS = (("a",), ("p",))
+_BEFORE, _AFTER = ({*c, *m, *x} for c, m, x in zip(_CERTAIN, _MAYBE, _LETTERS, strict=True))
+_HEADING = re.compile(
+    r"\ba[ ._]?m\.?[ /_|\\-]*p[ ._]?m\b|meridi[ea]m?|tageshälfte|half[ _]?(of[ _])?day",
+    re.IGNORECASE,
+)
+#: and one that may, if two words stand below it
+_SHORT = re.compile(r"[ap]\.?m\.?|half", re.IGNORECASE)
+_HOUR = re.compile(r"(?<![\d:])(\d{1,2})(?=:\d\d)")
+
+
+def _plain(cell: object) -> str:
+    return re.sub(r"[.\s]", "", str(cell)).casefold()
+
+
+def are_halves(cells: Sequence[str], heading: str) -> bool:
+    """Return whether cells say which half of a day it is.
+
+    Parameters
+    ----------
+    cells : sequence of str
+        The first filled ones of a column.
+    heading : str
+    """
+    words = {_plain(cell) for cell in cells}
+    known = (*_CERTAIN[0], *_CERTAIN[1], *_MAYBE[0], *_MAYBE[1])
+    if words.issubset(known) or says_halves(heading):
+        return bool(words)
+    return _SHORT.fullmatch(heading) is not None and len(words) == 2 and not any(map(is_number_like, words))
+
+
+def says_halves(heading: str) -> bool:
+    """Return whether a heading speaks of AM and PM."""
+    return _HEADING.search(heading) is not None
+
+
+def join_halves(
+    clocks: "pd.Series[Any]", halves: "pd.Series[Any]", form: str, table: FileTable, where: str, names: tuple[str, str]
+) -> "tuple[pd.Series[Any], tuple[str, ...]]":
+    """Return times of day with AM or PM behind them, as their column says; and how they were read.
+
+    Parameters
+    ----------
+    clocks : Series
+        Times of day, or dates with one.
+    halves : Series
+        AM or PM, or words for them.
+    form : str
+        Format of the times that a mapping gives; empty: none.
+    table : FileTable
+        That the cells come from.
+    where : str
+        The file, for messages.
+    names : tuple of str
+        Headings of both columns.
+
+    Raises
+    ------
+    RecordingError
+        A cell does not say which half; or it contradicts the time.
+    """
+    time, half = names
+    there = clocks.notna()
+    words = halves.map(_plain, na_action="ignore")
+    after, before = words.isin(_AFTER), words.isin(_BEFORE)
+    certain = (
+        says_halves(half) or _SHORT.fullmatch(half) is not None or bool(words.isin((*_CERTAIN[0], *_CERTAIN[1])).any())
+    )
+    ignore: Remedy = {"columns": {half: {"role": "ignore"}}}
+    unknown = np.flatnonzero(there & ~(after | before))
+    if unknown.size and not certain:
+        return clocks, ()  # shifts
+    if unknown.size:
+        row = int(unknown[0])
+        says = "is empty" if pd.isna(halves.iloc[row]) else f"{str(halves.iloc[row])!r} is neither AM nor PM"
+        raise RecordingError(
+            f"{where}: {table.place(row)}, column {half!r}: {says}, beside the time {clocks.iloc[row]}; fill it in, or "
+            f'if it has nothing to do with the time, leave it out by a mapping: [columns."{half}"] role = "ignore"',
+            [skip_row(table, row)] if 4 * unknown.size <= len(clocks) else [],
+        )
+    texts = clocks.astype(str).str.strip()
+    hours = pd.to_numeric(texts.str.extract(_HOUR, expand=False), errors="coerce")
+    whole_day = bool((hours > 12).any())  # written in 24 hours, with AM and PM beside them all the same
+    if whole_day or (form and "%p" not in form):
+        wrong = np.flatnonzero(there & hours.notna() & (after != (hours >= 12)) & (before | after))
+        if not wrong.size or (whole_day and not certain):
+            return clocks, ()
+        row = int(wrong[0])
+        raise TwoReadingsError(
+            f"{where}: {table.place(row)}: {half!r} says {halves.iloc[row]}, and {time!r} {clocks.iloc[row]}"
+            + (
+                ", of 24 hours, as other rows show: correct the one or the other, "
+                if whole_day
+                else f", which the format {form!r} takes for 24 hours: write %I for the hours and end it with %p, "
+            )
+            + f'or leave {half!r} out by a mapping: [columns."{half}"] role = "ignore"',
+            [] if whole_day else [{"time": {"column": time, "format": f"{form.replace('%H', '%I')} %p"}}, ignore],
+        )
+    twelve = texts.str.replace(r"(?<![\d:])0?0(?=:\d\d(?!\d))", "12", n=1, regex=True)  # 00:31 AM
+    joined = (twelve + " " + after.map({True: "PM", False: "AM"})).where(there)
+    return joined, (f"{half!r} says AM and PM of {time!r}",)

@@ -1,0 +1,120 @@
+"""Times that cannot be those of a recording: they fall, or the clock was set."""
+
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import RecordingError, TwoReadingsError
+from thermocomp.recordings.readers.columns import ColumnPlan
+from thermocomp.recordings.readers.mapping import Mapping
+from thermocomp.recordings.readers.tables import FileTable, skip_row
+
+FloatArray = NDArray[np.float64]
+
+_DAY = 86_400.0
+_ZONE = (
+    'use UTC or timestamps with an offset, or name the zone in a mapping, [time] zone = "Europe/Berlin" ("UTC": a '
+    "clock that is never set)"
+)
+
+
+def refuse_falling(
+    wrong: NDArray[np.intp],
+    time: FloatArray,
+    shown: "pd.Series[Any]",
+    table: FileTable,
+    where: str,
+    start: str,
+    *,
+    is_stamp: bool,
+) -> NoReturn:
+    """Refuse times that do not rise."""
+    row, local = int(wrong[0]), is_stamp and pd.Timestamp(start).tzinfo is None
+    what = "comes twice" if time[row] == time[row - 1] else f"is before {shown.iloc[row - 1]}"
+    more = f" ({wrong.size} rows like this)" if wrong.size > 1 else ""
+    text = f"{where.format(table.place(row))}: time {shown.iloc[row]} {what}, in {table.place(row - 1)}{more}"
+    steps = np.diff(time)
+    if len(steps) > 1 and (steps < 0).all():
+        raise RecordingError(f"{text}: the newest row comes first; sort the rows by time, the oldest first")
+    # a clock that is set back falls by an hour less one interval
+    if local and abs(steps[row - 1] - np.median(steps) + 3600) < 300:
+        raise RecordingError(f"{text}, perhaps as the clock was set back (daylight saving): {_ZONE}")
+    if local and _may_be_set_back(start, time, row):
+        raise RecordingError(
+            f"{text}, perhaps as the clock was set back (daylight saving) while nothing was recorded: {_ZONE}"
+        )
+    never_again = steps[row - 1] < 0 and time[row:].max() < time[row - 1]
+    if is_stamp and steps[row - 1] < 0 and abs(steps[row - 1] + 43_200) <= max(600, 2 * float(np.median(steps))):
+        raise TwoReadingsError(
+            f"{text}: perhaps a clock of twelve hours whose AM and PM are not in the file, or not found; write them "
+            "behind the times or into a column headed AM/PM, or write times of 24 hours",
+            [skip_row(table, row)],
+        )
+    if is_stamp and not start and never_again:
+        raise TwoReadingsError(
+            f"{text}, and no later row comes up to it: the next day, or a clock of twelve hours without AM and PM, "
+            "or one that was set? Write dates beside the times, or split the file into tests",
+            [skip_row(table, row)],
+        )
+    raise RecordingError(
+        f"{text}; time must rise: delete or correct the row, or split the file into tests", [skip_row(table, row)]
+    )
+
+
+def _may_be_set_back(start: str, time: FloatArray, row: int) -> bool:
+    """Return whether a row stands before another on a Sunday in the night on which clocks are set back."""
+    if not start or time[row] < time[row - 1] - 3600:
+        return False
+    before, after = (pd.Timestamp(start) + pd.Timedelta(seconds=time[k]) for k in (row - 1, row))
+    return after.weekday() == 6 and after.month in (4, 10, 11) and after.hour <= 3 and before.hour <= 3
+
+
+def refuse_passed(
+    time: FloatArray,
+    start: str,
+    cells: pd.DataFrame,
+    columns: ColumnPlan,
+    mapping: Mapping,
+    table: FileTable,
+    source: Path,
+) -> None:
+    """Refuse times that begin with zero and run on where the date changes: they passed, and are none of the day."""
+    if columns.date is None or mapping.time.format or not start:
+        return
+    dates, begin = cells[columns.date], pd.Timestamp(start)
+    changes = (dates != dates.shift()).to_numpy(dtype=np.bool_)[1:]
+    steps = np.diff(time)
+    usual = float(np.median(steps[~changes])) if not changes.all() else 0.0
+    more = steps - _DAY
+    rows = np.flatnonzero(changes & (more > 0) & (more <= 2 * usual)) + 1
+    if rows.size and (begin - begin.normalize()).total_seconds() <= usual:
+        heading, name = table.headings[columns.time], table.headings[columns.date]
+        raise TwoReadingsError(
+            f"{source}: {table.place(int(rows[0]))}: {name!r} changes, and {heading!r}, which begins with zero, runs "
+            f"on by {more[rows[0] - 1]:g} s: time that passed, or a pause of a whole day? If it is time that passed, "
+            f'leave out {name!r} in a mapping: [time] column = "{heading}" and [columns."{name}"] role = "ignore"; if '
+            "not, say how both are written: [time] column, date and format",
+            [{"time": {"column": heading}, "columns": {name: {"role": "ignore"}}}],
+        )
+
+
+def refuse_set_forward(
+    time: FloatArray, steps: FloatArray, start: str, table: FileTable, source: Path, heading: str
+) -> None:
+    """Refuse a gap of an hour where clocks are set forward: the file does not say whether an hour passed."""
+    usual = float(np.median(steps)) if steps.size else np.inf
+    if not usual <= 900:
+        return
+    for row in np.flatnonzero(np.abs(steps - usual - 3600) < min(usual, 60)) + 1:
+        before, after = (pd.Timestamp(start) + pd.Timedelta(seconds=time[k]) for k in (row - 1, row))
+        spring = after.month in (3, 4, 9, 10, 11) and after.weekday() in (4, 5, 6) and before.hour <= 3
+        if spring and after.hour == before.hour + (1 if after.minute >= before.minute else 2):
+            raise TwoReadingsError(
+                f"{source}: {table.place(int(row))}, column {heading!r}: an hour is missing between {before} and "
+                f"{after}, perhaps as the clock was set forward (daylight saving), perhaps as nothing was recorded: "
+                f"{_ZONE}",
+                [{"time": {"zone": "UTC"}}],
+            )
