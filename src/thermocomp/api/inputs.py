@@ -337,4 +337,4 @@ def training_table(
     X = samples.frame()[samples.valid & np.isfinite(samples.deviations[:, 0])].reset_index(drop=True)
     if time:
         X.insert(0, "time_s", rows.time)
-    return TrainingTable(X, rows.deviations[:, 0], rows.test, rows.cycle, pd.Series(rows.dt()))
+    return TrainingTable(X=X, y=rows.deviations[:, 0], test=rows.test, cycle=rows.cycle, dt=pd.Series(rows.dt()))

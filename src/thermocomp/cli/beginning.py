@@ -67,7 +67,13 @@ class Beginning:
         for e in earlier:
             if e.fingerprint == tests[0].fingerprint:
                 raise InputError(f"--continues {e.source}: is the recording itself")
-        return Start(word, "stated", earlier, self.gap, _zero(self.zero, tests[0], mapping) if self.zero else {})
+        return Start(
+            word=word,
+            why="stated",
+            earlier=earlier,
+            gap=self.gap,
+            zero=_zero(self.zero, tests[0], mapping) if self.zero else {},
+        )
 
 
 def _zero(text: str, test: "Recording", mapping: Path | None) -> dict[str, float]:

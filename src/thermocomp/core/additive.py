@@ -73,7 +73,7 @@ class Curve:
 
     def expression(self, of: Node, name: str) -> Lookup:
         """Return it as a part of an expression."""
-        return Lookup(of, self.x, self.y, self.kind, name)
+        return Lookup(of=of, x=self.x, y=self.y, kind=self.kind, name=name)
 
     def __call__(self, variable: FloatArray) -> FloatArray:
         """Return the values at `variable`, element by element: the same alone as in a batch, to the last bit."""

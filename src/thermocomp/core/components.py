@@ -55,31 +55,71 @@ def _axis_components() -> list[ErrorComponent]:
     for axis in _AXES:
         for along in _AXES:
             kind = "positioning" if along == axis else f"straightness in {along}"
-            found.append(ErrorComponent(f"E{along}{axis}", "axis", "um", axis, f"{kind} of {axis}", (axis,)))
+            found.append(
+                ErrorComponent(
+                    code=f"E{along}{axis}",
+                    group="axis",
+                    unit="um",
+                    depends_on=axis,
+                    description=f"{kind} of {axis}",
+                    axes=(axis,),
+                )
+            )
         for about in _AXES:
             code = f"E{_ROTATION[about]}{axis}"
             kind = "roll" if about == axis else f"tilt about {about}"
-            found.append(ErrorComponent(code, "axis", "urad", axis, f"{kind} of {axis}", (axis,)))
+            found.append(
+                ErrorComponent(
+                    code=code, group="axis", unit="urad", depends_on=axis, description=f"{kind} of {axis}", axes=(axis,)
+                )
+            )
     return found
 
 
 def _squareness() -> list[ErrorComponent]:
     pairs = (("C0Y", "Y", "X"), ("B0Z", "Z", "X"), ("A0Z", "Z", "Y"))
     return [
-        ErrorComponent(code, "squareness", "urad", None, f"squareness of {a} to {b}", (a, b)) for code, a, b in pairs
+        ErrorComponent(
+            code=code,
+            group="squareness",
+            unit="urad",
+            depends_on=None,
+            description=f"squareness of {a} to {b}",
+            axes=(a, b),
+        )
+        for code, a, b in pairs
     ]
 
 
 def _spindle() -> list[ErrorComponent]:
-    drifts = [ErrorComponent(f"{a}0C", "spindle", "um", None, f"spindle drift in {a}") for a in _AXES]
-    tilts = [ErrorComponent(f"{_ROTATION[a]}0C", "spindle", "urad", None, f"spindle tilt about {a}") for a in "XY"]
+    drifts = [
+        ErrorComponent(code=f"{a}0C", group="spindle", unit="um", depends_on=None, description=f"spindle drift in {a}")
+        for a in _AXES
+    ]
+    tilts = [
+        ErrorComponent(
+            code=f"{_ROTATION[a]}0C",
+            group="spindle",
+            unit="urad",
+            depends_on=None,
+            description=f"spindle tilt about {a}",
+        )
+        for a in "XY"
+    ]
     return drifts + tilts
 
 
 def _origins() -> list[ErrorComponent]:
     # One axis (here Z) is the reference for the two others: two times three translations (C-01).
     return [
-        ErrorComponent(f"{along}O{axis}", "origin", "um", None, f"shift in {along} of the reference of {axis}", (axis,))
+        ErrorComponent(
+            code=f"{along}O{axis}",
+            group="origin",
+            unit="um",
+            depends_on=None,
+            description=f"shift in {along} of the reference of {axis}",
+            axes=(axis,),
+        )
         for axis in "XY"
         for along in _AXES
     ]

@@ -100,7 +100,7 @@ def gains(model: ErrorModel, step: float) -> list[Gain]:
             ends = np.outer(parts, (0.0, 1.0)) * share ** bank.powers[bank.speeds == k][:, None]
         bound = max(float(ends.max(axis=1).sum()), -float(ends.min(axis=1).sum()))
         now = float(direct[k] + followed[own].sum())
-        found.append(Gain(i.name, i.quantity, now, float(parts.sum()), bound))
+        found.append(Gain(name=i.name, quantity=i.quantity, instantaneous=now, settled=float(parts.sum()), bound=bound))
     return sorted(found, key=lambda g: -g.bound)
 
 

@@ -150,13 +150,13 @@ class PacedDynamic(ErrorModel):
         stopped = [1 / s.stopped for s in states]
         lags = [1 / tau for tau in taus for _ in self.temperatures]
         return Bank(
-            np.array([t.input for t in self.temperatures], dtype=np.intp),
-            len(taus),
-            np.array([s.input for s in states], dtype=np.intp),
-            np.array([s.power for s in states], dtype=np.float64),
-            np.array(lags + stopped, dtype=np.float64),
-            np.array([1 / s.running - k for s, k in zip(states, stopped, strict=True)], dtype=np.float64),
-            self.top_speed,
+            temperatures=np.array([t.input for t in self.temperatures], dtype=np.intp),
+            taus=len(taus),
+            speeds=np.array([s.input for s in states], dtype=np.intp),
+            powers=np.array([s.power for s in states], dtype=np.float64),
+            rates=np.array(lags + stopped, dtype=np.float64),
+            gain=np.array([1 / s.running - k for s, k in zip(states, stopped, strict=True)], dtype=np.float64),
+            top=self.top_speed,
         )
 
     @cached_property

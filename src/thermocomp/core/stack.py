@@ -140,12 +140,12 @@ class Stack:
     def init(self) -> StackState:
         """Return the state of a machine that has just been zeroed: see `ErrorModel.init`."""
         return StackState(
-            self._zero.copy(),
-            None,
-            np.zeros(len(self.models)),
-            np.zeros(len(self._zero), dtype=np.bool_),
-            tuple(together.init() for _, together, _ in self._groups),
-            tuple(m.init() for _, m, _ in self._others),
+            reference=self._zero.copy(),
+            memory=None,
+            deviation=np.zeros(len(self.models)),
+            outside=np.zeros(len(self._zero), dtype=np.bool_),
+            groups=tuple(together.init() for _, together, _ in self._groups),
+            others=tuple(m.init() for _, m, _ in self._others),
         )
 
     def step(self, state: StackState, values: FloatArray, dt: float) -> tuple[StackState, FloatArray]:
@@ -214,7 +214,14 @@ class Stack:
                 last, now = state.deviation[..., models], deviation[..., models]
                 beyond = outside[..., taps].any(axis=-1) | ~(far[..., models] <= 1.0)
                 deviation[..., models] = np.where(beyond, last, now)
-        return StackState(reference, memory, deviation, outside, state.groups, state.others)
+        return StackState(
+            reference=reference,
+            memory=memory,
+            deviation=deviation,
+            outside=outside,
+            groups=state.groups,
+            others=state.others,
+        )
 
     def half_widths(self, state: StackState, values: FloatArray) -> FloatArray:
         """Return the half-widths of the bands about the deviations of a reading.

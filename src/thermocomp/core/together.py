@@ -69,7 +69,9 @@ class Together:
         else:
             memory = self._first.bank.advance(state.memory, change, dt)
         said, n = change @ self._direct + memory @ self._weights, len(self.models)
-        return TogetherState(reference, memory, change, outside, said[..., n:]), said[..., :n] + self._intercept
+        return TogetherState(
+            reference=reference, memory=memory, change=change, outside=outside, spread=said[..., n:]
+        ), said[..., :n] + self._intercept
 
     def half_widths(self, state: TogetherState) -> FloatArray:
         """Return the half-widths of the bands about the deviations of the last reading, (..., n_models)."""

@@ -140,13 +140,13 @@ class Watch:
         stopped = [1 / slow for _, _, slow, _ in self.states]
         lags = [1 / tau for tau in self.time_constants for _ in self.sensors]
         return Bank(
-            np.array([s.input for s in self.sensors], dtype=np.intp),
-            len(self.time_constants),
-            np.array([s[0] for s in self.states], dtype=np.intp),
-            np.array([s[1] for s in self.states], dtype=np.float64),
-            np.array(lags + stopped, dtype=np.float64),
-            np.array([1 / s[3] - k for s, k in zip(self.states, stopped, strict=True)], dtype=np.float64),
-            self.top_speed,
+            temperatures=np.array([s.input for s in self.sensors], dtype=np.intp),
+            taus=len(self.time_constants),
+            speeds=np.array([s[0] for s in self.states], dtype=np.intp),
+            powers=np.array([s[1] for s in self.states], dtype=np.float64),
+            rates=np.array(lags + stopped, dtype=np.float64),
+            gain=np.array([1 / s[3] - k for s, k in zip(self.states, stopped, strict=True)], dtype=np.float64),
+            top=self.top_speed,
         )
 
     @cached_property

@@ -93,7 +93,14 @@ def replay(
         return np.array([r[k] for r in rows], dtype=np.float64).reshape(len(rows), -1)
 
     passed = np.array([r[5] for r in rows], dtype=np.bool_)
-    return Answers(table(0), table(1), table(2).astype(int), table(3), table(4).astype(int), passed)
+    return Answers(
+        correction=table(0),
+        slope=table(1),
+        status=table(2).astype(int),
+        deviation=table(3),
+        fault=table(4).astype(int),
+        passed=passed,
+    )
 
 
 #: of a model, what is in no code: how it was judged decides what it may do, and must not be rounded

@@ -49,7 +49,7 @@ class Format:
     shared: tuple[str, ...] = ()
 
 
-MODELS = Format("thermocomp-model", 1, "model file", "thermocomp fit", ("watch",))
+MODELS = Format(name="thermocomp-model", version=1, words="model file", command="thermocomp fit", shared=("watch",))
 POSITION_MODELS = Format("thermocomp-position-model", 1, "position model file", "thermocomp position")
 _STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 _KNOWN = {f.name: f for f in (MODELS, POSITION_MODELS)}

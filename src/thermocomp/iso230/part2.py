@@ -136,7 +136,21 @@ def assess(test: Positioning) -> PositioningResult:
     up, down = (None if d is None else _direction(d) for d in (test.up, test.down))
     nan = float("nan")
     if up is None or down is None:
-        return PositioningResult(test, up, down, None, None, None, nan, nan, nan, nan, nan, nan, _shortfalls(test))
+        return PositioningResult(
+            test=test,
+            up=up,
+            down=down,
+            mean=None,
+            reversal=None,
+            repeatability=None,
+            A=nan,
+            E=nan,
+            M=nan,
+            R=nan,
+            B=nan,
+            B_mean=nan,
+            notes=_shortfalls(test),
+        )
     mean, reversal = (up.mean + down.mean) / 2.0, up.mean - down.mean
     both = 2.0 * up.s + 2.0 * down.s + np.abs(reversal)
     repeatability = np.maximum.reduce([both, up.repeatability, down.repeatability])

@@ -156,7 +156,7 @@ def assess(
         name = f"{recording.name}, {number}" if len(starts) > 1 else recording.name
         lead = _lead(recording, phases[k - 1].start if k else 0, warm.start)
         more = [*notes, *_about_rows(recording, kind, rows, number, lead)]
-        part = _Stretch(recording, kind, rows, lead, k == 0, warm)
+        part = _Stretch(recording=recording, kind=kind, rows=rows, lead=lead, rests=k == 0, warm=warm)
         tests.append(_evaluate(part, name, pairs, air, residuals, more))
     return tuple(tests)
 
@@ -261,7 +261,7 @@ def _lengths(
         length = part.curve(label, "um", f"{ends[1]} minus {ends[0]}", measured[ends[1]] - measured[ends[0]], left)
         positions = np.array([p for p, _ in ordered])
         curves = tuple(drawn.pop(c.name) for _, c in ordered)
-        targets.append(Targets(group, group[0].upper(), positions, curves, length))
+        targets.append(Targets(name=group, axis=group[0].upper(), positions=positions, curves=curves, length=length))
     return targets
 
 

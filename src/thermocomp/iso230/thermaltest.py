@@ -311,7 +311,16 @@ def evaluate_curve(time: FloatArray, values: FloatArray, stop: int) -> Figures:
     there = np.isfinite(values)
     run = there & (np.arange(len(values)) <= stop)
     if not run.any():
-        return Figures(*[nan] * 8)
+        return Figures(
+            range_60=nan,
+            range_run=nan,
+            range_all=nan,
+            at_60=nan,
+            at_end=nan,
+            largest=nan,
+            cool_down=nan,
+            range_last=nan,
+        )
     first = there & (time <= HOUR)
     at_60 = float(np.interp(HOUR, time[there], values[there]))
     hour = time[run][-1] >= HOUR

@@ -72,4 +72,10 @@ class Candidates:
             "above 10 means that the others say almost the same."
         )
         title = "How far the chosen sensors repeat each other"
-        return Table(title, ("sensor", "correlation with the error", "VIF"), rows, None, caption)
+        return Table(
+            title=title,
+            columns=("sensor", "correlation with the error", "VIF"),
+            rows=rows,
+            marked=None,
+            caption=caption,
+        )

@@ -164,7 +164,9 @@ def table(named: dict[str, Validity]) -> Table:
     columns = [_cells(v) for v in named.values()]
     rows: list[tuple[Cell, ...]] = [(heading, *(c[heading] for c in columns)) for heading in columns[0]]
     caption = f"Alike: inputs less than {ALIKE:g} of their spread apart all the way; copies count once."
-    return Table("What the judged units covered", ("", *named), tuple(rows), None, caption)
+    return Table(
+        title="What the judged units covered", columns=("", *named), rows=tuple(rows), marked=None, caption=caption
+    )
 
 
 def _cells(v: Validity) -> dict[str, str]:

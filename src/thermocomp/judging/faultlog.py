@@ -134,7 +134,9 @@ def find_costs(model: ErrorModel, assessment: Assessment, logs: Sequence[FaultLo
         honest = None if known is None else known.lost.get(", ".join(names)) if names else known.rms
         measured = assessment.measured[rows]
         left, none = rms(measured, assessment.predicted[rows]), rms(measured, np.zeros_like(measured))
-        found.append(Cost(names, float(hours[rows].sum()), left, none, honest, runs_on))
+        found.append(
+            Cost(failed=names, hours=float(hours[rows].sum()), rms=left, none_rms=none, honest=honest, runs_on=runs_on)
+        )
     return tuple(found)
 
 
@@ -160,18 +162,27 @@ def _log(watch: Watch, samples: Samples, test: int, recording: Recording) -> Fau
             stood_in[own] = np.where(state.fault != GOOD, let[heat], np.nan)
     found = [
         Fault(
-            name,
-            WORDS[fault[a, j]],
-            float(recording.time[a]),
-            float(recording.time[min(b, len(recording) - 1)]),
-            b < len(recording) and fault[b, j] == GOOD,
-            float("nan") if fault[a, j] == MISSING else float(np.nanmean(read[a:b, j] - stood_in[a:b, j])),
+            sensor=name,
+            word=WORDS[fault[a, j]],
+            begin=float(recording.time[a]),
+            end=float(recording.time[min(b, len(recording) - 1)]),
+            returned=b < len(recording) and fault[b, j] == GOOD,
+            beside=float("nan") if fault[a, j] == MISSING else float(np.nanmean(read[a:b, j] - stood_in[a:b, j])),
         )
         for j, name in enumerate(watch.names)
         for a, b in _runs(fault[:, j])
     ]
     ordered = tuple(sorted(found, key=lambda f: f.begin))
-    return FaultLog(test, samples.test_names[test], recording.time, watch, fault, read, stood_in, ordered)
+    return FaultLog(
+        recording=test,
+        name=samples.test_names[test],
+        time=recording.time,
+        watch=watch,
+        fault=fault,
+        read=read,
+        stood_in=stood_in,
+        faults=ordered,
+    )
 
 
 def _runs(fault: IntArray) -> Iterator[tuple[int, int]]:

@@ -52,7 +52,9 @@ def metric(best: Literal["low", "high", "zero"], unit: str) -> Callable[[Functio
 
     def register(function: Function) -> Metric:
         name = function.__name__
-        METRICS[name] = Metric(name, best, unit, (function.__doc__ or "").strip(), function)
+        METRICS[name] = Metric(
+            name=name, best=best, unit=unit, description=(function.__doc__ or "").strip(), function=function
+        )
         return METRICS[name]
 
     return register

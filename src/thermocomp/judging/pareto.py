@@ -67,7 +67,16 @@ def choose(samples: Samples, judging: Judging, settings: Settings, *, jobs: int,
     ]
     if recommended is None:
         why = f"no set of temperatures is clearly better than no compensation; the smallest error: {told}"
-        return Choice("pareto", targets, (), why, tuple(errors), tuple(notes), found, failure=why)
+        return Choice(
+            method="pareto",
+            target=targets,
+            sensors=(),
+            reason=why,
+            tables=tuple(errors),
+            notes=tuple(notes),
+            details=found,
+            failure=why,
+        )
     notes[1:1] = [
         next_to_buy(found, model, place),
         "Sensors of each number are those whose loss `averaged` feels least when they are made up from the others, "
@@ -87,7 +96,15 @@ def choose(samples: Samples, judging: Judging, settings: Settings, *, jobs: int,
         _repeats(candidates, sensors),
     ]
     reason = f"{told}; {trade_off(found, model, place)}"
-    return Choice("pareto", targets, sensors, reason, tuple(tables), tuple(notes), found)
+    return Choice(
+        method="pareto",
+        target=targets,
+        sensors=sensors,
+        reason=reason,
+        tables=tuple(tables),
+        notes=tuple(notes),
+        details=found,
+    )
 
 
 def _failed(found: Budget) -> str:
@@ -113,11 +130,12 @@ def _errors(found: Budget, judging: Judging, model: str, place: int | None) -> T
     )
     headings = [f"{m} mean RMS [{found.unit}]" for m in found.models]
     return Table(
-        f"Error on unseen blocks: {judging.name}",
-        ("sensors", *headings, f"next gains [{found.unit}]", "condition", "chosen in all rows"),
-        rows,
-        place,
-        f"RMS on each unseen block, mean over the blocks{_mean(found)}; without compensation {found.none_mean():.2f} "
+        title=f"Error on unseen blocks: {judging.name}",
+        columns=("sensors", *headings, f"next gains [{found.unit}]", "condition", "chosen in all rows"),
+        rows=rows,
+        marked=place,
+        caption=f"RMS on each unseen block, mean over the blocks{_mean(found)}; "
+        f"without compensation {found.none_mean():.2f} "
         f"{found.unit}. Next gains: what {model} gains by the sensors of the next row. Enough, each model by itself: "
         + ", ".join(f"{found.enough(m) or 'none'} for {m}" for m in found.models)
         + ".",
@@ -133,11 +151,11 @@ def _by_target(found: Budget, model: str, place: int) -> Table:
     more = (errors[place] - errors[-1]) / found.scales
     worst = int(np.argmax(more))
     return Table(
-        f"Error on unseen blocks for each displacement: {model}",
-        ("sensors", *(f"{t} mean RMS" for t in found.targets)),
-        rows,
-        1 + place,
-        "In the unit of each; 0 sensors: without compensation."
+        title=f"Error on unseen blocks for each displacement: {model}",
+        columns=("sensors", *(f"{t} mean RMS" for t in found.targets)),
+        rows=rows,
+        marked=1 + place,
+        caption="In the unit of each; 0 sensors: without compensation."
         + (
             f" {found.targets[worst]} is hit most: {more[worst]:.2f} {found.unit} more than with all."
             if place + 1 < len(errors)
@@ -151,14 +169,15 @@ def _next(found: Budget, model: str, place: int) -> Table:
     gains, blocks = found.gains(model)
     unit = found.unit
     return Table(
-        "What to buy next",
-        ("sensors", "next", f"gains [{unit}]", f"in the worst block [{unit}]", f"in the best block [{unit}]"),
-        tuple(
+        title="What to buy next",
+        columns=("sensors", "next", f"gains [{unit}]", f"in the worst block [{unit}]", f"in the best block [{unit}]"),
+        rows=tuple(
             (found.sizes[k], _joins(found, k), float(gains[k]), float(blocks[k].min()), float(blocks[k].max()))
             for k in range(len(gains))
         ),
-        place if place < len(gains) else None,
-        f"By {model}; below zero it is worse with the sensor than without it. In each block the sensors are those that "
+        marked=place if place < len(gains) else None,
+        caption=f"By {model}; below zero it is worse with the sensor than without it. "
+        "In each block the sensors are those that "
         "were chosen without it.",
     )
 
@@ -212,15 +231,15 @@ def next_to_buy(found: Budget, model: str, place: int) -> str:
 def _frequency(found: Budget, place: int) -> Table:
     order = np.argsort(-found.frequency[place], kind="stable")
     return Table(
-        f"How surely a sensor is among the best {len(found.sensors[place])}",
-        ("sensor", "share of the blocks [%]"),
-        tuple(
+        title=f"How surely a sensor is among the best {len(found.sensors[place])}",
+        columns=("sensor", "share of the blocks [%]"),
+        rows=tuple(
             (found.candidates[j], float(100 * found.frequency[place, j]))
             for j in order
             if found.frequency[place, j] > 0
         ),
-        None,
-        "Chosen anew without each block: a sensor far below 100 % was a matter of luck.",
+        marked=None,
+        caption="Chosen anew without each block: a sensor far below 100 % was a matter of luck.",
     )
 
 
@@ -247,11 +266,19 @@ def _stand_ins(found: Budget, place: int) -> Table:
         for j, name in enumerate(names)
     )
     return Table(
-        "What stands in for what",
-        ("sensor", "nearest other", "its miss [degC]", "of the chosen", "their miss [degC]", f"loses [{found.unit}]"),
-        rows,
-        None,
-        "Each is made up from the one other that misses it least, and from the chosen sensors (a chosen one from the "
+        title="What stands in for what",
+        columns=(
+            "sensor",
+            "nearest other",
+            "its miss [degC]",
+            "of the chosen",
+            "their miss [degC]",
+            f"loses [{found.unit}]",
+        ),
+        rows=rows,
+        marked=None,
+        caption="Each is made up from the one other that misses it least, and from the chosen sensors "
+        "(a chosen one from the "
         f"others of them, as if it failed), with {found.answer.noise:g} degC of noise in use. Miss: RMS of what is "
         "left of it. Loses: what the answer of `averaged` with all temperatures changes by if this one alone is made "
         f"up from the chosen{_mean(found)}. Those with less than {100 * PART:g} % part in it are not named.",

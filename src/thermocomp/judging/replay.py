@@ -129,9 +129,20 @@ def replay_compensated(
         half_width[mine] = found.half_width * np.where(np.isinf(widening[mine]), np.nan, widening[mine])
         if found.why and not why:
             why = f"{samples.test_names[test]}: {found.why}"
-    seen = Probed(probings, at[rows], shift[rows], without[rows], tuple(refused)) if probings else None
+    seen = (
+        Probed(plan=probings, at=at[rows], shift=shift[rows], without=without[rows], refused=tuple(refused))
+        if probings
+        else None
+    )
     return Replayed(
-        deviation[rows], compensated[rows], outside[rows], rejected[rows], why, within, half_width[rows], seen
+        deviation=deviation[rows],
+        compensated=compensated[rows],
+        outside=outside[rows],
+        rejected=rejected[rows],
+        why=why,
+        limits=within,
+        half_width=half_width[rows],
+        probed=seen,
     )
 
 

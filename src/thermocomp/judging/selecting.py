@@ -133,7 +133,16 @@ def select(
         except Exception as e:  # noqa: BLE001 - whatever fails for one target, the others have their choice
             errors.append(e)
             why = explain(e)
-            found.append(Choice(method, target.name, (), f"could not be chosen: {why}", (), failure=why))
+            found.append(
+                Choice(
+                    method=method,
+                    target=target.name,
+                    sensors=(),
+                    reason=f"could not be chosen: {why}",
+                    tables=(),
+                    failure=why,
+                )
+            )
     if together:
         few = tuple(samples.targets[k] for k in together)
         samples = replace(samples, targets=few, deviations=samples.deviations[:, together])
@@ -159,23 +168,24 @@ def _by_grouping(candidates: Candidates, settings: Settings) -> Choice:
         ),
     )
     curve = Table(
-        "Best subset of the representatives",
-        ("number", "MSE_p [um^2]", "sensors"),
-        tuple((len(s.columns), s.mse, " ".join(candidates.called(s.columns))) for s in found.curve_),
-        int(np.argmin([s.mse for s in found.curve_])),
-        f"{found.searched_[0]} subsets of representatives, then {found.searched_[1]} combinations of members.",
+        title="Best subset of the representatives",
+        columns=("number", "MSE_p [um^2]", "sensors"),
+        rows=tuple((len(s.columns), s.mse, " ".join(candidates.called(s.columns))) for s in found.curve_),
+        marked=int(np.argmin([s.mse for s in found.curve_])),
+        caption=f"{found.searched_[0]} subsets of representatives, then {found.searched_[1]} combinations of members.",
     )
     sensors = candidates.called(found.selected_)
     needed = (*sensors, *((settings.reference,) if settings.reference else ()))
     return Choice(
-        "grouping",
-        candidates.target,
-        needed,
-        f"smallest residual mean square, {found.mse_:.4g} um^2, among the members of {len(found.participating_)} of "
+        method="grouping",
+        target=candidates.target,
+        sensors=needed,
+        reason=f"smallest residual mean square, {found.mse_:.4g} um^2, "
+        f"among the members of {len(found.participating_)} of "
         f"{len(found.groups_)} groups",
-        (groups, curve, candidates.repeats(sensors), _other_thresholds(candidates, found, settings)),
-        _dependence(found.n_effective_, len(candidates.y)),
-        found,
+        tables=(groups, curve, candidates.repeats(sensors), _other_thresholds(candidates, found, settings)),
+        notes=_dependence(found.n_effective_, len(candidates.y)),
+        details=found,
     )
 
 
@@ -229,13 +239,13 @@ def _by_steps(candidates: Candidates, method: str) -> Choice:
         "F 100 to enter, 50 to delete" if method == "partial-f" else "alpha .001 to enter, .015 to remove, second order"
     )
     return Choice(
-        method,
-        candidates.target,
-        sensors,
-        f"{len(found.terms_)} terms by partial F ({rule}), R2 {found.r_squared_:.4f} {found.r_squared_kind_}",
-        (steps, candidates.repeats(sensors)),
-        _dependence(found.n_effective_, len(candidates.y)),
-        found,
+        method=method,
+        target=candidates.target,
+        sensors=sensors,
+        reason=f"{len(found.terms_)} terms by partial F ({rule}), R2 {found.r_squared_:.4f} {found.r_squared_kind_}",
+        tables=(steps, candidates.repeats(sensors)),
+        notes=_dependence(found.n_effective_, len(candidates.y)),
+        details=found,
     )
 
 
@@ -254,9 +264,9 @@ def _by_subsets(candidates: Candidates, settings: Settings, *, jobs: int, progre
     shown = [k for k in headings if k in found.scores_]
     best = found.subsets_.best
     table = Table(
-        "Best subset of every size",
-        ("sensors", *(headings[k] for k in shown), "certificate", "which"),
-        tuple(
+        title="Best subset of every size",
+        columns=("sensors", *(headings[k] for k in shown), "certificate", "which"),
+        rows=tuple(
             (
                 len(s.columns),
                 *(float(found.scores_[k][row]) for k in shown),
@@ -265,8 +275,8 @@ def _by_subsets(candidates: Candidates, settings: Settings, *, jobs: int, progre
             )
             for row, s in enumerate(best)
         ),
-        next((row for row, s in enumerate(best) if s.columns == found.selected_), None),
-        f"{found.subsets_.nodes} of {found.subsets_.possible:.3g} sets were looked at"
+        marked=next((row for row, s in enumerate(best) if s.columns == found.selected_), None),
+        caption=f"{found.subsets_.nodes} of {found.subsets_.possible:.3g} sets were looked at"
         + ("; the others cannot be better." if found.subsets_.proven else "."),
     )
     notes = _dependence(found.n_effective_, len(candidates.y))
@@ -278,14 +288,14 @@ def _by_subsets(candidates: Candidates, settings: Settings, *, jobs: int, progre
     sensors = candidates.called(found.selected_)
     what = found.chosen_by_ or headings[found.criterion_]
     return Choice(
-        "subsets",
-        candidates.target,
-        sensors,
-        f"best {len(sensors)} of {len(candidates.names)}, {'proven' if found.proven_ else 'not proven'}; "
+        method="subsets",
+        target=candidates.target,
+        sensors=sensors,
+        reason=f"best {len(sensors)} of {len(candidates.names)}, {'proven' if found.proven_ else 'not proven'}; "
         f"the number by {what}",
-        (table, candidates.repeats(sensors)),
-        notes,
-        found,
+        tables=(table, candidates.repeats(sensors)),
+        notes=notes,
+        details=found,
     )
 
 
@@ -325,14 +335,15 @@ def _by_maximal_correlation(samples: Samples, settings: Settings, *, jobs: int, 
     if not psi.complete:
         notes.append(f"Stopped: {int(done.sum())} of {len(sets)} thermal cycles were done.")
     return Choice(
-        "ace",
-        ", ".join(targets),
-        tuple(names[j] for j in chosen),
-        f"greatest sum of Psi among the sets of up to {max(map(len, small))} sensors that are as good as the best for "
+        method="ace",
+        target=", ".join(targets),
+        sensors=tuple(names[j] for j in chosen),
+        reason=f"greatest sum of Psi among the sets of up to {max(map(len, small))} sensors "
+        "that are as good as the best for "
         f"all displacements ({len(same.common)} sets are)",
-        (_best_sets(psi, same, names, targets), _listed_sets(psi, same, names, targets, chosen)),
-        tuple(notes),
-        same,
+        tables=(_best_sets(psi, same, names, targets), _listed_sets(psi, same, names, targets, chosen)),
+        notes=tuple(notes),
+        details=same,
     )
 
 
@@ -350,9 +361,9 @@ def _why(_: Any, why: str) -> FloatArray | str:
 def _best_sets(psi: MaximalCorrelations, same: Equivalents, names: Sequence[str], targets: Sequence[str]) -> Table:
     done = int(np.isfinite(psi.psi).all(axis=(0, 1)).sum())
     return Table(
-        "Best set for each displacement",
-        ("displacement", "best set", "mean Psi", "sets that are as good"),
-        tuple(
+        title="Best set for each displacement",
+        columns=("displacement", "best set", "mean Psi", "sets that are as good"),
+        rows=tuple(
             (
                 t,
                 " ".join(names[j] for j in same.subsets[k]),
@@ -361,8 +372,8 @@ def _best_sets(psi: MaximalCorrelations, same: Equivalents, names: Sequence[str]
             )
             for d, (t, k) in enumerate(zip(targets, same.best, strict=True))
         ),
-        None,
-        f"{len(psi.subsets)} sets, {done} thermal cycles, {len(targets)} displacements: "
+        marked=None,
+        caption=f"{len(psi.subsets)} sets, {done} thermal cycles, {len(targets)} displacements: "
         f"{len(psi.subsets) * done * len(targets)} models.",
     )
 
@@ -373,9 +384,9 @@ def _listed_sets(
     done = int(np.isfinite(psi.psi).all(axis=(0, 1)).sum())
     shown = same.table()[:30]
     return Table(
-        "Sets by the number of displacements for which they are as good as the best",
-        ("set", *(f"mean Psi {t}" for t in targets), "smallest p", "as good for"),
-        tuple(
+        title="Sets by the number of displacements for which they are as good as the best",
+        columns=("set", *(f"mean Psi {t}" for t in targets), "smallest p", "as good for"),
+        rows=tuple(
             (
                 " ".join(names[j] for j in row.subset),
                 *(float(v / done) for v in row.summed),
@@ -384,8 +395,8 @@ def _listed_sets(
             )
             for row in shown
         ),
-        next((k for k, row in enumerate(shown) if row.subset == chosen), None),
-        f"The first {len(shown)} of {len(psi.subsets)}.",
+        marked=next((k for k, row in enumerate(shown) if row.subset == chosen), None),
+        caption=f"The first {len(shown)} of {len(psi.subsets)}.",
     )
 
 

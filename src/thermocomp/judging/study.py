@@ -293,7 +293,7 @@ def assess(
         found += [*cut, overall] if len(cut) > 1 else [overall]
     if len(errors) == len(models):
         raise errors[0]
-    return Judged(tuple(models), tuple(found), seen, covered, told)
+    return Judged(models=tuple(models), assessments=tuple(found), seen=seen, validity=covered, starts=told)
 
 
 def _known_targets(models: Sequence[ErrorModel], recordings: Sequence[Recording]) -> list[Channel]:

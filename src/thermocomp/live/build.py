@@ -45,12 +45,12 @@ def build(settings: Settings) -> Service:
             raise InputError(f"axes of LinuxCNC: no model for {', '.join(sorted(unknown))}; there are {known}")
     sources = [one.open(folder, config.speed) for one in config.sources]
     service = Service(
-        compensator,
-        sources,
-        [one.open(folder) for one in config.sinks],
-        Clock(config.speed),
-        folder / config.state if config.state else None,
-        [_probe(one, sources, tuple(compensator.lines)) for one in config.probes],
+        compensator=compensator,
+        sources=sources,
+        sinks=[one.open(folder) for one in config.sinks],
+        clock=Clock(config.speed),
+        state_path=folder / config.state if config.state else None,
+        probes=[_probe(one, sources, tuple(compensator.lines)) for one in config.probes],
     )
     if (kept := config.journal) is not None:
         room = JournalLimits(size_bytes=round(kept.size_mb * 2**20), files=kept.files)

@@ -48,4 +48,6 @@ def check(
     size = math.nan if learned is None else learned.size
     limit = ACTION * math.hypot(size, probing.repeatability)
     said = predicted.at(probing.position)
-    return Checked(time, target, said, probing.deviation - said, limit, refused)
+    return Checked(
+        time=time, target=target, predicted=said, residual=probing.deviation - said, limit=limit, refused=refused
+    )

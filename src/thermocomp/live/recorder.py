@@ -60,7 +60,13 @@ class Recorder:
         channels = {name: Channel(name, kind, HOUSE_UNITS[kind]) for name, kind in (more or {}).items()}
         channels |= {i.name: Channel(i.name, i.quantity, i.unit) for i in inputs}
         targets = tuple(Target(name) for name in compensator.lines)
-        start = Start(clock.now(), targets, tuple(channels.values()), own, CONFIRM_WITHIN * clock.speed)
+        start = Start(
+            time=clock.now(),
+            targets=targets,
+            channels=tuple(channels.values()),
+            own_compensation=own,
+            confirm_within=CONFIRM_WITHIN * clock.speed,
+        )
         self.journal = Journal(path, limits, start)  # nothing is written before the service runs
         self._before: Compensated | None = None
         self._references: dict[str, Reference] = {}
@@ -95,7 +101,15 @@ class Recorder:
     def measure(self, time: float, found: Measurement, in_force: Correction | None) -> None:
         """Write a measurement of the tool point."""
         kind: Literal["probing"] = "probing"
-        row = MeasurementRow(time, found.target, found.measured, kind, not found.left, found.position, in_force)
+        row = MeasurementRow(
+            time=time,
+            target=found.target,
+            value=found.measured,
+            kind=kind,
+            includes_offset=not found.left,
+            position=found.position,
+            in_force=in_force,
+        )
         self.journal.add(row)
 
     def update(self, checked: Checked, after: float) -> None:
@@ -103,7 +117,14 @@ class Recorder:
         measured = checked.predicted + checked.residual
         if math.isfinite(measured):
             self.journal.add(
-                UpdateRow(checked.time, checked.target, measured, checked.predicted, after, checked.refused)
+                UpdateRow(
+                    time=checked.time,
+                    target=checked.target,
+                    measured=measured,
+                    before=checked.predicted,
+                    after=after,
+                    refused=checked.refused,
+                )
             )
 
     def alarm(self, time: float, kind: str, text: str) -> None:

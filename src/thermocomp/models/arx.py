@@ -142,7 +142,7 @@ class ARX(ClockedRegressor):
             raise InputError(f"criterion {self.criterion!r}: want fpe, aic, bic or free-run")
         ks, ms = self._orders(self.k, self.k_max, "k"), self._orders(self.m, self.m_max, "m")
         data = [
-            Clocked(h, ticks.put_on_clock(inputs, step, h), deviation, step, folds)
+            Clocked(interval=h, runs=ticks.put_on_clock(inputs, step, h), y=deviation, dt=step, folds=folds)
             for h in self._intervals(self.interval, step)
         ]
         constants = (False, True) if self.fit_intercept is None else (self.fit_intercept,)
@@ -183,7 +183,9 @@ class ARX(ClockedRegressor):
         inputs = self._used(rows)
         runs = ticks.put_on_clock(inputs, step, self.interval_)
         measured = np.asarray(y, dtype=np.float64)
-        data = Clocked(self.interval_, runs, measured, step, np.zeros(len(inputs), dtype=np.intp))
+        data = Clocked(
+            interval=self.interval_, runs=runs, y=measured, dt=step, folds=np.zeros(len(inputs), dtype=np.intp)
+        )
         work = data.lagged(data.targets(), self.k_, self.m_)
         return np.column_stack([work[:, -1], self._coefficients.one_step(work[:, :-1])])
 
@@ -244,4 +246,11 @@ class ARX(ClockedRegressor):
                 break
             errors.append(data.free_run_rms(c, data.folds == fold))
         ks, ms = setting.ks, setting.ms
-        return TriedSetting(data.interval, max(ks), max(ms), setting.intercept, 0, float(np.mean(errors)))
+        return TriedSetting(
+            interval=data.interval,
+            k=max(ks),
+            m=max(ms),
+            intercept=setting.intercept,
+            hidden=0,
+            cv_rms=float(np.mean(errors)),
+        )

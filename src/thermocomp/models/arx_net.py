@@ -172,7 +172,7 @@ class NetARX(ClockedRegressor):
         if not sizes or min(sizes) < 1:
             raise InputError(f"hidden = {self.hidden}: want numbers of nodes, at least 1")
         h = self._intervals(self.interval, step)[0]
-        data = Clocked(h, ticks.put_on_clock(inputs, step, h), deviation, step, folds)
+        data = Clocked(interval=h, runs=ticks.put_on_clock(inputs, step, h), y=deviation, dt=step, folds=folds)
         self.k_, self.m_ = (0, 0) if self.time == "none" else self._chosen_orders(inputs, deviation, step, folds)
         judged: list[TriedSetting] = []
         if len(sizes) > 1 and self.time != "none":
@@ -180,7 +180,8 @@ class NetARX(ClockedRegressor):
             errors = Parallel(n_jobs=self.jobs, prefer="threads")(delayed(self._judge)(data, *job) for job in jobs)
             means = np.reshape(errors, (len(sizes), -1)).mean(axis=1).tolist()
             judged = [
-                TriedSetting(h, self.k_, self.m_, False, size, mean) for size, mean in zip(sizes, means, strict=True)
+                TriedSetting(interval=h, k=self.k_, m=self.m_, intercept=False, hidden=size, cv_rms=mean)
+                for size, mean in zip(sizes, means, strict=True)
             ]
         self.hidden_, self.interval_ = sizes[self._chosen(judged)], h
         self._net = self._train(data, self.hidden_, None)

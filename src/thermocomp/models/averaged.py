@@ -240,7 +240,10 @@ class AveragedDynamic(TimedRegressor):
             time_constants=of.lags,
             temperatures=tuple(LaggedInput(used.index(i), w[0], tuple(w[1:])) for i, w in temperatures),
             top_speed=of.top_speed,
-            states=tuple(SpeedState(used.index(i), p, slow, fast, w) for (i, p, slow, fast), w in states),
+            states=tuple(
+                SpeedState(input=used.index(i), power=p, stopped=slow, running=fast, weight=w)
+                for (i, p, slow, fast), w in states
+            ),
             spread=tuple(tuple(float(f"{w:.5g}") for w in row) for row in self._spread[:, kept].tolist()),
         )
 

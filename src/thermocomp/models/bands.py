@@ -76,7 +76,7 @@ def find_band(
     else:
         factor = float(stats.t.ppf(0.5 + level / 2, n - 1) * np.sqrt(1 + 1 / n))
     running, stopped = (max(factor * size, _LEAST) for size in (running, stopped))
-    return Band(level, basis, n, floor, running, stopped, tuple(speeds))
+    return Band(level=level, basis=basis, cycles=n, floor=floor, running=running, stopped=stopped, speeds=tuple(speeds))
 
 
 def _size(errors: FloatArray, rows: Sequence[BoolArray], phase: BoolArray) -> float:

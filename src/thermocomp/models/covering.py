@@ -66,13 +66,13 @@ def find_joint_support(change: FloatArray, channels: Sequence[Channel], cycle: I
         points = np.round(_points(states, n_points), 3)
         limit = float(np.ceil(1e4 * max(_calibrated(states, cycle, n_points), _nearest(states, points).max())) / 1e4)
     return JointSupport(
-        tuple(columns),
-        tuple(scale.tolist()),
-        tuple(map(tuple, points.tolist())),
-        max(limit, 1e-3),
-        tuple(speeds),
-        tuple(levels),
-        tuple(tolerances),
+        columns=tuple(columns),
+        scale=tuple(scale.tolist()),
+        points=tuple(map(tuple, points.tolist())),
+        limit=max(limit, 1e-3),
+        speeds=tuple(speeds),
+        levels=tuple(levels),
+        tolerances=tuple(tolerances),
     )
 
 

@@ -91,7 +91,14 @@ class Doubt:
             seen = table * np.sqrt(duration / self.part / len(table)) / max(error, 1e-9)
             common = covariance @ seen.T
             left.append(covariance - common @ np.linalg.solve(np.eye(len(seen)) + seen @ common, common.T))
-        return Doubt(self.features, self.columns, np.array(left), self.error, self.part, self.heating)
+        return Doubt(
+            features=self.features,
+            columns=self.columns,
+            covariance=np.array(left),
+            error=self.error,
+            part=self.part,
+            heating=self.heating,
+        )
 
 
 def find_doubt(samples: Samples, settings: AveragedDynamic | None = None) -> Doubt:
@@ -143,4 +150,11 @@ def find_doubt(samples: Samples, settings: AveragedDynamic | None = None) -> Dou
     weights, _ = average(heat, alone.draw(of.structures, of.random_state))
     seconds = np.where(np.isfinite(step) & learned, step, 0.0).sum()
     part = max(float(seconds) / len(moments.rows), 1.0)
-    return Doubt(features, rows.shape[1], covariance, error, part, (alone, weights))
+    return Doubt(
+        features=features,
+        columns=rows.shape[1],
+        covariance=covariance,
+        error=error,
+        part=part,
+        heating=(alone, weights),
+    )

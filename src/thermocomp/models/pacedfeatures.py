@@ -142,11 +142,11 @@ class PacedFeatures:
                 products[k] += mine.T @ mine
             start += len(features)
         return Moments(
-            products[:, :n_features, :n_features],
-            products[:, :n_features, n_features:],
-            np.diagonal(products, axis1=1, axis2=2)[:, n_features:],
-            np.bincount(parts[parts >= 0], minlength=n_parts).astype(np.float64),
-            noise**2 * self._covariance(rows, step),
+            gram=products[:, :n_features, :n_features],
+            cross=products[:, :n_features, n_features:],
+            power=np.diagonal(products, axis1=1, axis2=2)[:, n_features:],
+            rows=np.bincount(parts[parts >= 0], minlength=n_parts).astype(np.float64),
+            noise=noise**2 * self._covariance(rows, step),
         )
 
     def _covariance(self, rows: FloatArray, step: FloatArray) -> FloatArray:

@@ -212,7 +212,13 @@ def _smooth(u: FloatArray, r: FloatArray, penalty: float) -> _Smooth:
     slopes = _SLOPES @ knots * ((_KNOTS - 1) / (high - low))
     values = knots[piece] + share * np.diff(knots)[piece]
     mean = values.mean()
-    return _Smooth(low, high, knots - mean, values - mean, slopes[piece] + share * np.diff(slopes)[piece])
+    return _Smooth(
+        low=low,
+        high=high,
+        knots=knots - mean,
+        values=values - mean,
+        slopes=slopes[piece] + share * np.diff(slopes)[piece],
+    )
 
 
 def _bends(u: FloatArray) -> bool:

@@ -159,7 +159,15 @@ def fit_method(name: str | BaseEstimator, samples: Samples, target: int, learn: 
     if isinstance(estimator, TimedRegressor) and hasattr(estimator, "left_out_"):  # of grouping they are columns
         left_out = np.full((len(samples), 2), np.nan)
         left_out[rows] = estimator.left_out_
-    return FittedMethod(how, estimator, columns, seen, seconds, predicted, left_out)
+    return FittedMethod(
+        how=how,
+        estimator=estimator,
+        columns=columns,
+        seen=seen,
+        seconds=seconds,
+        predicted=predicted,
+        left_out=left_out,
+    )
 
 
 def train(
@@ -215,7 +223,9 @@ def train(
     model = replace(model, joint=_joint(model, samples, seen) if joint else None, zeroing=samples.zeroing)
     if fit.left_out is not None:
         model = replace(model, band=_band(model, samples, target, fit.left_out))
-    return Trained(how.name, estimator, model, fit.seconds, r_squared, predicted)
+    return Trained(
+        method=how.name, estimator=estimator, model=model, seconds=fit.seconds, r_squared=r_squared, predicted=predicted
+    )
 
 
 def _refuse_unknown_counts(samples: Samples, seen: BoolArray) -> None:

@@ -103,7 +103,15 @@ def find_watch(samples: Samples, learn: BoolArray) -> Watch | None:
         }
         numbers = {name: float(f"{v:.4g}") for name, v in limits.items()}
         sensors.append(Watched(k, tuple(float(f"{w:.6g}") for w in weights[0, :, place]), **numbers))
-    return Watch(inputs, samples.zeroing, of.lags, of.top_speed, of.states, tuple(sensors), pace)
+    return Watch(
+        inputs=inputs,
+        zeroing=samples.zeroing,
+        time_constants=of.lags,
+        top_speed=of.top_speed,
+        states=of.states,
+        sensors=tuple(sensors),
+        pace=pace,
+    )
 
 
 def _covered(speed: FloatArray, folds: IntArray, test: IntArray) -> BoolArray:

@@ -327,12 +327,12 @@ def _claims(rows: Sequence[Row], *, real: bool) -> tuple[Claim, ...]:
         told += f" Not fitted: {', '.join(failed)}."
     return (
         Claim(
-            ("X-02", "X-03") if real else ("X-03",),
-            f"{none.task}: every method is better than no compensation where it was not trained",
-            "",
-            f"best {best.method} {best.rms:.2f} um of {none.rms:.2f} um; {len(harmful)} of {len(fitted)} do harm",
-            not harmful,
-            told,
+            ids=("X-02", "X-03") if real else ("X-03",),
+            text=f"{none.task}: every method is better than no compensation where it was not trained",
+            paper="",
+            ours=f"best {best.method} {best.rms:.2f} um of {none.rms:.2f} um; {len(harmful)} of {len(fitted)} do harm",
+            holds=not harmful,
+            finding=told,
         ),
     )
 

@@ -125,8 +125,8 @@ def not_redone(name: str, why: str) -> Study:
     -------
     Study
     """
-    claim = Claim(("-",), "The study can be redone here", "", "it failed", False, why)
-    return Study(name, f"{name}: not redone", (claim,), (), (), {}, ran=False)
+    claim = Claim(ids=("-",), text="The study can be redone here", paper="", ours="it failed", holds=False, finding=why)
+    return Study(name=name, title=f"{name}: not redone", claims=(claim,), tables=(), figures=(), numbers={}, ran=False)
 
 
 def _known(claim: Claim, others: Sequence[Sequence[Claim]], seed: int) -> Claim:

@@ -116,7 +116,14 @@ class Claims(Generic[_Found]):
                 mine = Ours(told) if isinstance(told, str) else told
                 holds = None if mine.holds is None else bool(mine.holds)
                 finding = (mine.note, mine.otherwise if holds is False else "")
-                return Claim(tuple(ids.split()), text, paper, mine.text, holds, " ".join(filter(None, finding)))
+                return Claim(
+                    ids=tuple(ids.split()),
+                    text=text,
+                    paper=paper,
+                    ours=mine.text,
+                    holds=holds,
+                    finding=" ".join(filter(None, finding)),
+                )
 
             self._judges.append(lambda found: (judge(found),))
             return judge

@@ -291,7 +291,14 @@ class Profiles:
             freedom += (n - len(powers)) * int(warm[mine].sum())
             squares += float(rest[warm[mine]].sum())
         remainder = float(np.sqrt(squares / freedom)) if freedom else float("nan")
-        return Slopes(powers, factors, errors, residual, remainder, 1.0 / (1.0 + int((~warm).sum())))
+        return Slopes(
+            powers=powers,
+            factors=factors,
+            errors=errors,
+            residual=residual,
+            remainder=remainder,
+            shared=1.0 / (1.0 + int((~warm).sum())),
+        )
 
 
 def _place(point: FloatArray) -> str:

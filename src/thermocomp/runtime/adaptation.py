@@ -156,7 +156,9 @@ def begin(size: float, n_directions: int, typical: float = np.inf, most: float =
     size = max(size, LEAST)
     prior = np.diag([*[1.0] * n_directions, size**2])
     usual = min(max(typical / size, LEAST_USUAL), 1.0) ** 2
-    return Adaptation(np.zeros(n_directions + 1), prior, size, size, -np.inf, most=most, usual=usual)
+    return Adaptation(
+        mean=np.zeros(n_directions + 1), covariance=prior, size=size, spread=size, time=-np.inf, most=most, usual=usual
+    )
 
 
 def take(
@@ -213,7 +215,16 @@ def take(
     variance = float(weights @ gain) + noise
     after = covariance - np.outer(gain, gain) / variance
     mean = mean + gain * (surprise / variance)
-    return Adaptation(mean, (after + after.T) / 2, before.size, spread, time, *doubt, before.most, usual), ""
+    refused, refused_since = doubt
+    return before._replace(
+        mean=mean,
+        covariance=(after + after.T) / 2,
+        spread=spread,
+        time=time,
+        refused=refused,
+        refused_since=refused_since,
+        usual=usual,
+    ), ""
 
 
 def _beside(directions: FloatArray, last: float) -> FloatArray:

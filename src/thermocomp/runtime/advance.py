@@ -65,7 +65,14 @@ def advance(
             outside += group.beyond(mine, values)
         for k, state, answer, width in zip(group.members, mine, answers, bands, strict=True):
             after[k], said[k], widths[k], given[k] = state, answer, width, values
-    return Advanced(tuple(after), tuple(begins), said, widths, given, tuple(dict.fromkeys(outside)))
+    return Advanced(
+        states=tuple(after),
+        gathered=tuple(begins),
+        said=said,
+        half_widths=widths,
+        values=given,
+        outside=tuple(dict.fromkeys(outside)),
+    )
 
 
 def _zeroed(

@@ -105,7 +105,17 @@ def run(
             model, gated, time, np.where(drives & later, probed, np.nan), repeatability, limits
         )
         moved = _moved(gated.deviation, drives, time, limits, known)
-    return ModelRun(alone.deviation, moved, alone.outside, turned, gate.why, alone.half_width, shift, without, refused)
+    return ModelRun(
+        deviation=alone.deviation,
+        compensated=moved,
+        outside=alone.outside,
+        rejected=turned,
+        why=gate.why,
+        half_width=alone.half_width,
+        shift=shift,
+        without=without,
+        refused=refused,
+    )
 
 
 def find_test_zero(
@@ -194,7 +204,7 @@ def _gated(model: ErrorModel, time: FloatArray, values: FloatArray, stands: Bool
     turned = np.flatnonzero(complete & ~passed)
     if turned.size and not why:
         why = explain_implausible(model, values[turned[0]].tolist(), zero.tolist())
-    return _Gate(passed, zero, known, why, window)
+    return _Gate(passed=passed, zero=zero, known=known, why=why, window=window)
 
 
 def _counted(

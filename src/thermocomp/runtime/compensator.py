@@ -187,7 +187,20 @@ class Compensator:
         return self.share(
             models,
             CompensatorState(
-                *((), none, None, None, None, 0.0, gathered, watches, {}, {}, {}, {}, dict(self.shadow), None)
+                models=(),
+                corrections=none,
+                time=None,
+                clock=None,
+                taken=None,
+                origin=0.0,
+                gathered=gathered,
+                watches=watches,
+                idle={},
+                learned={},
+                references={},
+                raw={},
+                orders=dict(self.shadow),
+                away=None,
             ),
         )
 
@@ -316,7 +329,15 @@ class Compensator:
         refused = known_before | {t: why for t, why in refused.items() if why}
         every = states_of | rest.states
         return new, Compensated(
-            *(rest.corrections, "", stepped.outside, failed, every, deviations, widths, refused, moved)
+            corrections=rest.corrections,
+            rejected="",
+            outside=stepped.outside,
+            failed=failed,
+            states=every,
+            deviations=deviations,
+            half_widths=widths,
+            refused=refused,
+            moved=moved,
         )
 
     def wait(self, state: CompensatorState, tick: float, why: str) -> tuple[CompensatorState, Compensated]:
@@ -338,7 +359,16 @@ class Compensator:
         rest = self._idle(state, state.corrections, tick, dict.fromkeys(self.lines, why))
         new = state._replace(corrections=rest.corrections, clock=rest.clock, idle=rest.idle)
         failed = Lookout.failed(self._lookouts, state.watches)
-        return new, Compensated(rest.corrections, why, (), failed, rest.states, {}, {}, {})
+        return new, Compensated(
+            corrections=rest.corrections,
+            rejected=why,
+            outside=(),
+            failed=failed,
+            states=rest.states,
+            deviations={},
+            half_widths={},
+            refused={},
+        )
 
     def _drive(
         self, state: CompensatorState, target: str, deviation: Deviation, travel: float

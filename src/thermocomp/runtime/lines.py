@@ -97,7 +97,7 @@ def evaluate(
     if band is not None:
         width = spoken.half_widths[first] * (models[first].widening(failed) if failed else 1.0)
     if learned is None and probing is None:
-        return Said(deviation, width, None, "", 0.0, raw)
+        return Said(deviation=deviation, half_width=width, learned=None, refused="", moved=0.0, raw=raw)
     directions = models[first].directions(spoken.states[first], spoken.values[first]) if single else np.zeros(0)
     wanted = deviation
     if learned is not None:
@@ -112,7 +112,7 @@ def evaluate(
         before = (learned or adaptation.begin(size, len(directions), typical))._replace(most=most)
         learned, refused = adaptation.take(before, directions, time, error, probing.repeatability)
         moved = float(learned.shift(time, directions) - before.shift(time, directions))
-    return Said(wanted, width, learned, refused, moved, raw)
+    return Said(deviation=wanted, half_width=width, learned=learned, refused=refused, moved=moved, raw=raw)
 
 
 def _mean_square(line: DeviationLine, models: Sequence[ErrorModel], name: str) -> float:

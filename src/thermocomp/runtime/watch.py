@@ -83,10 +83,26 @@ def begin(watch: Watch, reference: FloatArray | None = None, runs: tuple[int, ..
     memory = np.zeros((*runs, len(bank.rates)))
     traces = np.zeros((*runs, len(watch.time_constants) * len(watch.sensors)))
     return WatchState(
-        *(zero, Gathered(), np.nan, memory, traces, none, none, none, np.zeros(n, dtype=np.int8)),
-        *(nan, none, nan, nan, nan, nan, none, nan, nan),
-        np.zeros((*runs, len(watch.pairs[0]))),
-        np.full(runs, -np.inf),
+        reference=zero,
+        gathered=Gathered(),
+        time=np.nan,
+        memory=memory,
+        traces=traces,
+        used=none,
+        predicted=none,
+        usual=none,
+        fault=np.zeros(n, dtype=np.int8),
+        since=nan,
+        bridge=none,
+        jumped=nan,
+        off=nan,
+        same=nan,
+        still=nan,
+        then=none,
+        moving=nan,
+        back=nan,
+        evidence=np.zeros((*runs, len(watch.pairs[0]))),
+        fast=np.full(runs, -np.inf),
     )
 
 

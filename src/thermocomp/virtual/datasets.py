@@ -109,4 +109,4 @@ def make_recording(test: SimulatedTest) -> Recording:
     table = pd.DataFrame(test.values, columns=[c.name for c in test.channels])
     speeds = [c.name for c in test.channels if c.quantity == "spindle_speed"]
     cycles = find_cycles(test.time, table[speeds[0]].to_numpy()) if speeds else make_single_cycle(len(table))
-    return Recording(test.name, test.time, table, test.channels, cycles)
+    return Recording(name=test.name, time=test.time, table=table, channels=test.channels, cycles=cycles)

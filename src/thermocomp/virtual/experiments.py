@@ -197,7 +197,9 @@ def run(
     channels = [*(s.channel for s in sensors), *channels]
     if programme.faults or faults:
         recorded = with_faults(time, channels, recorded, [*programme.faults, *faults])
-    return SimulatedTest(programme.name, time, tuple(channels), recorded, truth, told)
+    return SimulatedTest(
+        name=programme.name, time=time, channels=tuple(channels), values=recorded, truth=truth, observables=told
+    )
 
 
 def _soaked(

@@ -99,7 +99,9 @@ def thermometer(kit: Kit, label: str, place: str, *, perfect: bool, noise: float
         sensor = Sensor(channel, noise=noise or 0.0)
     else:
         own = 0.05 if noise is None else noise
-        sensor = Sensor(channel, own, mounted.lag, 0.02, mounted.bias, mounted.drift)
+        sensor = Sensor(
+            channel=channel, noise=own, lag=mounted.lag, resolution=0.02, bias=mounted.bias, drift=mounted.drift
+        )
     if place in kit.air:
         return Instrument(sensor, air=(1.0, kit.air[place] - Air.REFERENCE_HEIGHT, 0.0))
     contact = 1.0 if perfect else mounted.contact

@@ -194,7 +194,7 @@ def component(code: str, position: float, z: float = TEST_POSITION["z"]) -> Prob
                 geometry += arm * float(find_cold_component(f"E{turn}X", point))
     aside = "" if z == TEST_POSITION["z"] else f", Z at {z:g} mm"
     words = f"{code}: {MOTIONS[code[:2]]} of {axis.upper()} at {position:g} mm{aside}"
-    return Probe(words, weights, geometry, unit, SIX_NOISE[unit], zeroed=False)
+    return Probe(place=words, reads=weights, cold=geometry, unit=unit, noise=SIX_NOISE[unit], zeroed=False)
 
 
 def _between_two(code: str, position: float) -> dict[str, float]:
@@ -231,7 +231,13 @@ def swing(along: str, way: FloatArray) -> list[tuple[str, float]]:
 
 def make_squareness_probe(code: str) -> Probe:
     """Return the squareness of two axes at 20 degC, by an artefact; what heat does is in the lasers' straightness."""
-    return Probe(f"{code}: squareness at 20 degC, artefact", {}, SQUARENESS[code], "urad", SIX_NOISE["urad"])
+    return Probe(
+        place=f"{code}: squareness at 20 degC, artefact",
+        reads={},
+        cold=SQUARENESS[code],
+        unit="urad",
+        noise=SIX_NOISE["urad"],
+    )
 
 
 #: X1 and Y1 at the tip of the test bar, X2 and Y2 towards the spindle: tilts A = (y1 - y2) / L, B = (x2 - x1) / L

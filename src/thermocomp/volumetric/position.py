@@ -159,7 +159,9 @@ def prepare(
     }
     left_open = tuple(name for name, value in given.items() if value is None)
     judging = partial(judging_of, split=s.split, leave_one=s.left_out(len(recordings)))
-    return PositionJob(tests, options, left_open, _several(component), judging, s.jobs)
+    return PositionJob(
+        tests=tests, options=options, left_open=left_open, several=_several(component), judging=judging, jobs=s.jobs
+    )
 
 
 def _several(component: Sequence[str]) -> bool:

@@ -57,7 +57,10 @@ class Supports:
         """Return the sizes and numbers of `thermocomp.export.block.distances`."""
         models = self._models
         bounds = [m.bounds for m in models]
-        joints = [m.joint or JointSupport((), (), (), 1.0, (), (), ()) for m in models]
+        joints = [
+            m.joint or JointSupport(columns=(), scale=(), points=(), limit=1.0, speeds=(), levels=(), tolerances=())
+            for m in models
+        ]
         places = [[self._ranges.index(i) for i in m.inputs] for m in models]
         units = [j.limit * math.sqrt(len(j.columns)) for j in joints]
         levels = [level for j in joints for level in j.levels]

@@ -56,7 +56,17 @@ def gather(compensator: Compensator) -> Tables:
     ranges = tuple(dict.fromkeys(i for m in models for i in m.inputs))
     known = [*ranges, *(watch.inputs if watch else ())]
     if zeroing.speed:
-        known.append(Input(zeroing.speed, "spindle_speed", "1/min", 0.0, False, 0.0, 0.0))
+        known.append(
+            Input(
+                name=zeroing.speed,
+                quantity="spindle_speed",
+                unit="1/min",
+                reference=0.0,
+                rezero=False,
+                low=0.0,
+                high=0.0,
+            )
+        )
     by_name = {i.name: i for i in reversed(known)}
     channels = tuple(by_name[name] for name in dict.fromkeys(i.name for i in known))
     place = {c.name: k for k, c in enumerate(channels)}
@@ -101,7 +111,16 @@ def gather(compensator: Compensator) -> Tables:
         **_watch_sizes(watch),
         **own_sizes,
     }
-    return Tables(channels, ranges, sensors, tuple(lines), models, sizes, values, formulas.functions)
+    return Tables(
+        channels=channels,
+        ranges=ranges,
+        sensors=sensors,
+        targets=tuple(lines),
+        models=models,
+        sizes=sizes,
+        values=values,
+        formulas=formulas.functions,
+    )
 
 
 def formula(model: ErrorModel, ranges: tuple[Input, ...]) -> Node:

@@ -118,11 +118,11 @@ def export(
     left = [m for m in models if m.target not in reasons and m.target not in elsewhere]
     if left:
         facts = Facts(
-            model.name,
-            sha256(model.read_bytes()).hexdigest(),
-            __version__,
-            date or datetime.now(UTC).astimezone().date().isoformat(),
-            reasons | elsewhere,
+            source=model.name,
+            sha256=sha256(model.read_bytes()).hexdigest(),
+            version=__version__,
+            date=date or datetime.now(UTC).astimezone().date().isoformat(),
+            left_out=reasons | elsewhere,
         )
         if target.shape is not None:
             texts, more, others = reducing.export_reduced(

@@ -147,7 +147,7 @@ def _moment(g: Graph, tables: Tables, state: str, dt: str, plausible: str) -> _M
     step = g.choose(g.put("And", seen, passes), since, 0.0)
     flags = (g.choose(g.put("Or", was, new), 1.0, 0.0) for was, new in ((begun, good), (seen, passes)))
     clocks = g.join([next(flags), now, next(flags), g.choose(passes, now, last)])
-    return _Moment(passes, seen, travel, step, clocks)
+    return _Moment(passes=passes, seen=seen, travel=travel, step=step, clocks=clocks)
 
 
 def _models(g: Graph, tables: Tables, memory: Memory, moment: _Moment, change: str) -> str:

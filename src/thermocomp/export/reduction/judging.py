@@ -128,15 +128,15 @@ def reduce_model(
     rows = known.valid & np.isfinite(known.deviations[:, 0]) & (known.cycle >= 0)
     said, _ = replay(written, known, rows)
     reduced = Reduced(
-        written,
-        axis,
-        _beside(model, method if full else "", judging),
-        Left(overall.none_metric("rms"), overall.none_metric("max_abs")),
-        _full(model, beside),
-        _left(overall),
-        tuple(_left_outs(blocks, full)),
-        _of(known.deviations[rows, 0] - said),
-        float(max(np.abs(a).max(initial=0.0) for a in (said, *(b.predicted for b in blocks)))),
+        model=written,
+        axis=axis,
+        beside=_beside(model, method if full else "", judging),
+        none=Left(overall.none_metric("rms"), overall.none_metric("max_abs")),
+        full=_full(model, beside),
+        reduced=_left(overall),
+        cycles=tuple(_left_outs(blocks, full)),
+        replayed=_of(known.deviations[rows, 0] - said),
+        most=float(max(np.abs(a).max(initial=0.0) for a in (said, *(b.predicted for b in blocks)))),
     )
     return Reduction(reduced, blocks, full, tuple(r.time for r in recordings))
 
@@ -180,7 +180,13 @@ def _blocks(found: Comparison | None) -> tuple[Assessment, ...]:
 def _left_outs(blocks: Sequence[Assessment], full: Sequence[Assessment]) -> list[LeftOut]:
     others = {a.block: a.metric("rms") for a in full}
     return [
-        LeftOut(a.block, a.frozen, a.none_metric("rms"), others.get(a.block, math.nan), a.metric("rms"))
+        LeftOut(
+            name=a.block,
+            model=a.frozen,
+            none=a.none_metric("rms"),
+            full=others.get(a.block, math.nan),
+            reduced=a.metric("rms"),
+        )
         for a in blocks
         if a.frozen is not None
     ]

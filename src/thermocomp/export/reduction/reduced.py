@@ -187,12 +187,12 @@ def as_it_is(model: ErrorModel, axis: str) -> Reduced:
     none = Left(math.nan if found is None else found.none_rms, math.nan)
     own = Left(*((math.nan, math.nan) if found is None else (found.rms, found.max_abs)))
     return Reduced(
-        model,
-        axis,
-        "the model is of that shape already, here with five digits; its error is that in the file",
-        none,
-        own,
-        own,
+        model=model,
+        axis=axis,
+        beside="the model is of that shape already, here with five digits; its error is that in the file",
+        none=none,
+        full=own,
+        reduced=own,
     )
 
 

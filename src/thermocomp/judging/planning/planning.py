@@ -219,7 +219,14 @@ def plan(samples: Samples, top_speed: float | None = None, *, hours: float = 12.
         for t, f, gain in zip(grid, tables, gains, strict=True)
     ]
     best = sorted(found, key=lambda c: -c.gain)
-    return Plan(tuple(best), float(before.mean()), top_speed, hours, swing, covered)
+    return Plan(
+        candidates=tuple(best),
+        expected=float(before.mean()),
+        top_speed=top_speed,
+        hours=hours,
+        swing=swing,
+        covered=covered,
+    )
 
 
 def _all_that_is_done(grid: Sequence[Trial], tables: Sequence[FloatArray]) -> FloatArray:

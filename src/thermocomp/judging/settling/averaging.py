@@ -168,7 +168,7 @@ def noise_of(time: FloatArray, values: FloatArray, stop: int | None = None) -> N
     there = np.isfinite(values)
     t, y = time[there], values[there]
     if len(y) < 3:
-        return Noise(float("nan"), 1.0, 0.0, WINDOW, False)
+        return Noise(sigma=float("nan"), inflation=1.0, resolution=0.0, window=WINDOW, moves=False)
     sigma, window = scatter(y), window_of(float(t[-1] - t[0]))
     steps = np.diff(np.unique(y))
     # rounding of the arithmetic is no resolution
@@ -181,7 +181,13 @@ def noise_of(time: FloatArray, values: FloatArray, stop: int | None = None) -> N
     white, own = sigma / np.sqrt(per_mean), 0.0
     if len(means) >= _MEANS and per_mean >= 2:
         own = _scatter_of_means([m for m, _ in parts])
-    noise = Noise(sigma, float(max(1.0, own / white)) if white > 0 else 1.0, resolution, window, False)
+    noise = Noise(
+        sigma=sigma,
+        inflation=float(max(1.0, own / white)) if white > 0 else 1.0,
+        resolution=resolution,
+        window=window,
+        moves=False,
+    )
     white = max(white, float(noise.of_mean(np.inf)))
     return replace(noise, moves=_moves(means, white, len(y), own))
 

@@ -138,7 +138,13 @@ def _least_squares(
     )
     total = float(np.sum((y - y.mean()) ** 2))
     share = 1.0 - float(left @ left) / total if total > 0 else float("nan")
-    return ExponentialFit(float(level), tuple(terms), share, float(np.sqrt(np.mean(left**2))), float(t[-1]))
+    return ExponentialFit(
+        start=float(level),
+        terms=tuple(terms),
+        r_squared=share,
+        rms=float(np.sqrt(np.mean(left**2))),
+        duration=float(t[-1]),
+    )
 
 
 def _residual(t: FloatArray, y: FloatArray) -> Callable[[FloatArray], FloatArray]:

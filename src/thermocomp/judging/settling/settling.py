@@ -241,7 +241,23 @@ def settle(
     lead, (t, y) = int(there[:lead].sum()), (time[there], values[there])
     nan = float("nan")
     if len(y) - lead < _ROWS:
-        return Settling(channel, unit, phase, nan, nan, nan, False, False, False, False, False, nan, nan, None, None)
+        return Settling(
+            channel=channel,
+            unit=unit,
+            phase=phase,
+            change=nan,
+            uncertainty=nan,
+            noise=nan,
+            moves=False,
+            clear=False,
+            returns=False,
+            overshoots=False,
+            settled=False,
+            t63=nan,
+            t90=nan,
+            one=None,
+            two=None,
+        )
     c = average_test(t, y, lead, len(y) - 1, rests=rests)
     t, y, curve = t[lead:] - time[min(np.flatnonzero(there)[lead], len(time) - 1)], y[lead:] - c.zero.value, c.values
     change, span = float(curve[-1]), float(np.ptp(curve))
@@ -254,21 +270,23 @@ def settle(
     last = t >= 0.75 * t[-1]
     settled = clear and _rests(t[last], y[last], curve[last], SETTLED * abs(change), c.noise)
     reads = clear and not returns and not overshoots
+    one, two = fit(t, y + c.zero.value) if clear else (None, None)
     return Settling(
-        channel,
-        unit,
-        phase,
-        change,
-        K * u,
-        c.noise.sigma,
-        moves,
-        clear,
-        returns,
-        overshoots,
-        settled,
-        _reached(t, y, c, 1.0 - np.exp(-1.0)) if reads else nan,
-        _reached(t, y, c, 0.9) if reads else nan,
-        *(fit(t, y + c.zero.value) if clear else (None, None)),
+        channel=channel,
+        unit=unit,
+        phase=phase,
+        change=change,
+        uncertainty=K * u,
+        noise=c.noise.sigma,
+        moves=moves,
+        clear=clear,
+        returns=returns,
+        overshoots=overshoots,
+        settled=settled,
+        t63=_reached(t, y, c, 1.0 - np.exp(-1.0)) if reads else nan,
+        t90=_reached(t, y, c, 0.9) if reads else nan,
+        one=one,
+        two=two,
     )
 
 

@@ -86,7 +86,15 @@ def read_measurement(payload: bytes | str, arrived: float) -> Measurement:
     at, measured, spread, position = (v or 0.0 for v in map(found.get, ("time", *_NUMBERS)))
     keys = [f"id {own}"] * ("id" in content) + [f"time {at!r}"] * ("time" in content)
     keys = keys or [f"content {measured} um at {position} mm, give or take {spread} um, {left}"]
-    return Measurement(at, str(target), measured, bool(left), spread, position, tuple(keys))
+    return Measurement(
+        time=at,
+        target=str(target),
+        measured=measured,
+        left=bool(left),
+        repeatability=spread,
+        position=position,
+        keys=tuple(keys),
+    )
 
 
 def write_message(corrections: Mapping[str, Correction], stamp: float) -> str:

@@ -73,7 +73,14 @@ class SimulatedProbe:
             for target in self.targets:
                 if (true := self.machine.truth.get(target)) is not None:
                     now, found = time.time(), true + noise.gauss(0.0, self.repeatability)
-                    yield Measurement(now, target, found, False, self.repeatability, keys=(f"time {now!r}",))
+                    yield Measurement(
+                        time=now,
+                        target=target,
+                        measured=found,
+                        left=False,
+                        repeatability=self.repeatability,
+                        keys=(f"time {now!r}",),
+                    )
 
     def status(self) -> Status:
         """Return how it is, at once."""

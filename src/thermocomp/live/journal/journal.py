@@ -163,8 +163,16 @@ class Journal:
         with self._adding:
             waiting = len(self._waiting)
         reason = self._trouble or self._odd
-        counted = (self._confirmed, waiting, self._lost, self._refused)
-        return JournalStatus(self._file, len(files), total, *counted, reason)
+        return JournalStatus(
+            file=self._file,
+            files=len(files),
+            size_bytes=total,
+            confirmed=self._confirmed,
+            waiting=waiting,
+            lost=self._lost,
+            refused=self._refused,
+            reason=reason,
+        )
 
     def close(self) -> None:
         """Flush, and give the file back; a second time does nothing."""

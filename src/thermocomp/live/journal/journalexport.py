@@ -190,7 +190,14 @@ def _read(reader: JournalReader, channels: Sequence[Channel], every: float) -> _
             measured.append((stored.run, row))
     if not time:
         raise InputError(f"{reader.paths[0]}: the journal holds no reading yet")
-    return _Found(np.array(time), np.array(run), np.array(values).reshape(len(time), -1), confirmed, measured, left)
+    return _Found(
+        time=np.array(time),
+        run=np.array(run),
+        values=np.array(values).reshape(len(time), -1),
+        confirmed=confirmed,
+        measured=measured,
+        overtaken=left,
+    )
 
 
 def _parted(

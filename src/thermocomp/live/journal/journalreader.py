@@ -156,12 +156,12 @@ class JournalReader:
             runs[run] = [min(before[0], low), max(before[1], high), before[2] + n]
         ends = [e for _, e in self._each("SELECT MIN(time), MAX(time) FROM rows") if e[0] is not None]
         return Summary(
-            self.paths,
-            sum(size(p) for p in self.paths),
-            min((e[0] for e in ends), default=None),
-            max((e[1] for e in ends), default=None),
-            dict(counts),
-            sum(high - low + 1 - n for low, high, n in runs.values()),
+            files=self.paths,
+            size_bytes=sum(size(p) for p in self.paths),
+            first=min((e[0] for e in ends), default=None),
+            last=max((e[1] for e in ends), default=None),
+            counts=dict(counts),
+            lost=sum(high - low + 1 - n for low, high, n in runs.values()),
         )
 
     def _each(self, query: str) -> Iterator[tuple[Path, Any]]:

@@ -254,7 +254,19 @@ def stepwise(
             work.enter(found[0])
         index, f = found
         alpha = alpha_of_f(f, df)
-        steps.append(Step(len(steps) + 1, action, index, names[index], f, df, alpha, 1 - work.sse, before - work.sse))
+        steps.append(
+            Step(
+                number=len(steps) + 1,
+                action=action,
+                index=index,
+                term=names[index],
+                f=f,
+                df=df,
+                alpha=alpha,
+                r_squared=1 - work.sse,
+                r_squared_step=before - work.sse,
+            )
+        )
         inside = frozenset(work.active)
         cycled = inside in seen
         seen.add(inside)

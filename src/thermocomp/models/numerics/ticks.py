@@ -95,7 +95,7 @@ def put_on_clock(inputs: FloatArray, dt: FloatArray, interval: float) -> list[Ti
 def _run(inputs: FloatArray, dt: FloatArray, rows: slice, h: float) -> TickedRun:
     u, n = inputs[rows], rows.stop - rows.start
     if (dt[rows][1:] == h).all():
-        return TickedRun(rows, np.arange(n), np.zeros(n), u, u)
+        return TickedRun(rows=rows, count=np.arange(n), phase=np.zeros(n), since=u, drive=u)
     step = dt[rows].copy()
     step[0] = 0.0
     time = np.cumsum(step)
@@ -106,7 +106,7 @@ def _run(inputs: FloatArray, dt: FloatArray, rows: slice, h: float) -> TickedRun
     phase = share - count
     phase[phase <= EARLY] = 0.0
     if not phase.any() and (np.diff(count) == 1).all():  # one row per tick
-        return TickedRun(rows, count, phase, u, u)
+        return TickedRun(rows=rows, count=count, phase=phase, since=u, drive=u)
     total = np.cumsum(step[:, None] * u, axis=0)
     at = np.searchsorted(count, np.arange(count[-1] + 1))  # row that makes each tick; it may come later
     late = (time[at] - np.arange(count[-1] + 1) * h)[:, None]
@@ -114,7 +114,7 @@ def _run(inputs: FloatArray, dt: FloatArray, rows: slice, h: float) -> TickedRun
     until[0] = 0.0
     drive = np.vstack([u[:1], np.diff(until, axis=0) / h])
     since = (total - until[count]) / np.where(phase > 0, phase * h, np.inf)[:, None]
-    return TickedRun(rows, count, phase, since, drive)
+    return TickedRun(rows=rows, count=count, phase=phase, since=since, drive=drive)
 
 
 def displacements(

@@ -145,7 +145,9 @@ def equivalents(
                 f"displacement {d}: {n_tests} data sets are too few: the smallest p value there can be is {least:.2g}, "
                 f"above {wanted:.2g}{' (Holm)' if holm else ''}, so that every set counts as equivalent"
             )
-    return Equivalents(sets, summed, tuple(best), p_values, equivalent, tuple(notes))
+    return Equivalents(
+        subsets=sets, summed=summed, best=tuple(best), p_values=p_values, equivalent=equivalent, notes=tuple(notes)
+    )
 
 
 def signed_rank_p(differences: FloatArray) -> FloatArray:

@@ -258,7 +258,7 @@ def choose(tri: Triangle, groups: Groups, *, limit: int = LIMIT) -> Grouped:
     subsets = search_subsets(tri, chosen, limit=limit)
     participating = tuple(k for k, g in enumerate(groups) if set(g) & set(subsets.best.columns))
     members = search_members(tri, [groups[k] for k in participating], limit=limit)
-    return Grouped(groups, chosen, subsets, participating, members)
+    return Grouped(groups=groups, representatives=chosen, subsets=subsets, participating=participating, members=members)
 
 
 @dataclass(frozen=True)

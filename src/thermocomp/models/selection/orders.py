@@ -108,7 +108,20 @@ def compute_orders(
             root = _largest_root(R[own, own], R[own, -1], small.noise[own])
             fpe = final_prediction_error(sse, n, d)
             able = d < n and root < largest_root
-            found.append(Order(k, m, d, n, sse, fpe, log + 2 * d, log + d * math.log(n), root, able))
+            found.append(
+                Order(
+                    k=k,
+                    m=m,
+                    n_parameters=d,
+                    n_rows=n,
+                    sse=sse,
+                    fpe=fpe,
+                    aic=log + 2 * d,
+                    bic=log + d * math.log(n),
+                    largest_root=root,
+                    admissible=able,
+                )
+            )
     return tuple(sorted(found, key=lambda o: (o.k, o.m)))
 
 

@@ -104,7 +104,13 @@ class Answer:
             weights[:, j] = made[:, j] = make_up(gram, [k for k in kept if k != j], self.noise)[:, j]
             losses.append(self.lose(made))
         single = tuple(int(k) for k in pairs.argmin(axis=1))
-        return StandIns(single, pairs.min(axis=1), weights, _left(gram, weights), np.array(losses))
+        return StandIns(
+            single=single,
+            single_residual=pairs.min(axis=1),
+            weights=weights,
+            residual=_left(gram, weights),
+            loss=np.array(losses),
+        )
 
 
 def reduce_sensors(

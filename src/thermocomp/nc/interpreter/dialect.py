@@ -153,7 +153,11 @@ def judge_dialect(lines: Iterable[str], *, whole: bool = False, startup: str = "
     """Return what a whole program shows of its dialect; see `check_dialect`."""
     scan = _Scan(InForce(whole))
     words = _WORD.findall(_squeeze(startup.upper()))
-    scan.force.take(LineWords("", [read_number(value) for letter, value in words if letter == "G"], [], "", {}))
+    scan.force.take(
+        LineWords(
+            code="", g=[read_number(value) for letter, value in words if letter == "G"], m=[], computed="", values={}
+        )
+    )
     for number, text in enumerate(lines, 1):
         if not scan.pass_plain(text):
             scan.take(number, text)
@@ -269,12 +273,12 @@ class _Scan:
     def _words(self, words: list[tuple[str, str]], *, runs: bool) -> None:
         values = {letter: value for letter, value in words if letter not in "GM"}
         line = LineWords(
-            self._code,
-            [read_number(value) for letter, value in words if letter == "G"],
-            [read_number(value) for letter, value in words if letter == "M"],
-            next((letter + value for letter, value in words if letter in "GM" and not _is_plain(value)), ""),
-            values,
-            find_owner_of_p((letter, read_number(value)) for letter, value in words) if "P" in values else "",
+            code=self._code,
+            g=[read_number(value) for letter, value in words if letter == "G"],
+            m=[read_number(value) for letter, value in words if letter == "M"],
+            computed=next((letter + value for letter, value in words if letter in "GM" and not _is_plain(value)), ""),
+            values=values,
+            p_of=find_owner_of_p((letter, read_number(value)) for letter, value in words) if "P" in values else "",
         )
         self.force.take(line)
         self._signs(line)

@@ -181,7 +181,15 @@ class Follower:
             fanuc.check_codes(state, words, code)
         if values.keys() - _PLAIN_LETTERS:
             self._reader.check_letters(words, code)
-        block = Block(words.line, before, "none", words.codes, words.words, values, state.place)
+        block = Block(
+            line=words.line,
+            modal=before,
+            kind="none",
+            codes=words.codes,
+            words=words.words,
+            values=values,
+            start=state.place,
+        )
         if groups and not (len(groups) == 1 and "motion" in groups):
             modal.apply_modal_codes(state, words, block)
         else:

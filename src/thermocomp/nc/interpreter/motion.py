@@ -31,7 +31,7 @@ def straight(state: InterpreterState, words: BlockWords, block: Block) -> None:
         end = (place[0] + offset[0], place[1] + offset[1], place[2] + offset[2])
     block.kind = "line"
     if state.modal.motion == "G0":
-        block.moves.append(Move(True, start, end, None, 0.0, None, rotary))
+        block.moves.append(Move(rapid=True, start=start, end=end, arc=None, feed=0.0, seconds=None, rotary=rotary))
     else:
         block.moves.append(state.cut(words, start, end, None, rotary))
     state.place, state.machine, state.known = place, end, known
@@ -52,7 +52,11 @@ def in_machine(state: InterpreterState, words: BlockWords, block: Block) -> None
     start, end = state.machine, replace_coordinates(state.machine, values)
     block.kind = "machine"
     rapid = state.fanuc or state.modal.motion == "G0"
-    block.moves.append(Move(True, start, end, None, 0.0, None, rotary) if rapid else state.cut(words, start, end))
+    block.moves.append(
+        Move(rapid=True, start=start, end=end, arc=None, feed=0.0, seconds=None, rotary=rotary)
+        if rapid
+        else state.cut(words, start, end)
+    )
     state.machine = end
     state.place = state.offsets.program(end)
     state.known = _doubt(state, values)
@@ -235,17 +239,17 @@ def cycle(state: InterpreterState, words: BlockWords, block: Block, again: bool)
     repeats = words.whole("K" if "K" in values and state.fanuc else "L", least=1) or 1
     x, y, z = (v / scale for v in start)
     run = CannedCycle(
-        code,
-        modal.plane,
-        modal.absolute,
-        modal.retract == 99,
-        modal.inch,
-        (x, y, z),
-        named,
-        state.sticky,
-        state.level / scale,
-        repeats,
-        state.fanuc,
+        code=code,
+        plane=modal.plane,
+        absolute=modal.absolute,
+        to_r=modal.retract == 99,
+        inch=modal.inch,
+        start=(x, y, z),
+        named=named,
+        sticky=state.sticky,
+        level=state.level / scale,
+        repeats=repeats,
+        direct=state.fanuc,
     )
     _turn_for_a_tap(state, words, block)
     block.pause += repeats * dwell_seconds(state, pause(code, state.sticky))

@@ -177,13 +177,13 @@ class InterpreterState:
         if mode == 93:
             if not words.values.get("F"):
                 raise words.error("G93 needs F on every line that cuts; add it, or write G94")
-            return Move(False, start, end, arc, 0.0, 60.0 / feed, rotary)
+            return Move(rapid=False, start=start, end=end, arc=arc, feed=0.0, seconds=60.0 / feed, rotary=rotary)
         if not feed:
             raise words.error("a move in feed, and no F is in force (G93, G94 and G95 forget it in LinuxCNC); write F")
         if rotary and start == end and arc is None:
             feed = self.feed_word
         if mode == 94:
-            return Move(False, start, end, arc, feed, None, rotary)
+            return Move(rapid=False, start=start, end=end, arc=arc, feed=feed, seconds=None, rotary=rotary)
         return self.per_turn(words, start, end, feed, arc, rotary)
 
     def per_turn(
@@ -206,4 +206,6 @@ class InterpreterState:
         if not feed:
             raise words.error("a feed per turn while the spindle stands; start it with S and M3 before")
         way = length(arc, start, end) if arc else math.dist(start, end)
-        return Move(False, start, end, arc, feed, (way or rotary) / feed * 60.0, rotary)
+        return Move(
+            rapid=False, start=start, end=end, arc=arc, feed=feed, seconds=(way or rotary) / feed * 60.0, rotary=rotary
+        )

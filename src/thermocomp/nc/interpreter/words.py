@@ -95,7 +95,7 @@ class Reader:
             else:
                 words[letter] = word
                 values[letter] = number
-        found = BlockWords(line, codes, groups, words, values)
+        found = BlockWords(line=line, codes=codes, groups=groups, words=words, values=values)
         if len(codes) > _MOST_M:
             self._count(found)
         if line.assignments:

@@ -206,7 +206,15 @@ def read(
     InputError
         The file is not there, or the interpreter crashed.
     """
-    job = InterpreterJob(path, stored or Stored(), inch, block_delete, subroutines, task, seconds)
+    job = InterpreterJob(
+        path=path,
+        stored=stored or Stored(),
+        inch=inch,
+        block_delete=block_delete,
+        subroutines=subroutines,
+        task=task,
+        seconds=seconds,
+    )
     with InterpreterRun(job) as run:
         yield from calls(run)
         if opened is not None:
@@ -218,7 +226,6 @@ def read(
 def calls(run: InterpreterRun) -> Iterator[Canonical]:
     """Yield the calls of the next job of a run; see `read`."""
     frame, plane, file, turns = ProgramFrame(), 17, "", 1
-    nowhere: tuple[Place, Place] = (ORIGIN, ORIGIN)
     centre = [0.0, 0.0]
     for records, more in run.blocks():
         names = {code: kind for kind, code in run.codes.items()}
@@ -227,7 +234,16 @@ def calls(run: InterpreterRun) -> Iterator[Canonical]:
             kind = names[code]
             values = tuple(numbers[:count])
             if kind in {"rapid", "feed", "probe"}:
-                yield Canonical(kind, line, file, values, frame.machine(values), None, (), "")
+                yield Canonical(
+                    kind=kind,
+                    line=line,
+                    file=file,
+                    program=values,
+                    machine=frame.machine(values),
+                    arc=None,
+                    values=(),
+                    text="",
+                )
             elif kind == "centre":
                 centre[:], turns, plane = values[:2], int(values[2]), int(values[3])
             elif kind == "arc":
@@ -236,13 +252,42 @@ def calls(run: InterpreterRun) -> Iterator[Canonical]:
                 at[i], at[j] = centre
                 about = at[0], at[1], at[2]
                 arc = ArcPath(plane, about, frame.machine(_nine(at))[:3], turns)
-                yield Canonical(kind, line, file, values, frame.machine(values), arc, (), "")
+                yield Canonical(
+                    kind=kind,
+                    line=line,
+                    file=file,
+                    program=values,
+                    machine=frame.machine(values),
+                    arc=arc,
+                    values=(),
+                    text="",
+                )
             elif kind in {"comment", "message"}:
-                yield Canonical(kind, line, file, *nowhere, None, (), more[int(values[0])])
+                yield Canonical(
+                    kind=kind,
+                    line=line,
+                    file=file,
+                    program=ORIGIN,
+                    machine=ORIGIN,
+                    arc=None,
+                    values=(),
+                    text=more[int(values[0])],
+                )
             elif kind == "file":
                 file = Path(more[int(values[0])]).name
             elif kind == "curve":
-                yield Canonical(kind, line, file, *nowhere, None, tuple(more[int(values[0])]), "")
+                yield Canonical(
+                    kind=kind,
+                    line=line,
+                    file=file,
+                    program=ORIGIN,
+                    machine=ORIGIN,
+                    arc=None,
+                    values=tuple(more[int(values[0])]),
+                    text="",
+                )
             elif kind != "done":
                 frame.take(kind, values)
-                yield Canonical(kind, line, file, *nowhere, None, values, "")
+                yield Canonical(
+                    kind=kind, line=line, file=file, program=ORIGIN, machine=ORIGIN, arc=None, values=values, text=""
+                )

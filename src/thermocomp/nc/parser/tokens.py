@@ -130,7 +130,17 @@ def read_line(text: str, number: int, controller: Controller = "linuxcnc") -> Li
     """
     found = _WORDS(text)
     if found is not None and len(text) < _ORDINARY and (few := _few_words(found)) is not None:
-        return Line(number, text, few, [], False, "", False, "", "")
+        return Line(
+            number=number,
+            text=text,
+            words=few,
+            assignments=[],
+            optional=False,
+            flow="",
+            demarcation=False,
+            comment="",
+            label="",
+        )
     item = _ITEM[controller]
     found = _HEAD(text)
     if found is None or len(text) >= _ORDINARY:  # every part of the head may be missing, so it is always found
@@ -154,7 +164,17 @@ def read_line(text: str, number: int, controller: Controller = "linuxcnc") -> Li
             plain = float(value) if kind == _NUMBER else None
             words.append(_new_word(Word, (letter, found.start(1), place, value, plain)))
         elif kind == _END:
-            return Line(number, text, words, [], slash != "", "", False, comment, label or "")
+            return Line(
+                number=number,
+                text=text,
+                words=words,
+                assignments=[],
+                optional=slash != "",
+                flow="",
+                demarcation=False,
+                comment=comment,
+                label=label or "",
+            )
         else:
             remark = found.group(kind) if kind == _COMMENT else found.group(kind).rstrip(_BLANK)
             if controller == "linuxcnc" and _runs_python(remark):
@@ -318,7 +338,7 @@ def _read_words(text: str, place: int, columns: Sequence[int], controller: Contr
             number = float(text[begin + 1 : place]) if plain else None
             if number is not None and isinf(number):
                 raise _NotUnderstoodError(begin, f"the number of {letter} is too large")
-            line.words.append(Word(letter, start, end, value, number))
+            line.words.append(Word(letter=letter, start=start, end=end, value=value, number=number))
         else:
             raise _NotUnderstoodError(begin, _complaint(text, begin))
 

@@ -266,7 +266,12 @@ class _Plan:
         if self.chained is not None:
             serial, move, block = self.chained
             self.chained = None
-            self._join(self.segments.of(serial, Move(False, self.chain[0], move.end, None, move.feed), block), block)
+            self._join(
+                self.segments.of(
+                    serial, Move(rapid=False, start=self.chain[0], end=move.end, arc=None, feed=move.feed), block
+                ),
+                block,
+            )
 
     def _finish(self) -> None:
         """End the first block that waits."""

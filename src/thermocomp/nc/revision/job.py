@@ -279,13 +279,13 @@ def _bounds(job: Job, run: Run) -> tuple[Bound, ...]:
     wrong, left = job.drift.uncertainty(), job.revision.left
     return tuple(
         Bound(
-            axis,
-            float(run.deviation[:, 0, k].min()),
-            float(run.deviation[:, 1, k].max()),
-            left.without[k],
-            left.most[k],
-            left.line[k],
-            wrong[k],
+            axis=axis,
+            low=float(run.deviation[:, 0, k].min()),
+            high=float(run.deviation[:, 1, k].max()),
+            without=left.without[k],
+            left=left.most[k],
+            line=left.line[k],
+            model=wrong[k],
         )
         for k, axis in enumerate("XYZ")
         if axis in job.drift.axes

@@ -74,7 +74,15 @@ def prepare_job(
     taken = tuple(dict.fromkeys(h.taken for s in found if (h := s.model.honest_error) is not None and h.taken))
     states = "" if way.unproved else foresee_sentence(setup)
     header_lines = headers.count_lines(models, taken, states, by_position=drift.by_position)
-    revision = Revision(setup, kinematics, drift, method, way.demand(), header_lines, not way.no_split)
+    revision = Revision(
+        setup=setup,
+        kinematics=kinematics,
+        drift=drift,
+        method=method,
+        demand=way.demand(),
+        header_lines=header_lines,
+        split=not way.no_split,
+    )
     _check_interpreter(way, setup, diameters=controller.diameter is not None)
     if way.expand and setup.controller == "linuxcnc" and controller.block_delete is None:
         _refuse_optional(program)
@@ -82,16 +90,16 @@ def prepare_job(
     given = (timing.machine, starting.carried, drifting.forecast)
     refuse_existing(paths.all(), overwrite, [program, *drifting.model, *(p for p in given if p is not None)])
     job = Job(
-        program,
-        paths,
-        revision,
-        drift,
-        models,
-        taken,
-        starting.words(),
-        f"drift counts {starting.counted()}",
-        f"method {way.words()}",
-        _moment(when),
+        program=program,
+        paths=paths,
+        revision=revision,
+        drift=drift,
+        models=models,
+        taken=taken,
+        start=starting.words(),
+        zero=f"drift counts {starting.counted()}",
+        method=f"method {way.words()}",
+        when=_moment(when),
         unproved=way.unproved,
         diameters=controller.diameters(expand=way.expand),
         subroutines=way.folders(),

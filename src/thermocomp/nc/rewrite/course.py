@@ -94,11 +94,11 @@ class Course:
         """Return the run so far."""
         table = np.array([self._low, self._high], dtype=np.float64).reshape(2, -1, 10).swapaxes(0, 1)
         return Run(
-            np.array(self._times, dtype=np.float64),
-            table[:, :, 0:3],
-            table[:, :, 3:6],
-            table[:, :, 7:10],
-            table[:, :, 6],
+            time=np.array(self._times, dtype=np.float64),
+            deviation=table[:, :, 0:3],
+            carried=table[:, :, 3:6],
+            left=table[:, :, 7:10],
+            speed=table[:, :, 6],
         )
 
     def _join(self) -> None:

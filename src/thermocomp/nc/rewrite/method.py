@@ -92,7 +92,9 @@ class CorrectionMethod(ABC):
         if any(self.doubtful):
             x, y, z = (o if d else c for o, d, c in zip(self.other, self.doubtful, self.carried, strict=True))
             other = None if (x, y, z) == self.carried else (x, y, z)
-        return Change(texts, before, self.carried, self.inner or self.carried, other, placed)
+        return Change(
+            texts=texts, before=before, after=self.carried, inner=self.inner or self.carried, other=other, placed=placed
+        )
 
     @property
     def splits(self) -> bool:

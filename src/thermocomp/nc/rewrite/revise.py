@@ -223,19 +223,19 @@ class Revision:
             ended |= block.ends
             yield self._told(
                 Revised(
-                    line.number,
-                    line.text,
-                    change.texts,
-                    block,
-                    start,
-                    end,
-                    deviation,
-                    carried,
-                    change.inner,
-                    cut,
-                    change.other,
-                    change.placed,
-                    tuple(carried for _, carried in knots[1:-1]),
+                    number=line.number,
+                    text=line.text,
+                    texts=change.texts,
+                    block=block,
+                    start=start,
+                    end=end,
+                    deviation=deviation,
+                    carried=carried,
+                    inner=change.inner,
+                    cut=cut,
+                    other=change.other,
+                    placed=change.placed,
+                    knots=tuple(carried for _, carried in knots[1:-1]),
                 )
             )
         if not headed:
@@ -256,7 +256,15 @@ class Revision:
 
     def _header(self, text: str, deviation: Vector, carried: Vector) -> Revised:
         return Revised(
-            0, "", header.make_blank(ending(text), self.header_lines), None, 0.0, 0.0, deviation, carried, carried
+            number=0,
+            text="",
+            texts=header.make_blank(ending(text), self.header_lines),
+            block=None,
+            start=0.0,
+            end=0.0,
+            deviation=deviation,
+            carried=carried,
+            inner=carried,
         )
 
     def _told(self, revised: Revised) -> Revised:
@@ -287,7 +295,14 @@ class Revision:
             changes.append(change)
         knots = [(0.0, begun), *((share, c.after) for share, c in zip(parts, changes, strict=True))]
         texts = tuple(text for c in changes for text in c.texts)
-        return Change(texts, begun, changes[-1].after, changes[-1].inner, changes[-1].other, changes[0].placed), knots
+        return Change(
+            texts=texts,
+            before=begun,
+            after=changes[-1].after,
+            inner=changes[-1].inner,
+            other=changes[-1].other,
+            placed=changes[0].placed,
+        ), knots
 
     def _worth(self, block: Block, samples: list[Sample], parts: list[float]) -> bool:
         """Return whether less is left in a cut that is split, and at its end not more than a step more."""

@@ -267,7 +267,7 @@ class Drift:
         for (k, i), (farthest, seconds) in self._outside.items():
             state, channel = self._states[k], self.stations[k].model.inputs[i]
             low, high = _trained(channel.low, channel.high, float(state.reference[i]))
-            mine = Outside(channel.name, channel.unit, low, high, farthest, seconds)
+            mine = Outside(name=channel.name, unit=channel.unit, low=low, high=high, farthest=farthest, seconds=seconds)
             other = found.get(channel.name)
             if other is None or _excess(farthest, low, high) > _excess(other.farthest, other.low, other.high):
                 found[channel.name] = mine

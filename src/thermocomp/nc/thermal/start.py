@@ -215,14 +215,14 @@ def hand_over_state(
         memory = np.empty(0) if state.memory is None else state.memory
         kept.append(
             StationState(
-                str(station),
-                station.model.target,
-                identity(station.model),
-                tuple(state.reference.tolist()),
-                tuple(memory.tolist()),
-                float(state.deviation),
-                zero,
-                doubt,
+                station=str(station),
+                target=station.model.target,
+                model=identity(station.model),
+                reference=tuple(state.reference.tolist()),
+                memory=tuple(memory.tolist()),
+                deviation=float(state.deviation),
+                zero=zero,
+                doubt=doubt,
             )
         )
     return JobState(tuple(kept), zero_known)

@@ -118,7 +118,7 @@ def judge(learned: LearnedVolume, seed: int) -> Volume:
     tests = list(simulate(virtual.find_experiment("volumetric-new"), seed=seed, whole=True))
     share = -(-POINTS // len(tests))
     parts = [_points(learned, test, min(share, POINTS - share * k), rng) for k, test in enumerate(tests)]
-    p = _Points(*map(np.vstack, zip(*parts, strict=True)))
+    p = _Points._make(map(np.vstack, zip(*parts, strict=True)))
     truth, kinematics = VolumetricTruth(MachiningCentre().observables), Kinematics(learned.machine)
 
     def effect(values: FloatArray, codes: Collection[str] = INDEX) -> FloatArray:
@@ -143,7 +143,13 @@ def judge(learned: LearnedVolume, seed: int) -> Volume:
         START: truth.error(p.start, p.points + 1e-3 * p.begin, p.tools) - zero + p.begin,
     }
     by_component = {c.code: rms(np.linalg.norm(effect(missed, [c.code]), axis=1)) for c in COMPONENTS}
-    return Volume(learned, errors, causes, by_component, float(np.abs(effect(true) - errors[WITHOUT]).max()))
+    return Volume(
+        learned=learned,
+        errors=errors,
+        causes=causes,
+        by_component=by_component,
+        closure=float(np.abs(effect(true) - errors[WITHOUT]).max()),
+    )
 
 
 def _points(learned: LearnedVolume, test: SimulatedTest, n: int, rng: np.random.Generator) -> _Points:
@@ -162,7 +168,16 @@ def _points(learned: LearnedVolume, test: SimulatedTest, n: int, rng: np.random.
         full.append(states[row].correction(point, tool))
         lines.append([line.correction.at(p) for line, p in zip(straight, point.tolist(), strict=True)])
         begin.append(states[0].correction(point, tool))
-    return _Points(now, start, points, tools, *map(np.array, (told, full, lines, begin)))
+    return _Points(
+        now=now,
+        start=start,
+        points=points,
+        tools=tools,
+        told=np.array(told),
+        full=np.array(full),
+        lines=np.array(lines),
+        begin=np.array(begin),
+    )
 
 
 def as_measured(truth: VolumetricTruth, now: FloatArray, start: FloatArray, points: FloatArray) -> FloatArray:

@@ -155,7 +155,9 @@ def learn(seed: int, told: Callable[[float], None]) -> LearnedDrift:
     for done, ((kind, _), net) in enumerate(zip(jobs, trained, strict=True), start=1):
         by_kind.setdefault(kind, []).append(net)
         told(done / len(jobs))
-    return LearnedDrift(samples, regressions, models, wide, by_kind.pop(""), by_kind)
+    return LearnedDrift(
+        samples=samples, regressions=regressions, models=models, wide=wide, nets=by_kind.pop(""), others=by_kind
+    )
 
 
 def _train(net: SigmoidNet, heat: Samples) -> LearnedNet:

@@ -111,9 +111,13 @@ class Measured(NamedTuple):
         n = len(self.errors)
         channels = tuple(Channel(t, "temperature", "degC") for t in TEMPERATURES)
         table = pd.DataFrame(self.temperatures, columns=list(TEMPERATURES))
-        states = with_differences(Recording(name, np.arange(0.0, 3600.0 * n, 3600.0), table, channels, whole_test(n)))
+        states = with_differences(
+            Recording(
+                name=name, time=np.arange(0.0, 3600.0 * n, 3600.0), table=table, channels=channels, cycles=whole_test(n)
+            )
+        )
         points = np.stack([0 * POSITIONS, POSITIONS, 0 * POSITIONS], axis=1)
-        return Profiles("EYY", "um", "Y", points, self.errors, states)
+        return Profiles(target="EYY", unit="um", axis="Y", points=points, values=self.errors, states=states)
 
 
 @dataclass(frozen=True, eq=False)
@@ -292,12 +296,12 @@ def seek(seed: int) -> Law:
         "net": planted - net.predict(other[list(SLOPE_VARIABLES)]),
     }
     return Law(
-        recoveries,
-        fit,
-        net,
-        r2_about_zero(k1, net.predict(change)),
-        float(np.abs(ends[1] - ends[0]).max()),
-        {name: rms(left) for name, left in missed.items()},
+        recoveries=recoveries,
+        fit=fit,
+        net=net,
+        net_r2=r2_about_zero(k1, net.predict(change)),
+        idle=float(np.abs(ends[1] - ends[0]).max()),
+        elsewhere={name: rms(left) for name, left in missed.items()},
     )
 
 

@@ -132,7 +132,15 @@ def learn(seed: int, other_seed: int) -> LearnedPositioning:
         learned, PositionOptions(order=EQ6.degree(), inputs=(*setup.TEMPERATURES, *setup.SPEED), method="dynamic")
     )
     fits = {MRA: regression, NET: nets[typical], DYNAMIC: ours}
-    return LearnedPositioning(learned, other, from_recording(first, "EAY"), fits, nets, linear, law.seek(seed))
+    return LearnedPositioning(
+        learned=learned,
+        other=other,
+        pitch=from_recording(first, "EAY"),
+        fits=fits,
+        nets=nets,
+        linear=linear,
+        law=law.seek(seed),
+    )
 
 
 def _net(fit: PositionFit) -> Any:

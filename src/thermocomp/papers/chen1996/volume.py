@@ -109,7 +109,14 @@ def _profiles(code: str, test: Recording, *, flat: bool) -> Profiles:
             reading = reading + 1e-3 * (aside["z"] - TEST_POSITION["z"]) * roll
         values.append(reading)
         points += [[{**TEST_POSITION, **aside, axis.lower(): p}[a] for a in AXES] for p in stations]
-    return Profiles(code, unit, axis, np.array(points, dtype=np.float64), np.hstack(values), test)
+    return Profiles(
+        target=code,
+        unit=unit,
+        axis=axis,
+        points=np.array(points, dtype=np.float64),
+        values=np.hstack(values),
+        states=test,
+    )
 
 
 def _spindle(tests: Sequence[Recording], inputs: Sequence[str]) -> dict[str, Source]:
@@ -123,5 +130,14 @@ def _spindle(tests: Sequence[Recording], inputs: Sequence[str]) -> dict[str, Sou
 
 def _machine(components: Mapping[str, Source]) -> Machine:
     test = (float(TEST_POSITION["x"]), float(TEST_POSITION["y"]), float(TEST_POSITION["z"]))
-    axes = tuple(Axis(a.upper(), (0.0, TRAVEL[a]), TEST_POSITION[a], test, TEST_BAR) for a in AXES)
+    axes = tuple(
+        Axis(
+            name=a.upper(),
+            travel=(0.0, TRAVEL[a]),
+            reference_position=TEST_POSITION[a],
+            measured_at=test,
+            measured_tool=TEST_BAR,
+        )
+        for a in AXES
+    )
     return Machine("virtual", Structure.parse(STRUCTURE), axes, components, spindle_tool=TEST_BAR, tool=TEST_BAR)

@@ -210,7 +210,17 @@ def compute(seed: int, progress: Progress) -> Computed:
         for size in NOISES
     }
     progress(0.9, "new tests")
-    return Computed(fit, new, grouped, single, interval, swept, fits, shaken, _dynamic(tests))
+    return Computed(
+        fit=fit,
+        new=new,
+        grouped=grouped,
+        single=single,
+        interval=interval,
+        swept=swept,
+        fits=fits,
+        shaken=shaken,
+        dynamic=_dynamic(tests),
+    )
 
 
 def _grouped(samples: Samples, threshold: float) -> CorrelationGrouping:

@@ -205,7 +205,7 @@ def revise_program(
     if way == SAFE:
         method = Offset(digits, STEP, safe_z=UP, axes=(False, False, True))
     demand = Demand(TOLERANCE, INTERVAL if way == EVERY else None)
-    revision = Revision(SETUP, KINEMATICS, drift, method, demand)
+    revision = Revision(setup=SETUP, kinematics=KINEMATICS, drift=drift, method=method, demand=demand)
     return [text for became in revision.revise(lines) for text in became.texts]
 
 

@@ -201,17 +201,17 @@ def compute(seed: int, progress: Progress) -> Computed:
     left = workshop.deviations - at_positions(models[NET], workshop)
     warm = warm_start(judge, models[NET][0])
     return Computed(
-        learn,
-        judge,
-        models,
-        tables,
-        hidden,
-        rms(np.concatenate(steps)),
-        clocks,
-        cuts,
-        warm,
-        room,
-        rms(left),
+        learn=learn,
+        judge=judge,
+        models=models,
+        orders=tables,
+        hidden=hidden,
+        one_step=rms(np.concatenate(steps)),
+        clocks=clocks,
+        cuts=cuts,
+        warm=warm,
+        room=room,
+        workshop=rms(left),
     )
 
 

@@ -161,13 +161,13 @@ def compute(seed: int, progress: Progress) -> Computed:
     raw, new = (stacked([r], [TARGET], heat, rezero=False) for r in (test, online))
     absolute = fit_and_freeze(PartialF(f_enter=F_ENTER, f_delete=F_DELETE), raw, [TARGET])[TARGET]
     return Computed(
-        learn,
-        judge,
-        selection,
-        {name: found[name] for name in METHODS},
-        thinned,
-        rms(measured - predict_deviation(absolute, new)),
-        shaken,
+        fit=learn,
+        online=judge,
+        selection=selection,
+        models={name: found[name] for name in METHODS},
+        thinned=thinned,
+        absolute=rms(measured - predict_deviation(absolute, new)),
+        shaken=shaken,
     )
 
 
@@ -209,11 +209,11 @@ def _thinned(warm: Samples, online: Samples, step: int) -> Thinned:
     residual = some.deviations[:, 0] - selection.predict(some.frame())
     error = online.deviations[:, 0] - predict_deviation(model, online)
     return Thinned(
-        len(some),
-        effective_sample_size(residual),
-        r_squared_of_f(F_ENTER, len(some) - 2),
-        selection.terms_,
-        rms(error),
+        rows=len(some),
+        effective=effective_sample_size(residual),
+        first=r_squared_of_f(F_ENTER, len(some) - 2),
+        names=selection.terms_,
+        rms=rms(error),
     )
 
 

@@ -110,7 +110,15 @@ def appendix_b(seed: int, progress: Progress, physics: Physics | None = None) ->
     small, holm, converged = (
         equivalents(list(found.psi), sets, holm=h) for found, h in ((psi, False), (psi, True), (limit, False))
     )
-    return Selection(psi, more, small, holm, converged, [len(r) for r in recordings], seconds)
+    return Selection(
+        psi=psi,
+        larger=more,
+        small=small,
+        holm=holm,
+        converged=converged,
+        rows=[len(r) for r in recordings],
+        seconds=seconds,
+    )
 
 
 def told(s: Selection) -> Part:

@@ -240,7 +240,7 @@ def trial(
         timed = [common.stacked(r, [target], [*(c.name for c in learned.inputs), *speeds]) for r in parts]
         memory = DynamicRidge(speed=speeds, time="routed")
         also("dynamic", memory, timed, support=Support(), dt=timed[0].dt(), cycle=timed[0].cycle)
-    return Trial(learned, unseen, ace, estimates, fits, flagged)
+    return Trial(learned=learned, unseen=unseen, ace=ace, estimates=estimates, fits=fits, flagged=flagged)
 
 
 def loop_width(samples: Samples, steps: int = 20) -> float:

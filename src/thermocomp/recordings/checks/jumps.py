@@ -56,7 +56,7 @@ def find_edges(signal: Signal) -> Edges:
     x, rows = signal.x, signal.rows
     if len(x) < 2 * _BESIDE + 3:
         none = np.empty(0, dtype=np.intp)
-        return Edges(signal, none, none, np.empty(0), np.empty(0, dtype=np.bool_))
+        return Edges(signal=signal, before=none, after=none, height=np.empty(0), clear=np.empty(0, dtype=np.bool_))
     moves = np.abs(np.diff(x))
     jump = x[2:] - x[:-2]
     noise = 1.4826 * float(np.median(np.abs(jump - np.median(jump))))
@@ -76,7 +76,13 @@ def find_edges(signal: Signal) -> Edges:
     # where the first or the last of the two moves is all of it, the row between belongs to a level
     early = np.abs(x[first + 1] - x[first]) > 0.8 * size[first]
     late = np.abs(x[first + 2] - x[first + 1]) > 0.8 * size[first]
-    return Edges(signal, rows[first + late], rows[first + 2 - (early & ~late)], jump[first], size[first] > limit[first])
+    return Edges(
+        signal=signal,
+        before=rows[first + late],
+        after=rows[first + 2 - (early & ~late)],
+        height=jump[first],
+        clear=size[first] > limit[first],
+    )
 
 
 def jumps(signals: Sequence[Signal], time: FloatArray, moved: BoolArray) -> Iterator[Finding]:
@@ -156,7 +162,14 @@ def _step(mine: Edges, lone: list[int], time: FloatArray) -> Finding:
             "that no other channel shares and that comes back: delete these values"
         )
         rows = np.arange(first - 1, last)
-        return Finding("trouble", channel.name, "step", text, rows, remedy=cut(channel.name, rows, time, "step"))
+        return Finding(
+            severity="trouble",
+            channel=channel.name,
+            kind="step",
+            text=text,
+            rows=rows,
+            remedy=cut(channel.name, rows, time, "step"),
+        )
     more = f", the largest of {len(lone)} such steps" if len(lone) > 1 else ""
     text = (
         f"steps by {height:+.3g} {channel.unit} at {at_row(row, time)}{more}, which no other channel shares: a sensor "

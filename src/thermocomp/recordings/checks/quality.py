@@ -184,7 +184,12 @@ def _wild_finding(channel: Channel, values: FloatArray, wild: IntArray, time: Fl
     if every:
         return Finding("trouble", channel.name, "implausible", text)
     return Finding(
-        "trouble", channel.name, "implausible", text, wild, remedy=cut(channel.name, wild, time, "implausible")
+        severity="trouble",
+        channel=channel.name,
+        kind="implausible",
+        text=text,
+        rows=wild,
+        remedy=cut(channel.name, wild, time, "implausible"),
     )
 
 
@@ -283,7 +288,14 @@ def _code_finding(channel: Channel, values: FloatArray, coded: BoolArray, time: 
         )
     said = {"role": "ignore"} if every else {"missing": np.unique(values[coded]).tolist()}
     rows = None if every else np.flatnonzero(coded)
-    return Finding("trouble", channel.name, "missing-value code", text, rows, remedy=column(channel.name, **said))
+    return Finding(
+        severity="trouble",
+        channel=channel.name,
+        kind="missing-value code",
+        text=text,
+        rows=rows,
+        remedy=column(channel.name, **said),
+    )
 
 
 def _missing(name: str, values: FloatArray, time: FloatArray, *, probed: bool) -> Iterator[Finding]:

@@ -53,12 +53,12 @@ def spikes(signal: Signal, time: FloatArray, moved: BoolArray) -> Iterator[Findi
     lengths = np.diff(np.flatnonzero(np.diff(hits, prepend=-5, append=len(x) + 5) != 1))
     width = f" of {'up to ' * (len(lengths) > 1)}{lengths.max()} rows" if lengths.max() > 1 else ""
     yield Finding(
-        "trouble" if height[top] > span else "warning",
-        signal.channel.name,
-        "spike",
-        f"{count(len(lengths), 'spike')}{width}, the highest by {height[top]:.3g} {signal.channel.unit} at "
+        severity="trouble" if height[top] > span else "warning",
+        channel=signal.channel.name,
+        kind="spike",
+        text=f"{count(len(lengths), 'spike')}{width}, the highest by {height[top]:.3g} {signal.channel.unit} at "
         f"{at_row(int(rows[top]), time)} (usual noise {off:.2g}); delete the values or look for a loose contact",
-        rows[hits],
+        rows=rows[hits],
         remedy=cut(signal.channel.name, rows[hits], time, "spike"),
     )
 

@@ -51,7 +51,12 @@ def stuck(signal: Signal, time: FloatArray) -> Iterator[Finding]:
         # the first value of each stretch may have been measured
         concerned = np.concatenate([rows[starts[j] + 1 : starts[j] + lengths[j]] for j in sorted(hits)])
         yield Finding(
-            severity, channel.name, "stuck", text, concerned, remedy=cut(channel.name, concerned, time, "stuck")
+            severity=severity,
+            channel=channel.name,
+            kind="stuck",
+            text=text,
+            rows=concerned,
+            remedy=cut(channel.name, concerned, time, "stuck"),
         )
     if coarse:
         text = f"moves in steps of {step:g} {channel.unit} over a span of {span:.3g}; a finer resolution would help"

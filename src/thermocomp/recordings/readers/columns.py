@@ -218,8 +218,20 @@ def plan(
     time_unit, note = _time_unit(headings[time], said, mapping, source)
     notes.extend([note] if note else [])
     aliases = _aliases(columns, headings, meanings)
-    found = tuple(columns), tuple(left_out), aliases, tuple(notes)
-    return ColumnPlan(time, time_unit, date, half, fraction, unused, beside, cycle, *found)
+    return ColumnPlan(
+        time=time,
+        time_unit=time_unit,
+        date=date,
+        half=half,
+        fraction=fraction,
+        unused=unused,
+        beside=beside,
+        cycle=cycle,
+        columns=tuple(columns),
+        left_out=tuple(left_out),
+        aliases=aliases,
+        notes=tuple(notes),
+    )
 
 
 def _meant(rule: ColumnMap, meaning: Meaning | None, where: str, heading: str) -> tuple[Unit, str]:

@@ -100,7 +100,14 @@ def read_long(
             f"{rows.source}: {rows.place(row)}: a new state begins at the time of the one before; correct the time, or "
             "the column of states"
         )
-    return Profiles(target, unit, axis, points, values, make_recording(rows, time, table, labels))
+    return Profiles(
+        target=target,
+        unit=unit,
+        axis=axis,
+        points=points,
+        values=values,
+        states=make_recording(rows, time, table, labels),
+    )
 
 
 def _error_column(rows: Rows, wanted: str, unit: str, owner: str) -> str:

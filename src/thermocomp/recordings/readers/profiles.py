@@ -236,7 +236,9 @@ def from_recording(recording: Recording, options: ProfileOptions | str) -> Profi
     taken = [c for c, _ in found]
     rest = tuple(c for c in recording.channels if c not in taken and not (called and is_profile(c)))
     states = replace(recording, table=recording.table[[c.name for c in rest]], channels=rest, notes=notes)
-    return Profiles(wanted.target, unit, axis, points, recording.values(taken), states)
+    return Profiles(
+        target=wanted.target, unit=unit, axis=axis, points=points, values=recording.values(taken), states=states
+    )
 
 
 def read_places(path: str | Path) -> dict[str, Place]:

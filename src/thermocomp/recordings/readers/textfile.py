@@ -304,7 +304,15 @@ def _scan(lines: Lines, head: _Head) -> _Body:
             most = max(map(len, split_line(line.decode("latin-1"), delimiter)))
             lines.limits.check("cell_characters", most, f"{lines.path}: line {number + 1}")
     tail = lines.read_tail(1 + max(number, *skipped[-1:]), skipped)[-MOST_REMARKS:]
-    return _Body(skipped, width, n_rows, odd, again, tail[-n_rows:] if n_rows > 0 else [], ragged)
+    return _Body(
+        skipped=skipped,
+        width=width,
+        n_rows=n_rows,
+        odd=odd,
+        again=again,
+        tail=tail[-n_rows:] if n_rows > 0 else [],
+        ragged=ragged,
+    )
 
 
 def _find_table(

@@ -165,7 +165,7 @@ def open_lines(path: Path, data: bytes | None, options: ReadOptions, limits: Lim
                 )
             returns += block.count(b"\r") - block.count(b"\r\n") - (last == b"\r" and block.startswith(b"\n"))
             last = block[-1:]
-    return Lines(path, data, options, limits, returns > 0)
+    return Lines(path=path, data=data, options=options, limits=limits, returns=returns > 0)
 
 
 def split_line(line: str, delimiter: str) -> list[str]:

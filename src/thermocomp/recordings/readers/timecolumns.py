@@ -98,7 +98,7 @@ def find_time(
     used = (time, date, half, fraction)
     twins = {k for k, heading in enumerate(headings) if heading and heading == headings[time]}
     unused = [k for k in range(len(headings)) if k not in used and k not in twins and kinds(k) in ("date", "stamp")]
-    return TimePlan(time, date, half, fraction, tuple(unused), tuple(notes))
+    return TimePlan(time=time, date=date, half=half, fraction=fraction, unused=tuple(unused), notes=tuple(notes))
 
 
 def find_position(place: Place, headings: Sequence[str], table: str, source: str) -> int:

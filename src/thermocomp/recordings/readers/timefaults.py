@@ -31,7 +31,29 @@ def refuse_falling(
     *,
     is_stamp: bool,
 ) -> NoReturn:
-    """Refuse times that do not rise."""
+    """Refuse times that do not rise.
+
+    Parameters
+    ----------
+    wrong : ndarray of int
+        Rows that do not come after the one before them.
+    time : ndarray of shape (n_rows,)
+        [s]
+    shown : Series
+        Times as the file has them.
+    table : FileTable
+    where : str
+        File and column, for the message.
+    start : str
+        Date and time of the first row; empty if there is none.
+    is_stamp : bool
+        They are dates with times.
+
+    Raises
+    ------
+    RecordingError
+        They do not, with the first row.
+    """
     row, local = int(wrong[0]), is_stamp and pd.Timestamp(start).tzinfo is None
     what = "comes twice" if time[row] == time[row - 1] else f"is before {shown.iloc[row - 1]}"
     more = f" ({wrong.size} rows like this)" if wrong.size > 1 else ""
@@ -81,7 +103,27 @@ def refuse_passed(
     table: FileTable,
     source: Path,
 ) -> None:
-    """Refuse times that begin with zero and run on where the date changes: they passed, and are none of the day."""
+    """Refuse times that begin with zero and run on where the date changes: they passed, and are none of the day.
+
+    Parameters
+    ----------
+    time : ndarray of shape (n_rows,)
+        [s]
+    start : str
+        Date and time of the first row; empty if there is none.
+    cells : DataFrame
+        As they are written.
+    columns : ColumnPlan
+    mapping : Mapping
+    table : FileTable
+    source : Path
+        The file, for the message.
+
+    Raises
+    ------
+    TwoReadingsError
+        They do.
+    """
     if columns.date is None or mapping.time.format or not start:
         return
     dates, begin = cells[columns.date], pd.Timestamp(start)
@@ -104,7 +146,27 @@ def refuse_passed(
 def refuse_set_forward(
     time: FloatArray, steps: FloatArray, start: str, table: FileTable, source: Path, heading: str
 ) -> None:
-    """Refuse a gap of an hour where clocks are set forward: the file does not say whether an hour passed."""
+    """Refuse a gap of an hour where clocks are set forward: the file does not say whether an hour passed.
+
+    Parameters
+    ----------
+    time : ndarray of shape (n_rows,)
+        [s]
+    steps : ndarray of shape (n_rows - 1,)
+        [s]
+    start : str
+        Date and time of the first row; empty if there is none.
+    table : FileTable
+    source : Path
+        The file, for the message.
+    heading : str
+        Of the column of times.
+
+    Raises
+    ------
+    TwoReadingsError
+        There is one.
+    """
     usual = float(np.median(steps)) if steps.size else np.inf
     if not usual <= 900:
         return

@@ -111,7 +111,15 @@ def read(path: str | Path) -> tuple[Positioning, ...]:
         }
         name = axis.upper() or _axis(table.headings[columns["position"]])
         found.append(
-            Positioning(name, state, deviation_unit, np.array(targets), sides.get("+"), sides.get("-"), str(source))
+            Positioning(
+                axis=name,
+                state=state,
+                unit=deviation_unit,
+                positions=np.array(targets),
+                up=sides.get("+"),
+                down=sides.get("-"),
+                source=str(source),
+            )
         )
     return tuple(found)
 

@@ -234,12 +234,24 @@ def study(
             progress(k / len(time))
     levers = Kinematics(machine)
     error, tilt = levers.synthesize(values, np.asarray(point), tip)
-    course = PointCourse(point, tip, time, values, error, tilt, levers.sensitivity(point, tip))
+    course = PointCourse(
+        point=point,
+        tool=tip,
+        time=time,
+        values=values,
+        error=error,
+        tilt=tilt,
+        sensitivity=levers.sensitivity(point, tip),
+    )
     points, moments = lay_grid(machine, grid), []
     for label, row in _rows(time, course.largest if at is not None else _largest(states, tip), hours):
         lines = straight_lines(states[row], point, tip, grid=grid, exact=True)
-        moments.append(Moment(label, row, float(time[row]), states[row], lines, tip, points))
-    return Volumetric(machine, recording, course, tuple(moments), missing)
+        moments.append(
+            Moment(
+                label=label, row=row, time=float(time[row]), field=states[row], straight=lines, tool=tip, grid=points
+            )
+        )
+    return Volumetric(machine=machine, recording=recording, course=course, moments=tuple(moments), missing=missing)
 
 
 def in_reference_state(machine: Machine) -> Machine:

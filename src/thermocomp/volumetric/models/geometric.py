@@ -272,7 +272,9 @@ def _try(
         if np.linalg.cond(free) > 1e10:
             return Tried(order, n_terms, np.inf, np.inf)
         squares.append(float(np.mean(np.linalg.solve(free, residual[rows]) ** 2)))
-    return Tried(order, n_terms, *_mean(squares), _misfit(residual, values, place, n_terms))
+    left_out, margin = _mean(squares)
+    misfit = _misfit(residual, values, place, n_terms)
+    return Tried(order=order, n_terms=n_terms, left_out=left_out, margin=margin, misfit=misfit)
 
 
 def _try_through(
@@ -287,7 +289,8 @@ def _try_through(
     n_terms = len(spline.places)
     residual = values - spline.through(values)(spline.position)
     misfit = _misfit(residual, values, place, n_terms)
-    return Tried((n_terms - 2, 0), n_terms, *_mean(squares), misfit, through=True)
+    left_out, margin = _mean(squares)
+    return Tried(order=(n_terms - 2, 0), n_terms=n_terms, left_out=left_out, margin=margin, misfit=misfit, through=True)
 
 
 def _mean(squares: Sequence[float]) -> tuple[float, float]:

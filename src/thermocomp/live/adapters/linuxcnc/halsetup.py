@@ -132,7 +132,11 @@ def prepare(path: Path, folder: Path, settings: HalSettings) -> Prepared:
         )
     component = Path(__file__).with_name("_hal_component.py").read_text(encoding="utf-8")
     return Prepared(
-        "\n".join(lines) + "\n", component, tuple(todo), socket, (folder / COMPONENT_NAME, folder / HAL_NAME)
+        hal="\n".join(lines) + "\n",
+        component=component,
+        todo=tuple(todo),
+        socket=socket,
+        files=(folder / COMPONENT_NAME, folder / HAL_NAME),
     )
 
 
@@ -188,7 +192,9 @@ def _axis(ini: Ini, letter: str, pattern: Pattern) -> HalAxis:
     else:
         joint = _joint(ini, letter)
     speed, acceleration = ini.number(section, "MAX_VELOCITY"), ini.number(section, "MAX_ACCELERATION")
-    return HalAxis(letter.lower(), joint, low, high, SHARE * speed, SHARE * acceleration)
+    return HalAxis(
+        letter=letter.lower(), joint=joint, low=low, high=high, speed=SHARE * speed, acceleration=SHARE * acceleration
+    )
 
 
 def _joint(ini: Ini, letter: str) -> int:

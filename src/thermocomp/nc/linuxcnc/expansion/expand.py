@@ -91,7 +91,13 @@ class _Around:
     def try_whether_it_ends(self, path: Path, stored: Stored) -> None:
         """Run a program and look at nothing: a loop without end is refused before anything is made of its moves."""
         job = InterpreterJob(
-            path, stored, bool(self.inch), self.block_delete, self.subroutines, task=False, seconds=self.seconds
+            path=path,
+            stored=stored,
+            inch=bool(self.inch),
+            block_delete=self.block_delete,
+            subroutines=self.subroutines,
+            task=False,
+            seconds=self.seconds,
         )
         with InterpreterRun(job) as run:
             for _ in run.blocks():
@@ -162,7 +168,16 @@ def expand(
     if not path.is_file():
         raise InputError(f"{path} is not a file")
     systems = _start_systems(path, block_delete)
-    around = _Around(inch, startup, diameters or {}, block_delete, subroutines, user_codes, seconds, systems)
+    around = _Around(
+        inch=inch,
+        startup=startup,
+        diameters=diameters or {},
+        block_delete=block_delete,
+        subroutines=subroutines,
+        user_codes=user_codes,
+        seconds=seconds,
+        systems=systems,
+    )
     acts = 0
     around.try_whether_it_ends(path, around.controller(_WRITTEN[0]))
     with draft(out, overwrite=False) as part:

@@ -96,7 +96,7 @@ def trace_acts(calls: Iterator[Canonical]) -> Iterator[Act]:
                 numbers = (*numbers, feed[turning])
             here = end
             if call.line:
-                yield Act(call.line, kind, numbers, state, "")
+                yield Act(line=call.line, kind=kind, numbers=numbers, state=state, text="")
         elif kind in STATES:
             states[STATES[kind]] = (STATES[kind], kind, call.values)
             state = tuple(states[name] for name in sorted(states))
@@ -105,7 +105,7 @@ def trace_acts(calls: Iterator[Canonical]) -> Iterator[Act]:
         elif kind in REMARKS:
             frame.take(kind, call.values)
         elif call.line:
-            yield Act(call.line, kind, call.values, state, call.text)
+            yield Act(line=call.line, kind=kind, numbers=call.values, state=state, text=call.text)
 
 
 def _way(call: Canonical, frame: ProgramFrame, here: Place) -> tuple[Place, tuple[float, ...]]:

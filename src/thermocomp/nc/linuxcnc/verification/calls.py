@@ -143,7 +143,19 @@ class Side:
         if last[-1] >= 0:
             self._here = end[last[-1]].copy()
         centre, sweep = _arcs(plane, turns, start, end)
-        calls = Calls(kind, raw, raw, values, start, end, centre, plane, turns, sweep, np.zeros(len(kind)))
+        calls = Calls(
+            kind=kind,
+            line=raw,
+            raw=raw,
+            values=values,
+            start=start,
+            end=end,
+            centre=centre,
+            plane=plane,
+            turns=turns,
+            sweep=sweep,
+            seconds=np.zeros(len(kind)),
+        )
         calls.seconds = self._seconds(calls, moving)
         keep = (raw > 0) & ~self.is_kind(kind, *PASSED)
         calls = calls.take(np.flatnonzero(keep))

@@ -105,7 +105,15 @@ class Ledger:
         before, loose = self._carried.at(lines - 1), self._loose.at(lines)[:, 0]
         others = (before + self._other.at(lines - 1), after + self._other.at(lines)) if self._other.lines else ()
         inner = after + self._inner.at(lines)
-        return Shifts(before, after, inner, inverse, loose != _UNPLACED, loose == _MACHINE, others)
+        return Shifts(
+            before=before,
+            after=after,
+            inner=inner,
+            inverse=inverse,
+            placed=loose != _UNPLACED,
+            machine=loose == _MACHINE,
+            others=others,
+        )
 
     def at(self, line: int) -> Shift:
         """Return what a line of the original should be shifted by."""
@@ -113,12 +121,12 @@ class Ledger:
         before, after, inner, inverse = (row[0].tolist() for row in found[:4])
         other = tuple(found.others[1][0].tolist()) if found.others else tuple(after)
         return Shift(
-            tuple(before),
-            tuple(after),
-            tuple(inner),
-            inverse,
-            self.knots.get(line, ()),
-            None if other == tuple(after) else other,
+            before=tuple(before),
+            after=tuple(after),
+            inner=tuple(inner),
+            inverse=inverse,
+            knots=self.knots.get(line, ()),
+            other=None if other == tuple(after) else other,
         )
 
     def originals(self, lines: Integers) -> Integers:

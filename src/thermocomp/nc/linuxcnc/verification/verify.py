@@ -127,7 +127,12 @@ def prove(
     if (reason := rs274.find_obstacle()) is not None:
         raise Unprovable(reason)
     if setup.controller == "linuxcnc":
-        proof = _prove(_Proving(original, revised, ledger, setup, Lines(_same, ledger.originals)), progress)
+        proof = _prove(
+            _Proving(
+                original=original, revised=revised, ledger=ledger, setup=setup, origin=Lines(_same, ledger.originals)
+            ),
+            progress,
+        )
         return proof._replace(held=_assumed(setup, proof.held))
     with scratch() as folder:
         try:
@@ -136,7 +141,10 @@ def prove(
         except UntranslatableError as e:
             raise Unprovable(f"line {e.line} cannot be said in LinuxCNC's words: {e.reason}") from e
         origin = Lines(first.lines, lambda lines: ledger.originals(second.lines(lines)), divided=False)
-        proof = _prove(_Proving(first.path, second.path, ledger, first.setup, origin), progress)
+        proof = _prove(
+            _Proving(original=first.path, revised=second.path, ledger=ledger, setup=first.setup, origin=origin),
+            progress,
+        )
         return proof._replace(held=_assumed(setup, proof.held))
 
 
@@ -219,12 +227,12 @@ def _prove(proving: _Proving, progress: Callable[[int], object]) -> Proof:
         if name in drawn
     ]
     return Proof(
-        min(f.moves for f in found),
-        max(f.largest for f in found),
-        len(found),
-        max(f.slower for f in found),
-        states.describe_setup(setup),
-        tuple(words),
+        moves=min(f.moves for f in found),
+        largest=max(f.largest for f in found),
+        states=len(found),
+        slower=max(f.slower for f in found),
+        held=states.describe_setup(setup),
+        drawn=tuple(words),
     )
 
 
