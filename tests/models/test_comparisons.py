@@ -361,7 +361,7 @@ def test_process_cannot_be_frozen_nor_written(samples: Samples) -> None:
 
 
 def test_process_is_judged_beside_the_others(samples: Samples, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(METHODS, "gp", Method("gp", "Gaussian process", "gp.GaussianProcess"))
+    monkeypatch.setitem(METHODS, "gp", Method("gp", "Gaussian process", "thermocomp.models.gp:GaussianProcess"))
     judging = splits.parse("0.75/0.25", samples)
     result = compare(samples, ["ols", "gp"], judging)
     for a in result.overall():

@@ -187,7 +187,9 @@ def test_bad_input_is_refused() -> None:
 
 
 def test_judged_beside_the_others(samples: Samples, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(METHODS, "ppr", Method("ppr", "projection pursuit", "ppr.ProjectionPursuit", takes=("cycle",)))
+    monkeypatch.setitem(
+        METHODS, "ppr", Method("ppr", "projection pursuit", "thermocomp.models.ppr:ProjectionPursuit", takes=("cycle",))
+    )
     result = compare(samples, ["ppr"], splits.parse("0.75/0.25", samples))
     for a in result.overall():
         assert a.failure == ""

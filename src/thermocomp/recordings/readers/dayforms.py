@@ -165,7 +165,7 @@ def _read_texts(texts: "pd.Series[str]", *, named: bool, beside_clock: bool) -> 
 def _are_parts(texts: "pd.Series[str]") -> bool:
     """Return whether texts count the parts of something: 1/3, 2/3, 3/3."""
     parts = texts.str.extract(r"^([1-9]\d?)/([1-9]\d?)$")
-    return parts[0].iloc[0] == "1" and parts[0].notna().all() and parts[1].nunique() == 1
+    return bool(parts[0].iloc[0] == "1" and parts[0].notna().all() and parts[1].nunique() == 1)
 
 
 def _read_weekdays(texts: "pd.Series[str]") -> list[IntArray]:
