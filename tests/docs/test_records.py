@@ -21,7 +21,7 @@ CLASSES = {
 
 def names(module: str) -> dict[str, str]:
     """Return what names of a module stand for, by their full name."""
-    found = {}
+    found: dict[str, str] = {}
     for node in ast.walk(TREES[module]):
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("thermocomp"):
             found |= {alias.asname or alias.name: f"{node.module}.{alias.name}" for alias in node.names}
