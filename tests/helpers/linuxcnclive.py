@@ -100,6 +100,7 @@ class Live:
                     display.close()
                     time.sleep(0.02)
                     continue
+                display.settimeout(300.0)  # a component that was killed while it had HAL's lock stops it for ever
                 self._display, self._file = display, display.makefile("rw")
                 return
             if "could not open shared memory" not in self.told():
