@@ -15,7 +15,7 @@ import numpy as np
 
 from thermocomp.virtual.centre import MachiningCentre
 from thermocomp.virtual.experiments import simulate
-from thermocomp.virtual.machine import Air, Drive
+from thermocomp.virtual.machine import Air, FeedDrive
 from thermocomp.virtual.nonlinear import NonlinearCentre
 from thermocomp.virtual.protocolfile import read_protocol
 
@@ -55,7 +55,7 @@ def steps(machine: MachiningCentre, *programmes: list[float]) -> list[float]:
     air = Air(22.0)
     found = []
     for speeds in programmes:
-        drives = [Drive(s) for s in speeds for _ in range(6000 // len(speeds))]
+        drives = [FeedDrive(s) for s in speeds for _ in range(6000 // len(speeds))]
         best = np.inf
         for _ in range(3):
             begin = time.perf_counter()

@@ -15,11 +15,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from thermocomp.virtual.centre import MachiningCentre
-from thermocomp.virtual.machine import Air, Drive
+from thermocomp.virtual.machine import Air, FeedDrive
 
 machine = MachiningCentre()
 room = Air(temperature=22.0, stratification=0.5)
-drives = [Drive()] * 4320 + [Drive(2600.0, feed=(600.0, 1000.0, 600.0))] * 2160 + [Drive()] * 3600
+drives = [FeedDrive()] * 4320 + [FeedDrive(2600.0, feed=(600.0, 1000.0, 600.0))] * 2160 + [FeedDrive()] * 3600
 air = np.tile(room.values, (len(drives), 1))
 
 _, truth = machine.run(machine.init(room), drives, air, dt=10.0)

@@ -16,7 +16,7 @@ from thermocomp.cli import app
 from thermocomp.cli.app import run
 from thermocomp.core.machine import Channel
 from thermocomp.live.journal.journal import Journal, JournalLimits
-from thermocomp.live.journal.journalrows import AlarmRow, ReadingRow, Start, Target
+from thermocomp.live.journal.journalrows import AlarmRow, ReadingRow, StartRow, TargetRow
 from thermocomp.papers import studies
 from thermocomp.papers.study import Claim, Study, StudyTable
 from thermocomp.recordings.readers import recordings
@@ -168,7 +168,7 @@ def test_a_revision(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> Non
 
 def test_a_journal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(tmp_path)
-    start = Start(1e9, (Target("z_um"),), (Channel("z_um", "displacement", "um"),), "off")
+    start = StartRow(1e9, (TargetRow("z_um"),), (Channel("z_um", "displacement", "um"),), "off")
     journal = Journal.open("live.db", JournalLimits(), start)
     assert held("journal", capsys, "show", "live.db")["counts"]["reading"] == 0
     for row in (ReadingRow(1e9, {"z_um": 1.0}), AlarmRow(1e9, "sensor", "stuck")):

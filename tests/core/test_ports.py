@@ -6,7 +6,7 @@ from collections.abc import AsyncIterator, Mapping
 from driftmodels import growing
 
 from thermocomp.core.correction import Correction, Limits
-from thermocomp.core.ports import Sink, Source, Status
+from thermocomp.core.ports import LinkStatus, Sink, Source
 from thermocomp.core.reading import Reading
 from thermocomp.runtime.compensator import Compensator
 
@@ -28,8 +28,8 @@ class Memory:
     async def apply(self, corrections: Mapping[str, Correction]) -> None:
         self.applied.append(corrections)
 
-    def status(self) -> Status:
-        return Status("connected" if self.open else "closed")
+    def status(self) -> LinkStatus:
+        return LinkStatus("connected" if self.open else "closed")
 
     async def close(self) -> None:
         self.open = False
@@ -54,4 +54,4 @@ def test_a_compensator_runs_from_a_source_to_a_sink() -> None:
     assert not isinstance(Limits(), Source)
     asyncio.run(run(source, Compensator.of([growing("z", 2.0)], Limits(rate=1.0)), sink))
     assert [said["z"].offset for said in sink.applied] == [0.0, -2.0, -4.0]
-    assert source.status() == sink.status() == Status("closed")
+    assert source.status() == sink.status() == LinkStatus("closed")

@@ -18,7 +18,7 @@ from numpydoc.validate import validate  # type: ignore[import-untyped]
 
 from thermocomp.cli.app import app
 from thermocomp.recordings.cleaning import Cut, Resample, Rezero, Shift, Swap
-from thermocomp.recordings.readers.limits import Limits
+from thermocomp.recordings.readers.limits import FileLimits
 from thermocomp.recordings.readers.mapping import ColumnMap, CycleRule, Mapping, ReadOptions, TimeColumn, read_mapping
 from thermocomp.recordings.readers.recordings import read
 
@@ -42,12 +42,12 @@ NOUNS = {
     "Deviation": "core.correction",
     "Reading": "core.reading",
     "Correction": "core.correction",
-    "Limits": "core.correction",
+    "FileLimits": "core.correction",
     "Assessment": "judging.compare",
 }
 VERBS = ["read", "select", "fit", "freeze", "assess", "compare"]
 VERBS += ["synthesize", "compensate", "revise", "export", "report", "serve"]
-TABLES = {"time": TimeColumn, "columns.NAME": ColumnMap, "read": ReadOptions, "cycles": CycleRule, "limits": Limits}
+TABLES = {"time": TimeColumn, "columns.NAME": ColumnMap, "read": ReadOptions, "cycles": CycleRule, "limits": FileLimits}
 STEPS = (Cut, Shift, Rezero, Swap, Resample)
 # Written by Sphinx itself, or not a page.
 _MADE = ("_build", "_templates", "auto_examples", "auto_papers", "papers", "reference", "tutorial")

@@ -36,3 +36,12 @@ def test_arrows_are_few() -> None:
     assert {a for a in found if set(a) <= SATELLITES} == {("live", "nc"), ("live", "virtual"), ("iso230", "volumetric")}
     known = Counter(a for a, b in found if a in SATELLITES and b in MAIN)
     assert {room for room, n in known.items() if n > 6} == {"volumetric", "export"}  # none is wanted
+
+
+def test_no_class_has_its_name_in_two_rooms() -> None:
+    rooms: dict[str, set[str]] = {}
+    for path in PACKAGE.rglob("*.py"):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                rooms.setdefault(node.name, set()).add(path.relative_to(PACKAGE).parts[0])
+    assert {name: where for name, where in rooms.items() if len(where) > 1} == {}

@@ -24,7 +24,7 @@ from thermocomp.core.zero import Zeroing
 from thermocomp.export.block.tables import gather
 from thermocomp.export.facts import Facts
 from thermocomp.export.st.package import write_package
-from thermocomp.export.st.structuredtext import Unit, translate
+from thermocomp.export.st.structuredtext import SourceUnit, translate
 from thermocomp.export.st.ststatements import RESERVED
 from thermocomp.export.st.sttest import write_test
 from thermocomp.export.vectors import Readings, make_readings, replay
@@ -50,7 +50,7 @@ def watched() -> Compensator:
 
 
 @pytest.fixture(scope="module")
-def units(watched: Compensator) -> list[Unit]:
+def units(watched: Compensator) -> list[SourceUnit]:
     return translate(gather(watched), "tc_x", "codesys")
 
 
@@ -60,7 +60,7 @@ def test_it_says_what_the_compensator_says(watched: Compensator) -> None:
     assert {0, 1} <= set(said.fault.ravel())
 
 
-def proof(watched: Compensator, units: list[Unit]) -> Any:
+def proof(watched: Compensator, units: list[SourceUnit]) -> Any:
     """Run the block that runs the vectors."""
     tables = gather(watched)
     readings = make_readings(tables)
@@ -72,7 +72,7 @@ def proof(watched: Compensator, units: list[Unit]) -> Any:
     return machine.memory
 
 
-def test_its_own_test_passes(watched: Compensator, units: list[Unit]) -> None:
+def test_its_own_test_passes(watched: Compensator, units: list[SourceUnit]) -> None:
     said = proof(watched, units)
     assert (said.wrong, said.largest < 1e-9) == (0, True)
 
@@ -88,7 +88,7 @@ def test_its_own_test_passes(watched: Compensator, units: list[Unit]) -> None:
     ],
 )
 def test_its_own_test_finds_a_mistake(
-    watched: Compensator, units: list[Unit], block: str, was: str, becomes: str
+    watched: Compensator, units: list[SourceUnit], block: str, was: str, becomes: str
 ) -> None:
     broken = []
     for unit in units:
@@ -103,7 +103,7 @@ def test_its_own_test_finds_a_mistake(
     assert proof(watched, broken).wrong > 0
 
 
-def test_a_restart_moves_nothing_at_once(watched: Compensator, units: list[Unit]) -> None:
+def test_a_restart_moves_nothing_at_once(watched: Compensator, units: list[SourceUnit]) -> None:
     tables, machine = gather(watched), Machine(units)
     readings = make_readings(tables)
     warm = Readings(*(a[:165] for a in readings))
@@ -179,7 +179,7 @@ ODD = st.one_of(st.floats(), st.sampled_from([np.nan, np.inf, -np.inf, 1e308, -0
     quiet=st.booleans(),
 )
 def test_nothing_that_comes_in_moves_it_beyond_its_limits(
-    watched: Compensator, units: list[Unit], rows: list[tuple[float, ...]], quiet: bool
+    watched: Compensator, units: list[SourceUnit], rows: list[tuple[float, ...]], quiet: bool
 ) -> None:
     table = np.array(rows, dtype=np.float64)
     age = np.abs(np.nan_to_num(table[:, 4], posinf=0, neginf=0)) % 5 if quiet else table[:, 4]
@@ -214,7 +214,7 @@ def test_scl_is_the_same_but_for_its_marks(watched: Compensator) -> None:
         assert bare(other.text("scl")) == bare(one.text("codesys"))
 
 
-def test_names_are_no_words_of_the_language(units: list[Unit]) -> None:
+def test_names_are_no_words_of_the_language(units: list[SourceUnit]) -> None:
     declared = {n for u in units for n in re.findall(r"^    (\w+) : ", u.declaration, re.M)}
     assert {"tc_time", "tc_step"} <= declared
     assert not {n for n in declared if n.lower() in RESERVED}

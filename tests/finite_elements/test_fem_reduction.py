@@ -16,13 +16,13 @@ from finite_elements.screw import Screw
 from finite_elements.transient import Stepper
 from thermocomp.core.exceptions import InputError
 from thermocomp.virtual.heat import HeatSources
-from thermocomp.virtual.machine import Drive
+from thermocomp.virtual.machine import FeedDrive
 from thermocomp.virtual.statespace import REFERENCE_TEMPERATURE, ReducedModel
 
 FloatArray = NDArray[np.float64]
 HOUR = 3600.0
 #: Chen's test at its highest speed (C-14), its axes moving: 6 h of running, 10 h of stop
-RUN, STOP = Drive(2600.0, (600.0, 1000.0, 600.0)), Drive()
+RUN, STOP = FeedDrive(2600.0, (600.0, 1000.0, 600.0)), FeedDrive()
 #: steps [s] after each change of the drive, and how many of them; then minutes
 PLAN = ((1.0, 30), (5.0, 54))
 
@@ -32,7 +32,7 @@ def warming(time: float) -> FloatArray:
     return np.array([22 + 1.8 * np.sin(time / 13751), 0.5 + 0.2 * np.sin(time / 9000), 0.4 * np.sin(time / 5000)])
 
 
-def given(model: FullModel | ReducedModel, drive: Drive) -> FloatArray:
+def given(model: FullModel | ReducedModel, drive: FeedDrive) -> FloatArray:
     """Heat of a drive [W], with the friction of warm bearings and a chiller that runs evenly."""
     source = HeatSources()
     heat = source.given(drive)
@@ -44,7 +44,7 @@ def given(model: FullModel | ReducedModel, drive: Drive) -> FloatArray:
     return np.array([heat.get(name, 0.0) for name in model.inputs])
 
 
-def shares(drive: Drive) -> dict[str, float]:
+def shares(drive: FeedDrive) -> dict[str, float]:
     source = HeatSources()
     feeds = {f"feed_{a}": source.moving(f) for a, f in zip("xyz", drive.feed, strict=True)}
     return {"rotation": source.rotation(drive.speed), "flow": 1.0} | feeds

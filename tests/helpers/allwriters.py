@@ -118,7 +118,7 @@ def _linuxcnc(folder: Path, version: int) -> None:
     """The HAL of a mill that `_inputs` has beside the program."""
     ini = write_linuxcnc_mill(_inputs(PLATE, version))
 
-    def prepare(path: Path, folder: Path, settings: HalSettings) -> halsetup.Prepared:
+    def prepare(path: Path, folder: Path, settings: HalSettings) -> halsetup.HalSetup:
         names = (folder / COMPONENT_NAME, folder / HAL_NAME)
         return found(path, Path("/tmp"), settings)._replace(files=names)  # it names its folder
 

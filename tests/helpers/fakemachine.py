@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.virtual.kits import CENTRE
-from thermocomp.virtual.machine import Air, Drive, Truth
+from thermocomp.virtual.machine import Air, FeedDrive, Truth
 
 FloatArray = NDArray[np.float64]
 
@@ -23,7 +23,7 @@ class FakeMachine:
     def init(self, air: Air) -> float:
         return 0.0 * air.temperature
 
-    def run(self, state: float, drives: Sequence[Drive], air: FloatArray, dt: float) -> tuple[float, Truth]:
+    def run(self, state: float, drives: Sequence[FeedDrive], air: FloatArray, dt: float) -> tuple[float, Truth]:
         self.steps.append(len(drives))
         warm = state + 0.001 * dt / 60.0 * np.cumsum([d.speed for d in drives])
         temperatures = np.repeat((air[:, 0] + warm)[:, None], len(self.places), axis=1)

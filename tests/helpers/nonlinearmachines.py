@@ -4,12 +4,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.virtual.centre import MachiningCentre
-from thermocomp.virtual.machine import Air, Drive, Truth
+from thermocomp.virtual.machine import Air, FeedDrive, Truth
 from thermocomp.virtual.toolsystem import RestingTool
 
 FloatArray = NDArray[np.float64]
 AIR = Air(22.0)
-HEATED = Drive(loads={"heater": 60.0, "tip": 5.0})
+HEATED = FeedDrive(loads={"heater": 60.0, "tip": 5.0})
 
 
 def steps(n: int, air: Air = AIR) -> FloatArray:

@@ -16,7 +16,7 @@ from blark import transform as b
 from blark.parse import parse_source_code
 
 from thermocomp.export.block.tables import gather
-from thermocomp.export.st.structuredtext import NOTHING, Unit, translate
+from thermocomp.export.st.structuredtext import NOTHING, SourceUnit, translate
 from thermocomp.export.vectors import Answers, Readings, replay
 from thermocomp.runtime.compensator import Compensator
 
@@ -83,11 +83,11 @@ class Machine:
 
     Parameters
     ----------
-    units : sequence of Unit
+    units : sequence of SourceUnit
         The function block is the last.
     """
 
-    def __init__(self, units: Sequence[Unit]) -> None:
+    def __init__(self, units: Sequence[SourceUnit]) -> None:
         self._structs = {u.name: declared(u.declaration) for u in units if not u.end}
         blocks = [parsed(u.text("codesys")) for u in units if u.end]
         self._heads = {str(block.name): _head(block) for block in blocks}

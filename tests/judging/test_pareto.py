@@ -14,7 +14,7 @@ from thermocomp.judging import budget, pareto, sensorsets, splits
 from thermocomp.judging.choice import Settings
 from thermocomp.judging.compare import compare
 from thermocomp.judging.metrics import rms
-from thermocomp.models.selection.standins import Answer
+from thermocomp.models.selection.standins import StandInAnswer
 from thermocomp.recordings.readers.recordings import read
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.stacking import stack
@@ -85,7 +85,7 @@ def by_hand(errors: list[list[float]], none: list[float]) -> budget.Budget:
         none=np.array([none]),
         frequency=np.ones((4, 4)),
         condition=np.ones(4),
-        answer=Answer(np.zeros((1, 4, 1)), np.eye(4), 0.4),
+        answer=StandInAnswer(np.zeros((1, 4, 1)), np.eye(4), 0.4),
     )
 
 

@@ -31,9 +31,9 @@ from thermocomp.live.journal.journalrows import (
     ReadingRow,
     ReferenceRow,
     Row,
-    Start,
+    StartRow,
     StateRow,
-    Target,
+    TargetRow,
     UpdateRow,
     dumps,
     kind_of,
@@ -42,7 +42,7 @@ from thermocomp.live.journal.journalrows import (
 )
 
 CHANNELS = (Channel("t1_C", "temperature", "degC"), Channel("spindle_rpm", "spindle_speed", "1/min", "motor"))
-START = Start(1000.0, (Target("z_um"), Target("Z", position=250.0)), CHANNELS, "off", 5.0)
+START = StartRow(1000.0, (TargetRow("z_um"), TargetRow("Z", position=250.0)), CHANNELS, "off", 5.0)
 SMALL = JournalLimits(size_bytes=2**16, files=3)
 ROWS: tuple[Row, ...] = (
     ReadingRow(1001.0, {"t1_C": 20.125, "spindle_rpm": 3000.0}),
@@ -57,7 +57,7 @@ ROWS: tuple[Row, ...] = (
 )
 
 
-def opened(folder: Path, limits: JournalLimits = SMALL, start: Start = START) -> Journal:
+def opened(folder: Path, limits: JournalLimits = SMALL, start: StartRow = START) -> Journal:
     return Journal.open(folder / "live.db", limits, start)
 
 
@@ -171,7 +171,7 @@ _anything = st.one_of(
 
 
 @settings(max_examples=300, deadline=None)
-@given(kind=st.sampled_from([k for k in KINDS.values() if k is not Start]), data=st.data())
+@given(kind=st.sampled_from([k for k in KINDS.values() if k is not StartRow]), data=st.data())
 def test_hostile_rows_never_raise_and_never_make_a_journal_unreadable(kind: Any, data: st.DataObject) -> None:
     values = [data.draw(_anything) for _ in kind._fields]
     if kind is ReadingRow:
@@ -208,13 +208,13 @@ def test_of_a_reading_what_is_no_number_is_missing() -> None:
         START._replace(time=float("nan")),
         START._replace(own_compensation="perhaps"),  # type: ignore[arg-type]
         START._replace(confirm_within=0.0),
-        START._replace(targets=(Target("z_um"), Target("z_um"))),
+        START._replace(targets=(TargetRow("z_um"), TargetRow("z_um"))),
         START._replace(channels=(CHANNELS[0], CHANNELS[0])),
         START._replace(targets=None),  # type: ignore[arg-type]
-        START._replace(targets=(Target("z_um", position=float("inf")),)),
+        START._replace(targets=(TargetRow("z_um", position=float("inf")),)),
     ],
 )
-def test_a_start_that_cannot_be_is_said_at_once(start: Start, tmp_path: Path) -> None:
+def test_a_start_that_cannot_be_is_said_at_once(start: StartRow, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"live\.db: the journal cannot begin"):
         opened(tmp_path, start=start)
     assert list(tmp_path.iterdir()) == []
@@ -384,7 +384,7 @@ def test_files_are_turned_over_and_the_oldest_goes(tmp_path: Path) -> None:
     assert len(names) == 3
     assert names[0] > "live.000005.db"
     reader = JournalReader(tmp_path / "live.db")
-    assert sum(isinstance(s.row, Start) for s in reader.rows()) == 1
+    assert sum(isinstance(s.row, StartRow) for s in reader.rows()) == 1
     assert reader.summary().lost == 0
     assert numbers([s.row for s in reader.latest(250)]) == list(range(5750, 6000))
     one = [s.row for s in JournalReader(tmp_path / names[1]).rows()]
@@ -408,7 +408,7 @@ def test_runs_follow_each_other_in_one_file(tmp_path: Path) -> None:
         journal = opened(tmp_path, start=START._replace(time=1000.0 * run))
         journal.add(AlarmRow(1000.0 * run + 1, "run", str(run)))
         journal.close()
-    assert [type(r) for r in read(tmp_path)] == [Start, AlarmRow] * 3
+    assert [type(r) for r in read(tmp_path)] == [StartRow, AlarmRow] * 3
     assert [p.name for p in tmp_path.iterdir()] == ["live.000001.db"]
 
 
@@ -576,7 +576,7 @@ def test_a_reader_keeps_nobody_from_writing(tmp_path: Path) -> None:
         journal.add(alarm(k))
     journal.flush()
     rows = JournalReader(tmp_path / "live.db").rows()
-    assert isinstance(next(rows).row, Start)
+    assert isinstance(next(rows).row, StartRow)
     for k in range(100, 4000):
         journal.add(alarm(k))
         assert k % 100 or journal.flush()

@@ -16,9 +16,9 @@ from thermocomp.live.journal.journalrows import (
     MeasurementRow,
     ReadingRow,
     ReferenceRow,
-    Start,
+    StartRow,
     StateRow,
-    Target,
+    TargetRow,
     UpdateRow,
 )
 from thermocomp.recordings.readers import recordings
@@ -32,7 +32,7 @@ def live(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Journal:
     monkeypatch.chdir(tmp_path)
     test = small_machine()
     channels = tuple(c for c in test.channels if c.name != "x_um")
-    start = Start(BEGIN, (Target("z_um"),), channels, "off", 90.0)
+    start = StartRow(BEGIN, (TargetRow("z_um"),), channels, "off", 90.0)
     journal = Journal.open("live.db", JournalLimits(), start)
     for time, values in zip(test.time.tolist(), test.table.to_dict("records"), strict=True):
         c = -3.0 - time / 10_000
@@ -101,7 +101,7 @@ def test_a_run_beside_another_compensation_is_refused(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     channels = (Channel("t1_C", "temperature", "degC"), Channel("z_um", "displacement", "um"))
-    journal = Journal.open("live.db", JournalLimits(), Start(BEGIN, (Target("z_um"),), channels, "unknown", 90.0))
+    journal = Journal.open("live.db", JournalLimits(), StartRow(BEGIN, (TargetRow("z_um"),), channels, "unknown", 90.0))
     for k in range(300):
         journal.add(ConfirmationRow(BEGIN + 60 * k, "z_um", Correction(-3.0)))
         journal.add(ReadingRow(BEGIN + 60 * k, {"t1_C": 20.0 + k / 100, "z_um": k / 50}))

@@ -22,8 +22,8 @@ from thermocomp.live.journal.journalrows import (
     MeasurementRow,
     ReadingRow,
     Row,
-    Start,
-    Target,
+    StartRow,
+    TargetRow,
 )
 from thermocomp.recordings.checks.quality import check
 from thermocomp.recordings.readers import recordings
@@ -36,9 +36,9 @@ Z = Channel("z_um", "displacement", "um")
 HEAT = Channel("t1_C", "temperature", "degC")
 
 
-def start_of(test: Recording, targets: Sequence[str], *, measured: bool = True, **how: Any) -> Start:
+def start_of(test: Recording, targets: Sequence[str], *, measured: bool = True, **how: Any) -> StartRow:
     kept = [c for c in test.channels if c.quantity != "displacement" or (measured and c.name in targets)]
-    start = Start(BEGIN, tuple(Target(t) for t in targets), tuple(kept), "off", 100.0)
+    start = StartRow(BEGIN, tuple(TargetRow(t) for t in targets), tuple(kept), "off", 100.0)
     return start._replace(**how)
 
 
@@ -47,7 +47,7 @@ def fake_correction(time: FloatArray, k: int = 0) -> FloatArray:
     return np.asarray(-20.0 * np.sin(time / 5000.0 + k) - 5.0)
 
 
-def journal_of(path: Path, start: Start, rows: Sequence[Row], **limits: int) -> JournalReader:
+def journal_of(path: Path, start: StartRow, rows: Sequence[Row], **limits: int) -> JournalReader:
     journal = Journal.open(path, JournalLimits(**limits), start)
     for k, row in enumerate(rows):
         journal.add(row)
@@ -159,7 +159,7 @@ def test_without_a_fresh_confirmation_a_cell_is_empty(tmp_path: Path) -> None:
 
 def test_a_confirmation_is_of_its_run(tmp_path: Path) -> None:
     path = tmp_path / "live.db"
-    one = Start(BEGIN, (Target("z_um"),), (HEAT, Z), "off", 1000.0)
+    one = StartRow(BEGIN, (TargetRow("z_um"),), (HEAT, Z), "off", 1000.0)
     journal_of(path, one, [ConfirmationRow(BEGIN, "z_um", Correction(-5.0)), ReadingRow(BEGIN + 1, {"z_um": 3.0})])
     two = one._replace(time=BEGIN + 2)
     reader = journal_of(path, two, [ReadingRow(BEGIN + 3, {"z_um": 3.0})])
@@ -167,7 +167,7 @@ def test_a_confirmation_is_of_its_run(tmp_path: Path) -> None:
 
 
 def test_a_correction_along_the_axis_is_taken_where_it_is_measured(tmp_path: Path) -> None:
-    start = Start(BEGIN, (Target("z_um", position=300.0),), (HEAT, Z), "off", 10.0)
+    start = StartRow(BEGIN, (TargetRow("z_um", position=300.0),), (HEAT, Z), "off", 10.0)
     rows: list[Row] = [ConfirmationRow(BEGIN, "z_um", Correction(-5.0, 20.0, 100.0)), ReadingRow(BEGIN, {"z_um": 3.0})]
     table = export(journal_of(tmp_path / "live.db", start, rows)).recording.table
     assert table["z_correction_um"].tolist() == [-1.0]
@@ -191,7 +191,7 @@ def test_probings_by_either_frame_say_the_same(
     rows.append(MeasurementRow(BEGIN + 503.0, "Z", seen, "probing", includes_offset, 250.0, in_force))
     for kind in ("work_offset", "tool_length"):
         rows.append(MeasurementRow(BEGIN + 600.0, "Z", 77.0, kind, includes_offset, 250.0, in_force))
-    start = Start(BEGIN, (Target("Z"),), (HEAT,), "off", 15.0)
+    start = StartRow(BEGIN, (TargetRow("Z"),), (HEAT,), "off", 15.0)
     found = export(journal_of(tmp_path / "live.db", start, rows))
     assert found.targets == (("Z", 1, 1),)
     assert any("2 work offsets and tool lengths are not in it" in n for n in found.notes)
@@ -208,7 +208,7 @@ def test_a_probing_without_a_confirmation(includes_offset: bool, known: int, tmp
         ReadingRow(BEGIN, {"t1_C": 20.0}),
         MeasurementRow(BEGIN, "z_um", 3.0, "probing", includes_offset),
     ]
-    start = Start(BEGIN, (Target("z_um"),), (HEAT,), "off", 15.0)
+    start = StartRow(BEGIN, (TargetRow("z_um"),), (HEAT,), "off", 15.0)
     found = export(journal_of(tmp_path / "live.db", start, rows))
     assert found.targets == (("z_um", 1, known),)
     assert found.recording.compensation == ("known" if known else "unknown")
@@ -227,7 +227,7 @@ def test_a_probing_beside_another_compensation(own: Any, includes_offset: bool, 
         ReadingRow(BEGIN + 1, {"t1_C": 20.0}),
         MeasurementRow(BEGIN + 1, "z_um", 3.0, "probing", False, 0.0, Correction(-12.0)),
     ]
-    found = export(journal_of(tmp_path / "live.db", Start(BEGIN, (Target("z_um"),), (HEAT,), own, 15.0), rows))
+    found = export(journal_of(tmp_path / "live.db", StartRow(BEGIN, (TargetRow("z_um"),), (HEAT,), own, 15.0), rows))
     assert found.recording.compensation == "unknown"
     table = found.recording.table
     assert table["z_um"].isna().all()
@@ -237,7 +237,7 @@ def test_a_probing_beside_another_compensation(own: Any, includes_offset: bool, 
 
 def test_a_probing_far_from_any_reading_is_told(tmp_path: Path) -> None:
     rows: list[Row] = [ReadingRow(BEGIN, {"t1_C": 20.0}), MeasurementRow(BEGIN + 61.0, "z_um", 3.0, "probing", True)]
-    start = Start(BEGIN, (Target("z_um"),), (HEAT,), "off", 15.0)
+    start = StartRow(BEGIN, (TargetRow("z_um"),), (HEAT,), "off", 15.0)
     found = export(journal_of(tmp_path / "live.db", start, rows))
     assert found.notes == ("z_um: 1 probings are not in it: there is no reading within 60 s",)
 
@@ -247,7 +247,7 @@ def test_a_probing_far_from_any_reading_is_told(tmp_path: Path) -> None:
 
 def test_readings_of_one_time_and_those_between(tmp_path: Path) -> None:
     rows: list[Row] = [ReadingRow(BEGIN + t, {"t1_C": 20.0 + t}) for t in (0.0, 0.0, 2.0, 1.0, 5.0, 9.0, 10.0)]
-    start = Start(BEGIN, (), (HEAT,), "off", 15.0)
+    start = StartRow(BEGIN, (), (HEAT,), "off", 15.0)
     reader = journal_of(tmp_path / "live.db", start, rows)
     assert export(reader).recording.time.tolist() == [0.0, 1.0, 2.0, 5.0, 9.0, 10.0]
     assert export(reader, every=5.0).recording.time.tolist() == [0.0, 5.0, 10.0]
@@ -255,7 +255,7 @@ def test_readings_of_one_time_and_those_between(tmp_path: Path) -> None:
 
 def test_an_angle_has_its_deviation_alone(tmp_path: Path) -> None:
     tilt = Channel("a_urad", "angle", "urad")
-    start = Start(BEGIN, (Target("a_urad", "angle", "urad"),), (HEAT, tilt), "off", 15.0)
+    start = StartRow(BEGIN, (TargetRow("a_urad", "angle", "urad"),), (HEAT, tilt), "off", 15.0)
     rows: list[Row] = [
         ConfirmationRow(BEGIN, "a_urad", Correction(-5.0)),
         ReadingRow(BEGIN, {"a_urad": 3.0, "t1_C": 20.0}),
@@ -266,7 +266,7 @@ def test_an_angle_has_its_deviation_alone(tmp_path: Path) -> None:
 
 
 def test_what_was_never_measured_has_its_correction(tmp_path: Path) -> None:
-    start = Start(BEGIN, (Target("z_um"),), (HEAT,), "off", 15.0)
+    start = StartRow(BEGIN, (TargetRow("z_um"),), (HEAT,), "off", 15.0)
     rows: list[Row] = [ConfirmationRow(BEGIN, "z_um", Correction(-5.0)), ReadingRow(BEGIN, {"t1_C": 20.0})]
     again = saved(export(journal_of(tmp_path / "live.db", start, rows)), tmp_path)
     assert [c.name for c in again.channels] == ["t1_C", "z_correction_um"]
@@ -275,7 +275,7 @@ def test_what_was_never_measured_has_its_correction(tmp_path: Path) -> None:
 
 
 def test_journals_that_are_no_recording(tmp_path: Path) -> None:
-    start = Start(BEGIN, (Target("z_um"),), (HEAT,), "off", 15.0)
+    start = StartRow(BEGIN, (TargetRow("z_um"),), (HEAT,), "off", 15.0)
     with pytest.raises(InputError, match=r"live\.000001\.db: the journal holds no reading yet"):
         export(journal_of(tmp_path / "live.db", start, []))
     other = start._replace(channels=(Channel("t1_C", "displacement", "um"),))
@@ -290,7 +290,7 @@ def test_journals_that_are_no_recording(tmp_path: Path) -> None:
 
 
 def test_a_clock_that_was_never_set(tmp_path: Path) -> None:
-    start = Start(0.0, (), (HEAT,), "off", 15.0)
+    start = StartRow(0.0, (), (HEAT,), "off", 15.0)
     found = export(journal_of(tmp_path / "live.db", start, [ReadingRow(1e14, {"t1_C": 20.0})]))
     assert found.recording.start == ""
 
@@ -321,7 +321,7 @@ def test_a_model_is_fitted_to_probings_alone(tmp_path: Path) -> None:
 @pytest.mark.parametrize("again", [False, True])
 def test_a_clock_that_is_set_back_mixes_no_times(again: bool, tmp_path: Path) -> None:
     """The first hour says 100 um and 1 um are corrected, the second, from the same half hour on, 200 and 2."""
-    path, start = tmp_path / "live.db", Start(BEGIN, (Target("z_um"),), (HEAT, Z), "off", 30.0)
+    path, start = tmp_path / "live.db", StartRow(BEGIN, (TargetRow("z_um"),), (HEAT, Z), "off", 30.0)
     journal = Journal.open(path, JournalLimits(), start)
     for part, (begin, size) in enumerate(((0.0, 1.0), (1800.0, 2.0))):
         if part and again:  # the service was started anew, by the other clock

@@ -11,7 +11,7 @@ from test_loop import Broken, Given, machine, running, say, until
 
 from thermocomp.core.correction import Correction
 from thermocomp.core.exceptions import ThermocompError
-from thermocomp.core.ports import Status
+from thermocomp.core.ports import LinkStatus
 from thermocomp.core.reading import Measurement, Reading
 from thermocomp.live import links
 from thermocomp.live.adapters.mqtt import MqttSink, MqttSource
@@ -71,7 +71,7 @@ class Bad(Given):
         yield Measurement(0.0, "z_um", 1.0, False)
         self.fail("middle")
 
-    def status(self) -> Status:
+    def status(self) -> LinkStatus:
         self.fail("status")
         return super().status()
 
@@ -100,8 +100,8 @@ class BadSink(Broken):
             raise self.error
         return {}
 
-    def status(self) -> Status:
-        return Status("connected")
+    def status(self) -> LinkStatus:
+        return LinkStatus("connected")
 
     async def close(self) -> None:
         if self.where == "close":

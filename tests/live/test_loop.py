@@ -15,7 +15,7 @@ from driftmodels import ACCEPTED, growing
 
 from thermocomp.core.correction import Correction, Limits
 from thermocomp.core.exceptions import InputError, ThermocompError
-from thermocomp.core.ports import Status as LinkStatus
+from thermocomp.core.ports import LinkStatus
 from thermocomp.core.reading import Measurement, Reading
 from thermocomp.live import loop, statefile
 from thermocomp.live.adapters.mqtt import MqttSink, MqttSource

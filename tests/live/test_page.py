@@ -15,7 +15,7 @@ from watchedmachine import failing, watched_model
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.reading import Measurement, Reading
-from thermocomp.live.clock import Clock
+from thermocomp.live.clock import ServiceClock
 from thermocomp.live.loop import Service
 from thermocomp.live.page import page, web
 from thermocomp.live.page.page import make_app
@@ -188,7 +188,7 @@ def test_a_port_that_is_taken_is_told() -> None:
         web.listen("127.0.0.1", taken.getsockname()[1])
 
 
-class Told(Clock):
+class Told(ServiceClock):
     """The clock of a machine whose rows say what time it is."""
 
     at = 0.0

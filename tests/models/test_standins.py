@@ -9,7 +9,7 @@ from smallmachine import two_that_matter
 
 from thermocomp.judging.sensorsets import choose_sets
 from thermocomp.models.numerics.folds import halve
-from thermocomp.models.selection.standins import Answer, make_up
+from thermocomp.models.selection.standins import StandInAnswer, make_up
 from thermocomp.recordings.readers.recordings import read
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.stacking import stack
@@ -49,7 +49,7 @@ def test_a_dead_sensor_makes_nothing_and_costs_nothing(three: np.ndarray) -> Non
     for noise in (0.0, 0.4):
         assert make_up(gram, [0, 2], noise)[:, 3] == pytest.approx(0)
         assert make_up(gram, [3], noise)[:, :3] == pytest.approx(0)
-        answer = Answer(np.ones((1, 4, 1)), gram, noise)
+        answer = StandInAnswer(np.ones((1, 4, 1)), gram, noise)
         assert answer.stand_ins([0, 2]).residual[3] == 0
         assert answer.stand_ins([0, 2]).loss[3] == 0
     assert make_up(np.zeros((2, 2)), [0], 0.0) == pytest.approx(np.array([[1, 0], [0, 0]]))  # all of them are dead
@@ -61,7 +61,7 @@ def test_with_none_kept_nothing_is_made(three: np.ndarray) -> None:
 
 def test_stand_ins_and_what_they_cost(three: np.ndarray) -> None:
     """The answer is 1 um per degC of the second sensor: what is missed of it is lost of the answer."""
-    answer = Answer(np.array([[[0.0], [1.0], [0.0]]]), three, 0.0)
+    answer = StandInAnswer(np.array([[[0.0], [1.0], [0.0]]]), three, 0.0)
     found = answer.stand_ins([0, 2])
     assert found.single[:2] == (1, 0)
     assert found.single_residual[:2] == pytest.approx([0, 0], abs=1e-5)
@@ -81,13 +81,13 @@ def test_stand_ins_and_what_they_cost(three: np.ndarray) -> None:
 def test_what_lags_lose_together_is_counted_together() -> None:
     """The lag takes back what the temperature says: the answer loses nothing, though each of them would."""
     gram = np.ones((2, 2))
-    both = Answer(np.array([[[1.0]], [[-1.0]]]), gram, 0.0)
+    both = StandInAnswer(np.array([[[1.0]], [[-1.0]]]), gram, 0.0)
     assert both.lose(np.zeros((1, 1)))[0] == 0
-    assert Answer(np.array([[[1.0]], [[1.0]]]), gram, 0.0).lose(np.zeros((1, 1)))[0] == pytest.approx(2)
+    assert StandInAnswer(np.array([[[1.0]], [[1.0]]]), gram, 0.0).lose(np.zeros((1, 1)))[0] == pytest.approx(2)
 
 
 def test_a_single_temperature_has_no_other() -> None:
-    found = Answer(np.ones((1, 1, 1)), np.eye(1), 0.4).stand_ins([0])
+    found = StandInAnswer(np.ones((1, 1, 1)), np.eye(1), 0.4).stand_ins([0])
     assert found.single == (0,)
     assert np.isinf(found.single_residual[0])
     assert found.residual[0] == found.loss[0, 0] == 1

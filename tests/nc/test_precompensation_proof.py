@@ -11,7 +11,7 @@ from thermocomp.core.exceptions import InputError, ProgramError
 from thermocomp.nc.interpreter.block import Block, Modal, Setup
 from thermocomp.nc.linuxcnc import rs274
 from thermocomp.nc.linuxcnc.verification.states import build_stored
-from thermocomp.nc.linuxcnc.verification.verify import Ledger, Shift, prove
+from thermocomp.nc.linuxcnc.verification.verify import Ledger, LineShift, prove
 from thermocomp.nc.parser.line import Line
 from thermocomp.nc.rewrite.revise import Revised
 
@@ -56,12 +56,12 @@ def test_a_ledger_is_kept_short() -> None:
     made = ledger(
         [(NONE, NONE)] * 5 + [((1.0, 0.0, 0.0), NONE)] * 2 + [((1.0, 0.0, 2.0), (0.0, 0.0, 3.0))], inverse=[8]
     )
-    assert made.at(0) == Shift(NONE, NONE, NONE, inverse=False)
-    assert made.at(1) == made.at(5) == Shift(NONE, NONE, NONE, inverse=False)
-    assert made.at(6) == Shift(NONE, (1.0, 0.0, 0.0), NONE, inverse=False)
-    assert made.at(7) == Shift((1.0, 0.0, 0.0), (1.0, 0.0, 0.0), NONE, inverse=False)
-    assert made.at(8) == Shift((1.0, 0.0, 0.0), (1.0, 0.0, 2.0), (0.0, 0.0, 3.0), inverse=True)
-    assert made.at(9) == Shift((1.0, 0.0, 2.0), (1.0, 0.0, 2.0), (0.0, 0.0, 3.0), inverse=True)
+    assert made.at(0) == LineShift(NONE, NONE, NONE, inverse=False)
+    assert made.at(1) == made.at(5) == LineShift(NONE, NONE, NONE, inverse=False)
+    assert made.at(6) == LineShift(NONE, (1.0, 0.0, 0.0), NONE, inverse=False)
+    assert made.at(7) == LineShift((1.0, 0.0, 0.0), (1.0, 0.0, 0.0), NONE, inverse=False)
+    assert made.at(8) == LineShift((1.0, 0.0, 0.0), (1.0, 0.0, 2.0), (0.0, 0.0, 3.0), inverse=True)
+    assert made.at(9) == LineShift((1.0, 0.0, 2.0), (1.0, 0.0, 2.0), (0.0, 0.0, 3.0), inverse=True)
     assert len(made._carried.lines) == 2
     assert made.originals(np.arange(1, 9)).tolist() == list(range(1, 9))
 

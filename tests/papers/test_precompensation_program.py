@@ -167,7 +167,7 @@ def test_a_surface_is_what_is_commanded_plus_the_drift_at_its_time_and_place() -
     test = recorded()
     table = test.table.assign(**{f"z_at_{p}_um": p / 100 + test.time / 60 for p in POSITIONS})
     truth = Recording(test.name, test.time, table, test.channels, test.cycles)
-    face = program.Face(1, 300.0, np.array([30.0, 600.0]), np.array([-4.0, -5.0]))
+    face = program.FacedSurface(1, 300.0, np.array([30.0, 600.0]), np.array([-4.0, -5.0]))
     # 300 mm lies in the middle of two positions; -5 um is 5e-6 of the way to the next one
     assert face.surface(truth) == pytest.approx([-4 + 3 + 0.5, -5 + 3 + 10], abs=1e-3)
 

@@ -19,7 +19,16 @@ from thermocomp.papers.wessel2004 import sets as wessel2004_sets
 from thermocomp.papers.wessel2004 import spindle as wessel2004_spindle
 from thermocomp.papers.wessel2004 import tools as wessel2004_tools
 from thermocomp.papers.wessel2004.sets import Selection
-from thermocomp.papers.wessel2004.trial import ACE_NAME, FROM_START, MLR_NAME, Trial, loop_width, place, stacked, trial
+from thermocomp.papers.wessel2004.trial import (
+    ACE_NAME,
+    FROM_START,
+    MLR_NAME,
+    MillingTrial,
+    loop_width,
+    place,
+    stacked,
+    trial,
+)
 from thermocomp.recordings.cycles import make_single_cycle
 from thermocomp.recordings.recording import Recording
 from thermocomp.virtual.datasets import record
@@ -300,7 +309,7 @@ def test_names_of_places() -> None:
 # -- claims on residuals that are set --------------------------------------------------------------------------------
 
 
-def judged(residual: Callable[[FloatArray], tuple[FloatArray, FloatArray]]) -> Trial:
+def judged(residual: Callable[[FloatArray], tuple[FloatArray, FloatArray]]) -> MillingTrial:
     """Return a trial of 100 points with the residuals of (linear regression, ACE) given."""
     found = trial([curved(199, 10.0), curved(100, 9.0, seed=1)], 0, (0, 1), beside=False)
     linear, ace = residual(np.arange(1.0, 101.0))
@@ -310,7 +319,7 @@ def judged(residual: Callable[[FloatArray], tuple[FloatArray, FloatArray]]) -> T
 
 
 def test_the_local_gain_is_the_greatest_of_ten_stretches() -> None:
-    def locally(found: Trial) -> Claim:
+    def locally(found: MillingTrial) -> Claim:
         return wessel2004_tools._locally(
             wessel2004_tools.Resting(found, found, selection([[[0.4, 0.5, 0.6]]], [(0,)]), {})
         )

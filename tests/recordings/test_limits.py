@@ -11,7 +11,7 @@ import pytest
 from hostile_files import HOSTILE
 
 from thermocomp.core.exceptions import InputError, RecordingError
-from thermocomp.recordings.readers.limits import _COUNTED, Limits
+from thermocomp.recordings.readers.limits import _COUNTED, FileLimits
 from thermocomp.recordings.readers.mapping import ColumnMap, Mapping, ReadOptions, read_mapping
 from thermocomp.recordings.readers.parquet import open_parquet
 from thermocomp.recordings.readers.recordings import read
@@ -38,7 +38,7 @@ def test_a_text_over_a_limit_says_which_and_how_to_raise_it(tmp_path: Path, limi
     path.write_text(TEXT)
 
     with pytest.raises(RecordingError, match=rf"rec\.csv: {place}over {most:,} .*mapping, \[limits\] {limit} = \d+$"):
-        read(path, Mapping(limits=Limits(**{limit: most})))
+        read(path, Mapping(limits=FileLimits(**{limit: most})))
 
     toml = tmp_path / "m.toml"
     toml.write_text(f"[limits]\n{limit} = 1000")
@@ -63,7 +63,7 @@ def test_a_workbook_over_a_limit_says_which(tmp_path: Path, limit: str, most: in
         pd.DataFrame().to_excel(book, sheet_name="b")
 
     with pytest.raises(RecordingError, match=rf"rec\.xlsx: .*over {most:,} .*\[limits\] {limit} = \d+$") as caught:
-        read(path, Mapping(limits=Limits(**{limit: most})))
+        read(path, Mapping(limits=FileLimits(**{limit: most})))
     assert place in str(caught.value)
 
 
@@ -76,7 +76,7 @@ def test_what_grows_too_much_may_grow_by_a_mapping(tmp_path: Path, name: str) ->
     with pytest.raises(RecordingError, match=rf"rec\.{ending}: over 100 times its size .*\[limits\] growth = \d+"):
         read(path)
     with pytest.raises(RecordingError, match=r"over 50,000 cells"):  # the next limit
-        read(path, Mapping(limits=Limits(growth=10**9, cells=50_000)))
+        read(path, Mapping(limits=FileLimits(growth=10**9, cells=50_000)))
 
 
 def test_a_parquet_file_is_refused_by_what_it_says_of_itself(tmp_path: Path) -> None:
@@ -84,7 +84,7 @@ def test_a_parquet_file_is_refused_by_what_it_says_of_itself(tmp_path: Path) -> 
     path.write_bytes(HOSTILE["parquet rows"][1]())
 
     with pytest.raises(RecordingError, match=r"over 100 times its size"):
-        open_parquet(path, ReadOptions(), Limits())  # nothing of it is loaded
+        open_parquet(path, ReadOptions(), FileLimits())  # nothing of it is loaded
 
 
 def test_a_file_does_not_raise_its_own_limits(tmp_path: Path) -> None:
@@ -93,11 +93,11 @@ def test_a_file_does_not_raise_its_own_limits(tmp_path: Path) -> None:
 
     assert read(path).channels[0].place == "front"
     with pytest.raises(RecordingError, match="over 2 thermal cycles"):
-        read(path, Mapping(limits=Limits(cycles=2)))
+        read(path, Mapping(limits=FileLimits(cycles=2)))
 
 
 def test_a_limit_is_a_whole_number_that_is_known(tmp_path: Path) -> None:
-    assert set(_COUNTED) == {f.name for f in fields(Limits)}
+    assert set(_COUNTED) == {f.name for f in fields(FileLimits)}
     for text, message in (
         ("rows = 0", r"\[limits\]: rows = 0: must be at least 1"),
         ("row = 5", "unknown key 'row'; did you mean 'rows'"),
@@ -133,7 +133,7 @@ def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
 def test_many_labels_and_columns_are_read(tmp_path: Path) -> None:
     path = tmp_path / "rec.csv"
     path.write_text("time_s,t1_C,cycle\n" + "".join(f"{k},20,c{k}\n" for k in range(200_000)))
-    assert len(read(path, Mapping(limits=Limits(cycles=200_000))).cycles) == 200_000
+    assert len(read(path, Mapping(limits=FileLimits(cycles=200_000))).cycles) == 200_000
 
     wide = pd.DataFrame({"time_s": [0.0, 1.0], "t_C": 20.0, **{f"sensor {k} of no unit": 1.0 for k in range(9_000)}})
     for ending in ("csv", "xlsx", "parquet"):

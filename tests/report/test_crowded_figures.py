@@ -13,7 +13,7 @@ from smallmachine import small_machine
 from thermocomp.judging import budget, splits
 from thermocomp.judging.compare import compare
 from thermocomp.judging.results import Comparison
-from thermocomp.models.selection.standins import Answer
+from thermocomp.models.selection.standins import StandInAnswer
 from thermocomp.recordings.samples import Samples
 from thermocomp.report import figures, html, selections
 from thermocomp.report.drawing import drawing, log_ticks
@@ -77,7 +77,7 @@ def few(names: tuple[str, ...], condition: float) -> budget.Budget:
         none=np.full((len(names), 3), 20.0),
         frequency=np.ones((4, 4)),
         condition=np.geomspace(1, condition, 4),
-        answer=Answer(np.zeros((1, 4, len(names))), np.eye(4), 0.4),
+        answer=StandInAnswer(np.zeros((1, 4, len(names))), np.eye(4), 0.4),
     )
 
 

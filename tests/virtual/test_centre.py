@@ -14,13 +14,13 @@ from thermocomp.virtual.axes import N_HATS
 from thermocomp.virtual.centre import CentreState, MachiningCentre
 from thermocomp.virtual.heat import BearingFriction, HeatSources, swept
 from thermocomp.virtual.joints import Joints, slide_with_friction
-from thermocomp.virtual.machine import Air, Drive, Truth, VirtualMachine
+from thermocomp.virtual.machine import Air, FeedDrive, Truth, VirtualMachine
 from thermocomp.virtual.statespace import REFERENCE_TEMPERATURE
 
 FloatArray = NDArray[np.float64]
 HOUR = 3600.0
 AIR = Air(20.0)
-OFF = Drive(powered=False)
+OFF = FeedDrive(powered=False)
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +29,7 @@ def centre() -> MachiningCentre:
 
 
 def run(
-    machine: MachiningCentre, state: CentreState, drive: Drive, hours: float, air: Air = AIR, dt: float = 20.0
+    machine: MachiningCentre, state: CentreState, drive: FeedDrive, hours: float, air: Air = AIR, dt: float = 20.0
 ) -> tuple[CentreState, Truth]:
     n = round(hours * HOUR / dt)
     return machine.run(state, [drive] * n, np.tile(air.values, (n, 1)), dt)
@@ -43,7 +43,7 @@ def seen(machine: MachiningCentre, truth: Truth, name: str) -> FloatArray:
 
 def test_the_machine_fills_the_interface(centre: MachiningCentre) -> None:
     machine: VirtualMachine[CentreState] = centre
-    _, truth = machine.run(machine.init(AIR), [Drive()] * 3, np.tile(AIR.values, (3, 1)), 10.0)
+    _, truth = machine.run(machine.init(AIR), [FeedDrive()] * 3, np.tile(AIR.values, (3, 1)), 10.0)
     assert truth.temperatures.shape == (3, len(machine.places))
     assert truth.observables.shape == (3, len(machine.observables))
 
@@ -58,7 +58,7 @@ def test_a_machine_at_rest_in_its_air_stays_as_it_is(centre: MachiningCentre) ->
 
 
 def test_the_machine_cools_to_its_air(centre: MachiningCentre) -> None:
-    state, warm = run(centre, centre.init(AIR), Drive(3000.0), 6.0)
+    state, warm = run(centre, centre.init(AIR), FeedDrive(3000.0), 6.0)
     _, cold = run(centre, state, OFF, 8 * 24.0)
     assert warm.temperatures.max() > 35.0
     np.testing.assert_allclose(cold.temperatures[-1], 20.0, atol=0.1)
@@ -69,7 +69,7 @@ def test_the_machine_cools_to_its_air(centre: MachiningCentre) -> None:
 
 @pytest.mark.parametrize("cooled", [False, True])
 def test_the_step_size_hardly_matters(cooled: bool) -> None:
-    drives = [Drive(3000.0 * (k // 12 % 2 == 0), cooled=cooled) for k in range(48)]
+    drives = [FeedDrive(3000.0 * (k // 12 % 2 == 0), cooled=cooled) for k in range(48)]
     results = []
     for longest in (2.5, 20.0):
         machine = MachiningCentre(longest_step=longest)
@@ -80,7 +80,7 @@ def test_the_step_size_hardly_matters(cooled: bool) -> None:
 
 
 def test_in_blocks_it_is_the_same(centre: MachiningCentre) -> None:
-    drives = [Drive(2000.0, (600.0, 1000.0, 600.0))] * 100 + [Drive()] * 100
+    drives = [FeedDrive(2000.0, (600.0, 1000.0, 600.0))] * 100 + [FeedDrive()] * 100
     air = np.column_stack([np.linspace(20.0, 24.0, 200), np.full(200, 0.4), np.linspace(0.0, 0.2, 200)])
     state = centre.init(AIR)
     kept = state.field.copy()
@@ -116,9 +116,9 @@ def test_another_arithmetic_gives_the_same_machine() -> None:
 def test_magnitudes_are_those_of_a_machine_tool(centre: MachiningCentre) -> None:
     """Chen's warm-up and cool-down at his highest speed (C-14)."""
     air = Air(22.0)
-    rest, soaked = run(centre, centre.init(air), Drive(), 12.0, air)
-    state, warm = run(centre, rest, Drive(2600.0, (600.0, 1000.0, 600.0)), 6.0, air)
-    _, cold = run(centre, state, Drive(), 10.0, air)
+    rest, soaked = run(centre, centre.init(air), FeedDrive(), 12.0, air)
+    state, warm = run(centre, rest, FeedDrive(2600.0, (600.0, 1000.0, 600.0)), 6.0, air)
+    _, cold = run(centre, state, FeedDrive(), 10.0, air)
     z = seen(centre, warm, "z") - seen(centre, soaked, "z")[-1]
     assert -200.0 < z.min() < -20.0  # towards the workpiece
     for axis in "xy":
@@ -140,7 +140,7 @@ def rising(course: FloatArray, dt: float) -> float:
 
 
 def test_the_spindle_is_much_quicker_than_the_column(centre: MachiningCentre) -> None:
-    _, truth = run(centre, centre.init(AIR), Drive(2600.0), 16.0)
+    _, truth = run(centre, centre.init(AIR), FeedDrive(2600.0), 16.0)
     spindle = rising(seen(centre, truth, "tip"), 20.0)
     column = rising(seen(centre, truth, "column_front_right"), 20.0)
     assert 3 * 60.0 < spindle < HOUR
@@ -149,8 +149,8 @@ def test_the_spindle_is_much_quicker_than_the_column(centre: MachiningCentre) ->
 
 def test_temperature_against_displacement_is_a_loop(centre: MachiningCentre) -> None:
     """Hysteresis: at one temperature of the housing, z on the way down is not z on the way up."""
-    state, warm = run(centre, centre.init(AIR), Drive(2600.0), 6.0)
-    _, cold = run(centre, state, Drive(), 10.0)
+    state, warm = run(centre, centre.init(AIR), FeedDrive(2600.0), 6.0)
+    _, cold = run(centre, state, FeedDrive(), 10.0)
     t_up, z_up, t_down, z_down = (seen(centre, x, name) for x in (warm, cold) for name in ("housing", "z"))
     levels = np.linspace(t_up.min(), t_up.max(), 12)[2:-2]
     up = np.interp(levels, t_up, z_up)
@@ -161,7 +161,7 @@ def test_temperature_against_displacement_is_a_loop(centre: MachiningCentre) -> 
 def test_heat_and_cooling_are_nonlinear_in_speed(centre: MachiningCentre) -> None:
     rise = {}
     for speed in (0.0, 1500.0, 3000.0):
-        _, truth = run(centre, centre.init(AIR), Drive(speed, cooled=False), 1.0)
+        _, truth = run(centre, centre.init(AIR), FeedDrive(speed, cooled=False), 1.0)
         rise[speed] = seen(centre, truth, "front_bearing")[-1]
     ratio = (rise[3000.0] - rise[0.0]) / (rise[1500.0] - rise[0.0])
     assert 2.1 < ratio < 3.2  # 2 if heat went with n, 3.2 with n^(5/3) and no thinner oil, no more air
@@ -178,7 +178,7 @@ def test_bearing_friction_is_that_of_palmgren() -> None:
 
 
 def test_the_chiller_cycles(centre: MachiningCentre) -> None:
-    _, truth = run(centre, centre.init(AIR), Drive(), 24.0)
+    _, truth = run(centre, centre.init(AIR), FeedDrive(), 24.0)
     excess = (seen(centre, truth, "coolant") - seen(centre, truth, "bed_front"))[1080:]
     heat = centre.heat
     assert excess.min() == pytest.approx(heat.setpoint - heat.half_band, abs=0.15)
@@ -209,7 +209,7 @@ def test_where_the_nut_moves_matters_to_the_screw(centre: MachiningCentre) -> No
     """Near the bearing's end the whole screw beyond is pushed; at the far end only the rest."""
     profiles = []
     for stroke in ((0.0, 100.0), (450.0, 550.0)):
-        drive = Drive(0.0, (0.0, 8000.0, 0.0), (None, stroke, None))
+        drive = FeedDrive(0.0, (0.0, 8000.0, 0.0), (None, stroke, None))
         _, truth = run(centre, centre.init(AIR), drive, 2.0)
         profiles.append([seen(centre, truth, f"yy@{p}")[-1] for p in range(0, 551, 50)])
     slopes = np.abs(np.diff(np.array(profiles), axis=1))
@@ -218,14 +218,14 @@ def test_where_the_nut_moves_matters_to_the_screw(centre: MachiningCentre) -> No
 
 
 def test_loads_of_a_drive_are_heat(centre: MachiningCentre) -> None:
-    _, cutting = run(centre, centre.init(AIR), Drive(1000.0, loads={"tool_tip": 60.0}), 1.0)
-    _, idle = run(centre, centre.init(AIR), Drive(1000.0), 1.0)
+    _, cutting = run(centre, centre.init(AIR), FeedDrive(1000.0, loads={"tool_tip": 60.0}), 1.0)
+    _, idle = run(centre, centre.init(AIR), FeedDrive(1000.0), 1.0)
     assert seen(centre, cutting, "tool")[-1] > seen(centre, idle, "tool")[-1] + 2.0
     assert seen(centre, cutting, "z")[-1] < seen(centre, idle, "z")[-1] - 1.0
 
 
 def test_all_heat_has_a_place(centre: MachiningCentre) -> None:
-    given = HeatSources().given(Drive(3000.0, (500.0, 600.0, 700.0)))
+    given = HeatSources().given(FeedDrive(3000.0, (500.0, 600.0, 700.0)))
     assert set(given) <= set(centre.model.inputs)
     assert sum(v for k, v in given.items() if k.startswith("x_")) == pytest.approx(0.5 * (9.0 + 16.0))
     assert HeatSources().given(OFF) == {}
@@ -246,17 +246,17 @@ def test_joints_that_are_not_linear() -> None:
 
 
 def test_joints_act_on_the_tool_point_in_the_right_direction(centre: MachiningCentre) -> None:
-    _, truth = run(centre, centre.init(AIR), Drive(3000.0, cooled=False), 2.0)
+    _, truth = run(centre, centre.init(AIR), FeedDrive(3000.0, cooled=False), 2.0)
     tight = MachiningCentre(joints=replace(centre.joints, preload=centre.joints.preload + 1.0))
-    _, tighter = run(tight, tight.init(AIR), Drive(3000.0, cooled=False), 2.0)
+    _, tighter = run(tight, tight.init(AIR), FeedDrive(3000.0, cooled=False), 2.0)
     warmer = seen(centre, truth, "shaft") - seen(centre, truth, "front_seat")
     assert warmer[-1] > 3.0
     # a shaft that is pushed out comes nearer to the workpiece
     np.testing.assert_allclose(seen(centre, tighter, "z") - seen(centre, truth, "z"), -warmer, atol=1e-9)
     np.testing.assert_allclose(seen(centre, tighter, "tip") - seen(centre, truth, "tip"), warmer, atol=1e-9)
     spun = MachiningCentre(joints=replace(centre.joints, centrifugal=2.0, lift=-1.5))
-    _, drawn = run(spun, spun.init(AIR), Drive(3500.0 / 2), 20.0 / HOUR)
-    _, plain = run(centre, centre.init(AIR), Drive(3500.0 / 2), 20.0 / HOUR)
+    _, drawn = run(spun, spun.init(AIR), FeedDrive(3500.0 / 2), 20.0 / HOUR)
+    _, plain = run(centre, centre.init(AIR), FeedDrive(3500.0 / 2), 20.0 / HOUR)
     # centrifugal forces draw the shaft in, and let it sink
     assert (seen(centre, drawn, "z") - seen(centre, plain, "z"))[0] == pytest.approx(1.0 / 4)
     assert (seen(centre, drawn, "y") - seen(centre, plain, "y"))[0] == pytest.approx(-1.0 / 4)
@@ -275,14 +275,14 @@ def test_unusable_steps_are_refused(centre: MachiningCentre) -> None:
     state, air = centre.init(AIR), AIR.values[None]
     for dt in (0.0, -1.0, float("nan"), float("inf")):
         with pytest.raises(InputError, match="must be positive"):
-            centre.run(state, [Drive()], air, dt)
+            centre.run(state, [FeedDrive()], air, dt)
     with pytest.raises(InputError, match="beyond the machine's 3500"):
-        centre.run(state, [Drive(4000.0)], air, 1.0)
-    for drives, given in (([], air), ([Drive()] * 2, air), ([Drive()], air[:, :2])):
+        centre.run(state, [FeedDrive(4000.0)], air, 1.0)
+    for drives, given in (([], air), ([FeedDrive()] * 2, air), ([FeedDrive()], air[:, :2])):
         with pytest.raises(InputError, match="three numbers per"):
             centre.run(state, drives, given, 1.0)
     with pytest.raises(InputError, match="air: a number is not finite"):
-        centre.run(state, [Drive()], air * np.nan, 1.0)
+        centre.run(state, [FeedDrive()], air * np.nan, 1.0)
     for wrong in (
         {"speed": float("nan")},
         {"feed": (0.0, float("inf"), 0.0)},
@@ -292,6 +292,6 @@ def test_unusable_steps_are_refused(centre: MachiningCentre) -> None:
         {"feed": (1.0, 0.0, 0.0), "powered": False},
     ):
         with pytest.raises(InputError, match="drive"):
-            Drive(**wrong)
+            FeedDrive(**wrong)
     with pytest.raises(InputError, match="'tool_tp'; the nearest are tool_tip"):
-        centre.run(state, [Drive(loads={"tool_tp": 5.0})], air, 1.0)
+        centre.run(state, [FeedDrive(loads={"tool_tp": 5.0})], air, 1.0)

@@ -14,14 +14,14 @@ from thermocomp.virtual.climate import STILL
 from thermocomp.virtual.experiments import SimulatedTest, run, simulate
 from thermocomp.virtual.instruments import Touch, mounting
 from thermocomp.virtual.kits import CENTRE
-from thermocomp.virtual.machine import Drive
-from thermocomp.virtual.protocol import Experiment, Plan, Programme
+from thermocomp.virtual.machine import FeedDrive
+from thermocomp.virtual.protocol import Experiment, Programme, TestPlan
 from thermocomp.virtual.segments import SteadySegment
-from thermocomp.virtual.sensors import Fault
+from thermocomp.virtual.sensors import SensorFault
 
 FloatArray = NDArray[np.float64]
 GOLDEN = [[22.22, 22.1, 22.28, 0.15], [48.76, 49.92, 22.74, 59.94], [75.82, 78.14, 23.1, 119.75]]
-RUN = (SteadySegment(40.0), SteadySegment(60.0, Drive(3000.0, (300.0, 400.0, 0.0))), SteadySegment(40.0))
+RUN = (SteadySegment(40.0), SteadySegment(60.0, FeedDrive(3000.0, (300.0, 400.0, 0.0))), SteadySegment(40.0))
 
 
 def programme(**more: Any) -> Programme:
@@ -59,7 +59,7 @@ def test_a_row_tells_what_led_to_it() -> None:
 
 
 def test_displacements_count_from_the_first_row() -> None:
-    test = done(programme(soak=(SteadySegment(3600.0, Drive(1000.0)),), probes=("z", "y_laser_50")))
+    test = done(programme(soak=(SteadySegment(3600.0, FeedDrive(1000.0)),), probes=("z", "y_laser_50")))
     assert test.values[0, 0] == pytest.approx(22.0 + 60.0)
     assert test.truth[0, 0] == 0.0
     assert test.truth[0, 1] == pytest.approx(8.48, abs=0.01)  # the cold profile stays
@@ -67,13 +67,13 @@ def test_displacements_count_from_the_first_row() -> None:
 
 def test_slow_sampling_asks_the_machine_often_enough() -> None:
     machine = FakeMachine()
-    test = done(programme(sampling=100.0, segments=(SteadySegment(200.0, Drive(600.0)),)), machine)
+    test = done(programme(sampling=100.0, segments=(SteadySegment(200.0, FeedDrive(600.0)),)), machine)
     assert machine.steps == [180, 10]
     np.testing.assert_allclose(test.truth[:, 0], [0.0, 1.0, 2.0])
 
 
 def test_blocks_leave_no_trace(monkeypatch: pytest.MonkeyPatch) -> None:
-    segments = (SteadySegment(6000.0, Drive(2000.0)), SteadySegment(6000.0))
+    segments = (SteadySegment(6000.0, FeedDrive(2000.0)), SteadySegment(6000.0))
     made = programme(sampling=60.0, segments=segments, perfect=False, places=("all",), probes=("nest",))
     machine = FakeMachine()
     whole = done(made, machine)
@@ -87,7 +87,7 @@ def test_blocks_leave_no_trace(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_sensors_lag_scatter_and_are_rounded() -> None:
-    segments = (SteadySegment(20.0), SteadySegment(3600.0, Drive(600.0)))
+    segments = (SteadySegment(20.0), SteadySegment(3600.0, FeedDrive(600.0)))
     real = done(programme(segments=segments, perfect=False, probes=("z",)))
     ideal = done(programme(segments=segments, probes=("z",)))
     mounted = mounting("housing")
@@ -121,18 +121,18 @@ def test_the_artefact_is_touched_while_the_spindle_stands() -> None:
 
 
 def test_faults_befall_a_test() -> None:
-    made = programme(faults=(Fault("z_um", "stuck", 60.0),))
-    test = done(made, faults=[Fault("t_housing_C", "lost", 100.0)])
+    made = programme(faults=(SensorFault("z_um", "stuck", 60.0),))
+    test = done(made, faults=[SensorFault("t_housing_C", "lost", 100.0)])
     assert np.isnan(column(test, "t_housing_C")).tolist() == [False] * 5 + [True] * 3
     assert column(test, "z_um").tolist() == [0.0] * 8
     np.testing.assert_array_equal(test.truth, done(programme()).truth)
     with pytest.raises(InputError, match=r"'t_hosing_C'; the nearest are t_housing_C"):
-        done(programme(), faults=[Fault("t_hosing_C", "lost", 0.0)])
+        done(programme(), faults=[SensorFault("t_hosing_C", "lost", 0.0)])
 
 
 def test_a_seed_fixes_everything_on_every_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(experiments.MACHINES, ("centre", "linear"), FakeMachine)
-    plan = Plan(sampling=60.0, duration=3600.0, speed=1000.0, places=("usual",))
+    plan = TestPlan(sampling=60.0, duration=3600.0, speed=1000.0, places=("usual",))
     experiment = Experiment(name="e", tests=(plan,))
     first, again, other = (next(iter(simulate(experiment, seed=s))) for s in (4, 4, 5))
     np.testing.assert_array_equal(first.values, again.values)
@@ -143,7 +143,7 @@ def test_a_seed_fixes_everything_on_every_machine(monkeypatch: pytest.MonkeyPatc
 
 
 def test_unusable_requests_are_refused() -> None:
-    experiment = Experiment(name="e", tests=(Plan(sampling=60.0, duration=3600.0),))
+    experiment = Experiment(name="e", tests=(TestPlan(sampling=60.0, duration=3600.0),))
     with pytest.raises(InputError, match="seed -1"):
         simulate(experiment, seed=-1)
     for noise in (-0.1, float("nan"), float("inf")):
@@ -155,7 +155,7 @@ def test_unusable_requests_are_refused() -> None:
 
 def test_a_month_takes_little_more_memory_than_its_recording() -> None:
     made = programme(
-        sampling=10.0, segments=(SteadySegment(30 * 86400.0, Drive(1000.0)),), places=("all",), perfect=False
+        sampling=10.0, segments=(SteadySegment(30 * 86400.0, FeedDrive(1000.0)),), places=("all",), perfect=False
     )
     tracemalloc.start()
     test = done(made)

@@ -10,7 +10,7 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.virtual.centre import CentreState, MachiningCentre
 from thermocomp.virtual.heat import BearingFriction, HeatSources
 from thermocomp.virtual.joints import Joints
-from thermocomp.virtual.machine import Air, Drive, Truth
+from thermocomp.virtual.machine import Air, FeedDrive, Truth
 from thermocomp.virtual.statespace import REFERENCE_TEMPERATURE, ReducedModel
 
 FloatArray = NDArray[np.float64]
@@ -21,7 +21,7 @@ NONE = BearingFriction(viscous=0.0, load=0.0)
 COLD = replace(
     HEAT, front=NONE, rear=NONE, motor_on=0.0, motor_top=0.0, pump=0.0, cabinet=0.0, hydraulics=0.0, hold=0.0
 )
-TOP = Drive(HEAT.top_speed, cooled=False)
+TOP = FeedDrive(HEAT.top_speed, cooled=False)
 
 
 @pytest.fixture(scope="module")
@@ -33,11 +33,11 @@ def model() -> ReducedModel:
 def hot(model: ReducedModel) -> CentreState:
     """A machine that has turned for hours, the coolant off."""
     machine = MachiningCentre(model, longest_step=60.0)
-    return run(machine, machine.init(AIR), Drive(3000.0, cooled=False), 3.0, dt=60.0)[0]
+    return run(machine, machine.init(AIR), FeedDrive(3000.0, cooled=False), 3.0, dt=60.0)[0]
 
 
 def run(
-    machine: MachiningCentre, state: CentreState, drive: Drive, hours: float, air: Air = AIR, dt: float = 20.0
+    machine: MachiningCentre, state: CentreState, drive: FeedDrive, hours: float, air: Air = AIR, dt: float = 20.0
 ) -> tuple[CentreState, Truth]:
     """Run with one drive; one step at least."""
     n = max(1, round(hours * 3600.0 / dt))
@@ -63,30 +63,30 @@ def temperature(model: ReducedModel, state: CentreState, place: str) -> float:
 # ------------------------------------------------------------------------------------------------------- what is given
 def test_the_motors_loss_is_split() -> None:
     sources = HeatSources(motor_on=40.0, motor_top=400.0, rotor_share=0.25, cabinet=10.0, cabinet_share=0.1)
-    half = sources.given(Drive(sources.top_speed / 2.0))
+    half = sources.given(FeedDrive(sources.top_speed / 2.0))
     assert half["rotor"] == pytest.approx(0.25 * 140.0)  # iron and windage with the square of speed
     assert half["stator"] == pytest.approx(0.75 * 140.0)
     assert half["cabinet"] == pytest.approx(10.0 + 0.1 * 140.0)
-    assert sources.given(Drive(-sources.top_speed / 2.0)) == half
-    at_rest = sources.given(Drive())
+    assert sources.given(FeedDrive(-sources.top_speed / 2.0)) == half
+    at_rest = sources.given(FeedDrive())
     assert (at_rest["rotor"], at_rest["stator"], at_rest["cabinet"]) == (0.0, 0.0, 10.0)  # not even magnetised
 
 
 def test_what_runs_whenever_the_machine_is_on() -> None:
-    on = HEAT.given(Drive(cooled=False))
+    on = HEAT.given(FeedDrive(cooled=False))
     assert {k: v for k, v in on.items() if v} == {
         "cabinet": HEAT.cabinet,
         "hydraulics": HEAT.hydraulics,
         "y_bearing": HEAT.hold,
     }
-    assert HEAT.given(Drive()) == on | {"coolant": HEAT.pump}
-    assert HEAT.given(Drive(powered=False, loads={"tool_tip": 50.0})) == {}
+    assert HEAT.given(FeedDrive()) == on | {"coolant": HEAT.pump}
+    assert HEAT.given(FeedDrive(powered=False, loads={"tool_tip": 50.0})) == {}
 
 
 def test_a_feed_drive_warms_nut_screw_and_bearing() -> None:
     sources = HeatSources(drive_nut=10.0, drive_bearing=20.0, screw_share=0.3, hold=7.0)
-    given = sources.given(Drive(feed=(500.0, -2000.0, 0.0), stroke=(None, (100.0, 300.0), None)))
-    rest = sources.given(Drive())
+    given = sources.given(FeedDrive(feed=(500.0, -2000.0, 0.0), stroke=(None, (100.0, 300.0), None)))
+    rest = sources.given(FeedDrive())
     extra = {k: v - rest[k] for k, v in given.items()}
     assert (extra["x_nut"], extra["y_nut"], extra["z_nut"]) == pytest.approx((3.5, 14.0, 0.0))
     assert (extra["x_bearing"], extra["y_bearing"], extra["z_bearing"]) == pytest.approx((10.0, 40.0, 0.0))
@@ -100,7 +100,7 @@ def test_a_feed_drive_warms_nut_screw_and_bearing() -> None:
 
 
 def test_loads_come_on_top() -> None:
-    drive = Drive(1000.0)
+    drive = FeedDrive(1000.0)
     loads = {"tool_tip": 60.0, "stator": 5.0, "coolant": -30.0, "y_bearing": 1.0}
     given, own = HEAT.given(replace(drive, loads=loads)), HEAT.given(drive)
     assert {k: v - own.get(k, 0.0) for k, v in given.items() if v != own.get(k, 0.0)} == pytest.approx(loads)
@@ -147,12 +147,12 @@ def test_the_thermostat_switches_where_the_limit_is_crossed(
 
 def test_the_chiller_comes_on_after_a_start_with_warm_coolant(model: ReducedModel) -> None:
     machine, without = (MachiningCentre(model, heat=replace(HEAT, chiller=watts)) for watts in (1500.0, 0.0))
-    warm, _ = run(machine, machine.init(AIR), Drive(cooled=False, loads={"coolant": 600.0}), 0.5)
+    warm, _ = run(machine, machine.init(AIR), FeedDrive(cooled=False, loads={"coolant": 600.0}), 0.5)
     assert temperature(model, warm, "coolant") > temperature(model, warm, "bed_front") + 2.0
     assert not warm.chilling
-    after, chilled = run(machine, warm, Drive(), 60.0 / 3600.0)
+    after, chilled = run(machine, warm, FeedDrive(), 60.0 / 3600.0)
     assert after.chilling
-    _, pumped = run(without, warm, Drive(), 60.0 / 3600.0)
+    _, pumped = run(without, warm, FeedDrive(), 60.0 / 3600.0)
     falls = seen(machine, chilled, "coolant") - seen(machine, pumped, "coolant")
     # from the first step on, and all of it: 1500 W taken from the coolant
     theta, at = tuple(float(name == "flow") for name in model.theta), model.inputs.index("coolant")
@@ -163,11 +163,11 @@ def test_the_chiller_comes_on_after_a_start_with_warm_coolant(model: ReducedMode
 
 def test_a_machine_switched_off_hot_neither_chills_nor_warms_itself(model: ReducedModel) -> None:
     machine = MachiningCentre(model)
-    state, truth = run(machine, machine.init(AIR), Drive(3500.0), 2.0)
+    state, truth = run(machine, machine.init(AIR), FeedDrive(3500.0), 2.0)
     chilling = state
     while not chilling.chilling:  # stop it while the chiller runs
-        chilling, _ = run(machine, chilling, Drive(3500.0), 0.0)
-    off = Drive(powered=False)
+        chilling, _ = run(machine, chilling, FeedDrive(3500.0), 0.0)
+    off = FeedDrive(powered=False)
     end, alone = run(machine, chilling, off, 1.0)
     assert not run(machine, chilling, off, 0.0)[0].chilling
     assert not end.chilling
@@ -176,29 +176,29 @@ def test_a_machine_switched_off_hot_neither_chills_nor_warms_itself(model: Reduc
     np.testing.assert_allclose(end.field, step.state @ chilling.field + step.air @ AIR.values, atol=1e-6)
     assert seen(machine, alone, "front_bearing")[-1] < seen(machine, truth, "front_bearing")[-1] - 1.0
     # the loop stands still without power, whatever is asked of it
-    loaded, _ = run(machine, chilling, Drive(powered=False, cooled=True, loads={"coolant": 500.0}), 1.0)
+    loaded, _ = run(machine, chilling, FeedDrive(powered=False, cooled=True, loads={"coolant": 500.0}), 1.0)
     np.testing.assert_allclose(loaded.field, end.field, atol=1e-9)
 
 
 @pytest.mark.parametrize(("speed", "feed"), [(100.0, (0.0, 0.0, 0.0)), (0.0, (0.0, 5.0, 0.0))])
 def test_a_machine_switched_off_cannot_be_driven(speed: float, feed: tuple[float, float, float]) -> None:
     with pytest.raises(InputError, match="switched off"):
-        Drive(speed, feed, powered=False)
+        FeedDrive(speed, feed, powered=False)
 
 
 @pytest.mark.parametrize("stroke", [(-1.0, 100.0), (0.0, 551.0), (float("nan"), 100.0)])
 def test_what_cannot_be_driven_is_refused(stroke: tuple[float, float]) -> None:
     with pytest.raises(InputError, match="of Y is beyond 0 to 550 mm"):
-        Drive(feed=(0.0, 500.0, 0.0), stroke=(None, stroke, None))
+        FeedDrive(feed=(0.0, 500.0, 0.0), stroke=(None, stroke, None))
     with pytest.raises(InputError, match="y = nan"):
-        Drive(feed=(0.0, float("nan"), 0.0))
+        FeedDrive(feed=(0.0, float("nan"), 0.0))
     with pytest.raises(InputError, match="speed = inf"):
-        Drive(float("inf"))
+        FeedDrive(float("inf"))
 
 
 def test_a_run_needs_drives_and_an_air_for_each(model: ReducedModel) -> None:
     machine, row = MachiningCentre(model), AIR.values[None]
-    for drives, air in (([], row[:0]), ([Drive()], np.tile(row, (2, 1))), ([Drive()] * 2, row)):
+    for drives, air in (([], row[:0]), ([FeedDrive()], np.tile(row, (2, 1))), ([FeedDrive()] * 2, row)):
         with pytest.raises(InputError, match="one row of three numbers per drive"):
             machine.run(machine.init(AIR), drives, air, 20.0)
 
@@ -206,14 +206,14 @@ def test_a_run_needs_drives_and_an_air_for_each(model: ReducedModel) -> None:
 # ------------------------------------------------------------------------------------------------ rotation and friction
 def test_a_turning_spindle_cools_faster_than_a_standing_one(model: ReducedModel, hot: CentreState) -> None:
     machine = MachiningCentre(model, heat=COLD)
-    _, stands = run(machine, hot, Drive(cooled=False), 0.5)
+    _, stands = run(machine, hot, FeedDrive(cooled=False), 0.5)
     _, turns = run(machine, hot, TOP, 0.5)
     # the wind was strong before: in still air the hot shaft warms the tool, in wind it falls with all others
     assert seen(machine, turns, "tool")[-1] < seen(machine, stands, "tool")[-1] - 5.0
     assert seen(machine, turns, "tool")[-1] < temperature(model, hot, "tool") - 1.0
     assert seen(machine, turns, "shaft")[-1] < seen(machine, stands, "shaft")[-1] - 1.0
     # the share in force is that of Becker's power, in 64ths
-    eighth, _ = run(machine, hot, Drive(HEAT.top_speed / 8.0, cooled=False), 0.0)
+    eighth, _ = run(machine, hot, FeedDrive(HEAT.top_speed / 8.0, cooled=False), 0.0)
     theta = tuple(0.25 * (name == "rotation") for name in model.theta)
     step = model.operators(theta, 20.0)
     np.testing.assert_allclose(eighth.field, step.state @ hot.field + step.air @ AIR.values, atol=1e-9)
@@ -251,7 +251,7 @@ def test_a_foot_that_has_rested_long_has_slid_as_it_wished(model: ReducedModel) 
     wish = float(model.observable[model.observables.index("slide")] @ rise)
     assert state.slid == pytest.approx(wish)
     assert abs(wish) > 0.1
-    _, truth = run(machine, state, Drive(powered=False), 0.0, Air(32.0, stratification=1.0))
+    _, truth = run(machine, state, FeedDrive(powered=False), 0.0, Air(32.0, stratification=1.0))
     z = float(model.observable[model.observables.index("z")] @ rise)
     assert seen(machine, truth, "z")[0] == pytest.approx(z, abs=1e-6)  # nothing is held back
     assert not state.chilling
@@ -259,7 +259,7 @@ def test_a_foot_that_has_rested_long_has_slid_as_it_wished(model: ReducedModel) 
 
 def test_half_of_what_the_foot_does_not_slide_moves_the_tool(model: ReducedModel) -> None:
     held, free = (MachiningCentre(model, joints=Joints(stiction=s, preload=0.0)) for s in (1.0, 0.0))
-    drive = Drive(feed=(0.0, 0.0, 10_000.0), loads={"cabinet": 300.0})
+    drive = FeedDrive(feed=(0.0, 0.0, 10_000.0), loads={"cabinet": 300.0})
     (_, stuck), (_, slides) = (run(m, m.init(AIR), drive, 6.0, dt=60.0) for m in (held, free))
     short = seen(held, stuck, "slide") - seen(free, slides, "slide")
     # without friction it is the linear model; the foot has grown on the bed by more than friction holds
@@ -275,21 +275,21 @@ def test_without_friction_speed_and_warm_shaft_the_tool_point_is_linear(model: R
     joints = Joints(stiction=0.0, preload=0.7, centrifugal=3.0, lift=-2.0)
     machine = MachiningCentre(model, joints=joints)
 
-    def beyond(state: CentreState, drive: Drive) -> tuple[dict[str, float], float]:
+    def beyond(state: CentreState, drive: FeedDrive) -> tuple[dict[str, float], float]:
         """Return what is more than linear, and how much warmer the shaft is than its seat."""
         end, truth = run(machine, state, drive, 0.0)
         linear = model.observable @ (end.field - REFERENCE_TEMPERATURE * model.one)
         extra = dict(zip(machine.observables, truth.observables[-1] - linear, strict=True))
         return extra, temperature(model, end, "shaft") - temperature(model, end, "front_seat")
 
-    cold, _ = beyond(warm_at(model, front_bearing=0.0), Drive())
+    cold, _ = beyond(warm_at(model, front_bearing=0.0), FeedDrive())
     assert max(map(abs, cold.values())) < 0.1
-    turning, tight = beyond(hot, Drive(-1750.0))
+    turning, tight = beyond(hot, FeedDrive(-1750.0))
     assert tight > 1.0
     shift = 0.7 * tight - 3.0 / 4.0  # out of the housing by preload, back by centrifugal forces
     named = {name: value for name, value in turning.items() if abs(value) > 1e-9}
     assert named == pytest.approx({"z": -shift, "nose": shift, "tip": shift, "y": -2.0 / 4.0})
     loose = warm_at(model, stator=200.0, front_bearing=-100.0)
-    extra, tight = beyond(loose, Drive(cooled=False))
+    extra, tight = beyond(loose, FeedDrive(cooled=False))
     assert tight < -1.0
     assert {name: value for name, value in extra.items() if abs(value) > 1e-9} == {}

@@ -13,7 +13,7 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.virtual.centre import CentreState, MachiningCentre
 from thermocomp.virtual.convection import Face, Faces
 from thermocomp.virtual.datasets import EXPERIMENTS, record
-from thermocomp.virtual.machine import Air, Drive
+from thermocomp.virtual.machine import Air, FeedDrive
 from thermocomp.virtual.nonlinear import CENTRE_FACES, TAPER, TOOL_FACES, NonlinearCentre, NonlinearTool
 from thermocomp.virtual.statespace import ReducedModel
 from thermocomp.virtual.toolsystem import RestingTool, ToolState
@@ -42,7 +42,7 @@ def test_without_all_that_is_nonlinear_the_tool_is_the_linear_one() -> None:
     model = ReducedModel.load("tool_joints")
     machine = NonlinearTool(model=model, **LINEAR_TOOL)
     linear = RestingTool(model=model, convection=0.0, stiction=0.0)
-    drives = [HEATED] * 200 + [Drive()] * 100
+    drives = [HEATED] * 200 + [FeedDrive()] * 100
     found, known = (m.run(m.init(AIR), drives, steps(300), 30.0)[1] for m in (machine, linear))
     np.testing.assert_allclose(found.temperatures, known.temperatures, atol=1e-9)
     np.testing.assert_allclose(found.observables, known.observables, atol=1e-9)
@@ -50,7 +50,9 @@ def test_without_all_that_is_nonlinear_the_tool_is_the_linear_one() -> None:
 
 def test_without_all_that_is_nonlinear_the_centre_is_the_linear_one() -> None:
     model = ReducedModel.load("centre_joints")
-    drives = [Drive(2600.0, (500.0, 500.0, 0.0))] * 200 + [Drive(1000.0, cooled=False)] * 50 + [Drive()] * 100
+    drives = (
+        [FeedDrive(2600.0, (500.0, 500.0, 0.0))] * 200 + [FeedDrive(1000.0, cooled=False)] * 50 + [FeedDrive()] * 100
+    )
     machines = (NonlinearCentre(model=model, **LINEAR_CENTRE), MachiningCentre(model=model))
     found, known = (m.run(m.init(AIR), drives, steps(350), 30.0)[1] for m in machines)
     np.testing.assert_allclose(found.temperatures, known.temperatures, atol=1e-9)
@@ -76,7 +78,7 @@ def test_films_that_do_not_change_are_those_of_the_model(tool: NonlinearTool) ->
 
 def test_the_new_models_answer_like_the_old_ones() -> None:
     """Two reductions of one full model, each good to 1 % of a drift."""
-    drives = [Drive(2600.0)] * 540 + [Drive()] * 540
+    drives = [FeedDrive(2600.0)] * 540 + [FeedDrive()] * 540
     for old, new in ((MachiningCentre(), MachiningCentre(model=ReducedModel.load("centre_joints"))),):
         first, second = (m.run(m.init(AIR), drives, steps(1080), 20.0)[1] for m in (old, new))
         for name in ("z", "y", "tip", "front_seat", "shaft"):
@@ -87,7 +89,7 @@ def test_the_new_models_answer_like_the_old_ones() -> None:
 @pytest.mark.parametrize("machine", [NonlinearTool(), NonlinearCentre()])
 def test_at_rest_in_its_air_it_stays_as_it_is(machine: Any) -> None:
     start = machine.init(AIR)
-    _, truth = machine.run(start, [Drive(powered=False)] * 200, steps(200), 60.0)
+    _, truth = machine.run(start, [FeedDrive(powered=False)] * 200, steps(200), 60.0)
     np.testing.assert_allclose(truth.temperatures, 22.0, atol=1e-8)
     np.testing.assert_allclose(truth.observables, truth.observables[:1].repeat(200, 0), atol=1e-7)
 
@@ -136,7 +138,7 @@ def test_long_heated_the_tool_loses_what_it_gets(tool: NonlinearTool) -> None:
 
 
 def test_what_comes_into_the_centre_is_stored_or_lost(centre: NonlinearCentre) -> None:
-    model, air, drive, dt = centre.model, AIR.values, Drive(2560.0, cooled=False), 5.0
+    model, air, drive, dt = centre.model, AIR.values, FeedDrive(2560.0, cooled=False), 5.0
     faces = Faces(list(CENTRE_FACES.values()))
     theta = centre._theta(drive)
     rows = model.rows((*CENTRE_FACES, "enclosure"))
@@ -173,7 +175,7 @@ def test_what_comes_into_the_centre_is_stored_or_lost(centre: NonlinearCentre) -
 def test_preload_settles_where_its_fixed_point_is() -> None:
     """Friction warms the inner ring, which tightens the bearing, which makes heat: solved by hand, and by running."""
     machine = NonlinearCentre(faces={}, taper=None, seat=None, rear=None, longest_step=2000.0)
-    drive = Drive(3000.0, cooled=False)
+    drive = FeedDrive(3000.0, cooled=False)
     assert machine.front is not None
     model, theta = machine.model, machine._theta(drive)
     given = machine._given(drive)
@@ -211,7 +213,7 @@ def test_a_stiffer_step_does_not_make_it_unstable() -> None:
 
 @pytest.mark.parametrize("cooled", [False, True])
 def test_the_step_size_hardly_matters(cooled: bool) -> None:
-    drives = [Drive(3000.0 * (k // 12 % 2 == 0), cooled=cooled) for k in range(48)]
+    drives = [FeedDrive(3000.0 * (k // 12 % 2 == 0), cooled=cooled) for k in range(48)]
     fine, coarse = (
         m.run(m.init(AIR), drives, steps(48), 300.0)[1]
         for m in (NonlinearCentre(longest_step=2.5), NonlinearCentre(longest_step=20.0))
@@ -230,11 +232,11 @@ def test_the_step_size_hardly_matters(cooled: bool) -> None:
 @pytest.mark.parametrize(
     ("machine", "drives"),
     [
-        (NonlinearTool(), [HEATED] * 70 + [Drive(loads={"tip": 8.0})] * 60 + [Drive()] * 70),
-        (NonlinearCentre(), [Drive(2000.0, (600.0, 0.0, 600.0))] * 100 + [Drive()] * 100),
+        (NonlinearTool(), [HEATED] * 70 + [FeedDrive(loads={"tip": 8.0})] * 60 + [FeedDrive()] * 70),
+        (NonlinearCentre(), [FeedDrive(2000.0, (600.0, 0.0, 600.0))] * 100 + [FeedDrive()] * 100),
     ],
 )
-def test_in_blocks_it_is_the_same_and_nothing_hides_in_it(machine: Any, drives: list[Drive]) -> None:
+def test_in_blocks_it_is_the_same_and_nothing_hides_in_it(machine: Any, drives: list[FeedDrive]) -> None:
     air = steps(200)
     air[:, 0] += np.linspace(0.0, 3.0, 200)
     start = machine.init(AIR)
@@ -253,9 +255,9 @@ def test_in_blocks_it_is_the_same_and_nothing_hides_in_it(machine: Any, drives: 
 def test_heat_without_a_place_is_refused(tool: NonlinearTool, centre: NonlinearCentre) -> None:
     for place in ("on_chuck", "taper_a", "surface"):
         with pytest.raises(InputError, match=f"'{place}' but at heater, tip$"):
-            tool.run(tool.init(AIR), [Drive(loads={place: 5.0})], steps(1), 1.0)
+            tool.run(tool.init(AIR), [FeedDrive(loads={place: 5.0})], steps(1), 1.0)
     with pytest.raises(InputError, match="beyond the machine's 3500"):
-        centre.run(centre.init(AIR), [Drive(4000.0)], steps(1), 1.0)
+        centre.run(centre.init(AIR), [FeedDrive(4000.0)], steps(1), 1.0)
 
 
 def test_a_recording_can_be_made_on_either(tmp_path: Any) -> None:

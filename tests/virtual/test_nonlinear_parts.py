@@ -9,7 +9,7 @@ from nonlinearmachines import AIR, HEATED, at, steps
 from numpy.typing import NDArray
 
 from thermocomp.virtual.convection import Faces
-from thermocomp.virtual.machine import Air, Drive
+from thermocomp.virtual.machine import Air, FeedDrive
 from thermocomp.virtual.nonlinear import CENTRE_FACES, SEAT, TAPER, NonlinearCentre, NonlinearTool
 from thermocomp.virtual.statespace import REFERENCE_TEMPERATURE
 
@@ -47,7 +47,7 @@ def test_a_warmer_outer_part_opens_its_joint_and_a_warmer_inner_one_closes_it(
     assert 0.0 < apart["eager", "grip"] < apart["linear", "grip"] / 2.0
     # such a housing would crush the bearings
     free = replace(centre, front=None, seat=replace(SEAT, **EAGER), taper=replace(TAPER, **EAGER))
-    drives = [Drive(3000.0, loads={"tool_tip": 100.0})] * 100
+    drives = [FeedDrive(3000.0, loads={"tool_tip": 100.0})] * 100
     differences = {}
     for name, spindle in (("eager", free), ("linear", replace(free, seat=None, taper=None))):
         _, truth = spindle.run(spindle.init(AIR), drives, steps(100), 60.0)
@@ -59,7 +59,7 @@ def test_a_warmer_outer_part_opens_its_joint_and_a_warmer_inner_one_closes_it(
 
 def test_what_passes_is_what_each_path_conducts_beside_the_model(centre: NonlinearCentre) -> None:
     """In a step of a microsecond nothing has changed: heat is the conductance that is missing times the difference."""
-    drive = Drive(2000.0)
+    drive = FeedDrive(2000.0)
     watched = dict.fromkeys(centre._watched, 40.0) | {"enclosure": 60.0, "seat_a": 55.0, "taper_b": 35.0}
     temperatures = np.array(list(watched.values()))
     correct = centre._correction(centre.model.operators(centre._theta(drive), 1e-6, centre._watched), drive)
@@ -80,7 +80,7 @@ def test_the_preload_falls_where_the_housing_is_the_warmer_part(centre: Nonlinea
     assert centre.front is not None
     air = steps(150, Air(20.0))
     air[50:, 0] = 50.0
-    _, truth = centre.run(centre.init(Air(20.0)), [Drive(powered=False)] * 150, air, 60.0)
+    _, truth = centre.run(centre.init(Air(20.0)), [FeedDrive(powered=False)] * 150, air, 60.0)
     approach = centre.front.approach(at(centre, truth, "balls_a"), at(centre, truth, "balls_b"))
     assert approach[40] == pytest.approx(centre.front.mounted)
     assert 500.0 < centre.front.force(float(approach.min())) < 560.0
@@ -89,7 +89,7 @@ def test_the_preload_falls_where_the_housing_is_the_warmer_part(centre: Nonlinea
 def test_an_open_taper_keeps_the_heat_behind(tool: NonlinearTool) -> None:
     """Mounted with a gap of 200 um of air, less comes through: the shaft is warmer, the chuck colder."""
     open_ = replace(tool, taper=replace(TAPER, squeeze=-200.0))
-    heated = Drive(loads={"heater": 60.0})
+    heated = FeedDrive(loads={"heater": 60.0})
     shut, apart = (m.run(m.init(AIR), [heated] * 400, steps(400), 60.0)[1] for m in (tool, open_))
     for name, sign in (("taper_a", 1.0), ("taper_b", -1.0)):
         assert sign * (at(tool, apart, name)[-1] - at(tool, shut, name)[-1]) > 0.05
@@ -97,7 +97,7 @@ def test_an_open_taper_keeps_the_heat_behind(tool: NonlinearTool) -> None:
 
 def test_the_shank_stays_behind_as_the_chuck_warms_and_keeps_some_of_it(tool: NonlinearTool) -> None:
     held = replace(tool, grip=replace(tool.grip, friction=1e3)) if tool.grip else tool
-    drives = [HEATED] * 180 + [Drive()] * 600
+    drives = [HEATED] * 180 + [FeedDrive()] * 600
     free, stuck = (m.run(m.init(Air(20.0)), drives, steps(780, Air(20.0)), 60.0)[1] for m in (tool, held))
     behind = at(tool, stuck, "s1") - at(tool, free, "s1")
     assert tool.grip is not None
@@ -119,7 +119,7 @@ def test_expansion_grows_as_it_warms(tool: NonlinearTool) -> None:
     off = replace(tool, expansion_grows=0.0, grip=None)
     bent = replace(off, expansion_grows=1e-3)
     for warm in (30.0, 60.0):
-        small, large = (m.run(m.init(Air(warm)), [Drive()], steps(1, Air(warm)), 20.0)[1] for m in (off, bent))
+        small, large = (m.run(m.init(Air(warm)), [FeedDrive()], steps(1, Air(warm)), 20.0)[1] for m in (off, bent))
         for name in ("s1", "s2", "s3"):
             share = at(bent, large, name)[0] / at(off, small, name)[0]
             assert share == pytest.approx(1.0 + 1e-3 * (warm - REFERENCE_TEMPERATURE) / 2.0, rel=2e-3)
@@ -127,7 +127,7 @@ def test_expansion_grows_as_it_warms(tool: NonlinearTool) -> None:
 
 def test_the_spindles_expansion_grows_too(centre: NonlinearCentre) -> None:
     flat = replace(centre, expansion_grows=0.0)
-    bent, straight = (m.run(m.init(AIR), [Drive(3000.0)] * 300, steps(300), 60.0)[1] for m in (centre, flat))
+    bent, straight = (m.run(m.init(AIR), [FeedDrive(3000.0)] * 300, steps(300), 60.0)[1] for m in (centre, flat))
     more = at(centre, bent, "tip") - at(flat, straight, "tip")
     assert 0.1 < more[-1] < 1.0
     np.testing.assert_allclose(at(centre, bent, "z") - at(flat, straight, "z"), -more, atol=1e-9)
@@ -137,7 +137,7 @@ def test_the_spindles_expansion_grows_too(centre: NonlinearCentre) -> None:
 def test_the_gap_of_the_outer_rings_closes_and_cools_them(centre: NonlinearCentre) -> None:
     tight = replace(centre, seat=replace(SEAT, squeeze=1.0))
     loose = replace(centre, seat=replace(SEAT, squeeze=-20.0))
-    drives = [Drive(3000.0, cooled=True)] * 200
+    drives = [FeedDrive(3000.0, cooled=True)] * 200
     rings = {}
     for name, machine in (("tight", tight), ("usual", centre), ("loose", loose)):
         _, truth = machine.run(machine.init(AIR), drives, steps(200), 60.0)
@@ -159,7 +159,7 @@ def test_a_tight_seat_squeezes_the_raceway(centre: NonlinearCentre) -> None:
 
 def test_the_shaft_is_pushed_out_by_its_preload(centre: NonlinearCentre) -> None:
     assert centre.front is not None
-    drives = [Drive(3000.0, cooled=False)] * 100
+    drives = [FeedDrive(3000.0, cooled=False)] * 100
     _, truth = centre.run(centre.init(AIR), drives, steps(100), 60.0)
     still = replace(centre, joints=replace(centre.joints, centrifugal=0.0))
     _, drawn = still.run(still.init(AIR), drives, steps(100), 60.0)

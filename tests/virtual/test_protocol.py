@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from thermocomp.core.exceptions import InputError, SettingError
-from thermocomp.virtual.machine import Drive
-from thermocomp.virtual.protocol import Experiment, Plan, Programme
+from thermocomp.virtual.machine import FeedDrive
+from thermocomp.virtual.protocol import Experiment, Programme, TestPlan
 from thermocomp.virtual.segments import Feed, Lot, SteadySegment, Stretch, Stroke
-from thermocomp.virtual.sensors import Fault
+from thermocomp.virtual.sensors import SensorFault
 
 MINUTE = 60.0
 
@@ -48,14 +48,14 @@ def test_a_stretch_becomes_segments() -> None:
             ),
         )
     )
-    full = Drive(2000.0, (100.0, 0.0, 300.0), (None, (100.0, 200.0), None), {"tool_tip": 40.0}, False, True)
+    full = FeedDrive(2000.0, (100.0, 0.0, 300.0), (None, (100.0, 200.0), None), {"tool_tip": 40.0}, False, True)
     assert stretch.draw(rng()) == [SteadySegment(60.0), SteadySegment(120.0, full)]
 
 
 def test_what_is_switched_off_stands_whatever_it_inherits() -> None:
     stretch = Stretch(speed=2000.0, feed=Feed(x=100.0), segments=(Stretch(duration=60.0, powered=False),))
     (segment,) = stretch.draw(rng())
-    assert segment.drive == Drive(powered=False)
+    assert segment.drive == FeedDrive(powered=False)
 
 
 def test_what_is_said_outside_holds_within() -> None:
@@ -65,9 +65,9 @@ def test_what_is_said_outside_holds_within() -> None:
         segments=(Stretch(), Stretch(speed=0.0, segments=(Stretch(duration=30.0), Stretch(cooled=False)))),
     )
     expected = [
-        SteadySegment(60.0, Drive(1000.0)),
-        SteadySegment(30.0, Drive(0.0)),
-        SteadySegment(60.0, Drive(0.0, cooled=False)),
+        SteadySegment(60.0, FeedDrive(1000.0)),
+        SteadySegment(30.0, FeedDrive(0.0)),
+        SteadySegment(60.0, FeedDrive(0.0, cooled=False)),
     ]
     assert stretch.draw(rng()) == expected
     assert [path for path, _ in stretch.leaves()] == [
@@ -126,8 +126,8 @@ def test_strokes_lie_within_the_travel() -> None:
             Stroke(x=wrong)
 
 
-def plan(**more: Any) -> Plan:
-    return Plan(sampling=10.0, **({"duration": MINUTE} | more))
+def plan(**more: Any) -> TestPlan:
+    return TestPlan(sampling=10.0, **({"duration": MINUTE} | more))
 
 
 def test_tests_have_the_names_of_their_experiment() -> None:
@@ -151,7 +151,7 @@ def test_no_test_depends_on_the_others() -> None:
 def test_the_soak_hears_nothing_of_the_test() -> None:
     (programme,) = Experiment(name="e", tests=(plan(speed=1000.0, soak=Stretch(duration=3600.0)),)).programmes()
     assert programme.soak == (SteadySegment(3600.0),)
-    assert programme.segments == (SteadySegment(MINUTE, Drive(1000.0)),)
+    assert programme.segments == (SteadySegment(MINUTE, FeedDrive(1000.0)),)
     assert Programme(name="p", sampling=10.0, segments=()).soak == (SteadySegment(12 * 3600.0),)
 
 
@@ -172,7 +172,7 @@ def test_the_soak_hears_nothing_of_the_test() -> None:
 )
 def test_an_impossible_test_is_refused(wrong: dict[str, Any], path: tuple[str | int, ...], message: str) -> None:
     with pytest.raises(SettingError, match=message) as e:
-        Plan(**({"sampling": 10.0, "duration": MINUTE} | wrong))
+        TestPlan(**({"sampling": 10.0, "duration": MINUTE} | wrong))
     assert e.value.path == path
 
 
@@ -187,7 +187,7 @@ def test_an_impossible_test_is_refused(wrong: dict[str, Any], path: tuple[str | 
         ({"soak": Stretch(duration=60.0, speed=9000.0)}, "centre", ("soak", "speed"), "at most 3500"),
         ({"speed": 100.0}, "tool", ("speed",), "no spindle"),
         ({"feed": Feed(x=1.0)}, "tool", ("feed",), "no axes"),
-        ({"faults": (Fault("t_hosing_C", "lost", 0.0),)}, "centre", ("faults", 0, "channel"), "t_housing_C"),
+        ({"faults": (SensorFault("t_hosing_C", "lost", 0.0),)}, "centre", ("faults", 0, "channel"), "t_housing_C"),
         ({}, "lathe", ("machine",), "there are centre, tool"),
     ],
 )

@@ -11,10 +11,10 @@ from thermocomp.virtual.climate import CLIMATES, STABLE, Climate
 from thermocomp.virtual.datasets import EXPERIMENTS
 from thermocomp.virtual.instruments import Touch
 from thermocomp.virtual.kits import KITS
-from thermocomp.virtual.protocol import Experiment, Plan
+from thermocomp.virtual.protocol import Experiment, TestPlan
 from thermocomp.virtual.protocolfile import TIMES, read_protocol
 from thermocomp.virtual.segments import Feed, Lot, SteadySegment, Stretch, Stroke
-from thermocomp.virtual.sensors import Fault
+from thermocomp.virtual.sensors import SensorFault
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 PAGE = (DOCS / "protocols.rst").read_text(encoding="utf-8")
@@ -28,7 +28,7 @@ def written(folder: Path, text: str) -> Path:
 
 def test_one_test_without_tables(tmp_path: Path) -> None:
     path = written(tmp_path, 'sampling = "10 s"\nduration = "1.5 h"\nspeed = 2000\nplaces = "usual"')
-    expected = Plan(sampling=10.0, duration=5400.0, speed=2000.0, places=("usual",))
+    expected = TestPlan(sampling=10.0, duration=5400.0, speed=2000.0, places=("usual",))
     assert read_protocol(path) == Experiment(name="mine", tests=(expected,))
 
 
@@ -94,7 +94,7 @@ perfect = false
     assert first.places == {"t1": "housing", "t2": "table"}
     assert first.probes == {"mine": "z_at_200", "sum": {"z": 1.0, "zz@200": -1.0}}
     assert first.touch == Touch(1800.0, {"a": (0.0, 100.0, 200.0)}, noise=1.0)
-    assert first.faults == (Fault("t_t1_C", "drift", 600.0, 3600.0, 2.0),)
+    assert first.faults == (SensorFault("t_t1_C", "drift", 600.0, 3600.0, 2.0),)
     assert first.soak == Stretch(duration=7200.0, powered=False)
     assert first.perfect
     assert first.segments == (
@@ -244,11 +244,11 @@ def test_no_file_and_no_text(tmp_path: Path) -> None:
 
 
 TABLES: dict[str, type] = {
-    "tests": Plan,
+    "tests": TestPlan,
     "segments": Stretch,
     "climate": Climate,
     "touch": Touch,
-    "faults": Fault,
+    "faults": SensorFault,
 }
 
 
@@ -278,7 +278,7 @@ def test_the_page_names_everything() -> None:
             assert f"``{name}``" in PAGE, name
     for name in CLIMATES:
         assert f"``{name}``" in PAGE
-    assert set(TIMES) <= {f.name for cls in (*TABLES.values(), Plan) for f in fields(cls)}
+    assert set(TIMES) <= {f.name for cls in (*TABLES.values(), TestPlan) for f in fields(cls)}
 
 
 @pytest.mark.parametrize("example", sorted((DOCS / "files").glob("*_test.toml")), ids=lambda p: p.stem)

@@ -5,7 +5,7 @@ import pytest
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
-from thermocomp.virtual.sensors import Fault, Sensor, apply_lags, read, with_faults
+from thermocomp.virtual.sensors import Sensor, SensorFault, apply_lags, read, with_faults
 
 TEMPERATURE = Channel("t_C", "temperature", "degC")
 
@@ -56,17 +56,17 @@ def test_rows_read_in_parts_have_the_noise_of_the_whole() -> None:
 @pytest.mark.parametrize(
     ("fault", "expected"),
     [
-        (Fault("t_C", "stuck", 20.0), [0, 1, 1, 1, 1]),
-        (Fault("t_C", "stuck", 20.0, 30.0), [0, 1, 1, 3, 4]),
-        (Fault("t_C", "stuck", 0.0), [0, 0, 0, 0, 0]),
-        (Fault("t_C", "lost", 25.0), [0, 1, 2, np.nan, np.nan]),
-        (Fault("t_C", "drift", 20.0, size=360.0), [0, 1, 2, 4, 6]),
-        (Fault("t_C", "spike", 15.0, size=5.0), [0, 1, 7, 3, 4]),
-        (Fault("t_C", "spike", 15.0, 35.0, size=5.0), [0, 1, 7, 8, 4]),
-        (Fault("t_C", "lost", 41.0), [0, 1, 2, 3, 4]),
+        (SensorFault("t_C", "stuck", 20.0), [0, 1, 1, 1, 1]),
+        (SensorFault("t_C", "stuck", 20.0, 30.0), [0, 1, 1, 3, 4]),
+        (SensorFault("t_C", "stuck", 0.0), [0, 0, 0, 0, 0]),
+        (SensorFault("t_C", "lost", 25.0), [0, 1, 2, np.nan, np.nan]),
+        (SensorFault("t_C", "drift", 20.0, size=360.0), [0, 1, 2, 4, 6]),
+        (SensorFault("t_C", "spike", 15.0, size=5.0), [0, 1, 7, 3, 4]),
+        (SensorFault("t_C", "spike", 15.0, 35.0, size=5.0), [0, 1, 7, 8, 4]),
+        (SensorFault("t_C", "lost", 41.0), [0, 1, 2, 3, 4]),
     ],
 )
-def test_faults(fault: Fault, expected: list[float]) -> None:
+def test_faults(fault: SensorFault, expected: list[float]) -> None:
     time, values = np.arange(0.0, 50.0, 10.0), np.column_stack([np.arange(5.0), np.arange(5.0)])
     channels = (TEMPERATURE, Channel("other_C", "temperature", "degC"))
     found = with_faults(time, channels, values, [fault])
@@ -77,10 +77,10 @@ def test_faults(fault: Fault, expected: list[float]) -> None:
 
 def test_unusable_faults_are_refused() -> None:
     with pytest.raises(InputError, match="unknown kind 'melted'"):
-        Fault("t_C", "melted", 0.0)  # type: ignore[arg-type]
+        SensorFault("t_C", "melted", 0.0)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="before end"):
-        Fault("t_C", "lost", 10.0, 10.0)
+        SensorFault("t_C", "lost", 10.0, 10.0)
     with pytest.raises(InputError, match="must be finite"):
-        Fault("t_C", "lost", float("nan"))
+        SensorFault("t_C", "lost", float("nan"))
     with pytest.raises(InputError, match=r"'tt_C'; the nearest are t_C"):
-        with_faults(np.zeros(1), (TEMPERATURE,), np.zeros((1, 1)), [Fault("tt_C", "lost", 0.0)])
+        with_faults(np.zeros(1), (TEMPERATURE,), np.zeros((1, 1)), [SensorFault("tt_C", "lost", 0.0)])

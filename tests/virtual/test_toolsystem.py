@@ -5,14 +5,14 @@ import pytest
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.virtual.machine import Air, Drive, Truth, VirtualMachine
+from thermocomp.virtual.machine import Air, FeedDrive, Truth, VirtualMachine
 from thermocomp.virtual.statespace import REFERENCE_TEMPERATURE
 from thermocomp.virtual.toolsystem import RestingTool, ToolState
 
 FloatArray = NDArray[np.float64]
 AIR = Air(20.0)
-HEATED = Drive(loads={"heater": 40.0})
-REST = Drive()
+HEATED = FeedDrive(loads={"heater": 40.0})
+REST = FeedDrive()
 
 
 @pytest.fixture(scope="module")
@@ -21,7 +21,7 @@ def tool() -> RestingTool:
 
 
 def run(
-    tool: RestingTool, state: ToolState, drive: Drive, hours: float, air: Air = AIR, dt: float = 20.0
+    tool: RestingTool, state: ToolState, drive: FeedDrive, hours: float, air: Air = AIR, dt: float = 20.0
 ) -> tuple[ToolState, Truth]:
     n = round(hours * 3600.0 / dt)
     return tool.run(state, [drive] * n, np.tile(air.values, (n, 1)), dt)
@@ -70,7 +70,7 @@ def test_its_loss_grows_faster_than_its_temperature(tool: RestingTool, watts: fl
         fits = long_heated(tool, watts, correction(rise))[surface] - AIR.temperature
         low, high = (rise, high) if fits > rise else (low, rise)
     expected = long_heated(tool, watts, correction(rise))
-    _, truth = run(tool, tool.init(AIR), Drive(loads={"heater": watts}), 60.0, dt=60.0)
+    _, truth = run(tool, tool.init(AIR), FeedDrive(loads={"heater": watts}), 60.0, dt=60.0)
     np.testing.assert_allclose(truth.temperatures[-1], expected, atol=0.01)
     # beside the linear model: warmer below the usual rise, colder above
     linear = long_heated(tool, watts, 0.0)
@@ -129,7 +129,7 @@ def test_a_warm_start_has_slipped_already() -> None:
 @pytest.mark.parametrize(("load", "at"), [("heater", "t8"), ("tip", "t1")])
 def test_heat_goes_in_where_it_should(tool: RestingTool, load: str, at: str) -> None:
     for hours in (0.1, 3.0):
-        _, truth = run(tool, tool.init(AIR), Drive(loads={load: 20.0}), hours)
+        _, truth = run(tool, tool.init(AIR), FeedDrive(loads={load: 20.0}), hours)
         rises = {f"t{k}": seen(tool, truth, f"t{k}")[-1] - 20.0 for k in range(1, 9)}
         assert max(rises, key=lambda place: rises[place]) == at
         assert min(rises.values()) > -1e-6
@@ -144,16 +144,16 @@ def test_loads_add_up_and_need_power(tool: RestingTool) -> None:
     linear = RestingTool(convection=0.0)
 
     def warmed(**loads: float) -> FloatArray:
-        rise: FloatArray = linear.run(start, [Drive(loads=loads)], air, 20.0)[1].temperatures[0] - 20.0
+        rise: FloatArray = linear.run(start, [FeedDrive(loads=loads)], air, 20.0)[1].temperatures[0] - 20.0
         return rise
 
     np.testing.assert_allclose(warmed(heater=30.0, tip=5.0), 3.0 * warmed(heater=10.0) + warmed(tip=5.0), atol=1e-9)
-    _, off = tool.run(start, [Drive(loads={"heater": 30.0}, powered=False)] * 5, np.tile(air, (5, 1)), 20.0)
+    _, off = tool.run(start, [FeedDrive(loads={"heater": 30.0}, powered=False)] * 5, np.tile(air, (5, 1)), 20.0)
     np.testing.assert_allclose(off.temperatures, 20.0, atol=1e-8)
 
 
 def test_in_blocks_it_is_the_same_and_nothing_hides_in_the_machine(tool: RestingTool) -> None:
-    drives = [HEATED] * 70 + [Drive(loads={"tip": 8.0})] * 60 + [REST] * 70
+    drives = [HEATED] * 70 + [FeedDrive(loads={"tip": 8.0})] * 60 + [REST] * 70
     air = np.tile(AIR.values, (200, 1))
     air[:, 0] += np.linspace(0.0, 3.0, 200)
     start = tool.init(AIR)
@@ -188,11 +188,11 @@ def test_a_room_that_changes_is_felt_in_its_own_step(tool: RestingTool) -> None:
 @pytest.mark.parametrize("load", ["coolant", "surface", "t1"])
 def test_heat_without_a_place_is_refused(tool: RestingTool, load: str) -> None:
     with pytest.raises(InputError, match=f"no heat can be put in at '{load}' but at heater, tip$"):
-        tool.run(tool.init(AIR), [Drive(loads={load: 5.0})], AIR.values[None], 1.0)
+        tool.run(tool.init(AIR), [FeedDrive(loads={load: 5.0})], AIR.values[None], 1.0)
 
 
-@pytest.mark.parametrize("drive", [Drive(100.0), Drive(feed=(0.0, 0.0, 5.0))])
-def test_it_neither_turns_nor_moves(tool: RestingTool, drive: Drive) -> None:
+@pytest.mark.parametrize("drive", [FeedDrive(100.0), FeedDrive(feed=(0.0, 0.0, 5.0))])
+def test_it_neither_turns_nor_moves(tool: RestingTool, drive: FeedDrive) -> None:
     with pytest.raises(InputError, match="cannot turn or move"):
         tool.run(tool.init(AIR), [REST, drive], np.tile(AIR.values, (2, 1)), 1.0)
 
@@ -209,4 +209,4 @@ def test_unusable_steps_are_refused(tool: RestingTool) -> None:
         tool.run(state, [REST], np.array([[20.0, float("nan"), 0.0]]), 1.0)
     for load in (float("nan"), float("inf")):
         with pytest.raises(InputError, match="finite"):
-            Drive(loads={"heater": load})
+            FeedDrive(loads={"heater": load})

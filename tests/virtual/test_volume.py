@@ -17,7 +17,7 @@ from thermocomp.virtual.climate import STILL
 from thermocomp.virtual.experiments import SimulatedTest, run
 from thermocomp.virtual.geometry import PROFILES, SAG, SQUARENESS, cold_profile, find_cold_component
 from thermocomp.virtual.kits import CENTRE
-from thermocomp.virtual.machine import Drive
+from thermocomp.virtual.machine import FeedDrive
 from thermocomp.virtual.probes import COMPONENTS, PROBE_DISTANCE, weigh_tool_point
 from thermocomp.virtual.protocol import Programme
 from thermocomp.virtual.segments import SteadySegment
@@ -28,9 +28,9 @@ HOUR = 3600.0
 MIDDLE = (300.0, 250.0, 300.0)
 MOVING = (600.0, 1000.0, 600.0)
 WARM = {
-    "spindle": Drive(2600.0),
-    "both": Drive(2600.0, MOVING),
-    "axes": Drive(0.0, (6000.0, 6000.0, 6000.0)),
+    "spindle": FeedDrive(2600.0),
+    "both": FeedDrive(2600.0, MOVING),
+    "axes": FeedDrive(0.0, (6000.0, 6000.0, 6000.0)),
 }
 SIX = ("X_six", "Y_six", "Z_six")
 #: the same machine as the package's own kinematics know it
@@ -74,7 +74,7 @@ class Warm:
         return float(self.test.values[-1, [c.name for c in self.test.channels].index(channel)])
 
 
-def measured(drive: Drive) -> SimulatedTest:
+def measured(drive: FeedDrive) -> SimulatedTest:
     programme = Programme(
         name="t",
         sampling=1200.0,

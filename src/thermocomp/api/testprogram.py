@@ -20,7 +20,7 @@ LONGEST = 1800.0
 _SHORTEST = 60.0
 
 
-class Stretch(NamedTuple):
+class ProgramStretch(NamedTuple):
     """A time in which nothing changes."""
 
     start: float  #: since the start of the test [s]
@@ -29,7 +29,7 @@ class Stretch(NamedTuple):
     first: bool  #: the speed is another one than before
 
 
-def stretches(trial: Trial, every: float = 0.0) -> Iterator[Stretch]:
+def stretches(trial: Trial, every: float = 0.0) -> Iterator[ProgramStretch]:
     """Cut a test into stretches without a change and without a measurement.
 
     Parameters
@@ -40,14 +40,14 @@ def stretches(trial: Trial, every: float = 0.0) -> Iterator[Stretch]:
 
     Yields
     ------
-    Stretch
+    ProgramStretch
     """
     start = 0.0
     for speed, duration in trial.steps:
         done = 0.0
         while done < duration - 1e-6:
             part = min(every or LONGEST, LONGEST, duration - done)
-            yield Stretch(start + done, part, speed, done == 0)
+            yield ProgramStretch(start + done, part, speed, done == 0)
             done += part
         start += duration
 
@@ -193,7 +193,7 @@ def clock(seconds: float) -> str:
     return f"{minutes // 60}:{minutes % 60:02d}"
 
 
-def _length(trial: Trial, part: Stretch) -> str:
+def _length(trial: Trial, part: ProgramStretch) -> str:
     """Return how long it is until the speed changes."""
     end, own = 0.0, 0.0
     for _, duration in trial.steps:

@@ -39,7 +39,7 @@ def read_recordings(paths: list[Path], mapping: Path | None, *, tell: bool = Tru
 def _read_all(paths: list[Path], read: "Callable[[list[Path]], list[Recording]]") -> "list[Recording]":
     if STDIN not in paths:
         return read(paths)
-    from thermocomp.recordings.readers.limits import Limits as FileLimits
+    from thermocomp.recordings.readers.limits import FileLimits
 
     if paths.count(STDIN) > 1:
         raise InputError("-: there is one standard input")

@@ -10,7 +10,7 @@ from thermocomp.core.correction import Correction
 from thermocomp.core.reading import Measurement, Reading
 
 
-class Status(NamedTuple):
+class LinkStatus(NamedTuple):
     """How a connection is."""
 
     state: Literal["closed", "connecting", "connected", "failed"]
@@ -30,7 +30,7 @@ class Source(Protocol):
         """Return readings as they come, oldest first, until the source ends or fails."""
         ...
 
-    def status(self) -> Status:
+    def status(self) -> LinkStatus:
         """Return the connection status without blocking."""
         ...
 
@@ -51,7 +51,7 @@ class Probe(Protocol):
         """Return measurements as they come, until the probe ends or fails."""
         ...
 
-    def status(self) -> Status:
+    def status(self) -> LinkStatus:
         """Return the connection status without blocking."""
         ...
 
@@ -94,7 +94,7 @@ class Sink(Protocol):
         """Hand one correction per axis or target to the controller, or raise `ThermocompError` with the reason."""
         ...
 
-    def status(self) -> Status:
+    def status(self) -> LinkStatus:
         """Return the connection status without blocking."""
         ...
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 from thermocomp.core.exceptions import InputError
 from thermocomp.export.block.tables import Tables
 from thermocomp.export.reduction.reduced import find_axis
-from thermocomp.export.st.structuredtext import Unit
+from thermocomp.export.st.structuredtext import SourceUnit
 from thermocomp.export.st.ststatements import SCL, Dialect, array, number, quoted, section
 
 
@@ -70,7 +70,7 @@ class Value(NamedTuple):
 
 def write_values(
     name: str, dialect: Dialect, drives: list[Drive], taken: Mapping[str, Value], direction: float
-) -> Unit:
+) -> SourceUnit:
     """Return a function block that makes what a controller takes of the corrections.
 
     Parameters
@@ -130,7 +130,7 @@ def write_values(
                 ]
             else:
                 lines.append(f"{place} := {said};")
-    return Unit(name, "\n".join(parts), "\n".join(lines), "END_FUNCTION_BLOCK")
+    return SourceUnit(name, "\n".join(parts), "\n".join(lines), "END_FUNCTION_BLOCK")
 
 
 def _check_whole(drives: list[Drive], taken: Value) -> None:

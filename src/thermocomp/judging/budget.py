@@ -16,7 +16,7 @@ from thermocomp.judging.replay import replay_compensated
 from thermocomp.judging.sensorsets import PERCENT, choose_sets, weigh_targets
 from thermocomp.judging.splits import Judging, Split
 from thermocomp.models.methods import expand
-from thermocomp.models.selection.standins import Answer, SensorSets
+from thermocomp.models.selection.standins import SensorSets, StandInAnswer
 from thermocomp.models.training import train
 from thermocomp.recordings.samples import Samples
 
@@ -56,7 +56,7 @@ class Budget:
         Share of the blocks without which a sensor is among the best.
     condition : ndarray of shape (n_sizes,)
         Condition number of the correlation matrix of `sensors`.
-    answer : Answer
+    answer : StandInAnswer
         Of `averaged` with all temperatures and rows, for what can stand in for what; targets in `unit`.
     failures : mapping of str to str
         Why a model could not be judged somewhere, by model.
@@ -73,7 +73,7 @@ class Budget:
     none: FloatArray
     frequency: FloatArray
     condition: FloatArray
-    answer: Answer
+    answer: StandInAnswer
     failures: Mapping[str, str] = field(default_factory=dict)
 
     def of_blocks(self) -> FloatArray:

@@ -19,7 +19,7 @@ from thermocomp.judging.pieces import elsewhere, explain, work_through
 from thermocomp.judging.splits import Judging
 from thermocomp.models.grouping import CorrelationGrouping
 from thermocomp.models.numerics.leastsquares import join_columns, triangle
-from thermocomp.models.numerics.stepwise import Step
+from thermocomp.models.numerics.stepwise import StepwiseStep
 from thermocomp.models.partial_f import PartialF
 from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.models.selection import grouping
@@ -228,7 +228,7 @@ def _by_steps(candidates: Candidates, method: str) -> Choice:
     """Choose by stepwise regression: ``partial-f`` (T-02 to T-06) or ``stepwise``, Chen's second-order one (C-15)."""
     estimator: PartialF | SecondOrderRegression = PartialF() if method == "partial-f" else SecondOrderRegression()
     found = estimator.fit(candidates.X, candidates.y)
-    log: tuple[Step, ...] = found.log_
+    log: tuple[StepwiseStep, ...] = found.log_
     steps = Table(
         "Steps",
         ("step", "action", "term", "partial F", "R2", "gain in R2"),

@@ -9,8 +9,8 @@ from thermocomp.live.adapters.network import MqttProbing
 from thermocomp.live.adapters.plain import SimulatedSource
 from thermocomp.live.adapters.probes import MqttProbe, SimulatedProbe
 from thermocomp.live.adapters.sections import LinuxCncOut
-from thermocomp.live.clock import Clock
-from thermocomp.live.config import Probings, Settings
+from thermocomp.live.clock import ServiceClock
+from thermocomp.live.config import Probings, ServiceSettings
 from thermocomp.live.findings import find_faults
 from thermocomp.live.journal.journal import JournalLimits
 from thermocomp.live.loop import Service
@@ -18,12 +18,12 @@ from thermocomp.live.recorder import Recorder
 from thermocomp.runtime.compensator import Compensator
 
 
-def build(settings: Settings) -> Service:
+def build(settings: ServiceSettings) -> Service:
     """Return the service of a configuration; nothing is connected yet.
 
     Parameters
     ----------
-    settings : Settings
+    settings : ServiceSettings
 
     Raises
     ------
@@ -48,7 +48,7 @@ def build(settings: Settings) -> Service:
         compensator=compensator,
         sources=sources,
         sinks=[one.open(folder) for one in config.sinks],
-        clock=Clock(config.speed),
+        clock=ServiceClock(config.speed),
         state_path=folder / config.state if config.state else None,
         probes=[_probe(one, sources, tuple(compensator.lines)) for one in config.probes],
     )

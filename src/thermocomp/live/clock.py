@@ -3,7 +3,7 @@
 import time
 
 
-class Clock:
+class ServiceClock:
     """The time of the machine: that of the world, or faster where the machine is a virtual one.
 
     Parameters

@@ -205,7 +205,7 @@ def _place(one: SourceSection | SinkSection | Probings) -> str:
     return next((f"{key} = {name!r}" for key, name in found.items() if name), f"kind = {one.kind!r}")
 
 
-class Settings(NamedTuple):
+class ServiceSettings(NamedTuple):
     """A configuration and the folder that its files are named from."""
 
     config: Config
@@ -225,7 +225,7 @@ _PLAIN = {
 }
 
 
-def read_config(path: str | Path) -> Settings:
+def read_config(path: str | Path) -> ServiceSettings:
     """Read a configuration.
 
     Parameters
@@ -249,7 +249,7 @@ def read_config(path: str | Path) -> Settings:
             line for error in [*errors, *_behind(adapter, content, errors)] for line in _tell(dict(error)).splitlines()
         ]
         raise InputError("\n".join([f"{path}: {len(lines)} to mend:", *(f"  {line}" for line in lines)])) from e
-    return Settings(config, Path(path).resolve().parent)
+    return ServiceSettings(config, Path(path).resolve().parent)
 
 
 def _adapter(content: dict[str, Any]) -> TypeAdapter[Config]:

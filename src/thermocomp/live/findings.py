@@ -11,19 +11,19 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.live.adapters.linuxcnc.halsetup import HAL_NAME, LONGEST
 from thermocomp.live.adapters.plain import read_rows
 from thermocomp.live.adapters.sections import FileOut, LinuxCncOut, ReplayIn, SimulatedIn
-from thermocomp.live.config import Page, Settings
+from thermocomp.live.config import Page, ServiceSettings
 from thermocomp.live.page import web
 
 #: bytes of a file's name on a disk
 _LONG = 255
 
 
-def find_faults(settings: Settings) -> Iterator[str]:
+def find_faults(settings: ServiceSettings) -> Iterator[str]:
     """Say which files cannot be read, and which cannot be written.
 
     Parameters
     ----------
-    settings : Settings
+    settings : ServiceSettings
     """
     config, folder = settings
     read = [*config.models, *([config.machine.file] if config.machine else [])]
@@ -55,12 +55,12 @@ def find_faults(settings: Settings) -> Iterator[str]:
             yield f"{folder / one.socket}: a socket has a path of at most {LONGEST} bytes"
 
 
-def find_faults_now(settings: Settings, page: Page | None) -> Iterator[str]:
+def find_faults_now(settings: ServiceSettings, page: Page | None) -> Iterator[str]:
     """Say what else would keep the service from starting, or a link from working, as it is now.
 
     Parameters
     ----------
-    settings : Settings
+    settings : ServiceSettings
     page : Page or None
         As it will be served.
     """
@@ -86,12 +86,12 @@ def find_faults_now(settings: Settings, page: Page | None) -> Iterator[str]:
             yield f"{e} (as found now)"
 
 
-def runs_now(settings: Settings) -> bool:
+def runs_now(settings: ServiceSettings) -> bool:
     """Return whether the service of this configuration runs: then its port is taken.
 
     Parameters
     ----------
-    settings : Settings
+    settings : ServiceSettings
     """
     config, folder = settings
     for name in (config.state, config.journal.file if config.journal else ""):

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 from thermocomp.core.correction import Correction
 from thermocomp.core.exceptions import ThermocompError
-from thermocomp.core.ports import Confirming, Probe, Sink, Source, Status
+from thermocomp.core.ports import Confirming, LinkStatus, Probe, Sink, Source
 from thermocomp.core.reading import Measurement, Reading
 from thermocomp.core.shown import escape
 
@@ -67,14 +67,14 @@ class Link:
             await asyncio.sleep(self._wait)
             self._wait = min(2 * self._wait, LONGEST)
 
-    def status(self) -> Status:
+    def status(self) -> LinkStatus:
         """Return how it is; what it was lost by stays until it is connected again."""
         if self.trouble:
-            return Status("failed", self.trouble)
+            return LinkStatus("failed", self.trouble)
         try:
             return self.end.status()
         except Exception as e:  # noqa: BLE001 - to be shown
-            return Status("failed", explain(e))
+            return LinkStatus("failed", explain(e))
 
     def news(self) -> Iterator[str]:
         """Return what is new since the last call: it was lost, it is back, it refused messages."""

@@ -15,7 +15,7 @@ from thermocomp.core.exceptions import InputError, ThermocompError
 from thermocomp.core.ports import Confirming, Probe, Sink, Source, Suspending
 from thermocomp.core.reading import Measurement, Reading
 from thermocomp.live import statefile
-from thermocomp.live.clock import Clock
+from thermocomp.live.clock import ServiceClock
 from thermocomp.live.events import Events
 from thermocomp.live.latest import Latest
 from thermocomp.live.links import TIMEOUT, Inlet, Link, Outlet, within
@@ -42,7 +42,7 @@ class Service:
     compensator : Compensator
     sources : sequence of Source
     sinks : sequence of Sink
-    clock : Clock
+    clock : ServiceClock
     state_path : Path or None
         Where the state is kept.
     probes : sequence of Probe
@@ -53,7 +53,7 @@ class Service:
     compensator: Compensator
     sources: Sequence[Source]
     sinks: Sequence[Sink]
-    clock: Clock = field(default_factory=Clock)
+    clock: ServiceClock = field(default_factory=ServiceClock)
     state_path: Path | None = None
     probes: Sequence[Probe] = ()
     recorder: Recorder | None = None

@@ -9,7 +9,7 @@ from thermocomp.core.correction import Correction
 from thermocomp.core.machine import Channel
 from thermocomp.core.reading import Measurement
 from thermocomp.core.units import HOUSE_UNITS
-from thermocomp.live.clock import Clock
+from thermocomp.live.clock import ServiceClock
 from thermocomp.live.journal.journal import Journal, JournalLimits
 from thermocomp.live.journal.journalrows import (
     AlarmRow,
@@ -19,9 +19,9 @@ from thermocomp.live.journal.journalrows import (
     Own,
     ReadingRow,
     ReferenceRow,
-    Start,
+    StartRow,
     StateRow,
-    Target,
+    TargetRow,
     UpdateRow,
 )
 from thermocomp.live.probe import Checked
@@ -41,7 +41,7 @@ class Recorder:
     compensator : Compensator
     own : {'on', 'off', 'unknown'}
         Whether the controller compensates by itself.
-    clock : Clock
+    clock : ServiceClock
     limits : JournalLimits
     more : mapping of str to str, optional
         Quantity of channels that are kept beside the inputs of the models.
@@ -52,15 +52,15 @@ class Recorder:
         path: Path,
         compensator: Compensator,
         own: Own,
-        clock: Clock,
+        clock: ServiceClock,
         limits: JournalLimits,
         more: Mapping[str, str] | None = None,
     ) -> None:
         inputs = [i for m in compensator.models for i in (*m.inputs, *(m.watch.inputs if m.watch else ()))]
         channels = {name: Channel(name, kind, HOUSE_UNITS[kind]) for name, kind in (more or {}).items()}
         channels |= {i.name: Channel(i.name, i.quantity, i.unit) for i in inputs}
-        targets = tuple(Target(name) for name in compensator.lines)
-        start = Start(
+        targets = tuple(TargetRow(name) for name in compensator.lines)
+        start = StartRow(
             time=clock.now(),
             targets=targets,
             channels=tuple(channels.values()),

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from thermocomp.core import lagbank
 from thermocomp.core.bounds import LEAST
-from thermocomp.models.numerics.structures import Moments, Structure
+from thermocomp.models.numerics.structures import LagStructure, Moments
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
@@ -163,7 +163,7 @@ class PacedFeatures:
         """Return how much of a jump each copy of a temperature follows within the usual step, (n_copies,)."""
         return np.append(1.0, lagbank.step_response(usual_step(step), np.array(self.lags, dtype=np.float64)))
 
-    def draw(self, count: int, random_state: int, keep: Sequence[int] | None = None) -> list[Structure]:
+    def draw(self, count: int, random_state: int, keep: Sequence[int] | None = None) -> list[LagStructure]:
         """Draw structures: some copies, the same for all temperatures, some speed states, and strengths of a ridge.
 
         Parameters
@@ -175,7 +175,7 @@ class PacedFeatures:
 
         Returns
         -------
-        list of Structure
+        list of LagStructure
         """
         rng = np.random.default_rng(random_state)
         kept = np.arange(len(self.temperatures)) if keep is None else np.asarray(keep, dtype=np.intp)
@@ -187,7 +187,7 @@ class PacedFeatures:
             strengths = 10 ** rng.uniform(_WEAKEST, _STRONGEST, 2)
             columns = [(copies[:, None] * len(self.temperatures) + kept).ravel(), first + states]
             each = [np.full(len(c), s * len(c)) for c, s in zip(columns, strengths, strict=True)]
-            drawn.append(Structure(np.concatenate(columns), np.concatenate(each)))
+            drawn.append(LagStructure(np.concatenate(columns), np.concatenate(each)))
         return drawn
 
 

@@ -8,7 +8,7 @@ from textwrap import fill
 from thermocomp.models.base import StaticRegressor
 from thermocomp.models.linear import TermRegressor
 from thermocomp.models.numerics.leastsquares import Triangle
-from thermocomp.models.numerics.stepwise import Rule, Step, stepwise
+from thermocomp.models.numerics.stepwise import Rule, StepwiseStep, stepwise
 
 
 class StepwiseRegressor(StaticRegressor, TermRegressor):
@@ -18,14 +18,14 @@ class StepwiseRegressor(StaticRegressor, TermRegressor):
     ----------
     selected_ : tuple of int
         Terms in the model, in rising order.
-    log_ : tuple of Step
+    log_ : tuple of StepwiseStep
         Each entering and leaving.
     cycled_ : bool
         True if the selection was stopped because it went round in a circle.
     """
 
     selected_: tuple[int, ...]
-    log_: tuple[Step, ...]
+    log_: tuple[StepwiseStep, ...]
 
     def log_text(self, target: str = "Y") -> str:
         """Return the rule, the steps, the fit and the coefficients as text (C-16).

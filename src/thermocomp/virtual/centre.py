@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from thermocomp.core.exceptions import InputError
 from thermocomp.virtual.heat import HeatSources
 from thermocomp.virtual.joints import Joints, slide_with_friction
-from thermocomp.virtual.machine import Air, Drive, Truth, check, stretches
+from thermocomp.virtual.machine import Air, FeedDrive, Truth, check, stretches
 from thermocomp.virtual.statespace import REFERENCE_TEMPERATURE, Operators, ReducedModel
 
 FloatArray = NDArray[np.float64]
@@ -79,18 +79,20 @@ class MachiningCentre:
 
     def init(self, air: Air) -> CentreState:
         """Return the state of a machine that was switched off for long, in this air."""
-        rest = Drive(powered=False)
+        rest = FeedDrive(powered=False)
         state = self.model.steady(np.zeros(len(self.model.inputs)), air.values, self._theta(rest))
         wish = self._observable("slide") @ (state - REFERENCE_TEMPERATURE * self.model.one)
         return CentreState(state, chilling=False, slid=float(wish))
 
-    def run(self, state: CentreState, drives: Sequence[Drive], air: FloatArray, dt: float) -> tuple[CentreState, Truth]:
+    def run(
+        self, state: CentreState, drives: Sequence[FeedDrive], air: FloatArray, dt: float
+    ) -> tuple[CentreState, Truth]:
         """Advance by one step of `dt` per drive, each in equal parts no longer than `longest_step`.
 
         Parameters
         ----------
         state : CentreState
-        drives : sequence of Drive
+        drives : sequence of FeedDrive
             Each holds during the whole of its step.
         air : ndarray of shape (n_steps, 3)
             `Air.values` of each step.
@@ -125,7 +127,7 @@ class MachiningCentre:
         return CentreState(current, chilling, slid), Truth(truth.temperatures[ends], truth.observables[ends])
 
     def _advance(
-        self, now: FloatArray, chilling: bool, drive: Drive, air: FloatArray, dt: float, fields: FloatArray
+        self, now: FloatArray, chilling: bool, drive: FeedDrive, air: FloatArray, dt: float, fields: FloatArray
     ) -> bool:
         """Fill in the fields after each step of one drive; return whether the chiller runs at the end."""
         self._check(drive)
@@ -181,13 +183,13 @@ class MachiningCentre:
         """Places looked at after every step; those of `_WATCHED` first."""
         return _WATCHED
 
-    def _friction(self, drive: Drive, seen: list[float]) -> tuple[float, float]:
+    def _friction(self, drive: FeedDrive, seen: list[float]) -> tuple[float, float]:
         """Heat of the front and of the rear bearing, which floats on springs, at the temperatures watched [W]."""
         front, rear, shaft, seat = seen[:4]
         ratio = abs(drive.speed) / self.heat.top_speed
         return self.heat.front.heat(ratio, front, shaft - seat), self.heat.rear.heat(ratio, rear, 0.0)
 
-    def _correction(self, _operators: Operators, _drive: Drive) -> Correction | None:
+    def _correction(self, _operators: Operators, _drive: FeedDrive) -> Correction | None:
         """Return what changes the state after a step beside the reduced model: nothing."""
         return None
 
@@ -195,17 +197,17 @@ class MachiningCentre:
         """Shift of the shaft towards the workpiece [um]."""
         return self.joints.shaft(place["shaft"] - place["front_seat"], ratio)
 
-    def _theta(self, drive: Drive) -> tuple[float, ...]:
+    def _theta(self, drive: FeedDrive) -> tuple[float, ...]:
         """Return what decides the conductances, in steps of a 64th: nobody knows them better."""
         shares = {"rotation": self.heat.rotation(drive.speed), "flow": float(drive.cooled and drive.powered)}
         shares |= {f"feed_{a}": self.heat.moving(f) for a, f in zip("xyz", drive.feed, strict=True)}
         return tuple(round(64.0 * shares[name]) / 64.0 for name in self.model.theta)
 
-    def _given(self, drive: Drive) -> FloatArray:
+    def _given(self, drive: FeedDrive) -> FloatArray:
         given = self.heat.given(drive)
         return np.array([given.get(name, 0.0) for name in self.model.inputs])
 
-    def _check(self, drive: Drive) -> None:
+    def _check(self, drive: FeedDrive) -> None:
         if not abs(drive.speed) <= self.heat.top_speed:
             raise InputError(f"spindle speed {drive.speed} 1/min is beyond the machine's {self.heat.top_speed:g} 1/min")
         for place in drive.loads:

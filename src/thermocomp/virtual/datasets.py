@@ -13,7 +13,7 @@ from thermocomp.recordings.recording import Recording
 from thermocomp.virtual.experiments import SimulatedTest, simulate
 from thermocomp.virtual.protocol import Experiment, Physics
 from thermocomp.virtual.protocolfile import read_protocol
-from thermocomp.virtual.sensors import Fault
+from thermocomp.virtual.sensors import SensorFault
 
 _FOLDER = Path(__file__).parent / "protocols"
 _FILES = {path.stem: path for path in sorted(_FOLDER.glob("*.toml"), key=lambda path: path.stem)}
@@ -64,7 +64,7 @@ def record(
     physics: Physics | None = None,
     seed: int = 0,
     sensor_noise: float | None = None,
-    faults: Sequence[Fault] = (),
+    faults: Sequence[SensorFault] = (),
     progress: Callable[[str], None] = lambda _: None,
 ) -> list[Recording]:
     """Run an experiment on a virtual machine.
@@ -79,7 +79,7 @@ def record(
         Of weather, noise, and what is drawn by lot; the machine and its sensors stay the same ones.
     sensor_noise : float, optional
         Standard deviation of the temperature noise [degC]; the sensors' own if not given.
-    faults : sequence of Fault
+    faults : sequence of SensorFault
         Befall every test, beside those of the protocol.
     progress : callable
         Told the name of each test that is done.

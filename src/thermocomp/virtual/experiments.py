@@ -16,7 +16,7 @@ from thermocomp.virtual.kits import Kit
 from thermocomp.virtual.machine import Truth, VirtualMachine
 from thermocomp.virtual.nonlinear import NonlinearCentre, NonlinearTool
 from thermocomp.virtual.protocol import FEED, SPEED, Experiment, Physics, Programme, make_seed
-from thermocomp.virtual.sensors import Fault, apply_lags, read, with_faults
+from thermocomp.virtual.sensors import SensorFault, apply_lags, read, with_faults
 from thermocomp.virtual.toolsystem import RestingTool
 
 FloatArray = NDArray[np.float64]
@@ -76,7 +76,7 @@ def simulate(
     *,
     seed: int = 0,
     sensor_noise: float | None = None,
-    faults: Sequence[Fault] = (),
+    faults: Sequence[SensorFault] = (),
     whole: bool = False,
 ) -> Iterator[SimulatedTest]:
     """Run the tests of an experiment, one after the other.
@@ -89,7 +89,7 @@ def simulate(
     sensor_noise : float, optional
         Standard deviation of the temperature noise [degC] (C-33: 0.4); the sensors' own if not given. The truth does
         not depend on it.
-    faults : sequence of Fault
+    faults : sequence of SensorFault
         Befall every test, beside those of the protocol.
     whole : bool
         Keep all that the machine tells of itself.
@@ -126,7 +126,7 @@ def run(
     noise: np.random.Generator,
     *,
     sensor_noise: float | None = None,
-    faults: Sequence[Fault] = (),
+    faults: Sequence[SensorFault] = (),
     whole: bool = False,
 ) -> SimulatedTest:
     """Run one test on a machine.
@@ -142,7 +142,7 @@ def run(
         Of the air round the machine, and of sensors and probes.
     sensor_noise : float, optional
         Standard deviation of the temperature noise [degC]; the sensors' own if not given.
-    faults : sequence of Fault
+    faults : sequence of SensorFault
         Beside those of the programme.
     whole : bool
         Keep all that the machine tells of itself.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from thermocomp.virtual.axes import AXES, N_HATS, TRAVEL
-from thermocomp.virtual.machine import Drive
+from thermocomp.virtual.machine import FeedDrive
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ class HeatSources:
         """Share of a turning screw's extra convection in force at a feed rate [mm/min], in the same way."""
         return float(min(abs(feed) / self.top_feed, 1.0) ** (2.0 / 3.0))
 
-    def given(self, drive: Drive) -> dict[str, float]:
+    def given(self, drive: FeedDrive) -> dict[str, float]:
         """Return the heat put in at each named place that does not depend on temperatures [W]."""
         if not drive.powered:
             return {}

@@ -15,7 +15,7 @@ from thermocomp.core.machine import Channel
 from thermocomp.virtual.axes import AXES, TRAVEL
 from thermocomp.virtual.kits import Kit, check_labels
 from thermocomp.virtual.machine import Air
-from thermocomp.virtual.probes import Probe, weigh_tool_point
+from thermocomp.virtual.probes import VirtualProbe, weigh_tool_point
 from thermocomp.virtual.sensors import Sensor
 
 FloatArray = NDArray[np.float64]
@@ -108,13 +108,13 @@ def thermometer(kit: Kit, label: str, place: str, *, perfect: bool, noise: float
     return Instrument(sensor, {place: contact}, air=(1.0 - contact, 0.0, 0.0))
 
 
-def displacement(label: str, probe: Probe, *, perfect: bool) -> Instrument:
+def displacement(label: str, probe: VirtualProbe, *, perfect: bool) -> Instrument:
     """Return a displacement probe, or a line of a laser; its channel is ``LABEL_um``, that of an angle ``LABEL_urad``.
 
     Parameters
     ----------
     label : str
-    probe : Probe
+    probe : VirtualProbe
     perfect : bool
         Without noise, drift and steps.
     """

@@ -14,7 +14,7 @@ from thermocomp.virtual.probes import (
     COMPONENTS,
     NEST,
     SPINDLE,
-    Probe,
+    VirtualProbe,
     at_position,
     component,
     laser,
@@ -85,7 +85,7 @@ class Kit:
         Place of a temperature sensor -> where it is, in words.
     air : mapping of str to float
         Height above the floor of those `places` that are in the air [m].
-    probes : mapping of str to Probe
+    probes : mapping of str to VirtualProbe
     observables : tuple of str
         What probes can be made of.
     outfits, nests : mapping of str to tuple of str
@@ -100,7 +100,7 @@ class Kit:
 
     places: Mapping[str, str]
     air: Mapping[str, float]
-    probes: Mapping[str, Probe]
+    probes: Mapping[str, VirtualProbe]
     observables: tuple[str, ...]
     outfits: Mapping[str, tuple[str, ...]]
     nests: Mapping[str, tuple[str, ...]]
@@ -130,7 +130,7 @@ class Kit:
             raise explain_unknown("place", name, [*known, *self.outfits])
         return known[name]
 
-    def probe(self, name: str | Mapping[str, float]) -> Probe:
+    def probe(self, name: str | Mapping[str, float]) -> VirtualProbe:
         """Return a probe by its name, such as ``z``, ``y_laser_250``, ``z_at_400`` or ``EXX_0``, or by its weights.
 
         Raises
@@ -142,7 +142,7 @@ class Kit:
             for observable in name:
                 if observable not in self.observables:
                     raise explain_unknown("observable", observable, self.observables)
-            return Probe(" + ".join(f"{w:g} {n}" for n, w in name.items()), name)
+            return VirtualProbe(" + ".join(f"{w:g} {n}" for n, w in name.items()), name)
         if name in self.probes:
             return self.probes[name]
         if name in self.nests.get("y_pitch", ()):
@@ -268,9 +268,9 @@ _TOOL_PLACES = {
     "t9": "room",
 }
 _AXIAL = {
-    "s1": Probe("axial, tip of the tool", {"s1": 1.0}),
-    "s2": Probe("axial, front of the chuck", {"s2": 1.0}),
-    "s3": Probe("axial, flange of the chuck", {"s3": 1.0}),
+    "s1": VirtualProbe("axial, tip of the tool", {"s1": 1.0}),
+    "s2": VirtualProbe("axial, front of the chuck", {"s2": 1.0}),
+    "s3": VirtualProbe("axial, flange of the chuck", {"s3": 1.0}),
 }
 
 TOOL = Kit(

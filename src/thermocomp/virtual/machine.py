@@ -47,7 +47,7 @@ class Air:
 
 
 @dataclass(frozen=True)
-class Drive:
+class FeedDrive:
     """What is done to the machine during one step.
 
     Parameters
@@ -125,13 +125,13 @@ class VirtualMachine(Protocol[S]):
         """Return the state of a machine that was switched off for long, in this air."""
         ...
 
-    def run(self, state: S, drives: Sequence[Drive], air: FloatArray, dt: float) -> tuple[S, Truth]:
+    def run(self, state: S, drives: Sequence[FeedDrive], air: FloatArray, dt: float) -> tuple[S, Truth]:
         """Return the state after `n_steps` steps of `dt`, and what was true at the end of each.
 
         Parameters
         ----------
         state : S
-        drives : sequence of Drive
+        drives : sequence of FeedDrive
             One per step.
         air : ndarray of shape (n_steps, 3)
             `Air.values` of each step.
@@ -141,12 +141,12 @@ class VirtualMachine(Protocol[S]):
         ...
 
 
-def check(drives: Sequence[Drive], air: FloatArray, dt: float) -> None:
+def check(drives: Sequence[FeedDrive], air: FloatArray, dt: float) -> None:
     """Refuse what `VirtualMachine.run` cannot take.
 
     Parameters
     ----------
-    drives : sequence of Drive
+    drives : sequence of FeedDrive
     air : ndarray of shape (n_steps, 3)
     dt : float
         [s]
@@ -166,7 +166,7 @@ def check(drives: Sequence[Drive], air: FloatArray, dt: float) -> None:
         raise InputError("air: a number is not finite")
 
 
-def stretches(drives: Sequence[Drive]) -> Iterator[tuple[int, int]]:
+def stretches(drives: Sequence[FeedDrive]) -> Iterator[tuple[int, int]]:
     """Yield where each stretch of one and the same drive begins and ends."""
     first = 0
     for k in range(1, len(drives) + 1):

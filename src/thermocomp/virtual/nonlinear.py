@@ -17,7 +17,7 @@ from thermocomp.virtual.convection import Face, Faces
 from thermocomp.virtual.exchange import Exchange
 from thermocomp.virtual.fits import Fit
 from thermocomp.virtual.joints import slide_with_friction
-from thermocomp.virtual.machine import Air, Drive, Truth, stretches
+from thermocomp.virtual.machine import Air, FeedDrive, Truth, stretches
 from thermocomp.virtual.preload import AngularContact
 from thermocomp.virtual.statespace import REFERENCE_TEMPERATURE, Operators, ReducedModel
 from thermocomp.virtual.toolsystem import RestingTool, ToolState
@@ -107,7 +107,7 @@ class NonlinearTool(RestingTool):
         return ToolState(state, float(self._slip(state[None], 0.0)[0]))
 
     def _advance(
-        self, now: FloatArray, drives: Sequence[Drive], air: FloatArray, dt: float, fields: FloatArray
+        self, now: FloatArray, drives: Sequence[FeedDrive], air: FloatArray, dt: float, fields: FloatArray
     ) -> None:
         parts = len(fields) // len(drives)
         watched = (*self.faces, "taper_a", "taper_b", "grip_a", "grip_b")
@@ -176,7 +176,7 @@ class NonlinearCentre(MachiningCentre):
     def _watched(self) -> tuple[str, ...]:
         return (*super()._watched, *_SIDES, "enclosure", *self.faces)
 
-    def _friction(self, drive: Drive, seen: list[float]) -> tuple[float, float]:
+    def _friction(self, drive: FeedDrive, seen: list[float]) -> tuple[float, float]:
         front, rear = super()._friction(drive, seen)
         n = len(super()._watched)
         if self.front:
@@ -187,7 +187,7 @@ class NonlinearCentre(MachiningCentre):
             rear = self.rear.heat(drive.speed, seen[1], self.rear.mounted)
         return front, rear
 
-    def _correction(self, operators: Operators, drive: Drive) -> Correction:
+    def _correction(self, operators: Operators, drive: FeedDrive) -> Correction:
         rooms = ["enclosure" if name in IN_WORK_SPACE else None for name in self.faces]
         paths = [*zip(self.faces, rooms, strict=True), ("seat_a", "seat_b"), ("taper_a", "taper_b")]
         exchange = Exchange.of(self.model, operators, self._watched, paths)

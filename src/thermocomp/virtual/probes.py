@@ -17,7 +17,7 @@ PROBE_DISTANCE = 0.1
 
 
 @dataclass(frozen=True)
-class Probe:
+class VirtualProbe:
     """A displacement probe, a line of a laser, or a touch probe on an artefact.
 
     Parameters
@@ -85,19 +85,19 @@ def _summed(*parts: tuple[float, Mapping[str, float]]) -> dict[str, float]:
     return {name: w for name, w in total.items() if w}
 
 
-def laser(axis: str, position: float) -> Probe:
+def laser(axis: str, position: float) -> VirtualProbe:
     """Return a laser that measures the positioning of an axis at a position [mm]."""
     # The reflector stands at the tool point. A laser measures each profile from its first position: the shift of the
     # origin is not in it.
     reads = _summed((1.0, positioning(axis, position)), (-1.0, positioning(axis, 0.0)))
     geometry = float(cold_profile(position)) if axis == "y" else 0.0
-    return Probe(f"positioning of {axis.upper()} at {position:g} mm, laser", reads, geometry)
+    return VirtualProbe(f"positioning of {axis.upper()} at {position:g} mm, laser", reads, geometry)
 
 
-def pitch(position: int) -> Probe:
+def pitch(position: int) -> VirtualProbe:
     """Return a laser that measures the pitch of Y at one of its stations [mm]."""
     words = f"pitch of Y at {position} mm: turn of the headstock about X, laser"
-    return Probe(words, {f"ay@{position}": 1.0, "ay@0": -1.0} if position else {}, unit="urad")
+    return VirtualProbe(words, {f"ay@{position}": 1.0, "ay@0": -1.0} if position else {}, unit="urad")
 
 
 def weigh_tool_point(axis: str, point: Mapping[str, float]) -> dict[str, float]:
@@ -119,10 +119,10 @@ def weigh_tool_point(axis: str, point: Mapping[str, float]) -> dict[str, float]:
     return _summed(*parts)
 
 
-def at_position(axis: str, position: float) -> Probe:
+def at_position(axis: str, position: float) -> VirtualProbe:
     """Return a displacement probe at the tip of the test bar, with the axis at a position [mm]."""
     where = f"{axis.upper()} at the tip of the test bar with the {axis.upper()} axis at {position:g} mm"
-    return Probe(where, weigh_tool_point(axis, {axis: position}))
+    return VirtualProbe(where, weigh_tool_point(axis, {axis: position}))
 
 
 #: what an axis does, along or about which axis; the codes of ISO 230-1 end with the axis
@@ -152,7 +152,7 @@ def station(code: str, position: int) -> tuple[str, ...]:
 NEARER = {"x": "", "z": "x", "y": "xz"}
 
 
-def component(code: str, position: float, z: float = TEST_POSITION["z"]) -> Probe:
+def component(code: str, position: float, z: float = TEST_POSITION["z"]) -> VirtualProbe:
     """Return a component of an axis as a laser with six degrees of freedom between table and spindle reads it.
 
     It is set to zero at the test position, in each run. The tool point is that of the test bar, and the other axes
@@ -194,7 +194,7 @@ def component(code: str, position: float, z: float = TEST_POSITION["z"]) -> Prob
                 geometry += arm * float(find_cold_component(f"E{turn}X", point))
     aside = "" if z == TEST_POSITION["z"] else f", Z at {z:g} mm"
     words = f"{code}: {MOTIONS[code[:2]]} of {axis.upper()} at {position:g} mm{aside}"
-    return Probe(place=words, reads=weights, cold=geometry, unit=unit, noise=SIX_NOISE[unit], zeroed=False)
+    return VirtualProbe(place=words, reads=weights, cold=geometry, unit=unit, noise=SIX_NOISE[unit], zeroed=False)
 
 
 def _between_two(code: str, position: float) -> dict[str, float]:
@@ -229,9 +229,9 @@ def swing(along: str, way: FloatArray) -> list[tuple[str, float]]:
     return [(turn, arm) for turn, arm in arms[along] if arm]
 
 
-def make_squareness_probe(code: str) -> Probe:
+def make_squareness_probe(code: str) -> VirtualProbe:
     """Return the squareness of two axes at 20 degC, by an artefact; what heat does is in the lasers' straightness."""
-    return Probe(
+    return VirtualProbe(
         place=f"{code}: squareness at 20 degC, artefact",
         reads={},
         cold=SQUARENESS[code],
@@ -242,14 +242,14 @@ def make_squareness_probe(code: str) -> Probe:
 
 #: X1 and Y1 at the tip of the test bar, X2 and Y2 towards the spindle: tilts A = (y1 - y2) / L, B = (x2 - x1) / L
 NEST = {
-    "x1": Probe("X at the tip of the test bar", {"x": 1.0}),
-    "x2": Probe("X towards the spindle", {"x": 1.0, "b": PROBE_DISTANCE}),
-    "y1": Probe("Y at the tip of the test bar", {"y": 1.0}),
-    "y2": Probe("Y towards the spindle", {"y": 1.0, "a": -PROBE_DISTANCE}),
-    "z": Probe("Z at the tip of the test bar; negative: the tool nears the workpiece", {"z": 1.0}),
+    "x1": VirtualProbe("X at the tip of the test bar", {"x": 1.0}),
+    "x2": VirtualProbe("X towards the spindle", {"x": 1.0, "b": PROBE_DISTANCE}),
+    "y1": VirtualProbe("Y at the tip of the test bar", {"y": 1.0}),
+    "y2": VirtualProbe("Y towards the spindle", {"y": 1.0, "a": -PROBE_DISTANCE}),
+    "z": VirtualProbe("Z at the tip of the test bar; negative: the tool nears the workpiece", {"z": 1.0}),
 }
 #: measured where nothing moves the spindle: in a calculation, or on the spindle itself
 SPINDLE = {
-    "nose": Probe("axial growth of the spindle nose from the housing's flange", {"nose": 1.0}),
-    "tip": Probe("axial growth of the tool's tip from the housing's flange", {"tip": 1.0}),
+    "nose": VirtualProbe("axial growth of the spindle nose from the housing's flange", {"nose": 1.0}),
+    "tip": VirtualProbe("axial growth of the tool's tip from the housing's flange", {"tip": 1.0}),
 }

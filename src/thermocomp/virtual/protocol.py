@@ -1,7 +1,7 @@
 """Protocols: what is done to a virtual machine and what is recorded, as data.
 
-What is written (`Experiment`, `Plan`) may leave numbers and orders open, which a seed then draws by lot; what is run
-(`Programme`) is fixed.
+What is written (`Experiment`, `TestPlan`) may leave numbers and orders open, which a seed then draws by lot; what is
+run (`Programme`) is fixed.
 """
 
 import math
@@ -18,7 +18,7 @@ from thermocomp.virtual.climate import Climate
 from thermocomp.virtual.instruments import Instrument, Touch, displacement, thermometer
 from thermocomp.virtual.kits import KITS, Kit, labelled
 from thermocomp.virtual.segments import Path, SteadySegment, Stretch, values
-from thermocomp.virtual.sensors import Fault
+from thermocomp.virtual.sensors import SensorFault
 
 HOUR = 3600.0
 #: what is recorded of the drive: of a machine with a spindle, and where axes move
@@ -49,7 +49,7 @@ class RecordingSetup:
         Sensors without lag, bias, drift, noise and steps: a calculation, not a measurement.
     touch : Touch, optional
         A probing cycle.
-    faults : tuple of Fault
+    faults : tuple of SensorFault
     """
 
     sampling: float
@@ -58,7 +58,7 @@ class RecordingSetup:
     probes: tuple[str, ...] | Mapping[str, str | Mapping[str, float]] = ("nest",)
     perfect: bool = False
     touch: Touch | None = None
-    faults: tuple[Fault, ...] = ()
+    faults: tuple[SensorFault, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.sampling > 0:
@@ -123,7 +123,7 @@ class Programme(RecordingSetup):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Plan(RecordingSetup, Stretch):
+class TestPlan(RecordingSetup, Stretch):
     """One test as it is written, or several alike; beside what `Setup` and `Stretch` say of it.
 
     Parameters
@@ -198,7 +198,7 @@ class Experiment:
     Parameters
     ----------
     name : str
-    tests : tuple of Plan
+    tests : tuple of TestPlan
     description : str
         One line.
     machine : str
@@ -208,7 +208,7 @@ class Experiment:
     """
 
     name: str
-    tests: tuple[Plan, ...]
+    tests: tuple[TestPlan, ...]
     description: str = ""
     machine: str = "centre"
     physics: Physics = "linear"

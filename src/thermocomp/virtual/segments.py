@@ -8,7 +8,7 @@ import numpy as np
 
 from thermocomp.core.exceptions import SettingError
 from thermocomp.virtual.axes import AXES, TRAVEL
-from thermocomp.virtual.machine import Drive
+from thermocomp.virtual.machine import FeedDrive
 
 # Keys and positions that lead to something inside a protocol
 Path = tuple[str | int, ...]
@@ -28,11 +28,11 @@ class SteadySegment:
     ----------
     duration : float
         [s]
-    drive : Drive
+    drive : FeedDrive
     """
 
     duration: float
-    drive: Drive = field(default_factory=Drive)
+    drive: FeedDrive = field(default_factory=FeedDrive)
 
 
 @dataclass(frozen=True)
@@ -228,7 +228,7 @@ def _segment(given: Mapping[str, Any], rng: np.random.Generator) -> SteadySegmen
     feeds = (_drawn(feed.x, rng), _drawn(feed.y, rng), _drawn(feed.z, rng))
     powered = given.get("powered", True)
     # A machine that is switched off stands, whatever speed it has inherited.
-    drive = Drive(
+    drive = FeedDrive(
         speed=speed if powered else 0.0,
         feed=feeds if powered else (0.0, 0.0, 0.0),
         stroke=(stroke.x, stroke.y, stroke.z),

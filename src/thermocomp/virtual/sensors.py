@@ -100,7 +100,7 @@ def read(sensors: Sequence[Sensor], felt: FloatArray, time: FloatArray, rng: np.
 
 
 @dataclass(frozen=True)
-class Fault:
+class SensorFault:
     """A sensor that fails (C-34).
 
     Parameters
@@ -135,7 +135,7 @@ class Fault:
 
 
 def with_faults(
-    time: FloatArray, channels: Sequence[Channel], values: FloatArray, faults: Sequence[Fault]
+    time: FloatArray, channels: Sequence[Channel], values: FloatArray, faults: Sequence[SensorFault]
 ) -> FloatArray:
     """Return readings in which some sensors fail.
 
@@ -146,7 +146,7 @@ def with_faults(
     channels : sequence of Channel
     values : ndarray of shape (n_rows, n_channels)
         Left as they are.
-    faults : sequence of Fault
+    faults : sequence of SensorFault
         Applied in turn; a fault that begins after the last row changes nothing.
 
     Returns

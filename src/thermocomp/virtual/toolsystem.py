@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.virtual.joints import slide_with_friction
-from thermocomp.virtual.machine import Air, Drive, Truth, check, stretches
+from thermocomp.virtual.machine import Air, FeedDrive, Truth, check, stretches
 from thermocomp.virtual.statespace import REFERENCE_TEMPERATURE, ReducedModel
 
 FloatArray = NDArray[np.float64]
@@ -74,13 +74,13 @@ class RestingTool:
         state = self.model.steady(np.zeros(len(self.model.inputs)), air.values, ())
         return ToolState(state, self._wish(self._linear(state[None])).item())
 
-    def run(self, state: ToolState, drives: Sequence[Drive], air: FloatArray, dt: float) -> tuple[ToolState, Truth]:
+    def run(self, state: ToolState, drives: Sequence[FeedDrive], air: FloatArray, dt: float) -> tuple[ToolState, Truth]:
         """Advance by one step of `dt` per drive, each in equal parts no longer than `longest_step`.
 
         Parameters
         ----------
         state : ToolState
-        drives : sequence of Drive
+        drives : sequence of FeedDrive
             Only their loads count.
         air : ndarray of shape (n_steps, 3)
             `Air.values` of each step.
@@ -108,7 +108,7 @@ class RestingTool:
         return ToolState(fields[-1].copy(), slipped), truth
 
     def _advance(
-        self, now: FloatArray, drives: Sequence[Drive], air: FloatArray, dt: float, fields: FloatArray
+        self, now: FloatArray, drives: Sequence[FeedDrive], air: FloatArray, dt: float, fields: FloatArray
     ) -> None:
         """Fill in the fields after each part of each step."""
         parts = len(fields) // len(drives)
@@ -142,7 +142,7 @@ class RestingTool:
         result: FloatArray = observables[:, s1] - observables[:, s2]
         return result
 
-    def _given(self, drive: Drive) -> FloatArray:
+    def _given(self, drive: FeedDrive) -> FloatArray:
         if drive.speed or any(drive.feed):
             raise InputError("the resting tool cannot turn or move: its protocol takes loads only")
         given = np.zeros(len(self.model.inputs))

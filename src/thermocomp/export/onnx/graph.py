@@ -22,7 +22,7 @@ CLOCKS = 4
 
 
 @dataclass(frozen=True)
-class Block:
+class GraphBlock:
     """A compensator as a graph.
 
     Parameters
@@ -60,7 +60,7 @@ class _Moment:
     clocks: str
 
 
-def translate(tables: Tables) -> Block:
+def translate(tables: Tables) -> GraphBlock:
     """Return a compensator as a graph of one step.
 
     Parameters
@@ -95,7 +95,7 @@ def translate(tables: Tables) -> Block:
     g.leave("slope", slope, (targets,))
     g.leave("status", status, (targets,), np.int64)
     g.leave("next_state", g.join([moment.clocks, idle, correction, slope, learned]), (memory.end,))
-    return Block(g, memory.end, places[3])
+    return GraphBlock(g, memory.end, places[3])
 
 
 def _checked(g: Graph, drive: Drive, state: str, places: list[int]) -> str:

@@ -4,7 +4,7 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.export.block.tables import Tables, gather
 from thermocomp.export.c99.c99 import identifier
 from thermocomp.export.facts import Facts
-from thermocomp.export.onnx.graph import Block, translate
+from thermocomp.export.onnx.graph import GraphBlock, translate
 from thermocomp.export.onnx.nodes import IR, OPSET, serialize
 from thermocomp.export.onnx.vectors import PROGRAM, answer, pick_readings, pick_zero, without_watch, write_vectors
 from thermocomp.export.target import Target
@@ -132,7 +132,7 @@ def _properties(tables: Tables, said: list[str], facts: Facts) -> dict[str, str]
     }
 
 
-def _readme(compensator: Compensator, tables: Tables, name: str, said: list[str], block: Block, calls: int) -> str:
+def _readme(compensator: Compensator, tables: Tables, name: str, said: list[str], block: GraphBlock, calls: int) -> str:
     """Return the page.
 
     Parameters
@@ -143,7 +143,7 @@ def _readme(compensator: Compensator, tables: Tables, name: str, said: list[str]
     name : str
     said : list of str
         Facts.
-    block : Block
+    block : GraphBlock
     calls : int
         Of the test vectors.
     """

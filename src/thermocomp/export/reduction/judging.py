@@ -11,7 +11,7 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.core.inputs import Support
 from thermocomp.core.model import ErrorModel
 from thermocomp.export.reduction.models import LinearReduction
-from thermocomp.export.reduction.reduced import Left, LeftOut, Reduced, Shape
+from thermocomp.export.reduction.reduced import LeftOut, Reduced, RemainingError, Shape
 from thermocomp.judging import metrics
 from thermocomp.judging.compare import compare
 from thermocomp.judging.replay import are_absolute, replay
@@ -131,7 +131,7 @@ def reduce_model(
         model=written,
         axis=axis,
         beside=_beside(model, method if full else "", judging),
-        none=Left(overall.none_metric("rms"), overall.none_metric("max_abs")),
+        none=RemainingError(overall.none_metric("rms"), overall.none_metric("max_abs")),
         full=_full(model, beside),
         reduced=_left(overall),
         cycles=tuple(_left_outs(blocks, full)),
@@ -203,17 +203,17 @@ def _beside(model: ErrorModel, method: str, judging: Judging) -> str:
     )
 
 
-def _full(model: ErrorModel, beside: Comparison | None) -> Left:
+def _full(model: ErrorModel, beside: Comparison | None) -> RemainingError:
     if beside is not None:
         return _left(beside.overall()[0])
     found = model.honest_error
-    return Left(math.nan, math.nan) if found is None else Left(found.rms, found.max_abs)
+    return RemainingError(math.nan, math.nan) if found is None else RemainingError(found.rms, found.max_abs)
 
 
-def _left(found: Assessment) -> Left:
-    return Left(found.metric("rms"), found.metric("max_abs"))
+def _left(found: Assessment) -> RemainingError:
+    return RemainingError(found.metric("rms"), found.metric("max_abs"))
 
 
-def _of(residual: FloatArray) -> Left:
+def _of(residual: FloatArray) -> RemainingError:
     nothing = np.zeros_like(residual)
-    return Left(metrics.METRICS["rms"](residual, nothing), metrics.METRICS["max_abs"](residual, nothing))
+    return RemainingError(metrics.METRICS["rms"](residual, nothing), metrics.METRICS["max_abs"](residual, nothing))

@@ -43,7 +43,7 @@ SHAPES = {
 }
 
 
-class Left(NamedTuple):
+class RemainingError(NamedTuple):
     """What is left of a deviation [um]; nan if it is not known."""
 
     rms: float
@@ -83,11 +83,11 @@ class Reduced:
         X, Y or Z.
     beside : str
         What the full model is, and on what its error was found.
-    none, full, reduced : Left
+    none, full, reduced : RemainingError
         On unseen cycles: without compensation, with the full model, with this one.
     cycles : tuple of LeftOut
         One by one; empty where the model was of that shape already.
-    replayed : Left or None
+    replayed : RemainingError or None
         With the model as it is written, over all rows of the recordings that it was fitted to.
     most : float
         Largest deviation that was said in all of this [um].
@@ -96,11 +96,11 @@ class Reduced:
     model: ErrorModel
     axis: str
     beside: str
-    none: Left
-    full: Left
-    reduced: Left
+    none: RemainingError
+    full: RemainingError
+    reduced: RemainingError
     cycles: tuple[LeftOut, ...] = ()
-    replayed: Left | None = None
+    replayed: RemainingError | None = None
     most: float = 0.0
 
     @property
@@ -184,8 +184,8 @@ def as_it_is(model: ErrorModel, axis: str) -> Reduced:
         coefficients=tuple(float(f"{c:.5g}") for c in model.coefficients),
         intercept=float(f"{model.intercept:.5g}"),
     )
-    none = Left(math.nan if found is None else found.none_rms, math.nan)
-    own = Left(*((math.nan, math.nan) if found is None else (found.rms, found.max_abs)))
+    none = RemainingError(math.nan if found is None else found.none_rms, math.nan)
+    own = RemainingError(*((math.nan, math.nan) if found is None else (found.rms, found.max_abs)))
     return Reduced(
         model=model,
         axis=axis,

@@ -8,7 +8,7 @@ from thermocomp.export.block.tables import Tables, gather
 from thermocomp.export.c99.c99 import identifier
 from thermocomp.export.facts import Facts
 from thermocomp.export.pages import describe
-from thermocomp.export.st.structuredtext import Unit, comment, translate
+from thermocomp.export.st.structuredtext import SourceUnit, comment, translate
 from thermocomp.export.st.ststatements import Dialect
 from thermocomp.export.st.sttest import allow, write_test
 from thermocomp.export.target import Target
@@ -108,7 +108,7 @@ def write_blocks(
     name: str,
     facts: Facts,
     dialect: Dialect,
-    more: Sequence[Unit] = (),
+    more: Sequence[SourceUnit] = (),
     about: str = "",
 ) -> dict[str, bytes]:
     """Return all files of a compensator, and of more blocks for a controller.
@@ -120,7 +120,7 @@ def write_blocks(
     name : str
     facts : Facts
     dialect : {'codesys', 'twincat', 'scl'}
-    more : sequence of Unit
+    more : sequence of SourceUnit
         Beside the compensator.
     about : str
         What the page says of them.
@@ -164,11 +164,11 @@ def _kilobytes(tables: Tables) -> int:
     return 10 + (8 * (readings + sizes.get("MEMORY", 0) * (sizes["SENSORS"] + 1) + sizes["POINTS"])) // 1000
 
 
-def _joined(units: Sequence[Unit], head: str, dialect: Dialect) -> str:
+def _joined(units: Sequence[SourceUnit], head: str, dialect: Dialect) -> str:
     return "\n".join([head, *(unit.text(dialect) for unit in units)])
 
 
-def _object(unit: Unit, head: str) -> tuple[str, str]:
+def _object(unit: SourceUnit, head: str) -> tuple[str, str]:
     """Return name and text of a file of TwinCAT 3."""
     body = f"\n    <Implementation><ST><![CDATA[{unit.statements}]]></ST></Implementation>" if unit.end else ""
     kind = "POU" if unit.end else "DUT"

@@ -52,7 +52,7 @@ END_FOR;
 
 
 @dataclass(frozen=True)
-class Unit:
+class SourceUnit:
     """A block or a type.
 
     Parameters
@@ -77,7 +77,7 @@ class Unit:
         return "\n".join([self.declaration, *begin, self.statements.rstrip("\n"), self.end]) + "\n"
 
 
-def translate(tables: Tables, name: str, dialect: Dialect) -> list[Unit]:
+def translate(tables: Tables, name: str, dialect: Dialect) -> list[SourceUnit]:
     """Return a compensator in structured text, each part behind those that it uses.
 
     What it does with values is what `Compensator.step` does with a reading.
@@ -101,12 +101,12 @@ def translate(tables: Tables, name: str, dialect: Dialect) -> list[Unit]:
     used += " ".join([*(f" s.{safe(n)}" for n in OUTPUTS), f"w.value w.age w.{safe('dt')} t.rate"])
     if scl:
         used = used.replace("#", "")
-    units = [Unit(f"{name}_{word}", write_type(tables, name, bag, used, dialect)) for bag, word in BAGS.items()]
-    units += [Unit(n, head, body, "END_FUNCTION") for n, (head, body) in functions.items()]
+    units = [SourceUnit(f"{name}_{word}", write_type(tables, name, bag, used, dialect)) for bag, word in BAGS.items()]
+    units += [SourceUnit(n, head, body, "END_FUNCTION") for n, (head, body) in functions.items()]
     return [*units, _start(tables, name, used, scl), _block(tables, name, scl)]
 
 
-def _start(tables: Tables, name: str, used: str, scl: bool) -> Unit:
+def _start(tables: Tables, name: str, used: str, scl: bool) -> SourceUnit:
     """Return the function that begins anew; the corrections in force stay, and move from there."""
     mark = "#" if scl else ""
     lines = []
@@ -124,10 +124,10 @@ def _start(tables: Tables, name: str, used: str, scl: bool) -> Unit:
     parts += ["(* Begin anew: temperatures count from now on; corrections stay, and move from where they are. *)"]
     parts += [section("VAR_IN_OUT", {"s": quoted(f"{name}_state", scl)})]
     parts += [section("VAR_TEMP" if scl else "VAR", {"k": "DINT"})]
-    return Unit(f"{name}_start", "\n".join(parts), "\n".join(lines), "END_FUNCTION")
+    return SourceUnit(f"{name}_start", "\n".join(parts), "\n".join(lines), "END_FUNCTION")
 
 
-def _block(tables: Tables, name: str, scl: bool) -> Unit:
+def _block(tables: Tables, name: str, scl: bool) -> SourceUnit:
     """Return the function block."""
     mark, n = "#" if scl else "", len(tables.channels)
     outputs = {o: (tables.sizes[size] if size else 0) for o, size in OUTPUTS.items() if o != "fault" or tables.sensors}
@@ -171,7 +171,7 @@ def _block(tables: Tables, name: str, scl: bool) -> Unit:
             body += "END_FOR;\n"
         else:
             body += f"{mark}{o} := {mark}s.{safe(o)};\n"
-    return Unit(name, "\n".join(parts), body, "END_FUNCTION_BLOCK")
+    return SourceUnit(name, "\n".join(parts), body, "END_FUNCTION_BLOCK")
 
 
 def _listed(names: Sequence[str]) -> str:

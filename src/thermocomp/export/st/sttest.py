@@ -7,7 +7,7 @@ import numpy as np
 
 from thermocomp.export.block.layout import Kind
 from thermocomp.export.block.tables import Tables
-from thermocomp.export.st.structuredtext import NOTHING, Unit
+from thermocomp.export.st.structuredtext import NOTHING, SourceUnit
 from thermocomp.export.st.ststatements import SCL, Dialect, array, number, quoted, section, values, wrapped
 from thermocomp.export.vectors import Answers, Readings, find_tolerance
 
@@ -52,7 +52,7 @@ _FAULTS = """    FOR {_}j := 0 TO {last_sensor} DO
 """
 
 
-def write_test(tables: Tables, name: str, dialect: Dialect, readings: Readings, answers: Answers) -> list[Unit]:
+def write_test(tables: Tables, name: str, dialect: Dialect, readings: Readings, answers: Answers) -> list[SourceUnit]:
     """Return the type that holds the vectors, and the block that runs them.
 
     Parameters
@@ -82,7 +82,7 @@ def write_test(tables: Tables, name: str, dialect: Dialect, readings: Readings, 
         "STRUCT",
     ]
     lines += [wrapped(f"    {n} : {array(k, len(v))} := {values(v, k)};") for n, (k, v) in held.items()]
-    vectors = Unit(f"{name}_vectors", "\n".join([*lines, f"END_STRUCT{';' if scl else ''}", "END_TYPE"]))
+    vectors = SourceUnit(f"{name}_vectors", "\n".join([*lines, f"END_STRUCT{';' if scl else ''}", "END_TYPE"]))
     parts = [
         f"FUNCTION_BLOCK {quoted(f'{name}_test', scl)}",
         *(SCL if scl else []),
@@ -116,7 +116,7 @@ def write_test(tables: Tables, name: str, dialect: Dialect, readings: Readings, 
         "last_sensor": sensors - 1,
     }
     body = _BODY.format(**sizes, faults=_FAULTS.format(**sizes) if sensors else "")
-    return [vectors, Unit(f"{name}_test", "\n".join(parts), body, "END_FUNCTION_BLOCK")]
+    return [vectors, SourceUnit(f"{name}_test", "\n".join(parts), body, "END_FUNCTION_BLOCK")]
 
 
 def allow(tables: Tables) -> float:

@@ -4,7 +4,7 @@ import time
 from dataclasses import dataclass, field
 from typing import Literal
 
-from thermocomp.core.ports import Status
+from thermocomp.core.ports import LinkStatus
 
 
 @dataclass
@@ -13,12 +13,12 @@ class Connection:
 
     Parameters
     ----------
-    now : Status
+    now : LinkStatus
     """
 
-    now: Status = field(default=Status("closed"))
+    now: LinkStatus = field(default=LinkStatus("closed"))
 
     def to(self, state: Literal["closed", "connecting", "connected", "failed"], reason: str = "") -> None:
         """Say how it is from now on."""
         if (self.now.state, self.now.reason) != (state, reason):
-            self.now = Status(state, reason, time.time())
+            self.now = LinkStatus(state, reason, time.time())

@@ -10,7 +10,7 @@ import aiomqtt
 
 from thermocomp.core.correction import Correction
 from thermocomp.core.exceptions import ReadingError, ThermocompError
-from thermocomp.core.ports import Status
+from thermocomp.core.ports import LinkStatus
 from thermocomp.core.reading import Reading
 from thermocomp.core.shown import escape
 from thermocomp.live.adapters.connection import Connection
@@ -49,7 +49,7 @@ class Broker:
         self._client = client
         self._connection.to("connected")
 
-    def status(self) -> Status:
+    def status(self) -> LinkStatus:
         """Return the connection status without blocking."""
         return self._connection.now
 

@@ -13,7 +13,7 @@ from typing import BinaryIO
 
 from thermocomp.core.correction import Correction
 from thermocomp.core.exceptions import InputError, ThermocompError
-from thermocomp.core.ports import Status
+from thermocomp.core.ports import LinkStatus
 from thermocomp.core.reading import Reading
 from thermocomp.core.shown import explain_unfit
 from thermocomp.files.draft import write_text
@@ -80,7 +80,7 @@ class Played:
             self._connection.to("failed", str(e))
             raise
 
-    def status(self) -> Status:
+    def status(self) -> LinkStatus:
         """Return how it is, at once."""
         return self._connection.now
 
@@ -177,7 +177,7 @@ class FileSink:
         except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError, InputError):
             return None
 
-    def status(self) -> Status:
+    def status(self) -> LinkStatus:
         """Return how it is, at once."""
         return self._connection.now
 

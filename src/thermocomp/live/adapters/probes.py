@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import aiomqtt
 
 from thermocomp.core.exceptions import ReadingError
-from thermocomp.core.ports import Status
+from thermocomp.core.ports import LinkStatus
 from thermocomp.core.reading import Measurement
 from thermocomp.live.adapters.connection import Connection
 from thermocomp.live.adapters.messages import read_measurement
@@ -82,7 +82,7 @@ class SimulatedProbe:
                         keys=(f"time {now!r}",),
                     )
 
-    def status(self) -> Status:
+    def status(self) -> LinkStatus:
         """Return how it is, at once."""
         return self._connection.now
 

@@ -12,7 +12,7 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.files.draft import refuse_existing
 
 if TYPE_CHECKING:
-    from thermocomp.live.journal.journalreader import JournalReader, Stored
+    from thermocomp.live.journal.journalreader import JournalReader, StoredRun
 
 
 def journal(
@@ -116,7 +116,7 @@ def _show(reader: "JournalReader", last: int, *, as_json: bool) -> None:
         console.print(words(line), soft_wrap=True)
 
 
-def told(stored: "Stored", reader: "JournalReader") -> tuple[str, str]:
+def told(stored: "StoredRun", reader: "JournalReader") -> tuple[str, str]:
     """Return kind and text of a row, as a person reads it."""
     from thermocomp.live.journal.journalrows import (
         MeasurementRow,

@@ -16,7 +16,7 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.files.draft import write_text
 
 if TYPE_CHECKING:
-    from thermocomp.live.config import Settings
+    from thermocomp.live.config import ServiceSettings
     from thermocomp.live.loop import Service
 
 #: seconds of the virtual machine in one of the world, in the demo
@@ -74,7 +74,7 @@ def serve(
         return _serve(settings, port, check=check)
 
 
-def _serve(settings: "Settings", port: int | None, *, check: bool) -> int:
+def _serve(settings: "ServiceSettings", port: int | None, *, check: bool) -> int:
     from thermocomp.live.build import build
     from thermocomp.live.config import Page
     from thermocomp.live.findings import find_faults, find_faults_now

@@ -16,7 +16,7 @@ from typing import NamedTuple, Self
 
 from thermocomp.core.exceptions import InputError, SettingError
 from thermocomp.live.journal.journalreader import APPLICATION, SCHEMA, VERSION, checksum, find_version, numbered, size
-from thermocomp.live.journal.journalrows import Row, Start, dumps, kind_of
+from thermocomp.live.journal.journalrows import Row, StartRow, dumps, kind_of
 
 #: SQLite says of these files that they are none
 _DAMAGED = {sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB}
@@ -69,10 +69,10 @@ class Journal:
     ----------
     path : Path
     limits : JournalLimits
-    start : Start
+    start : StartRow
     """
 
-    def __init__(self, path: Path, limits: JournalLimits, start: Start) -> None:
+    def __init__(self, path: Path, limits: JournalLimits, start: StartRow) -> None:
         self.path, self.limits = path, limits
         self._run = int.from_bytes(os.urandom(7))
         try:
@@ -89,7 +89,7 @@ class Journal:
         self._adding, self._writing = threading.Lock(), threading.Lock()
 
     @classmethod
-    def open(cls, path: str | Path, limits: JournalLimits, start: Start) -> Self:
+    def open(cls, path: str | Path, limits: JournalLimits, start: StartRow) -> Self:
         """Open a journal, to go on with it or to begin it; a disk that does not let us is told by `status`.
 
         A file that is damaged or no journal is kept as ``.refused``; one of a newer version stays as it is.
@@ -99,7 +99,7 @@ class Journal:
         path : str or Path
             Its files are numbered: ``live.db`` is ``live.000001.db`` and so on.
         limits : JournalLimits
-        start : Start
+        start : StartRow
             What readings hold, and what is compensated.
 
         Raises

@@ -13,13 +13,20 @@ from thermocomp.core.correction import Correction, uncompensated
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
 from thermocomp.live.journal.journalreader import JournalReader
-from thermocomp.live.journal.journalrows import ConfirmationRow, MeasurementRow, ReadingRow, Start, Target, measured_by
+from thermocomp.live.journal.journalrows import (
+    ConfirmationRow,
+    MeasurementRow,
+    ReadingRow,
+    StartRow,
+    TargetRow,
+    measured_by,
+)
 from thermocomp.recordings.compensated import beside
 from thermocomp.recordings.cycles import find_cycles, make_single_cycle
 from thermocomp.recordings.recording import Recording
 
 FloatArray = NDArray[np.float64]
-_T = TypeVar("_T", Channel, Target)
+_T = TypeVar("_T", Channel, TargetRow)
 _KINDS = ("reading", "confirmation", "measurement")
 #: a probing is put to the reading nearest to it, if that is not further away [s]
 NEAR = 60.0
@@ -201,7 +208,7 @@ def _read(reader: JournalReader, channels: Sequence[Channel], every: float) -> _
 
 
 def _parted(
-    target: Target, found: _Found, starts: dict[int, Start], channel: FloatArray | None, notes: list[str]
+    target: TargetRow, found: _Found, starts: dict[int, StartRow], channel: FloatArray | None, notes: list[str]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return residual, correction in force and uncompensated deviation of a target, (n,) each."""
     n = len(found.time)
@@ -236,7 +243,7 @@ def _parted(
     return residual, correction, deviation
 
 
-def _in_force(m: MeasurementRow, start: Start, confirmed: _Confirmed) -> float:
+def _in_force(m: MeasurementRow, start: StartRow, confirmed: _Confirmed) -> float:
     """Return what was in force where and when a measurement was made [um]; nan if that is not known."""
     if start.own_compensation != "off":
         return float("nan")

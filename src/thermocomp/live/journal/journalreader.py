@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.live.journal.journalrows import KINDS, Row, Start, loads
+from thermocomp.live.journal.journalrows import KINDS, Row, StartRow, loads
 
 #: ``tcJl``, and of the tables
 APPLICATION, VERSION = 0x74634A6C, 1
@@ -36,7 +36,7 @@ SET_BACK = 5.0
 _ROWS = "SELECT run, seq, time, kind, content, crc FROM rows"
 
 
-class Stored(NamedTuple):
+class StoredRun(NamedTuple):
     """A row, and which one it is."""
 
     run: int
@@ -74,13 +74,13 @@ class JournalReader:
         self.paths = tuple(numbered(given).values()) or ((given,) if given.is_file() else ())
         if not self.paths:
             raise InputError(f"{given}: there is no journal of that name; name the one in the service's configuration")
-        self.starts: dict[int, Start] = {}  #: by run
+        self.starts: dict[int, StartRow] = {}  #: by run
         for file, stored in self._each(f"{_ROWS} WHERE kind = 'start'"):
             start = self._row(file, *stored).row
-            assert isinstance(start, Start)
+            assert isinstance(start, StartRow)
             self.starts[stored[0]] = start
 
-    def rows(self, kinds: Collection[str] = tuple(KINDS)) -> Iterator[Stored]:
+    def rows(self, kinds: Collection[str] = tuple(KINDS)) -> Iterator[StoredRun]:
         """Return the rows of some kinds in the order of their times; the start of a run once.
 
         Parameters
@@ -102,7 +102,7 @@ class JournalReader:
                     begun |= {stored.run} if not stored.seq else set()
                     yield stored
 
-    def overtaken(self) -> Callable[[Stored], bool]:
+    def overtaken(self) -> Callable[[StoredRun], bool]:
         """Return what tells whether a row stands at a time that was written again later: a clock was set back.
 
         Then the later rows are right, and the earlier ones would stand among them.
@@ -120,13 +120,13 @@ class JournalReader:
         places = [(order[run], seq) for run, seq, _ in begins]
         firsts = [min(time for *_, time in begins[k:]) for k in range(len(begins))]
 
-        def told(stored: Stored) -> bool:
+        def told(stored: StoredRun) -> bool:
             k = bisect_right(places, (order[stored.run], stored.seq))
             return k < len(firsts) and stored.row.time >= firsts[k]
 
         return told
 
-    def latest(self, n: int, kinds: Collection[str] = EVENTS) -> list[Stored]:
+    def latest(self, n: int, kinds: Collection[str] = EVENTS) -> list[StoredRun]:
         """Return the rows of some kinds that were written last, oldest first.
 
         Parameters
@@ -136,7 +136,7 @@ class JournalReader:
         """
         marks = ",".join("?" * len(kinds))
         query = f"{_ROWS} WHERE kind IN ({marks}) ORDER BY id DESC LIMIT ?"
-        found: list[Stored] = []
+        found: list[StoredRun] = []
         with ExitStack() as stack:
             for path in reversed(self.paths):
                 found += self._read(stack, path, query, (*kinds, n - len(found)))
@@ -170,18 +170,18 @@ class JournalReader:
                 for found in connection.execute(query) if connection else ():
                     yield path, found
 
-    def _read(self, stack: ExitStack, path: Path, query: str, values: tuple[object, ...]) -> Iterator[Stored]:
+    def _read(self, stack: ExitStack, path: Path, query: str, values: tuple[object, ...]) -> Iterator[StoredRun]:
         connection = stack.enter_context(reading(path))
         with telling(path):
             for found in connection.execute(query, values) if connection else ():
                 yield self._row(path, *found)
 
-    def _row(self, path: Path, run: int, seq: int, time: float, kind: str, text: str, crc: int) -> Stored:
+    def _row(self, path: Path, run: int, seq: int, time: float, kind: str, text: str, crc: int) -> StoredRun:
         where = f"{path}: row {seq} of run {run}"
         if crc != checksum(run, seq, time, kind, text):
             raise InputError(f"{where} is damaged; set the file aside, {_OTHERS}")
         try:
-            return Stored(run, seq, loads(kind, time, text, self.starts.get(run)))
+            return StoredRun(run, seq, loads(kind, time, text, self.starts.get(run)))
         except (ValueError, TypeError, InputError) as e:
             raise InputError(f"{where} cannot be understood: {e}") from e
 

@@ -25,7 +25,7 @@ LARGEST, LONGEST = 1e15, 2000
 _MOST = 10_000
 
 
-class Target(NamedTuple):
+class TargetRow(NamedTuple):
     """What is compensated: a target or an axis."""
 
     name: str
@@ -34,11 +34,11 @@ class Target(NamedTuple):
     position: float = 0.0  #: where on the axis its displacement channel measures [mm]
 
 
-class Start(NamedTuple):
+class StartRow(NamedTuple):
     """A run of the service: how the rows after it are to be read."""
 
     time: float  #: [s] since 1970
-    targets: tuple[Target, ...]
+    targets: tuple[TargetRow, ...]
     channels: tuple[Channel, ...]  #: what readings hold; one that is named as a target measures what is left of it
     own_compensation: Own = "unknown"
     confirm_within: float = 10.0  #: so long after a confirmation the correction in force counts as known [s]
@@ -125,9 +125,19 @@ class UpdateRow(NamedTuple):
     refused: str  #: why nothing was learned; empty if it was
 
 
-Row = ReadingRow | DemandRow | ConfirmationRow | StateRow | ReferenceRow | MeasurementRow | AlarmRow | UpdateRow | Start
+Row = (
+    ReadingRow
+    | DemandRow
+    | ConfirmationRow
+    | StateRow
+    | ReferenceRow
+    | MeasurementRow
+    | AlarmRow
+    | UpdateRow
+    | StartRow
+)
 KINDS: dict[str, type[Any]] = {
-    "start": Start,
+    "start": StartRow,
     "reading": ReadingRow,
     "demand": DemandRow,
     "confirmation": ConfirmationRow,
@@ -140,7 +150,7 @@ KINDS: dict[str, type[Any]] = {
 _NAMES = {kind: name for name, kind in KINDS.items()}
 
 
-def measured_by(row: MeasurementRow, start: Start, in_force: Correction | None = None) -> float | None:
+def measured_by(row: MeasurementRow, start: StartRow, in_force: Correction | None = None) -> float | None:
     """Return the uncompensated deviation that a measurement tells [um].
 
     At the place that is probed the tool point is where it should be: the motors stand off by minus the deviation. A
@@ -150,7 +160,7 @@ def measured_by(row: MeasurementRow, start: Start, in_force: Correction | None =
     Parameters
     ----------
     row : MeasurementRow
-    start : Start
+    start : StartRow
         Of its run.
     in_force : Correction, optional
         What was in force, where the row does not tell.
@@ -185,13 +195,13 @@ def kind_of(row: Row) -> str:
     return found
 
 
-def dumps(row: Row, start: Start) -> str:
+def dumps(row: Row, start: StartRow) -> str:
     """Return all of a row but its time as ASCII text.
 
     Parameters
     ----------
     row : Row
-    start : Start
+    start : StartRow
         Of its run: readings are written in the order of its channels.
 
     Raises
@@ -201,7 +211,7 @@ def dumps(row: Row, start: Start) -> str:
     """
     name = kind_of(row)
     to_number(row.time)
-    if isinstance(row, Start):
+    if isinstance(row, StartRow):
         text = _plain(encode(row))
         _checked(json.loads(text))
         return text
@@ -210,7 +220,7 @@ def dumps(row: Row, start: Start) -> str:
     return _plain([write(value) for (write, _), value in zip(_CODECS[name], row[1:], strict=True)])
 
 
-def loads(kind: str, time: float, text: str, start: Start | None) -> Row:
+def loads(kind: str, time: float, text: str, start: StartRow | None) -> Row:
     """Return the row that `dumps` made a text of.
 
     Parameters
@@ -218,7 +228,7 @@ def loads(kind: str, time: float, text: str, start: Start | None) -> Row:
     kind : str
     time : float
     text : str
-    start : Start or None
+    start : StartRow or None
         Of its run.
 
     Raises
@@ -251,9 +261,9 @@ def to_number(value: Any) -> float:
     return float(value)
 
 
-def _checked(value: Any) -> Start:
+def _checked(value: Any) -> StartRow:
     try:
-        start: Start = decode(Start, value, "start")
+        start: StartRow = decode(StartRow, value, "start")
     except InputError as e:  # a unit that does not measure the quantity
         raise ValueError(str(e)) from e
     for number in (start.time, *(t.position for t in start.targets)):
@@ -321,5 +331,5 @@ def _codec(hint: Any) -> _Codec:
 _CODECS = {
     name: tuple(_codec(get_type_hints(kind)[field]) for field in kind._fields[1:])
     for name, kind in KINDS.items()
-    if kind not in (Start, ReadingRow)
+    if kind not in (StartRow, ReadingRow)
 }

@@ -30,7 +30,7 @@ OFTEN = 0.5
 MOST_PAGES = 100
 
 
-class Order(BaseModel):
+class PageOrder(BaseModel):
     """Request body of an order."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
@@ -137,7 +137,7 @@ def make_app(service: Service, token: str = "", settled: float = 1.0, hosts: tup
     return app
 
 
-def read_order(body: bytes) -> Order:
+def read_order(body: bytes) -> PageOrder:
     """Return the order in the body of a request.
 
     Raises
@@ -150,19 +150,19 @@ def read_order(body: bytes) -> Order:
     except ValueError as e:
         raise HTTPException(400, f"body: want JSON in UTF-8: {escape(e, 200)}") from e
     try:
-        return Order.model_validate(content)
+        return PageOrder.model_validate(content)
     except ValidationError as e:
         found = (f"{'.'.join(map(str, p['loc'])) or 'body'}: {p['msg']}" for p in e.errors(include_url=False))
         raise HTTPException(422, escape("; ".join(found), 400)) from e
 
 
-def give(service: Service, wanted: Order) -> str:
+def give(service: Service, wanted: PageOrder) -> str:
     """Carry an order out; return why not, or the empty string.
 
     Parameters
     ----------
     service : Service
-    wanted : Order
+    wanted : PageOrder
     """
     target = wanted.target
     if wanted.do == "rezero":

@@ -143,7 +143,7 @@ def _bare(value: float) -> str:
 
 
 @dataclass(frozen=True)
-class Step:
+class StepwiseStep:
     """One line of the log.
 
     Parameters
@@ -191,13 +191,13 @@ class StepwiseSelection:
     ----------
     selected : tuple of int
         Terms in the model, in rising order.
-    steps : tuple of Step
+    steps : tuple of StepwiseStep
     cycled : bool
         True if it was stopped because a model came up a second time.
     """
 
     selected: tuple[int, ...]
-    steps: tuple[Step, ...]
+    steps: tuple[StepwiseStep, ...]
     cycled: bool
 
 
@@ -235,7 +235,7 @@ def stepwise(
     StepwiseSelection
     """
     work = _Tableau(triangle, tolerance)
-    steps: list[Step] = []
+    steps: list[StepwiseStep] = []
     seen = {frozenset[int]()}
     cycled = False
     while not cycled:
@@ -255,7 +255,7 @@ def stepwise(
         index, f = found
         alpha = alpha_of_f(f, df)
         steps.append(
-            Step(
+            StepwiseStep(
                 number=len(steps) + 1,
                 action=action,
                 index=index,

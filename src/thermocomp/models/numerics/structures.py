@@ -14,7 +14,7 @@ TRUST = 3.0
 
 
 @dataclass(frozen=True)
-class Structure:
+class LagStructure:
     """One choice of features, and how strongly each is shrunk.
 
     Parameters
@@ -57,13 +57,13 @@ class Moments:
         return np.asarray(np.maximum(squares, 0.0) / self.rows[part])
 
 
-def average(moments: Moments, structures: Sequence[Structure]) -> tuple[FloatArray, FloatArray]:
+def average(moments: Moments, structures: Sequence[LagStructure]) -> tuple[FloatArray, FloatArray]:
     """Return the weights of the features, averaged over structures, and what the average errs by on what was left out.
 
     Parameters
     ----------
     moments : Moments
-    structures : sequence of Structure
+    structures : sequence of LagStructure
 
     Returns
     -------
@@ -75,13 +75,13 @@ def average(moments: Moments, structures: Sequence[Structure]) -> tuple[FloatArr
     return (shares[:, None] * fit_each(moments, structures, range(len(moments.rows)))).sum(axis=0), errors
 
 
-def fit_each(moments: Moments, structures: Sequence[Structure], parts: Iterable[int]) -> FloatArray:
+def fit_each(moments: Moments, structures: Sequence[LagStructure], parts: Iterable[int]) -> FloatArray:
     """Return the weights of the features in each structure, fitted to some of the parts.
 
     Parameters
     ----------
     moments : Moments
-    structures : sequence of Structure
+    structures : sequence of LagStructure
     parts : iterable of int
         Without any, the weights are nan: nothing was learned.
 
@@ -114,7 +114,7 @@ def fit_each(moments: Moments, structures: Sequence[Structure], parts: Iterable[
     return weights
 
 
-def share_out(moments: Moments, structures: Sequence[Structure]) -> tuple[FloatArray, FloatArray]:
+def share_out(moments: Moments, structures: Sequence[LagStructure]) -> tuple[FloatArray, FloatArray]:
     """Return the shares of structures in their average, (n_structures, n_targets), and the errors as `average` does.
 
     Each part is left out in turn. A structure's share is the less, the more it errs there, by `TRUST`.

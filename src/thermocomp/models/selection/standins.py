@@ -27,14 +27,14 @@ class SensorSets:
         Mean root mean square error on what was left out [unit of the target].
     loss : ndarray of shape (n_sets, n_targets)
         Root mean square of what the answer with all temperatures loses [unit of the target].
-    answer : Answer
+    answer : StandInAnswer
         With all temperatures.
     """
 
     sets: tuple[tuple[int, ...], ...]
     error: FloatArray
     loss: FloatArray
-    answer: "Answer"
+    answer: "StandInAnswer"
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +63,7 @@ class StandIns:
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class StandInAnswer:
     """What a model with all temperatures makes of them and their lags.
 
     Parameters
@@ -143,7 +143,7 @@ def reduce_sensors(
     everything = list(range(len(features.temperatures)))
     weights, _ = average(moments, features.draw(structures, random_state))
     count = features.copies * len(everything)
-    answer = Answer(
+    answer = StandInAnswer(
         weights[:count].reshape(features.copies, len(everything), -1),
         moments.gram.sum(axis=0)[:count, :count] / moments.rows.sum(),
         noise,

@@ -25,7 +25,7 @@ class RefusedError(Exception):
     """The program wants something that is not done for it: the line, and the reason."""
 
 
-class Reading:
+class ProgramReading:
     """Bounds what is read.
 
     Parameters

@@ -9,7 +9,7 @@ from thermocomp.core.exceptions import InputError, UnitError
 from thermocomp.core.units import Unit
 from thermocomp.recordings.headings import understand
 from thermocomp.recordings.readers.leftout import why_left_out
-from thermocomp.recordings.readers.limits import Limits, check_file
+from thermocomp.recordings.readers.limits import FileLimits, check_file
 
 #: hours at a row a second are below one
 _MOST_BYTES = 64 << 20
@@ -58,7 +58,7 @@ def read(path: str | Path) -> Forecast:
     """
     source = Path(path)
     try:
-        check_file(source, Limits())
+        check_file(source, FileLimits())
         if source.stat().st_size > _MOST_BYTES:
             raise InputError(f"{source}: has more than {_MOST_BYTES >> 20} MiB, which no forecast has; leave rows out")
         text = source.read_text(encoding="utf-8-sig")

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.nc.rewrite.demand import Cut
+from thermocomp.nc.rewrite.demand import CutErrors
 from thermocomp.nc.rewrite.frame import Vector
 from thermocomp.nc.rewrite.revise import Revised
 
@@ -57,7 +57,7 @@ class Course:
     _times: list[float] = field(default_factory=list, init=False)
     _low: list[tuple[float, ...]] = field(default_factory=list, init=False)
     _high: list[tuple[float, ...]] = field(default_factory=list, init=False)
-    _last: tuple[Vector, Vector, float, Cut | None] | None = field(default=None, init=False)
+    _last: tuple[Vector, Vector, float, CutErrors | None] | None = field(default=None, init=False)
     _rows: int = field(default=0, init=False)  # in the last stretch
     _stride: int = field(default=1, init=False)  # rows of a stretch
 

@@ -107,7 +107,7 @@ def oppose_deviation(deviation: Vector) -> Vector:
     return x, y, z
 
 
-class Cut(NamedTuple):
+class CutErrors(NamedTuple):
     """What was met in a block in which the tool cuts, at its ends and inside: lowest and highest of each axis [um]."""
 
     drift: tuple[Vector, Vector]
@@ -132,7 +132,7 @@ class Left:
     line: list[int] = field(default_factory=lambda: [0] * 3)
     without: list[float] = field(default_factory=lambda: [0.0] * 3)
 
-    def take(self, line: int, samples: Iterable[tuple[Vector, Vector]]) -> Cut:
+    def take(self, line: int, samples: Iterable[tuple[Vector, Vector]]) -> CutErrors:
         """Take a cut in.
 
         Parameters
@@ -143,14 +143,14 @@ class Left:
 
         Returns
         -------
-        Cut
+        CutErrors
             All that is told of this cut comes from here.
         """
         drifts, lefts = [], []
         for deviation, carried in samples:
             drifts.append(deviation)
             lefts.append(tuple(map(add, deviation, carried)))
-        cut = Cut(_range(drifts), _range(lefts))
+        cut = CutErrors(_range(drifts), _range(lefts))
         most, without = self.most, self.without
         for i in range(3):
             left = max(-cut.left[0][i], cut.left[1][i])

@@ -9,7 +9,7 @@ from thermocomp.nc.rewrite.frame import Vector
 
 
 @dataclass
-class Spindle:
+class SpindleState:
     """Spindle speed, also of a program that finds the spindle running."""
 
     setup: Setup

@@ -22,7 +22,7 @@ from thermocomp.nc.parser.tokens import read_lines
 from thermocomp.nc.planner.timeline import MotionLimits, time_blocks
 from thermocomp.nc.rewrite import header, known
 from thermocomp.nc.rewrite.check import Check
-from thermocomp.nc.rewrite.demand import Cut, Demand, DriftSource, Left
+from thermocomp.nc.rewrite.demand import CutErrors, Demand, DriftSource, Left
 from thermocomp.nc.rewrite.elsewhere import Elsewhere
 from thermocomp.nc.rewrite.frame import Vector
 from thermocomp.nc.rewrite.method import Change, CorrectionMethod
@@ -53,7 +53,7 @@ class Revised(NamedTuple):
     deviation: Vector  #: drift at its end, at its place [um, machine axes]
     carried: Vector  #: correction that the axes carry at its end [um, machine axes]
     inner: Vector  #: and on the way, in a cycle that ends where it began
-    cut: Cut | None = None  #: what was met in it, if the tool cuts
+    cut: CutErrors | None = None  #: what was met in it, if the tool cuts
     other: Vector | None = None  #: what the axes may carry instead at its end, where the program leaves open which
     placed: bool = True  #: it is known where the axes stood that it names: if they do not move, they may not
     knots: tuple[Vector, ...] = ()  #: what the axes carry at the inner ends of its pieces, where it is split [um]
@@ -143,7 +143,7 @@ class Revision:
         ProgramError
             A line cannot be read, followed or shifted safely.
         """
-        method, steered = copy.deepcopy(self.method), known.Spindle(self.setup)
+        method, steered = copy.deepcopy(self.method), known.SpindleState(self.setup)
         nothing: Vector = (0.0, 0.0, 0.0)
         modal, seen = None, set[tuple[str, ...]]()
         for block in follow_program(self._guarded(read_lines(_recognised(texts), self.setup.controller)), self.setup):
@@ -185,7 +185,7 @@ class Revision:
         """
         lines = self._guarded(read_lines(_recognised(texts), self.setup.controller))
         check = Check(self.setup)
-        steered = known.Spindle(self.setup)
+        steered = known.SpindleState(self.setup)
         point: Point = (0.0, 0.0, 0.0)
         deviation = self.drift.deviation(point)
         headed = ended = False
@@ -242,7 +242,7 @@ class Revision:
             raise ProgramError(max(self.lines, 1), "the program is empty")
         self._refuse_open(ended, carried)
 
-    def _cut(self, block: Block, samples: list[Sample], knots: list[tuple[float, Vector]], demand: Vector) -> Cut:
+    def _cut(self, block: Block, samples: list[Sample], knots: list[tuple[float, Vector]], demand: Vector) -> CutErrors:
         """Return how far the tool is off in a cut, and note what has held the correction."""
         cut = self.left.take(block.line.number, _beside(samples, knots))
         self._note_held(block, demand, samples[0].deviation, (knots[0][1], knots[-1][1]), cut)
@@ -365,7 +365,9 @@ class Revision:
         if not (speed or self.standing) and cutting and block.kind in ("line", "arc", "curve") and block.moves:
             self.standing = block.line.number
 
-    def _note_held(self, block: Block, demand: Vector, drift: Vector, ends: tuple[Vector, Vector], cut: Cut) -> None:
+    def _note_held(
+        self, block: Block, demand: Vector, drift: Vector, ends: tuple[Vector, Vector], cut: CutErrors
+    ) -> None:
         """Note what keeps the correction from following in a cut that began at a drift."""
         tolerance = self.demand.tolerance
         gap = max(*cut.left[1], -min(cut.left[0]))

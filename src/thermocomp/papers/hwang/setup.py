@@ -55,7 +55,7 @@ SAME = 1.1
 
 
 @dataclass(frozen=True)
-class Fit:
+class PaperFit:
     """A model with how well it fits.
 
     Parameters
@@ -81,7 +81,7 @@ def nearest(found: Sequence[Interval], groups: int) -> Interval:
     return min(found, key=lambda i: (abs(len(i.groups) - groups), i.low - i.high))
 
 
-def polynomial(samples: Samples, names: Sequence[str], degree: int) -> Fit:
+def polynomial(samples: Samples, names: Sequence[str], degree: int) -> PaperFit:
     """Fit powers of differences from the reference: with degree 2 the engineering judgement model (H-13).
 
     Parameters
@@ -94,7 +94,7 @@ def polynomial(samples: Samples, names: Sequence[str], degree: int) -> Fit:
 
     Returns
     -------
-    Fit
+    PaperFit
     """
     used = [n for n in NAMES if n in (*names, REFERENCE)]
     variables = tuple(Variable.difference(used, n, REFERENCE) for n in names)
@@ -106,7 +106,7 @@ def polynomial(samples: Samples, names: Sequence[str], degree: int) -> Fit:
     found = solved.coefficients.tolist()
     model = frozen(samples, columns, found, solved.intercept, variables=variables, terms=terms)
     total = float(np.sum((y - y.mean()) ** 2))
-    return Fit(model, 1 - solved.rss / total, float(np.sqrt(solved.rss / (len(y) - len(terms) - 1))))
+    return PaperFit(model, 1 - solved.rss / total, float(np.sqrt(solved.rss / (len(y) - len(terms) - 1))))
 
 
 def agreement(groups: Groups) -> float:
@@ -131,7 +131,7 @@ class Computed:
         Thresholds that give the same groups.
     swept : list of (Interval, CorrelationGrouping)
         At all thresholds.
-    fits : dict of str to Fit
+    fits : dict of str to PaperFit
         The three models, by name.
     shaken : dict of (str, float) to dict of str to Sensitivity
         R2 under random sensor error, by its law and size [degC].
@@ -145,7 +145,7 @@ class Computed:
     single: CorrelationGrouping
     interval: Interval
     swept: list[tuple[Interval, CorrelationGrouping]]
-    fits: dict[str, Fit]
+    fits: dict[str, PaperFit]
     shaken: dict[tuple[str, float], dict[str, Sensitivity]]
     dynamic: FloatArray
 
@@ -227,10 +227,10 @@ def _grouped(samples: Samples, threshold: float) -> CorrelationGrouping:
     return CorrelationGrouping(threshold=threshold, reference=REFERENCE).fit(samples.frame(), samples.deviations[:, 0])
 
 
-def _fit_of(g: CorrelationGrouping, samples: Samples) -> Fit:
+def _fit_of(g: CorrelationGrouping, samples: Samples) -> PaperFit:
     inputs = samples.model_inputs(range(len(NAMES)), every(samples))
     model = g.freeze(target=TARGET, inputs=inputs, support=PAPERS_SUPPORT)
-    return Fit(model, float(g.r_squared_), float(g.standard_error_))
+    return PaperFit(model, float(g.r_squared_), float(g.standard_error_))
 
 
 def _dynamic(tests: Sequence[Recording]) -> FloatArray:

@@ -148,7 +148,7 @@ class Milled:
     surfaces: dict[tuple[str, str, str], Surfaces] = field(default_factory=dict)
     turning: float = 0.0
     lines: int = 0
-    first: dict[str, list[tuple[program.Face, FloatArray]]] = field(default_factory=dict)
+    first: dict[str, list[tuple[program.FacedSurface, FloatArray]]] = field(default_factory=dict)
 
     def without(self, case: str) -> Surfaces:
         """Return what the programs mill that nobody has revised."""
@@ -258,6 +258,6 @@ def _mill(
             milled.first[way] = list(zip(cut[0], lies[0], strict=True))
 
 
-def _second_minus_first(faces: Sequence[program.Face], lies: Sequence[FloatArray]) -> list[float]:
+def _second_minus_first(faces: Sequence[program.FacedSurface], lies: Sequence[FloatArray]) -> list[float]:
     mean = {(f.number, f.position): float(v.mean()) for f, v in zip(faces, lies, strict=True)}
     return [mean[2, float(p)] - mean[1, float(p)] for p in POSITIONS]

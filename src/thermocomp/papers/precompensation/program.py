@@ -213,7 +213,7 @@ def revise_program(
 
 
 @dataclass(frozen=True, eq=False)
-class Face:
+class FacedSurface:
     """A face as the program has it cut, at every second of its passes.
 
     Parameters
@@ -253,7 +253,7 @@ def run(lines: Iterable[str]) -> Iterator[Timed]:
     return time_blocks(follow_program(read_lines(lines, SETUP.controller), SETUP), KINEMATICS)
 
 
-def faces(lines: Iterable[str]) -> list[Face]:
+def faces(lines: Iterable[str]) -> list[FacedSurface]:
     """Return what a program cuts; it says itself, in comments, where a face begins.
 
     Parameters
@@ -262,7 +262,7 @@ def faces(lines: Iterable[str]) -> list[Face]:
 
     Returns
     -------
-    list of Face
+    list of FacedSurface
         In the order they are milled.
     """
     begins = {_comment(n, z).strip("()"): (n, float(z)) for n in (1, 2) for z in POSITIONS}
@@ -274,7 +274,7 @@ def faces(lines: Iterable[str]) -> list[Face]:
             found.setdefault(face, []).append(_looked_at(block, start, end, face[1]))
         elif block.moves:
             face = None
-    return [Face(n, z, *np.hstack(parts)) for (n, z), parts in found.items()]
+    return [FacedSurface(n, z, *np.hstack(parts)) for (n, z), parts in found.items()]
 
 
 def _cuts(block: Block) -> bool:

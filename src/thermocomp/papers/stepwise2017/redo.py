@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from thermocomp.models.numerics.stepwise import Step
+from thermocomp.models.numerics.stepwise import StepwiseStep
 from thermocomp.papers.common import Errors, errors_table, rms, table
 from thermocomp.papers.pictures import curves, single
 from thermocomp.papers.stepwise2017 import setup
@@ -182,7 +182,7 @@ def _absolute(c: Computed) -> str:
 
 
 def _tables(c: Computed) -> tuple[StudyTable, ...]:
-    steps: dict[str, Callable[[Step], str]] = {
+    steps: dict[str, Callable[[StepwiseStep], str]] = {
         "step": lambda s: str(s.number),
         "temperature": lambda s: f"{'+' if s.action == 'enter' else '-'} {_place(s.term)}",
         "partial F": lambda s: f"{s.f:.1f}",

@@ -15,7 +15,7 @@ from thermocomp.papers.wessel2004.trial import (
     MLR_NAME,
     SLIGHT,
     SWEEPS,
-    Trial,
+    MillingTrial,
     loops,
     named,
     place,
@@ -46,14 +46,14 @@ class Spindle:
     ----------
     recordings : sequence of Recording
         The one that is learned, and the one that is estimated.
-    found : Trial
-    peaked : Trial
+    found : MillingTrial
+    peaked : MillingTrial
         The wider series is the one that is estimated: `found`, or the two exchanged.
     """
 
     recordings: Sequence[Recording]
-    found: Trial
-    peaked: Trial
+    found: MillingTrial
+    peaked: MillingTrial
 
     @property
     def how(self) -> str:

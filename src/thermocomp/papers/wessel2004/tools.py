@@ -16,7 +16,7 @@ from thermocomp.papers.wessel2004.trial import (
     ACE_NAME,
     MLR_NAME,
     SWEEPS,
-    Trial,
+    MillingTrial,
     loops,
     named,
     place,
@@ -53,7 +53,7 @@ class Resting:
 
     Parameters
     ----------
-    paper, own : Trial
+    paper, own : MillingTrial
         With the paper's set of temperatures, and with that of our own Appendix B.
     selection : Selection
         Of Appendix B.
@@ -61,8 +61,8 @@ class Resting:
         RMS of ACE in the unseen test with each set of at most three temperatures [um].
     """
 
-    paper: Trial
-    own: Trial
+    paper: MillingTrial
+    own: MillingTrial
     selection: Selection
     by_set: Mapping[tuple[int, ...], float]
 
@@ -127,7 +127,7 @@ def milling_machine(seed: int, progress: Progress, physics: Physics | None = Non
 
 # -- claims --------------------------------------------------------------------------------------------------------
 
-resting, milling = Claims[Resting](), Claims[Trial]()
+resting, milling = Claims[Resting](), Claims[MillingTrial]()
 
 BETTER = "ACE beats multiple linear regression under hysteresis: smaller total RMS in the unseen test"
 
@@ -136,7 +136,7 @@ def _times(mlr: float, ace: float) -> str:
     return f"MLR {mlr} um, ACE {ace} um: {mlr / ace:.1f}x"
 
 
-def _better(found: Trial, temperatures: Sequence[int]) -> Ours:
+def _better(found: MillingTrial, temperatures: Sequence[int]) -> Ours:
     mlr, ace = found.rms(MLR_NAME), found.rms(ACE_NAME)
     beside = [f"{m} {found.rms(m):.2f} um" for m in found.estimates if m not in (ACE_NAME, MLR_NAME)]
     return Ours(
@@ -157,7 +157,7 @@ def _better_by_ours(r: Resting) -> Ours:
 
 
 @milling.add("W-09", f"{BETTER} (working milling machine, the fifth day)", _times(*PAPER_MILLING))
-def _better_at_work(found: Trial) -> Ours:
+def _better_at_work(found: MillingTrial) -> Ours:
     return _better(found, range(len(found.learned.inputs)))
 
 
@@ -235,7 +235,7 @@ def _window(r: Resting) -> str:
     "Without the worst episode ACE is accurate to 1-2 um",
     f"at most {PAPER_ACCURACY:g} um without the errors round point 17; {PAPER_MILLING[1]} um in total",
 )
-def _without_episode(found: Trial) -> Ours:
+def _without_episode(found: MillingTrial) -> Ours:
     error = found.residual(ACE_NAME)
     worst = int(np.argmax(np.abs(error)))
     first, last = max(0, worst - EPISODE), min(len(error), worst + EPISODE + 1)
@@ -254,7 +254,7 @@ def _without_episode(found: Trial) -> Ours:
     f"Linear regression over-estimates between points {OVER[0]} and {OVER[1]} and under-estimates from {UNDER} on",
     "a figure",
 )
-def _systematic(found: Trial) -> Ours:
+def _systematic(found: MillingTrial) -> Ours:
     """Judge the sign of the linear regression's error; over-estimated means: too much of the drift."""
     drift = np.sign(found.measured.mean()) or 1.0
     excess, ace = (-drift * found.residual(m) for m in (MLR_NAME, ACE_NAME))
@@ -306,7 +306,7 @@ def _sets_table(r: Resting) -> StudyTable:
 # -- figures -------------------------------------------------------------------------------------------------------
 
 
-def _estimated(found: Trial) -> list[Panel]:
+def _estimated(found: MillingTrial) -> list[Panel]:
     shown, x = (MLR_NAME, ACE_NAME), points(found.unseen)
     above = {"measured": found.measured} | {m: found.estimates[m] for m in shown}
     below = {m: found.residual(m) for m in (*shown, "dynamic")}
@@ -339,7 +339,7 @@ def _tool_figures(recordings: list[Recording], r: Resting) -> tuple[Figure, ...]
     )
 
 
-def _milling_figures(recordings: list[Recording], found: Trial) -> tuple[Figure, ...]:
+def _milling_figures(recordings: list[Recording], found: MillingTrial) -> tuple[Figure, ...]:
     warm = curves(points(found.unseen), named(found.unseen))
     return (
         Figure(

@@ -32,7 +32,7 @@ SLIGHT = 0.01
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class MillingTrial:
     """One displacement learned on some tests and estimated in another.
 
     Parameters
@@ -194,7 +194,7 @@ def stacked(
 
 def trial(
     recordings: Sequence[Recording], displacement: int, temperatures: Sequence[int], *, beside: bool = True
-) -> Trial:
+) -> MillingTrial:
     """Learn on all recordings but the last and estimate the last.
 
     Temperatures are taken as read, as the paper does: its laptop is told temperatures. Where the tests do not begin
@@ -213,7 +213,7 @@ def trial(
 
     Returns
     -------
-    Trial
+    MillingTrial
     """
     parts = (recordings[:-1], recordings[-1:])
     learned, unseen = (stacked(r, displacement, temperatures) for r in parts)
@@ -240,7 +240,7 @@ def trial(
         timed = [common.stacked(r, [target], [*(c.name for c in learned.inputs), *speeds]) for r in parts]
         memory = DynamicRidge(speed=speeds, time="routed")
         also("dynamic", memory, timed, support=Support(), dt=timed[0].dt(), cycle=timed[0].cycle)
-    return Trial(learned=learned, unseen=unseen, ace=ace, estimates=estimates, fits=fits, flagged=flagged)
+    return MillingTrial(learned=learned, unseen=unseen, ace=ace, estimates=estimates, fits=fits, flagged=flagged)
 
 
 def loop_width(samples: Samples, steps: int = 20) -> float:

@@ -28,7 +28,7 @@ _GEOMETRY = ("displacement", "angle", "position")
 
 
 @dataclass(frozen=True)
-class Column:
+class PlannedColumn:
     """A column of the file and the channel it becomes.
 
     Parameters
@@ -116,7 +116,7 @@ class ColumnPlan:
         Positions of further columns that must hold the same times: one beside each channel.
     cycle : int or None
         Position of the column of cycle labels.
-    columns : tuple of Column
+    columns : tuple of PlannedColumn
         One per channel.
     left_out : tuple of int
         Positions of the columns that neither a heading nor the mapping explains.
@@ -133,7 +133,7 @@ class ColumnPlan:
     unused: tuple[int, ...]
     beside: tuple[int, ...]
     cycle: int | None
-    columns: tuple[Column, ...]
+    columns: tuple[PlannedColumn, ...]
     left_out: tuple[int, ...] = ()
     aliases: dict[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
@@ -179,7 +179,7 @@ def plan(
     beside = () if mapping.time.column else tuple(twins)
     _refuse_twins(headings, mapping, source, headings[time] if beside else "")
     cycle = _find_cycle(headings, mapping, source)
-    columns: list[Column] = []
+    columns: list[PlannedColumn] = []
     tables: dict[int, str] = {}
     ignored = {k for k in (time, date, half, fraction, cycle, *beside) if k is not None}
     for name, rule in mapping.columns.items():
@@ -201,13 +201,13 @@ def plan(
             continue
         meant, note = _meant(rule, meanings[index], f"{source}: mapping [columns.{name}]", heading)
         notes.extend([f"{name}: {note}"] if note else [])
-        columns.append(Column(index, Channel(name, meant.quantity, meant.house, rule.place), meant, rule))
+        columns.append(PlannedColumn(index, Channel(name, meant.quantity, meant.house, rule.place), meant, rule))
     left_out: list[int] = []
     if not mapping.read.only_mapped:
         for k, meaning in enumerate(meanings):
             if k not in ignored and meaning is not None and meaning.unit.quantity != "time":
                 channel = Channel(meaning.name, meaning.unit.quantity, meaning.unit.house)
-                columns.append(Column(k, channel, meaning.unit, ColumnMap()))
+                columns.append(PlannedColumn(k, channel, meaning.unit, ColumnMap()))
                 ignored.add(k)
         left_out = [k for k, h in enumerate(headings) if h and k not in ignored]
     _check_names(columns, headings, source)
@@ -341,13 +341,13 @@ def _numbered(heading: str, *places: int) -> dict[str, dict[str, object]]:
     return {f"{base}_{k}{suffix}": {"column": place} for k, place in enumerate(places, start=1)}
 
 
-def _check_names(columns: Sequence[Column], headings: Sequence[str], source: str) -> None:
+def _check_names(columns: Sequence[PlannedColumn], headings: Sequence[str], source: str) -> None:
     if not columns:
         raise RecordingError(
             f"{source}: none of the columns {', '.join(h for h in headings if h)} is understood as a channel; put the "
             "unit behind the name (t1_C, drift_um, spindle_rpm) or give a mapping with a table [columns.NAME] for each"
         )
-    seen: dict[str, Column] = {}
+    seen: dict[str, PlannedColumn] = {}
     for column in columns:
         other = seen.setdefault(column.channel.name, column)
         if other is not column:
@@ -358,7 +358,9 @@ def _check_names(columns: Sequence[Column], headings: Sequence[str], source: str
             )
 
 
-def _aliases(columns: Sequence[Column], headings: Sequence[str], meanings: Sequence[Meaning | None]) -> dict[str, str]:
+def _aliases(
+    columns: Sequence[PlannedColumn], headings: Sequence[str], meanings: Sequence[Meaning | None]
+) -> dict[str, str]:
     """Headings, and names without a unit where only one channel has them, to channel names."""
     names = {c.channel.name for c in columns}
     aliases: dict[str, str] = {}

@@ -18,7 +18,7 @@ _MONTH = 26
 _CHANGES, _PAUSE = 3, 4
 
 
-class Choice(NamedTuple):
+class DateChoice(NamedTuple):
     """An order that was chosen."""
 
     order: str  #: empty if several are possible
@@ -26,7 +26,7 @@ class Choice(NamedTuple):
     why: str  #: what speaks against the others, in words
 
 
-def find_order(readings: Mapping[str, IntArray]) -> Choice:
+def find_order(readings: Mapping[str, IntArray]) -> DateChoice:
     """Choose the order in which rows go on.
 
     Parameters
@@ -36,7 +36,7 @@ def find_order(readings: Mapping[str, IntArray]) -> Choice:
 
     Returns
     -------
-    Choice
+    DateChoice
 
     Notes
     -----
@@ -52,10 +52,10 @@ def find_order(readings: Mapping[str, IntArray]) -> Choice:
     """
     begun, *others = readings.values()
     if all(np.array_equal(begun, t) for t in others):
-        return Choice(next(iter(readings)), "", "")  # the fifth of May
+        return DateChoice(next(iter(readings)), "", "")  # the fifth of May
     rising = [order for order, t in readings.items() if rises(t)]
     if len(rising) == 1:
-        return Choice(rising[0], "rising", "otherwise time would not rise")
+        return DateChoice(rising[0], "rising", "otherwise time would not rise")
     tried = {order: readings[order] for order in rising or readings}
     steps = {order: np.diff(t) for order, t in tried.items()}
     first, *more = steps.values()
@@ -69,12 +69,12 @@ def find_order(readings: Mapping[str, IntArray]) -> Choice:
         if all(a.any() for a in apart) and not any((going_on[o] & ~follows).any() for o in rest):
             days = min(int(np.abs(steps[o])[a].max()) for o, a in zip(rest, apart, strict=True)) // _DAY
             why = f"otherwise a gap of {days} days would lie between two rows that follow each other"
-            return Choice(order, "going on", why)
+            return DateChoice(order, "going on", why)
     for order, t in tried.items():
         if all(_are_days_in_a_row(t, other) for o, other in tried.items() if o != order):
             why = "so they are days in a row, otherwise each would be a month or more after the one before"
-            return Choice(order, "days in a row", why)
-    return Choice("", "", "")
+            return DateChoice(order, "days in a row", why)
+    return DateChoice("", "", "")
 
 
 def rises(t: IntArray) -> bool:

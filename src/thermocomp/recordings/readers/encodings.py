@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from thermocomp.core.exceptions import RecordingError
-from thermocomp.recordings.readers.limits import Limits
+from thermocomp.recordings.readers.limits import FileLimits
 
 #: tried in this order; the first under which most of the text makes sense is taken
 _ENCODINGS = ("cp1252", "cp850", "mac-roman", "shift_jis", "gb18030")
@@ -18,13 +18,13 @@ _HEAD = 65536
 _LONE_CR = re.compile(rb"\r(?![\r\n])")
 
 
-def bring_to_utf8(path: Path, limits: Limits) -> tuple[bytes | None, tuple[str, ...]]:
+def bring_to_utf8(path: Path, limits: FileLimits) -> tuple[bytes | None, tuple[str, ...]]:
     """Return a file as UTF-8 with line ends of its own time, and what was done, if it has neither.
 
     Parameters
     ----------
     path : Path
-    limits : Limits
+    limits : FileLimits
 
     Returns
     -------

@@ -42,7 +42,7 @@ _STATISTICS = frozenset(
 )
 
 
-class Layout(NamedTuple):
+class FileLayout(NamedTuple):
     """Rows of a file, counted from 0 as they were given."""
 
     heading: int  #: of the headings
@@ -50,7 +50,7 @@ class Layout(NamedTuple):
     begin: int  #: first row of the table
 
 
-def find_layout(rows: Sequence[Sequence[str]]) -> Layout | None:
+def find_layout(rows: Sequence[Sequence[str]]) -> FileLayout | None:
     """Find the headings of a table, its units, and its first row.
 
     Above the first row of numbers stand rows of text. The headings are the first of those that name most columns of
@@ -63,7 +63,7 @@ def find_layout(rows: Sequence[Sequence[str]]) -> Layout | None:
 
     Returns
     -------
-    Layout or None
+    FileLayout or None
         None if there is no such row.
     """
     if len(rows) < 2:
@@ -101,7 +101,7 @@ def find_layout(rows: Sequence[Sequence[str]]) -> Layout | None:
             # of rows that say nothing the first that is full; in two columns what stands above is a preamble
             order = 1 if width == 2 else -1
             heading = known[0] if known else max(names, key=lambda k: (_count_filled(rows[k], columns), order * k))
-            return Layout(heading, units[-1] if units else heading, begin)
+            return FileLayout(heading, units[-1] if units else heading, begin)
     return None
 
 
@@ -129,14 +129,14 @@ def find_end(first: Sequence[Sequence[str]], last: Sequence[Sequence[str]]) -> i
     return count
 
 
-def tell_layout(numbers: Sequence[int], layout: Layout, word: str) -> tuple[str, ...]:
+def tell_layout(numbers: Sequence[int], layout: FileLayout, word: str) -> tuple[str, ...]:
     """Return what was passed over and taken for units, in words.
 
     Parameters
     ----------
     numbers : sequence of int
         Places of the rows in the file, from 1.
-    layout : Layout
+    layout : FileLayout
     word : str
         What a row is called there.
 

@@ -29,7 +29,7 @@ _COUNTED: Final = {
 
 
 @dataclass(frozen=True)
-class Limits:
+class FileLimits:
     """Table ``[limits]``: what is read of a file at most.
 
     They stand far above what recordings need. Time and memory of reading grow with what they let pass.
@@ -148,18 +148,18 @@ class Limits:
             self.check("growth", -(-(unpacked - _UNPACKED_FREE) // size), path)
 
 
-def check_file(path: Path, limits: Limits) -> None:
+def check_file(path: Path, limits: FileLimits) -> None:
     """Refuse what is no file, such as a pipe or a device (also through a link), and a file that is too large.
 
     Parameters
     ----------
     path : Path
-    limits : Limits
+    limits : FileLimits
 
     Raises
     ------
     RecordingError
-        See `Limits.check`.
+        See `FileLimits.check`.
     OSError
         There is nothing of that name.
     """

@@ -17,7 +17,7 @@ from thermocomp.core.exceptions import InputError, UnitError
 from thermocomp.core.units import HOUSE_UNITS, Unit, find_unit
 from thermocomp.files.tomlfile import as_json, read_toml
 from thermocomp.recordings.cleaning import Cut, Resample, Rezero, Shift, Swap
-from thermocomp.recordings.readers.limits import Limits
+from thermocomp.recordings.readers.limits import FileLimits
 
 #: a column by its heading, or by its number from 1
 Place = str | int
@@ -181,7 +181,7 @@ class Mapping:
     cycles : CycleRule
     clean : tuple of Step
         What is changed in the values that were read, in this order; see `thermocomp.recordings.cleaning`.
-    limits : Limits
+    limits : FileLimits
     compensation : {'', 'off', 'known', 'unknown'}
         Whether a correction was in force at the machine; see `thermocomp.recordings.compensated`.
     """
@@ -191,7 +191,7 @@ class Mapping:
     read: ReadOptions = ReadOptions()
     cycles: CycleRule = CycleRule()
     clean: tuple[CleaningStep, ...] = ()
-    limits: Limits = Limits()
+    limits: FileLimits = FileLimits()
     compensation: Literal["", "off", "known", "unknown"] = ""
 
     def __post_init__(self) -> None:
@@ -231,7 +231,7 @@ _TABLES: dict[str, type] = {
     "columns": ColumnMap,
     "read": ReadOptions,
     "cycles": CycleRule,
-    "limits": Limits,
+    "limits": FileLimits,
 }
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from thermocomp.core.exceptions import InputError, MissingExtraError, RecordingError
-from thermocomp.recordings.readers.limits import Limits
+from thermocomp.recordings.readers.limits import FileLimits
 from thermocomp.recordings.readers.mapping import ReadOptions
 from thermocomp.recordings.readers.tables import (
     EMBEDDED,
@@ -55,7 +55,7 @@ class ParquetTable:
         Positions of the columns that do not hold numbers by their type.
     n_rows : int
     embedded : str
-    limits : Limits
+    limits : FileLimits
     decimal : str
         Decimal sign of numbers that are texts, if it is known beforehand.
     notes : tuple of str
@@ -68,7 +68,7 @@ class ParquetTable:
     others: tuple[int, ...]
     n_rows: int
     embedded: str
-    limits: Limits
+    limits: FileLimits
     decimal: str = ""
     notes: tuple[str, ...] = ()
 
@@ -149,14 +149,14 @@ def _translated(path: Path) -> Iterator[None]:
         ) from e
 
 
-def open_parquet(path: Path, options: ReadOptions, limits: Limits) -> FileTable:
+def open_parquet(path: Path, options: ReadOptions, limits: FileLimits) -> FileTable:
     """Open a Parquet file.
 
     Parameters
     ----------
     path : Path
     options : ReadOptions
-    limits : Limits
+    limits : FileLimits
 
     Raises
     ------

@@ -20,13 +20,13 @@ from thermocomp.files.draft import draft
 from thermocomp.recordings.cleaning import clean
 from thermocomp.recordings.cycles import Cycle, find_cycles, make_single_cycle, split_by_labels
 from thermocomp.recordings.headings import understand
-from thermocomp.recordings.readers.columns import Column, ColumnPlan, plan
+from thermocomp.recordings.readers.columns import ColumnPlan, PlannedColumn, plan
 from thermocomp.recordings.readers.datecheck import check_dates
 from thermocomp.recordings.readers.dayforms import find_column_kind, find_day_columns
 from thermocomp.recordings.readers.dayhalves import join_halves
 from thermocomp.recordings.readers.guesses import guess
 from thermocomp.recordings.readers.leftout import refuse_nameless, why_left_out
-from thermocomp.recordings.readers.limits import Limits, check_file
+from thermocomp.recordings.readers.limits import FileLimits, check_file
 from thermocomp.recordings.readers.mapping import ADAPTER, ColumnMap, Mapping, ReadOptions, TimeColumn
 from thermocomp.recordings.readers.parquet import open_parquet
 from thermocomp.recordings.readers.tables import EMBEDDED, FileTable, defuse, restore, skip_row
@@ -302,7 +302,7 @@ def open_table(path: str | Path, mapping: Mapping) -> FileTable:
     return _opened(Path(path), mapping.read, mapping.limits)[0]
 
 
-def _opened(path: Path, options: ReadOptions, limits: Limits) -> tuple[FileTable, str]:
+def _opened(path: Path, options: ReadOptions, limits: FileLimits) -> tuple[FileTable, str]:
     """Return the raw table and the SHA-256 of the file."""
     ending = path.suffix.lower()
     if ending not in ENDINGS:
@@ -392,7 +392,7 @@ def _times(
 
 
 def _convert(
-    column: Column, raw: FloatArray, missing: Sequence[float], table: FileTable
+    column: PlannedColumn, raw: FloatArray, missing: Sequence[float], table: FileTable
 ) -> tuple[FloatArray, tuple[str, ...]]:
     """Return the values of a column; one that a scale or a unit makes infinite is missing."""
     with np.errstate(over="ignore", invalid="ignore"):
@@ -437,5 +437,5 @@ def _cycles(recording: Recording, labels: Sequence[Any] | None, rows: Rows) -> t
     else:
         values = recording.table[speed.name].to_numpy()
         found = find_cycles(recording.time, values, min_run=rows.min_run, min_stop=rows.min_stop)
-    Limits(cycles=rows.most_cycles).check("cycles", len(found), recording.source)
+    FileLimits(cycles=rows.most_cycles).check("cycles", len(found), recording.source)
     return found

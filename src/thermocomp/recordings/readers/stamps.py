@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from thermocomp.recordings.headings import find_date_order
-from thermocomp.recordings.readers.dateorder import Choice, IntArray, find_longest_step, find_order, rises
+from thermocomp.recordings.readers.dateorder import DateChoice, IntArray, find_longest_step, find_order, rises
 
 _CHUNK = 100_000
 #: steps of rows that only a wrong order makes [d]: of a day and month, of a day and year
@@ -204,12 +204,12 @@ def _is_one_stretch(stamps: "pd.Series[pd.Timestamp]") -> bool:
     return bool(stamps.notna().all()) and rises(t := _instants(stamps)) and find_longest_step(t) < _MONTH
 
 
-def _choose(shape: re.Match[str], read: dict[str, IntArray]) -> Choice:
+def _choose(shape: re.Match[str], read: dict[str, IntArray]) -> DateChoice:
     """Choose the order of dates that fit several."""
     choice = find_order(read)
     if not _has_points(shape) or "dmy" not in read:
         return choice
-    day_first = Choice("dmy", "", "")  # as wherever dates are written with points
+    day_first = DateChoice("dmy", "", "")  # as wherever dates are written with points
     if choice.order == "dmy":
         return day_first
     if choice.by == "going on" or (choice.by == "days in a row" and choice.order == "ymd"):
@@ -220,7 +220,7 @@ def _choose(shape: re.Match[str], read: dict[str, IntArray]) -> Choice:
     longest, other = find_longest_step(read["dmy"]), find_longest_step(year_first)
     if not rises(read["dmy"]):
         return choice if choice.order == "ymd" and other < _MONTH else day_first
-    return Choice("", "", "") if longest >= _YEAR and longest > other else day_first
+    return DateChoice("", "", "") if longest >= _YEAR and longest > other else day_first
 
 
 def _instants(stamps: "pd.Series[pd.Timestamp]") -> IntArray:

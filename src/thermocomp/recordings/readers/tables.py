@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import RecordingError, Remedy
-from thermocomp.recordings.readers.limits import Limits
+from thermocomp.recordings.readers.limits import FileLimits
 from thermocomp.recordings.readers.numbers import Notation, Signs, is_filler, is_number_like, is_word
 
 FloatArray = NDArray[np.float64]
@@ -181,7 +181,7 @@ def restore(text: str) -> str:
     return (text[1:] if text.startswith("'") and _FORMULA.match(text) else text).translate(_LINE_SIGNS)
 
 
-def check_headings(path: Path, headings: Sequence[str], n_rows: int, limits: Limits) -> None:
+def check_headings(path: Path, headings: Sequence[str], n_rows: int, limits: FileLimits) -> None:
     """Refuse a table that cannot be a recording, whatever its columns mean.
 
     Parameters
@@ -190,7 +190,7 @@ def check_headings(path: Path, headings: Sequence[str], n_rows: int, limits: Lim
     headings : sequence of str
     n_rows : int
         Without that of the headings.
-    limits : Limits
+    limits : FileLimits
 
     Raises
     ------

@@ -15,7 +15,7 @@ from thermocomp.core.exceptions import RecordingError
 from thermocomp.recordings.readers.encodings import bring_to_utf8, find_encoding
 from thermocomp.recordings.readers.layout import (
     MOST_REMARKS,
-    Layout,
+    FileLayout,
     find_end,
     find_layout,
     join_units,
@@ -24,7 +24,7 @@ from thermocomp.recordings.readers.layout import (
     tell_end,
     tell_layout,
 )
-from thermocomp.recordings.readers.limits import Limits
+from thermocomp.recordings.readers.limits import FileLimits
 from thermocomp.recordings.readers.mapping import ReadOptions
 from thermocomp.recordings.readers.numbers import MISSING_TEXT, Notation, Signs, is_filler, is_number_like
 from thermocomp.recordings.readers.tables import check_headings, clean_heading, convert, decide, tell_notation
@@ -166,7 +166,7 @@ class CsvTable:
         }
 
 
-def open_csv(path: Path, options: ReadOptions, limits: Limits = Limits()) -> CsvTable:
+def open_csv(path: Path, options: ReadOptions, limits: FileLimits = FileLimits()) -> CsvTable:
     """Find out how a text file is written: one pass over its lines, none of which is kept.
 
     Parameters
@@ -174,7 +174,7 @@ def open_csv(path: Path, options: ReadOptions, limits: Limits = Limits()) -> Csv
     path : Path
     options : ReadOptions
         What is known beforehand.
-    limits : Limits
+    limits : FileLimits
 
     Raises
     ------
@@ -238,7 +238,7 @@ class _Head(NamedTuple):
 
     lines: list[tuple[int, bytes]]  #: with their numbers from 0
     delimiter: str
-    layout: Layout
+    layout: FileLayout
     in_remark: bool  #: the headings stand in a comment, as numpy writes them
 
 
@@ -264,7 +264,7 @@ def _read_head(lines: Lines) -> _Head:
     if remark is not None:
         first = [remark, *first]
         delimiter, layout = _find_table(path, first, options.delimiter, limits)
-    return _Head(first, delimiter, layout or Layout(0, 0, 1), remark is not None)
+    return _Head(first, delimiter, layout or FileLayout(0, 0, 1), remark is not None)
 
 
 def _sample(content: Iterator[tuple[int, bytes]], top: int) -> list[tuple[int, bytes]]:
@@ -316,8 +316,8 @@ def _scan(lines: Lines, head: _Head) -> _Body:
 
 
 def _find_table(
-    path: Path, first: Sequence[tuple[int, bytes]], delimiter: str, limits: Limits
-) -> tuple[str, Layout | None]:
+    path: Path, first: Sequence[tuple[int, bytes]], delimiter: str, limits: FileLimits
+) -> tuple[str, FileLayout | None]:
     """Choose the delimiter, unless it is given, under which most rows have as many cells as the headings."""
     lines = [line.decode("utf-8" if is_utf8(line) else "latin-1") for _, line in first]
     best, best_layout, best_fit = delimiter or ",", None, (False, 0.0, 0)

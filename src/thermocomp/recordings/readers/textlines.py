@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from thermocomp.core.exceptions import RecordingError
-from thermocomp.recordings.readers.limits import Limits
+from thermocomp.recordings.readers.limits import FileLimits
 from thermocomp.recordings.readers.mapping import ReadOptions
 from thermocomp.recordings.readers.tables import EMBEDDED
 
@@ -34,7 +34,7 @@ class Lines:
     data : bytes or None
         The whole file in UTF-8, where it had to be brought to that.
     options : ReadOptions
-    limits : Limits
+    limits : FileLimits
     returns : bool
         There are carriage returns that end no line.
     """
@@ -42,7 +42,7 @@ class Lines:
     path: Path
     data: bytes | None
     options: ReadOptions
-    limits: Limits
+    limits: FileLimits
     returns: bool
 
     def open(self) -> BinaryIO:
@@ -134,7 +134,7 @@ class Lines:
         return found[1].decode() if found else ""
 
 
-def open_lines(path: Path, data: bytes | None, options: ReadOptions, limits: Limits) -> Lines:
+def open_lines(path: Path, data: bytes | None, options: ReadOptions, limits: FileLimits) -> Lines:
     """Make sure that a file is text.
 
     Parameters
@@ -143,7 +143,7 @@ def open_lines(path: Path, data: bytes | None, options: ReadOptions, limits: Lim
     data : bytes or None
         See `Lines`.
     options : ReadOptions
-    limits : Limits
+    limits : FileLimits
 
     Returns
     -------

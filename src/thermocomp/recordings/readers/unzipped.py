@@ -5,7 +5,7 @@ from pathlib import Path
 from xml.parsers import expat
 
 from thermocomp.core.exceptions import RecordingError
-from thermocomp.recordings.readers.limits import Limits
+from thermocomp.recordings.readers.limits import FileLimits
 
 #: what an element of XML counts, in bytes: it costs time, however short it is
 _ELEMENT = 48
@@ -16,7 +16,7 @@ _DONE_WITH = {"worksheet": "row", "sst": "si", "document-content": "table-row"}
 _PLACE = len("XFD1048576")
 
 
-def check_unzipped(path: Path, limits: Limits) -> None:
+def check_unzipped(path: Path, limits: FileLimits) -> None:
     """Refuse a zip bomb, and XML that would take much more memory or time than its size.
 
     What the zip file says of its sizes is not believed. Parts of a workbook never define entities.
@@ -24,12 +24,12 @@ def check_unzipped(path: Path, limits: Limits) -> None:
     Parameters
     ----------
     path : Path
-    limits : Limits
+    limits : FileLimits
 
     Raises
     ------
     RecordingError
-        See `Limits.check`; or a part defines its own kind of XML.
+        See `FileLimits.check`; or a part defines its own kind of XML.
     zipfile.BadZipFile
         It is no zip file.
     """
@@ -47,7 +47,7 @@ def check_unzipped(path: Path, limits: Limits) -> None:
 class _Survey:
     """Counts the elements of one part, and the longest text and row in it."""
 
-    def __init__(self, where: str, limits: Limits) -> None:
+    def __init__(self, where: str, limits: FileLimits) -> None:
         self.where = where
         self.limits = limits
         self.size = self.elements = self.begun = self.last = 0

@@ -19,14 +19,14 @@ from numpy.typing import NDArray
 from thermocomp.core.exceptions import InputError, MissingExtraError, RecordingError
 from thermocomp.recordings.readers.layout import (
     MOST_REMARKS,
-    Layout,
+    FileLayout,
     find_end,
     find_layout,
     join_units,
     tell_end,
     tell_layout,
 )
-from thermocomp.recordings.readers.limits import Limits
+from thermocomp.recordings.readers.limits import FileLimits
 from thermocomp.recordings.readers.mapping import ReadOptions
 from thermocomp.recordings.readers.tables import FrameTable, check_headings, clean_heading
 from thermocomp.recordings.readers.unzipped import check_unzipped
@@ -49,7 +49,7 @@ Column = NDArray[Any]
 Sheets = dict[str, Callable[[], Generator[Row]]]
 
 
-def open_workbook(path: Path, options: ReadOptions, limits: Limits) -> FrameTable:
+def open_workbook(path: Path, options: ReadOptions, limits: FileLimits) -> FrameTable:
     """Open the sheet of a workbook that holds a recording.
 
     Parameters
@@ -57,7 +57,7 @@ def open_workbook(path: Path, options: ReadOptions, limits: Limits) -> FrameTabl
     path : Path
         Ending in .xlsx or .ods.
     options : ReadOptions
-    limits : Limits
+    limits : FileLimits
 
     Raises
     ------
@@ -121,7 +121,7 @@ def _sample(rows: Iterable[Row]) -> list[list[str]]:
 
 
 def _table(
-    path: Path, name: str, rows: Iterator[Row], notes: tuple[str, ...], options: ReadOptions, limits: Limits
+    path: Path, name: str, rows: Iterator[Row], notes: tuple[str, ...], options: ReadOptions, limits: FileLimits
 ) -> FrameTable:
     """Return the table of a sheet: its heading row, and the rows below it."""
     where = f"{path}: sheet {name!r}"
@@ -145,7 +145,7 @@ def _table(
                 limits.check_unpacked(8 * cells, path)
     if not first:
         raise RecordingError(f"{where} is empty; a recording has a heading row and rows of numbers")
-    layout = find_layout(_sample(first)) or Layout(0, 0, 1)
+    layout = find_layout(_sample(first)) or FileLayout(0, 0, 1)
     begin = layout.begin
     headings = [_text(cell).strip() for cell in first[layout.heading]]
     if layout.units != layout.heading:
@@ -243,7 +243,7 @@ def _plain(cell: object) -> object:
     return cell.isoformat() if isinstance(cell, date | time) else cell
 
 
-def _xlsx_sheets(path: Path, stack: ExitStack, limits: Limits) -> Sheets:
+def _xlsx_sheets(path: Path, stack: ExitStack, limits: FileLimits) -> Sheets:
     import openpyxl
 
     book = openpyxl.load_workbook(path, read_only=True, data_only=True, keep_links=False)
@@ -263,14 +263,14 @@ def _xlsx_sheets(path: Path, stack: ExitStack, limits: Limits) -> Sheets:
     return {sheet.title: lambda name=sheet.title: rows(name) for sheet in book.worksheets}  # type: ignore[misc]
 
 
-def _ods_sheets(path: Path, limits: Limits) -> Sheets:
+def _ods_sheets(path: Path, limits: FileLimits) -> Sheets:
     with zipfile.ZipFile(path) as parts, parts.open("content.xml") as content:
         tables = (e for _, e in ElementTree.iterparse(content, ("start",)) if e.tag == f"{_TABLE}table")
         names = [table.get(f"{_TABLE}name", "") for table in tables]
     return {name: lambda k=k: _ods_rows(path, k, limits) for k, name in enumerate(names)}  # type: ignore[misc]
 
 
-def _ods_rows(path: Path, wanted: int, limits: Limits) -> Generator[Row]:
+def _ods_rows(path: Path, wanted: int, limits: FileLimits) -> Generator[Row]:
     """Yield the rows of a sheet; empty ones only where something comes after them."""
     with zipfile.ZipFile(path) as parts, parts.open("content.xml") as content:
         number, table, empty = -1, None, 0

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from thermocomp.core.exceptions import RecordingError, UnitError
 from thermocomp.core.units import Unit, find_unit
 from thermocomp.recordings.headings import understand
-from thermocomp.recordings.readers.limits import Limits, check_file
+from thermocomp.recordings.readers.limits import FileLimits, check_file
 from thermocomp.recordings.readers.mapping import ReadOptions
 from thermocomp.recordings.readers.textfile import CsvTable, open_csv
 from thermocomp.volumetric.positioning import Positioning
@@ -66,7 +66,7 @@ def read(path: str | Path) -> tuple[Positioning, ...]:
     if source.suffix.lower() not in ENDINGS:
         raise RecordingError(f"{source}: a positioning test is read from one of {', '.join(ENDINGS)}")
     try:
-        check_file(source, Limits())
+        check_file(source, FileLimits())
         table = open_csv(source, ReadOptions())
     except FileNotFoundError as e:
         raise RecordingError(f"{source}: no such file") from e

@@ -46,7 +46,7 @@ ASIDE, PATIENCE = 1.0, 1.0
 STILL, GONE = 1.0, 5.0
 
 
-class Axis:
+class AxisLine:
     """An axis: where its line shall go, in the machine's units about the middle of its travel."""
 
     def __init__(self, text: str, unit: float) -> None:
@@ -69,7 +69,7 @@ class Server:
     def __init__(self, options: argparse.Namespace) -> None:
         self.options = options
         self.unit = 1.0 if options.unit == "mm" else 1.0 / 25.4
-        self.axes = {a.letter.upper(): a for a in (Axis(t, self.unit) for t in options.axis)}
+        self.axes = {a.letter.upper(): a for a in (AxisLine(t, self.unit) for t in options.axis)}
         self.magnitude, self.rate = options.magnitude, options.rate
         self.heard = time.monotonic()  # when the service spoke last; a new process gives it the whole time
         self.ticks, self.echoed = 0, time.monotonic()
@@ -98,7 +98,7 @@ class Server:
             if now - self.echoed > GONE:
                 return
 
-    def get(self, axis: Axis, pin: str) -> float:
+    def get(self, axis: AxisLine, pin: str) -> float:
         """Return the value of a pin of an axis."""
         return float(self.pins[f"{axis.letter}.{pin}"])
 
@@ -122,7 +122,7 @@ class Server:
             follows = aside <= ASIDE * 1e-3 * self.unit
             axis.aside = None if follows else axis.aside or now
 
-    def move(self, axis: Axis, fading: bool) -> None:
+    def move(self, axis: AxisLine, fading: bool) -> None:
         """Let the line of an axis go where it shall, straight, neither end faster than the rate."""
         if fading:
             axis.ends = None
@@ -257,7 +257,7 @@ def named(k: int) -> str:
     return f"{NAME}-{k}" if k else NAME
 
 
-def join(axes: list[Axis]) -> Any:
+def join(axes: list[AxisLine]) -> Any:
     """Return a component whose pins hang on the signals of ``thermocomp.hal``; nothing moves by that.
 
     Pins are read and written without HAL's lock: a process that is killed while it holds that stops LinuxCNC.

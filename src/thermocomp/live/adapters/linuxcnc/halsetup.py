@@ -68,7 +68,7 @@ class HalSettings:
                 raise SettingError(f"group = {self.group!r}: there is no such group on this computer") from e
 
 
-class Prepared(NamedTuple):
+class HalSetup(NamedTuple):
     """What `prepare` returns."""
 
     hal: str  #: text of the HAL file
@@ -78,7 +78,7 @@ class Prepared(NamedTuple):
     files: tuple[Path, ...]  #: what is written
 
 
-def prepare(path: Path, folder: Path, settings: HalSettings) -> Prepared:
+def prepare(path: Path, folder: Path, settings: HalSettings) -> HalSetup:
     """Return what corrects a machine; nothing is written.
 
     Parameters
@@ -131,7 +131,7 @@ def prepare(path: Path, folder: Path, settings: HalSettings) -> Prepared:
             f"{name}: cannot be seen through; a pin that it uses, or a module that it loads, can be used once only"
         )
     component = Path(__file__).with_name("_hal_component.py").read_text(encoding="utf-8")
-    return Prepared(
+    return HalSetup(
         hal="\n".join(lines) + "\n",
         component=component,
         todo=tuple(todo),
@@ -140,7 +140,7 @@ def prepare(path: Path, folder: Path, settings: HalSettings) -> Prepared:
     )
 
 
-def set_up(path: Path, folder: Path, settings: HalSettings, *, overwrite: bool = False) -> Prepared:
+def set_up(path: Path, folder: Path, settings: HalSettings, *, overwrite: bool = False) -> HalSetup:
     """Write what corrects a machine: a HAL file and the component that it starts.
 
     Parameters
@@ -152,7 +152,7 @@ def set_up(path: Path, folder: Path, settings: HalSettings, *, overwrite: bool =
 
     Returns
     -------
-    Prepared
+    HalSetup
         The INI and the machine's own HAL are left alone: what is to be done there is told.
 
     Raises

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from thermocomp.core.correction import Correction
 from thermocomp.core.exceptions import SettingError, ThermocompError
-from thermocomp.core.ports import Status
+from thermocomp.core.ports import LinkStatus
 from thermocomp.core.shown import escape
 from thermocomp.live.adapters.connection import Connection
 
@@ -115,7 +115,7 @@ class LinuxCncSink:
             return None
         return {target: self._reports[letter.upper()].correction for target, letter in self.axes.items()}
 
-    def status(self) -> Status:
+    def status(self) -> LinkStatus:
         """Return the connection status without blocking."""
         return self._connection.now
 

@@ -38,7 +38,7 @@ class _Check(NamedTuple):
     say: Callable[[int], str]
 
 
-class Lines(NamedTuple):
+class LineOrigins(NamedTuple):
     """Where the lines of both programs, as the interpreter has them, come from: lines of the original."""
 
     first: Callable[[Integers], Integers]  #: of the original, or of its translation
@@ -47,7 +47,11 @@ class Lines(NamedTuple):
 
 
 def compare(
-    first: InterpreterRun, second: InterpreterRun, ledger: Ledger, origin: Lines, progress: Callable[[int], object]
+    first: InterpreterRun,
+    second: InterpreterRun,
+    ledger: Ledger,
+    origin: LineOrigins,
+    progress: Callable[[int], object],
 ) -> Found:
     """Run the next job of both programs, side by side, and compare what they do.
 
@@ -57,7 +61,7 @@ def compare(
         Of the original, and of the revised program.
     ledger : Ledger
         What the lines of the original should be shifted by.
-    origin : Lines
+    origin : LineOrigins
     progress : callable
         Told lines of the original.
 

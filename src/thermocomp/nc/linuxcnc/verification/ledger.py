@@ -17,7 +17,7 @@ _INVERSE_TIME = 93
 _UNPLACED, _MACHINE = 1.0, 2.0
 
 
-class Shift(NamedTuple):
+class LineShift(NamedTuple):
     """By how much the moves of a line may be shifted [um, machine axes]."""
 
     before: Vector  #: what the axes carry before it
@@ -115,12 +115,12 @@ class Ledger:
             others=others,
         )
 
-    def at(self, line: int) -> Shift:
+    def at(self, line: int) -> LineShift:
         """Return what a line of the original should be shifted by."""
         found = self.of(np.array([line]))
         before, after, inner, inverse = (row[0].tolist() for row in found[:4])
         other = tuple(found.others[1][0].tolist()) if found.others else tuple(after)
-        return Shift(
+        return LineShift(
             before=tuple(before),
             after=tuple(after),
             inner=tuple(inner),

@@ -16,12 +16,12 @@ from thermocomp.nc.interpreter.block import Setup
 from thermocomp.nc.linuxcnc import rs274
 from thermocomp.nc.linuxcnc.rs274process import InterpreterJob, InterpreterRun
 from thermocomp.nc.linuxcnc.verification import states
-from thermocomp.nc.linuxcnc.verification.comparison import Found, Lines, RefusedError, compare
-from thermocomp.nc.linuxcnc.verification.ledger import Integers, Ledger, Shift
+from thermocomp.nc.linuxcnc.verification.comparison import Found, LineOrigins, RefusedError, compare
+from thermocomp.nc.linuxcnc.verification.ledger import Integers, Ledger, LineShift
 from thermocomp.nc.linuxcnc.verification.translation import Translator, UntranslatableError
 from thermocomp.nc.parser.tokens import program_lines
 
-__all__ = ["Ledger", "Proof", "Shift", "prove"]
+__all__ = ["Ledger", "LineShift", "Proof", "prove"]
 
 #: what a state may be without if the original does not run with it
 _SPARED = ("rotation", "tool diameters")
@@ -50,7 +50,7 @@ class _Proving(NamedTuple):
     revised: Path
     ledger: Ledger
     setup: Setup
-    origin: Lines
+    origin: LineOrigins
 
     def run(
         self, wanted: Sequence[tuple[int, set[str]]], progress: Callable[[int], object] = lambda _: None
@@ -129,7 +129,11 @@ def prove(
     if setup.controller == "linuxcnc":
         proof = _prove(
             _Proving(
-                original=original, revised=revised, ledger=ledger, setup=setup, origin=Lines(_same, ledger.originals)
+                original=original,
+                revised=revised,
+                ledger=ledger,
+                setup=setup,
+                origin=LineOrigins(_same, ledger.originals),
             ),
             progress,
         )
@@ -140,7 +144,7 @@ def prove(
             second = _Translated.of(revised, folder / "revised.ngc", setup)
         except UntranslatableError as e:
             raise Unprovable(f"line {e.line} cannot be said in LinuxCNC's words: {e.reason}") from e
-        origin = Lines(first.lines, lambda lines: ledger.originals(second.lines(lines)), divided=False)
+        origin = LineOrigins(first.lines, lambda lines: ledger.originals(second.lines(lines)), divided=False)
         proof = _prove(
             _Proving(original=first.path, revised=second.path, ledger=ledger, setup=first.setup, origin=origin),
             progress,
