@@ -42,7 +42,7 @@ NOUNS = {
     "Deviation": "core.correction",
     "Reading": "core.reading",
     "Correction": "core.correction",
-    "FileLimits": "core.correction",
+    "Limits": "core.correction",
     "Assessment": "judging.compare",
 }
 VERBS = ["read", "select", "fit", "freeze", "assess", "compare"]
