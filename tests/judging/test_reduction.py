@@ -132,7 +132,7 @@ def test_a_single_cycle_proves_nothing() -> None:
 def test_a_measured_printer(shared_data: Path) -> None:
     """Its frame, with the bed hot: its maker finds -33.35 um/K (R, with the bed as a second input)."""
     night = shared_data / "voron_frame" / "frame_exp_quant_v3_2021-06-13_05-41-53.csv"
-    whole = read(night, read_mapping(Path(__file__).parents[1] / "files" / "voron.toml"))
+    whole = read(night, read_mapping(Path(__file__).parents[1] / "recordings" / "voron.toml"))
     hot = np.flatnonzero(whole.table["bed_t"] > 104)[30:]
     table = whole.table.iloc[hot].reset_index(drop=True)
     table["z"] -= table["z"].iloc[0]

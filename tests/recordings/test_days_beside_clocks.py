@@ -251,3 +251,11 @@ def test_a_time_in_five_columns_is_named(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="stands in 5 columns, Year, Month, Day, Hour, Minute") as caught:
         read(path)
     assert not caught.value.remedies
+
+
+def test_names_of_cycles_are_no_days(tmp_path: Path) -> None:
+    """Three tests of a day each, one behind the other on a time that leaves the nights out."""
+    rows = [f"{k * 600},day {1 + k // 4}" for k in range(12)]
+    path = write(tmp_path / "cycles.csv", "time_s,cycle", rows)
+    assert read(path).time[-1] == 6600.0
+    assert len(read(path).cycles) == 3

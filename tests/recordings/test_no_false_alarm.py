@@ -60,7 +60,7 @@ def test_a_measured_spindle_test_raises_no_trouble(shared_data: Path) -> None:
 
 
 def test_a_measured_printer_raises_no_trouble_once_it_is_mapped(shared_data: Path) -> None:
-    voron = read_mapping(ROOT / "tests" / "files" / "voron.toml")
+    voron = read_mapping(ROOT / "tests" / "recordings" / "voron.toml")
     names = sorted(p.name for p in (shared_data / "voron_frame").glob("*.csv"))
     assert len(names) >= 2
     for name in names:

@@ -99,9 +99,9 @@ def test_another_arithmetic_gives_the_same_machine() -> None:
     script = (
         "import numpy as np\n"
         "from thermocomp.virtual.centre import MachiningCentre\n"
-        "from thermocomp.virtual.machine import Air, Drive\n"
+        "from thermocomp.virtual.machine import Air, FeedDrive\n"
         "m = MachiningCentre()\n"
-        "d = [Drive(2600.0, (600.0, 1000.0, 600.0))] * 2000 + [Drive()] * 2000\n"
+        "d = [FeedDrive(2600.0, (600.0, 1000.0, 600.0))] * 2000 + [FeedDrive()] * 2000\n"
         "_, t = m.run(m.init(Air(22.0)), d, np.tile(Air(22.0).values, (4000, 1)), 20.0)\n"
         "print(*np.hstack([t.temperatures, t.observables])[::500].ravel().tolist())\n"
     )

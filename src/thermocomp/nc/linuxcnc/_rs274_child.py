@@ -94,7 +94,7 @@ class Canon:
         self.spindle: int = job["spindle"]
         self.program = os.path.realpath(job["program"].encode())
         home = os.path.dirname(job["home"])  # noqa: PTH120
-        self.reading = reading.Reading(job["program"], home, job["folders"], job["lines"], self.reached)
+        self.reading = reading.ProgramReading(job["program"], home, job["folders"], job["lines"], self.reached)
 
     def connect(self, module: str) -> None:
         """Turn the functions the module leaves empty to this object."""

@@ -124,7 +124,7 @@ def _read_rows(source: Path, mapping: Mapping, *, rising: bool, extra: Sequence[
     if is_stamp and columns.fraction is not None:
         numbers.append(columns.fraction)
     times = [columns.time, *columns.beside]
-    known = {*numbers, *times, columns.date, columns.half, columns.fraction, *columns.unused}
+    known = {*numbers, *times, columns.cycle, columns.date, columns.half, columns.fraction, *columns.unused}
     others = find_day_columns(
         table, [k for k, h in enumerate(table.headings) if h and k not in known], beside_clock=is_stamp
     )
