@@ -18,7 +18,7 @@ CODE = '''
 from dataclasses import dataclass
 from typing import Literal
 from sklearn.linear_model import LinearRegression
-from thermocomp.core.ports import Status
+from thermocomp.core.ports import LinkStatus
 from thermocomp.core.reading import Reading
 from thermocomp.export.target import Target
 from thermocomp.models.method import Method
@@ -55,7 +55,7 @@ class Counting:
             yield Reading(float(k), {"t": 20.0 + k})
 
     def status(self):
-        return Status("connected")
+        return LinkStatus("connected")
 
     async def close(self):
         pass
