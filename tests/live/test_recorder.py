@@ -54,10 +54,10 @@ def test_what_is_measured_under_a_correction_becomes_the_deviation(tmp_path: Pat
     rows = [stored.row for stored in reader.rows()]
     kinds = {type(row).__name__ for row in rows}
     assert kinds == {
-        *("Start", "ReadingRow", "DemandRow", "ConfirmationRow", "StateRow", "ReferenceRow", "MeasurementRow"),
+        *("StartRow", "ReadingRow", "DemandRow", "ConfirmationRow", "StateRow", "ReferenceRow", "MeasurementRow"),
         *("AlarmRow", "UpdateRow"),
     }
-    start = next(r for r in rows if type(r).__name__ == "Start")
+    start = next(r for r in rows if type(r).__name__ == "StartRow")
     found = [measured_by(r, start) for r in rows if type(r).__name__ == "MeasurementRow"]  # type: ignore[arg-type]
     assert found == [pytest.approx(9.0), pytest.approx(9.0)]  # and not the five thousand, which was refused
     updates = [r for r in rows if type(r).__name__ == "UpdateRow"]

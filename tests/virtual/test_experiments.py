@@ -15,7 +15,7 @@ from thermocomp.virtual.experiments import SimulatedTest, run, simulate
 from thermocomp.virtual.instruments import Touch, mounting
 from thermocomp.virtual.kits import CENTRE
 from thermocomp.virtual.machine import FeedDrive
-from thermocomp.virtual.protocol import Experiment, Programme, TestPlan
+from thermocomp.virtual.protocol import Experiment, PlannedTest, Programme
 from thermocomp.virtual.segments import SteadySegment
 from thermocomp.virtual.sensors import SensorFault
 
@@ -132,7 +132,7 @@ def test_faults_befall_a_test() -> None:
 
 def test_a_seed_fixes_everything_on_every_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(experiments.MACHINES, ("centre", "linear"), FakeMachine)
-    plan = TestPlan(sampling=60.0, duration=3600.0, speed=1000.0, places=("usual",))
+    plan = PlannedTest(sampling=60.0, duration=3600.0, speed=1000.0, places=("usual",))
     experiment = Experiment(name="e", tests=(plan,))
     first, again, other = (next(iter(simulate(experiment, seed=s))) for s in (4, 4, 5))
     np.testing.assert_array_equal(first.values, again.values)
@@ -143,7 +143,7 @@ def test_a_seed_fixes_everything_on_every_machine(monkeypatch: pytest.MonkeyPatc
 
 
 def test_unusable_requests_are_refused() -> None:
-    experiment = Experiment(name="e", tests=(TestPlan(sampling=60.0, duration=3600.0),))
+    experiment = Experiment(name="e", tests=(PlannedTest(sampling=60.0, duration=3600.0),))
     with pytest.raises(InputError, match="seed -1"):
         simulate(experiment, seed=-1)
     for noise in (-0.1, float("nan"), float("inf")):

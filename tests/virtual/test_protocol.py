@@ -7,7 +7,7 @@ import pytest
 
 from thermocomp.core.exceptions import InputError, SettingError
 from thermocomp.virtual.machine import FeedDrive
-from thermocomp.virtual.protocol import Experiment, Programme, TestPlan
+from thermocomp.virtual.protocol import Experiment, PlannedTest, Programme
 from thermocomp.virtual.segments import Feed, Lot, SteadySegment, Stretch, Stroke
 from thermocomp.virtual.sensors import SensorFault
 
@@ -126,8 +126,8 @@ def test_strokes_lie_within_the_travel() -> None:
             Stroke(x=wrong)
 
 
-def plan(**more: Any) -> TestPlan:
-    return TestPlan(sampling=10.0, **({"duration": MINUTE} | more))
+def plan(**more: Any) -> PlannedTest:
+    return PlannedTest(sampling=10.0, **({"duration": MINUTE} | more))
 
 
 def test_tests_have_the_names_of_their_experiment() -> None:
@@ -172,7 +172,7 @@ def test_the_soak_hears_nothing_of_the_test() -> None:
 )
 def test_an_impossible_test_is_refused(wrong: dict[str, Any], path: tuple[str | int, ...], message: str) -> None:
     with pytest.raises(SettingError, match=message) as e:
-        TestPlan(**({"sampling": 10.0, "duration": MINUTE} | wrong))
+        PlannedTest(**({"sampling": 10.0, "duration": MINUTE} | wrong))
     assert e.value.path == path
 
 

@@ -11,7 +11,7 @@ from thermocomp.virtual.climate import CLIMATES, STABLE, Climate
 from thermocomp.virtual.datasets import EXPERIMENTS
 from thermocomp.virtual.instruments import Touch
 from thermocomp.virtual.kits import KITS
-from thermocomp.virtual.protocol import Experiment, TestPlan
+from thermocomp.virtual.protocol import Experiment, PlannedTest
 from thermocomp.virtual.protocolfile import TIMES, read_protocol
 from thermocomp.virtual.segments import Feed, Lot, SteadySegment, Stretch, Stroke
 from thermocomp.virtual.sensors import SensorFault
@@ -28,7 +28,7 @@ def written(folder: Path, text: str) -> Path:
 
 def test_one_test_without_tables(tmp_path: Path) -> None:
     path = written(tmp_path, 'sampling = "10 s"\nduration = "1.5 h"\nspeed = 2000\nplaces = "usual"')
-    expected = TestPlan(sampling=10.0, duration=5400.0, speed=2000.0, places=("usual",))
+    expected = PlannedTest(sampling=10.0, duration=5400.0, speed=2000.0, places=("usual",))
     assert read_protocol(path) == Experiment(name="mine", tests=(expected,))
 
 
@@ -244,7 +244,7 @@ def test_no_file_and_no_text(tmp_path: Path) -> None:
 
 
 TABLES: dict[str, type] = {
-    "tests": TestPlan,
+    "tests": PlannedTest,
     "segments": Stretch,
     "climate": Climate,
     "touch": Touch,
@@ -278,7 +278,7 @@ def test_the_page_names_everything() -> None:
             assert f"``{name}``" in PAGE, name
     for name in CLIMATES:
         assert f"``{name}``" in PAGE
-    assert set(TIMES) <= {f.name for cls in (*TABLES.values(), TestPlan) for f in fields(cls)}
+    assert set(TIMES) <= {f.name for cls in (*TABLES.values(), PlannedTest) for f in fields(cls)}
 
 
 @pytest.mark.parametrize("example", sorted((DOCS / "files").glob("*_test.toml")), ids=lambda p: p.stem)

@@ -1,6 +1,6 @@
 """Protocols: what is done to a virtual machine and what is recorded, as data.
 
-What is written (`Experiment`, `TestPlan`) may leave numbers and orders open, which a seed then draws by lot; what is
+What is written (`Experiment`, `PlannedTest`) may leave numbers and orders open, which a seed then draws by lot; what is
 run (`Programme`) is fixed.
 """
 
@@ -123,7 +123,7 @@ class Programme(RecordingSetup):
 
 
 @dataclass(frozen=True, kw_only=True)
-class TestPlan(RecordingSetup, Stretch):
+class PlannedTest(RecordingSetup, Stretch):
     """One test as it is written, or several alike; beside what `Setup` and `Stretch` say of it.
 
     Parameters
@@ -198,7 +198,7 @@ class Experiment:
     Parameters
     ----------
     name : str
-    tests : tuple of TestPlan
+    tests : tuple of PlannedTest
     description : str
         One line.
     machine : str
@@ -208,7 +208,7 @@ class Experiment:
     """
 
     name: str
-    tests: tuple[TestPlan, ...]
+    tests: tuple[PlannedTest, ...]
     description: str = ""
     machine: str = "centre"
     physics: Physics = "linear"

@@ -14,7 +14,7 @@ from thermocomp.core.units import read_with_unit
 from thermocomp.files.tomlfile import as_json, read_toml
 from thermocomp.virtual.climate import CLIMATES, Climate
 from thermocomp.virtual.instruments import Touch
-from thermocomp.virtual.protocol import Experiment, TestPlan
+from thermocomp.virtual.protocol import Experiment, PlannedTest
 from thermocomp.virtual.segments import Feed, Lot, Stretch, Stroke
 from thermocomp.virtual.segments import Path as Keys
 from thermocomp.virtual.sensors import SensorFault
@@ -31,7 +31,7 @@ TEXTS = ("description", "name", *TIMES)
 _OF_ALL = ("description", "machine", "physics", "tests")
 #: what stands under a key; numbers that are drawn by lot stand under any other
 _TABLES: dict[str, type] = {
-    "tests": TestPlan,
+    "tests": PlannedTest,
     "segments": Stretch,
     "soak": Stretch,
     "feed": Feed,
@@ -118,7 +118,7 @@ def _check_types(value: Any, path: Keys) -> None:
 
 def _in_house_units(content: dict[str, Any]) -> dict[str, Any]:
     """Return the file's content with what all tests share in each of them, times in seconds, and names replaced."""
-    known = [*_OF_ALL, *(f.name for f in fields(TestPlan))]
+    known = [*_OF_ALL, *(f.name for f in fields(PlannedTest))]
     for key in content:
         if key not in known:
             raise explain_unknown("key", key, known, (key,))
