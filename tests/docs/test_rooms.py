@@ -25,7 +25,7 @@ def arrows() -> Counter[tuple[str, str]]:
 
 
 def test_each_room_is_a_main_room_or_a_satellite() -> None:
-    found = {p.name for p in PACKAGE.iterdir() if p.is_dir()} - {"__pycache__"}
+    found = {p.parent.name for p in PACKAGE.glob("*/__init__.py")}
     assert found == MAIN | SATELLITES | {"papers"}
 
 
