@@ -96,6 +96,8 @@ list = tinyplug:TARGET
 broken = tinyplug:NOTHING
 [thermocomp.sources]
 counting = tinyplug:CountingIn
+other = tinyplug:CountingIn
+plain = tinyplug:Counting
 broken = tinyplug:NOTHING
 """
 CONFIG = 'models = ["model.json"]\nown_compensation = "off"\nshadow = true\n[[sources]]\nkind = "counting"\n{}\n'
@@ -172,6 +174,12 @@ def test_a_source(installed: Path, tmp_path: Path) -> None:
     (tmp_path / "live.toml").write_text(CONFIG.format("to = 2.0"), encoding="utf-8")
     _, err = thermocomp(installed, "serve", "live.toml", "--check", cwd=tmp_path, code=2)
     assert "sources.1.to is no key that is known" in err
-    (tmp_path / "live.toml").write_text(CONFIG.format("").replace("counting", "broken"), encoding="utf-8")
-    _, err = thermocomp(installed, "serve", "live.toml", "--check", cwd=tmp_path, code=2)
-    assert "plug-in broken (thermocomp.sources) of the package tinyplug cannot be loaded" in err
+    for kind, why in (
+        ("broken", "of the package tinyplug cannot be loaded"),
+        ("plain", "tinyplug:Counting is not a dataclass with a method open"),
+        ("other", "tinyplug:CountingIn needs a field kind: Literal['other']"),
+    ):
+        (tmp_path / "live.toml").write_text(CONFIG.format("").replace("counting", kind), encoding="utf-8")
+        _, err = thermocomp(installed, "serve", "live.toml", "--check", cwd=tmp_path, code=2)
+        assert f"plug-in {kind} (thermocomp.sources)" in err
+        assert why in err

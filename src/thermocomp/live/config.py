@@ -3,16 +3,17 @@
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from copy import deepcopy
-from dataclasses import dataclass, field, make_dataclass
+from dataclasses import dataclass, field, is_dataclass, make_dataclass
+from importlib.metadata import EntryPoint
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, Union
+from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_type_hints
 
 from pydantic import ConfigDict, Discriminator, Field, TypeAdapter, ValidationError, with_config
 from pydantic_core import ErrorDetails
 
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError, SettingError
-from thermocomp.core.plugins import find_plugins, load_plugin
+from thermocomp.core.plugins import describe_plugin, find_plugins, load_plugin
 from thermocomp.core.shown import explain_unfit
 from thermocomp.core.units import HOUSE_UNITS
 from thermocomp.files.tomlfile import as_json, read_toml
@@ -263,8 +264,17 @@ def _section_of(group: Literal["sources", "sinks"], tables: Any) -> Any:
     found_kinds = (t.get("kind") for t in tables if isinstance(t, dict)) if isinstance(tables, list) else ()
     named = {kind for kind in found_kinds if isinstance(kind, str)}
     known = find_plugins(group)
-    found = [load_plugin(e) for name, e in known.items() if e.value.startswith("thermocomp.") or name in named]
+    found = [_load_section(e) for name, e in known.items() if e.value.startswith("thermocomp.") or name in named]
     return Annotated[Union[tuple(found)], Discriminator("kind")]  # noqa: UP007 - made of a list
+
+
+def _load_section(entry: EntryPoint) -> type:
+    section = load_plugin(entry)
+    if not (isinstance(section, type) and is_dataclass(section) and callable(getattr(section, "open", None))):
+        raise InputError(f"{describe_plugin(entry)}: {entry.value} is not a dataclass with a method open")
+    if get_args(get_type_hints(section).get("kind")) != (entry.name,):
+        raise InputError(f"{describe_plugin(entry)}: {entry.value} needs a field kind: Literal[{entry.name!r}]")
+    return section
 
 
 def _unfit(value: Any, place: str = "") -> Iterator[str]:
