@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 BENCH ?= .venv-bench
 PYTEST ?=
 
-.PHONY: help demo test test-long check bench docs clean
+.PHONY: help demo test test-long check bench docs count clean
 
 help:
 	@echo "make demo    the main job on the virtual machine: record, fit, judge on unseen cycles, report"
@@ -14,6 +14,7 @@ help:
 	@echo "make check   format, lint, types, architecture"
 	@echo "make bench   speed and accuracy beside the peers"
 	@echo "make docs    the documentation, into docs/_build/html"
+	@echo "make count   lines of code by room"
 	@echo "make clean   take away what the other targets made"
 
 demo: $(VENV)/.study
@@ -42,6 +43,9 @@ bench: $(BENCH)/.bench
 
 docs: $(VENV)/.docs
 	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html
+
+count:
+	$(PYTHON) scripts/count.py
 
 clean:
 	rm -rf $(VENV) $(BENCH) demo docs/_build docs/auto_examples docs/auto_papers docs/reference/generated .coverage .mypy_cache .ruff_cache .pytest_cache .hypothesis \

@@ -40,7 +40,7 @@ class NamedEstimator(str):
 def _registered() -> dict[str, Method]:
     """Return the methods of all packages by name; what cannot be loaded is skipped with a warning."""
     found: dict[str, Method] = {}
-    for entry in find_plugins("methods").values():
+    for entry in find_plugins("methods", warnings.warn).values():
         try:
             methods: Sequence[Method] = load_plugin(entry)
         except InputError as e:
