@@ -9,12 +9,13 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from thermocomp.api.check import check
+    from thermocomp.api.explain import explain
     from thermocomp.api.inputs import read, training_table
     from thermocomp.api.plan import may_stop, plan
     from thermocomp.api.verbs import assess, compare, fit, select
     from thermocomp.core.correction import Correction, Deviation, Limits
     from thermocomp.core.exceptions import ThermocompError
-    from thermocomp.core.explained import explain
     from thermocomp.core.lineardynamic import LinearDynamic
     from thermocomp.core.model import ErrorModel
     from thermocomp.core.polynomial import Polynomial
@@ -51,6 +52,7 @@ _PUBLIC = {
     # the main job
     "read": "thermocomp.api.inputs",
     "simulate": "thermocomp.virtual.verbs",
+    "check": "thermocomp.api.check",
     "select": "thermocomp.api.verbs",
     "compare": "thermocomp.api.verbs",
     "fit": "thermocomp.api.verbs",
@@ -58,7 +60,7 @@ _PUBLIC = {
     "revise": "thermocomp.nc.revise",
     "plan": "thermocomp.api.plan",
     "may_stop": "thermocomp.api.plan",
-    "explain": "thermocomp.core.explained",
+    "explain": "thermocomp.api.explain",
     "freeze": "thermocomp.models.pipelines",
     "training_table": "thermocomp.api.inputs",
     "Recording": "thermocomp.recordings.recording",
@@ -132,6 +134,7 @@ __all__ = [
     "ThermocompError",
     "__version__",
     "assess",
+    "check",
     "compare",
     "explain",
     "fit",

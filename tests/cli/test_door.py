@@ -49,11 +49,11 @@ def test_a_recording_from_standard_input(
     assert "there is one standard input" in capsys.readouterr().err
 
 
-def test_without_a_target_the_displacements_are_listed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_without_a_target_all_displacements_are_predicted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     recordings.write(small_machine(), tmp_path / "drift.csv")
-    for command in (["compare"], ["select"], ["fit", "-o", str(tmp_path / "m.json")]):
-        assert run([command[0], str(tmp_path / "drift.csv"), *command[1:]]) == 2
-        assert "--target: z_um" in capsys.readouterr().err
+    drift, model = str(tmp_path / "drift.csv"), str(tmp_path / "m.json")
+    assert run(["fit", drift, "--model", "ols", "-o", model, "--json", "--jobs", "1"]) == 0
+    assert [m["target"] for m in json.loads(capsys.readouterr().out)["models"]] == ["z_um", "x_um"]
 
 
 def test_an_error_is_told_to_programs_too(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,6 +1,6 @@
 """What is handed in: recordings, files, tables; and what is made of them before any work."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -21,6 +21,7 @@ from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.stacking import stack
 from thermocomp.recordings.starts import Start
+from thermocomp.recordings.tilts import with_tilts
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
@@ -134,6 +135,30 @@ def starts_of(starts: Starts, recordings: Sequence[Recording]) -> tuple[Start, .
     return each
 
 
+class Listener:
+    """What hears how far the work is: a verb's ``progress``, whatever of this it has.
+
+    Parameters
+    ----------
+    progress : callable
+        Called with a line of text after each piece of work; may have ``begin``, called with the number of pieces, and
+        ``warn``, called with lines of trouble before the work.
+    """
+
+    def __init__(self, progress: Callable[..., object]) -> None:
+        self._progress = progress
+        self.warn: Callable[[list[str]], object] = getattr(progress, "warn", lambda _: None)
+
+    def begin(self, pieces: Callable[[], int]) -> None:
+        """Say how many pieces of work there are; they are counted only for who wants to know."""
+        if (begin := getattr(self._progress, "begin", None)) is not None:
+            begin(pieces())
+
+
+#: hears nothing
+SILENT = Listener(lambda *_: None)
+
+
 @dataclass(frozen=True, eq=False)
 class Prepared:
     """All that judging begins with.
@@ -162,10 +187,13 @@ def prepare(
     *,
     absolute: bool = False,
     starts: Starts = None,
-    zeroing: Zeroing | None = None,
+    zero_over: float = Zeroing.at_rest,
+    tilt: Sequence[str] | None = None,
     split: str | None = None,
     leave_one: LeaveOne | None = None,
+    jobs: int = -1,
     judged: bool = True,
+    listener: Listener = SILENT,
 ) -> Prepared:
     """Make of recordings what judging begins with.
 
@@ -178,23 +206,36 @@ def prepare(
     absolute : bool
     starts : Start or sequence of Start, optional
         How the recordings begin, see `starts_of`.
-    zeroing : Zeroing, optional
-        Over how long the zero is averaged.
+    zero_over : float
+        Average the start over so long, while the spindle stands [s].
+    tilt : sequence of str, optional
+        Tilts to predict too, see `thermocomp.recordings.tilts.with_tilts`.
     split, leave_one : str, optional
         What is judged, see `judging_of`.
+    jobs : int
+        Processes to share the work among.
     judged : bool
         False: nothing is judged unless one of these says so; a single thermal cycle is enough then.
+    listener : Listener
+        Gets what is wrong with the recordings, before the work.
 
     Returns
     -------
     Prepared
     """
+    if jobs == 0:
+        raise InputError("jobs 0: name a number of processes, or -1 for all cores")
     named = [targets] if isinstance(targets, str) else targets
     if named is None:
         named = [c.name for c in tests[0].displacements]
+    if tilt:
+        tests, names = with_tilts(tests, tilt)
+        named = [*named, *names]
     chosen = [inputs] if isinstance(inputs, str) else inputs
-    begun, how = starts_of(starts, tests), {} if zeroing is None else {"zeroing": zeroing}
-    samples = drop_unsound(stack(tests, named, chosen, rezero=not absolute, starts=begun, **how), tests)
+    speed = tests[0].speed
+    zeroing = Zeroing(zero_over, min(zero_over, Zeroing.otherwise), speed.name if speed is not None else "")
+    begun = starts_of(starts, tests)
+    samples = drop_unsound(stack(tests, named, chosen, rezero=not absolute, starts=begun, zeroing=zeroing), tests)
     wanted = judged or split is not None or leave_one is not None
     judging = judging_of(samples, split=split, leave_one=leave_one) if wanted else Judging("", ())
     trouble = trouble_of(tests)
@@ -204,6 +245,7 @@ def prepare(
             f"{tests[0].name}: {left} left out: of several spindle speeds the first, {taken}, is an input; name the "
             "inputs to take others"
         )
+    listener.warn(trouble)
     return Prepared(tuple(tests), samples, judging, trouble)
 
 

@@ -8,11 +8,22 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from thermocomp.api import testprogram
-from thermocomp.api.inputs import Given, Prepared, Starts, judging_of, prepare, recordings_of
+from thermocomp.api.inputs import (
+    Given,
+    LeaveOne,
+    Listener,
+    Prepared,
+    Starts,
+    judging_of,
+    prepare,
+    recordings_of,
+    trouble_of,
+)
 from thermocomp.api.results import Result
 from thermocomp.api.testprogram import Dialect
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
+from thermocomp.core.zero import Zeroing
 from thermocomp.judging.planning import learningcurve, planning
 from thermocomp.judging.planning.learningcurve import LearningCurve
 from thermocomp.judging.planning.planning import Candidate, Plan
@@ -50,6 +61,25 @@ class Planned(Result):
     curve: LearningCurve | None
     channels: tuple[Channel, ...]
     trouble: tuple[str, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all of it for a program: what ``--json`` prints."""
+        curve = self.curve
+        return {
+            "trouble": list(self.trouble),
+            "expected_um": self.plan.expected,
+            "candidates": [_candidate(c) for c in self.plan.candidates],
+            "curve": curve
+            and {
+                "model": curve.model,
+                "none_rms_um": curve.none,
+                "last_gain_um": curve.last_gain,
+                "worth_um": curve.worth,
+                "enough": curve.enough,
+                "cycles": [x._asdict() for x in curve.by_cycles()],
+                "speeds": [x._asdict() for x in curve.by_speeds()],
+            },
+        }
 
     @property
     def next(self) -> Candidate:
@@ -121,6 +151,18 @@ class Planned(Result):
         return " ".join([*found, *([f"Trouble: {'; '.join(self.trouble)}."] if self.trouble else [])])
 
 
+def _candidate(c: Candidate) -> dict[str, Any]:
+    return {
+        "kind": c.trial.kind,
+        "words": c.trial.words,
+        "speed_1_min": c.trial.speed,
+        "steps": [{"speed_1_min": speed, "duration_s": duration} for speed, duration in c.trial.steps],
+        "gain_um": c.gain,
+        "expected_um": c.doubt,
+        "news": c.news,
+    }
+
+
 def plan(
     recordings: Given,
     targets: str | Sequence[str] | None = None,
@@ -129,29 +171,33 @@ def plan(
     hours: float = 12.0,
     swing: float = 5.0,
     inputs: str | Sequence[str] | None = None,
+    split: str | None = None,
+    leave_one: LeaveOne | None = None,
     absolute: bool = False,
     starts: Starts = None,
+    zero_over: float = Zeroing.at_rest,
     mapping: str | Path | Mapping | None = None,
     curve: bool = True,
-    jobs: int = 1,
+    jobs: int = -1,
     progress: Callable[..., Any] = _silent,
 ) -> Planned:
-    """Say which test would teach most next, and whether more of the same would.
+    """Say how much test is enough, and write the test that would teach most next as an NC program.
 
     Parameters
     ----------
     recordings, targets
         As for `compare`.
     top_speed : float, optional
-        Of the machine [1/min]; the highest recorded one without it.
+        The machine's highest spindle speed [1/min]; the highest recorded one if not given.
     hours : float
         Length of the next test [h].
     swing : float
-        How far the room's temperature may change within so long where the machine stands [degC]; 0: never.
-    inputs, absolute, starts, mapping
+        How far the room's temperature may change within that time, where the machine stands [degC]; 0: never.
+    inputs, split, leave_one, absolute, starts, zero_over, mapping
         As for `compare`.
     curve : bool
-        Also find out how the error on unseen cycles falls with the number of cycles learned from, which takes long.
+        Also find out how the error on unseen cycles falls with the number of cycles learned from, which takes most of
+        the time.
     jobs, progress
         As for `compare`.
 
@@ -173,72 +219,58 @@ def plan(
     >>> planned.write("next.ngc").name
     'next.csv'
     """
-    tests = recordings_of(recordings, mapping)
-    ready = prepare(tests, targets, inputs, absolute=absolute, starts=starts, judged=False)
-    return plan_from(ready, top_speed=top_speed, hours=hours, swing=swing, curve=curve, jobs=jobs, progress=progress)
-
-
-def plan_from(
-    ready: Prepared,
-    *,
-    top_speed: float | None,
-    hours: float,
-    swing: float,
-    curve: bool,
-    jobs: int,
-    progress: Callable[..., Any] = _silent,
-) -> Planned:
-    """Do the work of `plan` with what it begins with.
-
-    Parameters
-    ----------
-    ready : Prepared
-    top_speed, hours, swing, curve, jobs, progress
-        Of `plan`.
-
-    Returns
-    -------
-    Planned
-    """
+    listener = Listener(progress)
+    ready = prepare(
+        recordings_of(recordings, mapping),
+        targets,
+        inputs,
+        absolute=absolute,
+        starts=starts,
+        zero_over=zero_over,
+        split=split,
+        leave_one=leave_one,
+        jobs=jobs,
+        judged=False,
+        listener=listener,
+    )
+    judging = _units(ready) if curve else Judging("", ())
+    worth_it = len(judging.splits) > 2
+    listener.begin(lambda: 1 + (learningcurve.n_pieces(judging) if worth_it else 0))
     found = planning.plan(ready.samples, top_speed, hours=hours, swing=swing)
     progress("test errors predicted")
-    judging = units_of(ready) if curve else Judging("", ())
     learned = None
-    if len(judging.splits) > 2:
+    if worth_it:
         learned = learningcurve.learning_curve(ready.samples, judging, jobs=jobs, progress=progress)
     channels = (*ready.samples.inputs, *ready.samples.targets)
     return Planned(found, learned, channels, tuple(ready.trouble))
 
 
-def units_of(ready: Prepared) -> Judging:
-    """Return the blocks of a learning curve: what was asked for, or the thermal cycles; none if there is only one.
-
-    Parameters
-    ----------
-    ready : Prepared
-
-    Returns
-    -------
-    Judging
-    """
+def _units(ready: Prepared) -> Judging:
+    """Return the blocks of a learning curve: what was asked for, or the thermal cycles; none if there is only one."""
     if ready.judging.splits:
         return ready.judging
     return judging_of(ready.samples) if len(ready.samples.cycle_names) > 1 else Judging("", ())
 
 
 def may_stop(
-    recording: Given, targets: str | Sequence[str] | None = None, *, mapping: str | Path | Mapping | None = None
+    recordings: Given,
+    targets: str | Sequence[str] | None = None,
+    *,
+    mapping: str | Path | Mapping | None = None,
+    progress: Callable[..., Any] = _silent,
 ) -> Running:
     """Judge whether the running part of a test may end: its steady state is known.
 
     Parameters
     ----------
-    recording : Recording, path or DataFrame
-        The test up to now.
+    recordings : Recording, path or DataFrame
+        The test up to now, one recording.
     targets : str or sequence of str, optional
         Displacement channels; all of them without it.
     mapping : str, Path or Mapping, optional
         For a file.
+    progress : callable
+        As for `plan`.
 
     Returns
     -------
@@ -260,8 +292,9 @@ def may_stop(
     >>> running.may_stop, round(running.states[0][1].final)
     (True, 40)
     """
-    tests = recordings_of(recording, mapping)
+    tests = recordings_of(recordings, mapping)
     if len(tests) != 1:
         raise InputError(f"{len(tests)} recordings: give the one of the running test")
+    Listener(progress).warn(trouble_of(tests))
     named = [targets] if isinstance(targets, str) else targets
     return judge_running(tests[0], named or [c.name for c in tests[0].displacements])

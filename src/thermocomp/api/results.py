@@ -2,9 +2,9 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -14,11 +14,13 @@ from thermocomp.core.columns import Columns
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.explained import Explanations, explain_all
 from thermocomp.core.model import ErrorModel
-from thermocomp.judging.choice import Choice
+from thermocomp.judging.faultlog import find_faults
 from thermocomp.judging.results import Assessment, Comparison
 from thermocomp.judging.study import Fitted, Judged
 from thermocomp.models.methods import deployable
 from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.starts import Start
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,6 +34,10 @@ class Result(ABC):
     @abstractmethod
     def to_frame(self) -> pd.DataFrame:
         """Return the figures as a table, a row for each of what was judged, fitted or chosen."""
+
+    @abstractmethod
+    def to_dict(self) -> dict[str, Any]:
+        """Return all of it for a program: what ``--json`` prints."""
 
     @abstractmethod
     def plot(self) -> "Figure":
@@ -48,6 +54,11 @@ class Result(ABC):
         from html import escape
 
         return f"<p>{escape(str(self))}</p>{self.to_frame().to_html(index=False, float_format='{:.2f}'.format)}"
+
+
+def starts_content(begins: Sequence[tuple[str, Start]]) -> list[dict[str, object]]:
+    """Return how recordings begin, for a program."""
+    return [start.content(name) for name, start in begins]
 
 
 def frame_of(assessments: Sequence[Assessment]) -> pd.DataFrame:
@@ -92,11 +103,40 @@ class Compared(Result):
     recordings : tuple of Recording
     trouble : tuple of str
         What is wrong with the recordings.
+    samples : Samples, optional
+        The rows that were judged, for figures of the inputs.
     """
 
     comparison: Comparison
     recordings: tuple[Recording, ...]
     trouble: tuple[str, ...] = ()
+    samples: Samples | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all of it for a program: what ``--json`` prints."""
+        from thermocomp.report import records, summary
+
+        found = self.comparison
+        return {
+            "judging": found.judging.name,
+            "starts": starts_content(found.starts),
+            "condition_number": found.collinearity.condition_number,
+            "vif": dict(zip(found.collinearity.names, found.collinearity.vif, strict=True)),
+            "trouble": self.trouble,
+            "not_judged": found.left,
+            "cautions": summary.cautions(found),
+            "recommended": [
+                {
+                    "target": r.target,
+                    "model": r.method,
+                    "chosen_per_unit": r.chosen,
+                    "verdict": r.verdict.word,
+                    "reason": r.verdict.told,
+                }
+                for r in found.recommended
+            ],
+            "results": [records.assessment(a) for a in found.assessments],
+        }
 
     @property
     def best(self) -> dict[str, str | None]:
@@ -147,13 +187,13 @@ class Compared(Result):
         """Write the page that ``thermocomp compare -o`` writes; return its path."""
         from thermocomp.report import html
 
-        html.write(self.comparison, self.recordings, Path(path), overwrite=overwrite)
+        html.write(self.comparison, self.recordings, Path(path), self.samples, overwrite=overwrite)
         return Path(path)
 
     def __str__(self) -> str:
         from thermocomp.report.summary import verdict
 
-        return " ".join([verdict(self.comparison), *_told(self.trouble)])
+        return " ".join([verdict(self.comparison), *told_trouble(self.trouble)])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -170,6 +210,20 @@ class FittedModels(Result):
     fitted: Fitted
     recordings: tuple[Recording, ...]
     trouble: tuple[str, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all of it for a program: what ``--json`` prints."""
+        from thermocomp.report import records
+
+        found, overall = self.fitted, self.fitted.comparison.overall()
+        return {
+            "judging": found.comparison.judging.name,
+            "starts": starts_content(found.comparison.starts),
+            "trouble": self.trouble,
+            "models": [
+                records.model(m, r2, a) for m, r2, a in zip(found.models, found.r_squared, overall, strict=True)
+            ],
+        }
 
     @property
     def models(self) -> dict[str, ErrorModel]:
@@ -241,7 +295,7 @@ class FittedModels(Result):
         return " ".join(
             [
                 *(_judged(a) for a in self.fitted.comparison.overall()),
-                *_told(self.trouble),
+                *told_trouble(self.trouble),
             ]
         )
 
@@ -260,6 +314,24 @@ class Assessed(Result):
     judged: Judged
     recordings: tuple[Recording, ...]
     trouble: tuple[str, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all of it for a program: what ``--json`` prints."""
+        from thermocomp.report import records
+
+        judged = self.judged
+        logs = find_faults(judged, self.recordings)
+        return {
+            "seen_in_training": judged.seen,
+            "starts": starts_content(judged.starts),
+            "verdict_when_fitted": {m.target: m.honest_error.word for m in judged.models if m.honest_error},
+            "taken": {m.target: h.taken for m in judged.models if (h := m.honest_error) is not None and h.taken},
+            "trouble": self.trouble,
+            "validity": asdict(judged.validity) if judged.validity is not None else None,
+            "validity_when_fitted": {m.target: asdict(m.validity) for m in judged.models if m.validity is not None},
+            "failed_sensors": [{"recording": log.name, **f._asdict()} for log in logs for f in log.faults],
+            "results": [records.assessment(a) for a in judged.assessments],
+        }
 
     @property
     def coverage(self) -> dict[str, float]:
@@ -287,59 +359,7 @@ class Assessed(Result):
         return Path(path)
 
     def __str__(self) -> str:
-        return " ".join([*(_judged(a) for a in self.judged.overall()), *_told(self.trouble)])
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Selected(Result):
-    """Sensors that were chosen.
-
-    Parameters
-    ----------
-    choices : tuple of Choice
-    trouble : tuple of str
-    """
-
-    choices: tuple[Choice, ...]
-    trouble: tuple[str, ...] = ()
-
-    @property
-    def sensors(self) -> dict[str, tuple[str, ...]]:
-        """Names of the chosen sensors, by target."""
-        return {c.target: c.sensors for c in self.choices}
-
-    def to_frame(self) -> pd.DataFrame:
-        """Return a row per target; the tables behind it are in ``choices[k].tables``."""
-        return pd.DataFrame(
-            {
-                "target": [c.target for c in self.choices],
-                "method": [c.method for c in self.choices],
-                "sensors": [" ".join(c.sensors) for c in self.choices],
-                "reason": [c.reason for c in self.choices],
-            }
-        )
-
-    def plot(self, target: str | None = None) -> "Figure":
-        """Return the figure of the first choice, or of that of a target.
-
-        Raises
-        ------
-        InputError
-            There is no such target, or nothing was chosen from.
-        """
-        from thermocomp.report import selections
-
-        mine = [c for c in self.choices if target in (None, c.target)]
-        if not mine:
-            raise InputError(f"no choice for {target!r}; there are {', '.join(c.target for c in self.choices)}")
-        drawn = selections.draw(mine[0])
-        if drawn is None:
-            raise InputError(f"{mine[0].method} has nothing to draw: see {mine[0].reason}")
-        return drawn[0].figure
-
-    def __str__(self) -> str:
-        chosen = (f"{c.target}: {', '.join(c.sensors) or 'no sensor'} ({c.reason})." for c in self.choices)
-        return " ".join([*chosen, *_told(self.trouble)])
+        return " ".join([*(_judged(a) for a in self.judged.overall()), *told_trouble(self.trouble)])
 
 
 def _judged(a: Assessment) -> str:
@@ -351,7 +371,8 @@ def _judged(a: Assessment) -> str:
     )
 
 
-def _told(trouble: Sequence[str]) -> list[str]:
+def told_trouble(trouble: Sequence[str]) -> list[str]:
+    """Return the trouble of recordings as a sentence; nothing if there is none."""
     return [f"Trouble: {'; '.join(trouble)}."] if trouble else []
 
 

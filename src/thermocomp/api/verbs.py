@@ -5,13 +5,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
-from thermocomp.api.inputs import Given, LeaveOne, Starts, prepare, recordings_of, starts_of, trouble_of
-from thermocomp.api.results import Assessed, Compared, FittedModels, Selected
+from thermocomp.api.explain import models_of
+from thermocomp.api.inputs import Given, LeaveOne, Listener, Starts, prepare, recordings_of, starts_of, trouble_of
+from thermocomp.api.results import Assessed, Compared, FittedModels
+from thermocomp.api.selected import Selected
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.inputs import Support
 from thermocomp.core.model import ErrorModel
-from thermocomp.files import modelfile
+from thermocomp.core.zero import Zeroing
 from thermocomp.judging import compare as comparing
 from thermocomp.judging import do_no_harm, selecting
 from thermocomp.judging import study as studies
@@ -40,6 +42,7 @@ def compare(
     leave_one: LeaveOne | None = None,
     absolute: bool = False,
     starts: Starts = None,
+    zero_over: float = Zeroing.at_rest,
     mapping: str | Path | Mapping | None = None,
     support: Policy = "clip",
     margin: float = Support.margin,
@@ -47,7 +50,7 @@ def compare(
     primary: str | None = None,
     harm_margin: float | None = None,
     limits: Limits | None = Limits(),
-    jobs: int = 1,
+    jobs: int = -1,
     scheduler: str | None = None,
     progress: Callable[[str], None] = _silent,
 ) -> Compared:
@@ -56,35 +59,44 @@ def compare(
     Parameters
     ----------
     recordings : Recording, path, DataFrame, or sequence of them
-        Each is one test.
+        Files (CSV, XLSX, ODS or Parquet) or tables; each is one test.
     targets : str or sequence of str, optional
-        Displacement channels to predict; all of the first recording without it.
+        Displacement channels to predict; all of the first recording if not given.
     models : str, estimator, or sequence of them
-        Names of methods, ``all``, and estimators of any kind: one of thermocomp's with settings of its own, any
-        regressor of scikit-learn, a Pipeline, a small class of one's own.
+        Methods to compare, or all: ols, partial-f, mra, averaged, dynamic, grouping, subsets, ace, ace-monotone,
+        mlp, mlp-sklearn, arx, arx-free-run, arx-net, ridge, pcr, pls, lasso, elastic-net, ppr, gp.
+
+        In Python also estimators of any kind: one of thermocomp's with settings of its own, any regressor of
+        scikit-learn, a Pipeline, a small class of one's own.
     inputs : str or sequence of str, optional
-        Channels to predict from; all temperatures and the first spindle speed without it.
+        Channels to predict from; all temperatures and the first spindle speed if not given.
     split : str, optional
         Judge by time: shares of the rows such as ``0.75/0.25``, or hours such as ``20h/8h``.
     leave_one : {'cycle', 'day', 'file'}, optional
-        Judge on each thermal cycle in turn, which is done if nothing is said, on each day (the recordings need time
+        Judge on each thermal cycle in turn (the default), on each day (the recordings need time
         stamps), or on each recording.
     absolute : bool
         Take temperatures as they are; without it they are counted from the start of each test.
     starts : Start or sequence of Start, optional
-        How all recordings begin, or each of them, such as ``Start("continued", earlier=(monday,))``; found out without
-        it. See `thermocomp.recordings.starts.Start`.
+        How all recordings begin, or each of them, such as ``Start("continued", earlier=(monday,))``; found out if not
+        given. See `thermocomp.recordings.starts.Start`.
+    zero_over : float
+        Average the start of each test over so long, while the spindle stands [s]; 0: it is the first row.
     mapping : str, Path or Mapping, optional
-        What the columns of files are.
-    support, margin : str, float
-        What the models do outside their trained range, see `thermocomp.core.inputs.Support`.
+        TOML file that says what the columns of files are.
+    support : {'clip', 'hold', 'fade'}
+        What a model does outside its trained range: clip its inputs, hold its last value, or fade to zero.
+    margin : float
+        Share of each input's trained span by which its range is widened.
     robustness : bool
-        Also replay with noise and lost sensors, as ``thermocomp compare`` does: a model that they make worse than none
-        is unproven. Without it, which is quicker, none is accepted.
+        Also replay with noise and lost sensors: a model that they make worse than none is unproven. Without it, which
+        is quicker, none is accepted.
     primary : str, optional
-        Method that is named beforehand, see `thermocomp.judging.results.Rules`.
+        Method that is named beforehand: it is judged as if it were the only one, the others are corrected for the
+        number tried. Without it that goes for the recommended one, which is chosen anew without each cycle.
     harm_margin : float, optional
-        Tolerated degradation in a single unit, stated before judging [um].
+        Tolerated degradation in a single cycle, day or file, stated before judging [um]. If not given: three times the
+        probe's noise or 5 % of the largest drift, at most 2 um.
     limits : Limits or None
         Of the compensator that is judged with the models; None: the models alone.
     jobs : int
@@ -93,7 +105,7 @@ def compare(
         Dask scheduler whose workers do the work in place of these processes, such as ``tcp://192.168.1.20:8786``: see
         :doc:`/many_recordings`.
     progress : callable
-        Called with a line of text after each piece of work.
+        Called with a line of text after each piece of work; see `thermocomp.api.inputs.Listener`.
 
     Returns
     -------
@@ -116,14 +128,27 @@ def compare(
     >>> found.best  # the accepted model with the smallest error
     {'s1_um': 'ols'}
     """
-    tests = recordings_of(recordings, mapping)
-    ready = prepare(tests, targets, inputs, absolute=absolute, starts=starts, split=split, leave_one=leave_one)
+    listener, rules = Listener(progress), Rules(harm_margin, primary)
+    methods = list(models) if isinstance(models, Iterable) and not _single(models) else [models]
+    ready = prepare(
+        recordings_of(recordings, mapping),
+        targets,
+        inputs,
+        absolute=absolute,
+        starts=starts,
+        zero_over=zero_over,
+        split=split,
+        leave_one=leave_one,
+        jobs=jobs,
+        listener=listener,
+    )
     with shared_among(scheduler):
+        listener.begin(lambda: comparing.n_pieces(ready.samples, methods, ready.judging, rules))
         found = comparing.compare(
             ready.samples,
-            list(models) if isinstance(models, Iterable) and not _single(models) else [models],
+            methods,
             ready.judging,
-            rules=Rules(harm_margin, primary),
+            rules=rules,
             support=Support(support, margin),
             robustness=robustness,
             limits=limits,
@@ -132,7 +157,7 @@ def compare(
         )
     if not robustness:
         found = replace(found, assessments=tuple(_untried(a) for a in found.assessments))
-    return Compared(found, ready.tests, tuple(ready.trouble))
+    return Compared(found, ready.tests, tuple(ready.trouble), ready.samples)
 
 
 def _single(models: Any) -> bool:
@@ -155,31 +180,41 @@ def fit(
     leave_one: LeaveOne | None = None,
     absolute: bool = False,
     starts: Starts = None,
+    zero_over: float = Zeroing.at_rest,
     mapping: str | Path | Mapping | None = None,
     support: Policy = "clip",
     margin: float = Support.margin,
     harm_margin: float | None = None,
+    tilt: Sequence[str] | None = None,
     limits: Limits = Limits(),
     accept_unproven: str | None = None,
-    jobs: int = 1,
+    jobs: int = -1,
     scheduler: str | None = None,
     progress: Callable[[str], None] = _silent,
 ) -> FittedModels:
-    """Judge a method on thermal cycles it has not seen, then fit it to everything and freeze it.
+    """Fit a model, judge it on thermal cycles it has not seen, and write it with its honest error.
+
+    The method is first judged on unseen cycles, then fitted to everything. A refused model is written too, with the
+    refusal inside: nothing will run it. An unproven one runs in shadow only.
 
     Parameters
     ----------
     recordings, targets
         As for `compare`.
     model : str or estimator
-        A method, or an estimator that can be frozen: one of thermocomp's, or a Pipeline of selectors and one of them.
-    inputs, split, leave_one, absolute, starts, mapping, support, margin, harm_margin
+        A method as for ``thermocomp compare``, all but gp.
+
+        In Python also an estimator that can be frozen: one of thermocomp's, or a Pipeline of selectors and one of them.
+    inputs, split, leave_one, absolute, starts, zero_over, mapping, support, margin, harm_margin
         As for `compare`.
+    tilt : sequence of str, optional
+        Tilts to predict too, each of two probes and their distance, such as ``A0C=y1_um:y2_um:100mm`` (turn about X,
+        the probe at the tip first) or ``B0C=x1_um:x2_um:100mm`` (about Y).
     limits : Limits
         Of the compensator that is judged with the models.
     accept_unproven : str, optional
-        Who takes the models if they are unproven, and why, such as ``"M. Weber, trial on machine 7"``: they run then,
-        and it is said wherever they are shown.
+        Person who approves the use of an unproven model, and the reason, such as ``"M. Weber, trial on machine 7"``.
+        Kept in the model file, shown wherever the model is. A refused one never runs.
     jobs, scheduler, progress
         As for `compare`.
 
@@ -202,16 +237,29 @@ def fit(
     >>> fitted.save("model.json").name
     'model.json'
     """
-    tests = recordings_of(recordings, mapping)
-    ready = prepare(tests, targets, inputs, absolute=absolute, starts=starts, split=split, leave_one=leave_one)
+    listener = Listener(progress)
+    ready = prepare(
+        recordings_of(recordings, mapping),
+        targets,
+        inputs,
+        absolute=absolute,
+        starts=starts,
+        zero_over=zero_over,
+        tilt=tilt,
+        split=split,
+        leave_one=leave_one,
+        jobs=jobs,
+        listener=listener,
+    )
     with shared_among(scheduler):
+        listener.begin(lambda: comparing.n_pieces(ready.samples, [model], ready.judging) + len(ready.samples.targets))
         found = studies.fit(
             ready.samples,
             model,
             ready.judging,
             rules=Rules(harm_margin),
             support=Support(support, margin),
-            recordings=tests,
+            recordings=ready.tests,
             limits=limits,
             jobs=jobs,
             progress=progress,
@@ -221,7 +269,7 @@ def fit(
 
 
 def assess(
-    models: ErrorModel | FittedModels | str | Path | Sequence[ErrorModel],
+    model: ErrorModel | FittedModels | str | Path | Sequence[ErrorModel],
     recordings: Given,
     *,
     starts: Starts = None,
@@ -231,22 +279,22 @@ def assess(
     probing: str | Probings | None = None,
     progress: Callable[[str], None] = _silent,
 ) -> Assessed:
-    """Judge frozen models on recordings: per cycle, with noise, with each sensor lost, outside their range.
+    """Judge a model file on recordings: per cycle, with noise, with each sensor lost, outside its range.
+
+    Rows that a model has learned from are known again by their fingerprints, whatever file they stand in: they are left
+    out and counted.
 
     Parameters
     ----------
-    models : ErrorModel, FittedModels, path of a model file, or sequence of ErrorModel
-    recordings : Recording, path, DataFrame, or sequence of them
-    starts : Start or sequence of Start, optional
-        How the recordings begin, as for `compare`.
-    mapping : str, Path or Mapping, optional
-        What the columns of files are.
-    harm_margin : float, optional
-        Tolerated degradation in a single unit, stated before judging [um].
+    model : ErrorModel, FittedModels, path of a model file, or sequence of ErrorModel
+        Model file, or models.
+    recordings, starts, mapping, harm_margin
+        As for `compare`.
     limits : Limits
         Of the compensator that is judged with the models.
     probing : str or Probings, optional
-        The tool point is probed while it runs, such as ``every 2 h``; what that says corrects the models from then on.
+        The tool point is probed while it runs, such as ``every 2 h``, or ``every 30 min, 0.3 um`` with the probe's
+        repeatability (standard deviation; 0.5 um if not given): each probing corrects the models from then on.
     progress : callable
         Called with a line of text per model.
 
@@ -271,14 +319,11 @@ def assess(
     >>> print(found.to_frame()["reason"][0])
     judged on 2 units, at least 3 are needed; record 1 more thermal cycle, at other speeds or on other days
     """
-    if isinstance(models, str | Path):
-        models = modelfile.read(models)
-    elif isinstance(models, FittedModels):
-        models = models.fitted.models
-    elif isinstance(models, ErrorModel):
-        models = (models,)
-    tests = recordings_of(recordings, mapping)
-    begun = starts_of(starts, tests)
+    models = models_of(model)
+    listener, tests = Listener(progress), recordings_of(recordings, mapping)
+    begun, trouble = starts_of(starts, tests), trouble_of(tests)
+    listener.warn(trouble)
+    listener.begin(lambda: len(models))
     judged = studies.assess(
         models,
         tests,
@@ -288,7 +333,7 @@ def assess(
         probings=Probings.of(probing),
         progress=progress,
     )
-    return Assessed(judged, tuple(tests), tuple(trouble_of(tests)))
+    return Assessed(judged, tuple(tests), tuple(trouble))
 
 
 def select(
@@ -301,8 +346,9 @@ def select(
     leave_one: LeaveOne | None = None,
     absolute: bool = False,
     starts: Starts = None,
+    zero_over: float = Zeroing.at_rest,
     mapping: str | Path | Mapping | None = None,
-    jobs: int = 1,
+    jobs: int = -1,
     scheduler: str | None = None,
     progress: Callable[..., None] = _silent,
     **settings: Any,
@@ -314,8 +360,10 @@ def select(
     recordings, targets
         As for `compare`.
     method : {'pareto', 'subsets', 'grouping', 'partial-f', 'stepwise', 'ace'}
-        How to choose; see :doc:`/methods`.
-    inputs, split, leave_one, absolute, starts, mapping, jobs, scheduler, progress
+        How to choose (:doc:`/methods`). pareto: error on unseen cycles against the number of sensors; subsets: exact
+        best subset of every size; grouping: correlation grouping (Hwang); partial-f and stepwise: by partial F
+        (stepwise 2017, Chen); ace: by maximal correlation (Wessel).
+    inputs, split, leave_one, absolute, starts, zero_over, mapping, jobs, scheduler, progress
         As for `compare`.
     **settings
         Of the method, see `thermocomp.judging.choice.Settings`: ``max_sensors=5``, ``threshold=0.95``.
@@ -347,17 +395,21 @@ def select(
         known = ", ".join(Settings.__dataclass_fields__)
         raise InputError(f"select: {str(e).partition(') ')[2]}; the settings are {known}") from e
     chosen.check(method)
-    tests = recordings_of(recordings, mapping)
+    listener = Listener(progress)
     ready = prepare(
-        tests,
+        recordings_of(recordings, mapping),
         targets,
         inputs,
         absolute=absolute,
         starts=starts,
+        zero_over=zero_over,
         split=split,
         leave_one=leave_one,
+        jobs=jobs,
         judged=method == "pareto",
+        listener=listener,
     )
     with shared_among(scheduler):
+        listener.begin(lambda: selecting.n_pieces(method, ready.samples, ready.judging, chosen))
         found = selecting.select(method, ready.samples, ready.judging, chosen, jobs=jobs, progress=progress)
-    return Selected(found, tuple(ready.trouble))
+    return Selected(found, tuple(ready.trouble), ready.tests)

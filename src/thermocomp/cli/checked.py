@@ -1,4 +1,4 @@
-"""What `check` prints: tables for people, JSON for machines."""
+"""What `check` prints for people."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -6,7 +6,7 @@ from typing import Any
 
 from rich.console import Console
 
-from thermocomp.cli.jsonoutput import print_json
+from thermocomp.api.check import Checked
 from thermocomp.cli.terminal import marked, print_table, words
 from thermocomp.recordings.checks.findings import Finding
 from thermocomp.recordings.recording import Recording
@@ -20,37 +20,15 @@ MANY = 3
 _FULL = 4
 
 
-def show_check(
-    tests: Sequence[Recording],
-    findings: Sequence[Sequence[Finding]],
-    page: Path | None,
-    console: Console,
-    *,
-    as_json: bool,
-) -> None:
-    """Print what recordings hold and what is wrong with them; of more than three, one line each.
-
-    Parameters
-    ----------
-    tests : sequence of Recording
-    findings : sequence of sequence of Finding
-        Of each recording, the gravest first.
-    page : Path or None
-        Page that was written.
-    console : Console
-    as_json : bool
-        Print JSON instead of tables.
-    """
-    told = [records.recording(r, found) for r, found in zip(tests, findings, strict=True)]
-    if as_json:
-        print_json({"recordings": told, "page": None if page is None else str(page)})
-        return
-    if len(tests) > MANY:
-        print_table(_overview(told), console)
+def show_check(found: Checked, page: Path | None, console: Console) -> None:
+    """Print what recordings hold and what is wrong with them; of more than three, one line each."""
+    contents = found.to_dict()["recordings"]
+    if len(contents) > MANY:
+        print_table(_overview(contents), console)
         console.print("[dim]name a file alone to see all that was found in it, or write a page with -o[/]")
     else:
-        for r, found, content in zip(tests, findings, told, strict=True):
-            _show(r, found, content, console)
+        for r, mine, content in zip(found.recordings, found.findings, contents, strict=True):
+            _show(r, mine, content, console)
     if page is not None:
         console.print(f"Page: {words(page)}", soft_wrap=True)
 

@@ -1,12 +1,10 @@
 """What the commands print: a table for people, JSON for machines."""
 
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 
 from rich.console import Console
 
-from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.terminal import mark, print_table, words
 from thermocomp.judging import coverage
 from thermocomp.judging.choice import Choice
@@ -29,35 +27,9 @@ from thermocomp.report.summary import cautions, describe_unlike
 def show_comparison(
     comparison: Comparison,
     report: Path | None,
-    trouble: Sequence[str],
     console: Console,
-    *,
-    as_json: bool,
 ) -> None:
     """Print a comparison of methods on unseen blocks."""
-    if as_json:
-        content = {
-            "judging": comparison.judging.name,
-            "starts": _starts(comparison.starts),
-            "condition_number": comparison.collinearity.condition_number,
-            "vif": dict(zip(comparison.collinearity.names, comparison.collinearity.vif, strict=True)),
-            "trouble": trouble,
-            "not_judged": comparison.left,
-            "cautions": cautions(comparison),
-            "recommended": [
-                {
-                    "target": r.target,
-                    "model": r.method,
-                    "chosen_per_unit": r.chosen,
-                    "verdict": r.verdict.word,
-                    "reason": r.verdict.told,
-                }
-                for r in comparison.recommended
-            ],
-            "results": [records.assessment(a) for a in comparison.assessments],
-        }
-        print_json(content)
-        return
     _tell_starts(comparison.starts, console)
     console.print(f"Judged on: {words(comparison.judging.name)}")
     print_table(_assessment_table(comparison.assessments), console)
@@ -86,27 +58,8 @@ def show_comparison(
         console.print(f"Report: {words(report)}")
 
 
-def show_choices(
-    choices: Sequence[Choice], page: Path | None, trouble: Sequence[str], console: Console, *, as_json: bool
-) -> None:
+def show_choices(choices: Sequence[Choice], page: Path | None, console: Console) -> None:
     """Print selections of sensors."""
-    if as_json:
-        content = {
-            "trouble": trouble,
-            "choices": [
-                {
-                    "method": c.method,
-                    "target": c.target,
-                    "sensors": c.sensors,
-                    "reason": c.reason,
-                    "notes": c.notes,
-                    "tables": {t.title: [dict(zip(t.columns, row, strict=True)) for row in t.rows] for t in c.tables},
-                }
-                for c in choices
-            ],
-        }
-        print_json(content)
-        return
     for c in choices:
         for t in c.tables:
             console.print(f"\n[bold]{words(c.target)}: {words(t.title)}[/]")
@@ -121,20 +74,10 @@ def show_choices(
         console.print(f"Page: {words(page)}", soft_wrap=True)
 
 
-def show_fit(fitted: Fitted, path: Path, trouble: Sequence[str], console: Console, *, as_json: bool) -> None:
+def show_fit(fitted: Fitted, path: Path | None, console: Console) -> None:
     """Print models that were fitted and written."""
     overall = fitted.comparison.overall()
     models = [records.model(m, r2, a) for m, r2, a in zip(fitted.models, fitted.r_squared, overall, strict=True)]
-    if as_json:
-        content = {
-            "judging": fitted.comparison.judging.name,
-            "starts": _starts(fitted.comparison.starts),
-            "file": str(path),
-            "trouble": trouble,
-            "models": models,
-        }
-        print_json(content)
-        return
     _tell_starts(fitted.comparison.starts, console)
     console.print(f"Judged on: {words(fitted.comparison.judging.name)}")
     columns = (
@@ -155,34 +98,18 @@ def show_fit(fitted: Fitted, path: Path, trouble: Sequence[str], console: Consol
         *describe_losses(fitted.models),
     ]:
         console.print(words(line))
-    console.print(f"Model file: {words(path)}", soft_wrap=True)
+    if path is not None:
+        console.print(f"Model file: {words(path)}", soft_wrap=True)
 
 
 def show_assess(
     judged: Judged,
     recordings: Sequence[Recording],
-    trouble: Sequence[str],
+    report: Path | None,
     console: Console,
-    *,
-    as_json: bool,
-    report: Path | None = None,
 ) -> None:
     """Print how models did on recordings."""
     logs = find_faults(judged, recordings)
-    if as_json:
-        content = {
-            "seen_in_training": judged.seen,
-            "starts": _starts(judged.starts),
-            "verdict_when_fitted": {m.target: m.honest_error.word for m in judged.models if m.honest_error},
-            "taken": {m.target: h.taken for m in judged.models if (h := m.honest_error) is not None and h.taken},
-            "trouble": trouble,
-            "validity": asdict(judged.validity) if judged.validity is not None else None,
-            "validity_when_fitted": {m.target: asdict(m.validity) for m in judged.models if m.validity is not None},
-            "failed_sensors": [{"recording": log.name, **f._asdict()} for log in logs for f in log.faults],
-            "results": [records.assessment(a) for a in judged.assessments],
-        }
-        print_json(content)
-        return
     _tell_starts(judged.starts, console)
     for line in describe_faults(logs, recordings):
         console.print(f"[yellow]sensor failed[/] {words(line)}", soft_wrap=True)
@@ -223,10 +150,6 @@ def show_assess(
 def _tell_starts(begins: Sequence[tuple[str, Start]], console: Console) -> None:
     for name, start in begins:
         console.print(f"Start of {words(start.told(name))}")
-
-
-def _starts(begins: Sequence[tuple[str, Start]]) -> list[dict[str, object]]:
-    return [start.content(name) for name, start in begins]
 
 
 def _robustness(assessments: Sequence[Assessment]) -> Layout:

@@ -2,7 +2,7 @@
 
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Protocol
 
@@ -27,36 +27,57 @@ OFTEN = 10.0
 _console = make_console(stderr=True)
 
 
-class Steps(Protocol):
-    """Tells what is worked on, and how many steps are done since it was told last."""
-
-    def __call__(self, text: str, /, steps: int = 1) -> None: ...  # noqa: D102
-
-
 class Share(Protocol):
     """Tells how far the work is, as a share of it, and on what."""
 
     def __call__(self, share: float, text: str = "", /) -> None: ...  # noqa: D102
 
 
+class Steps:
+    """Shows how many of so many steps are done, as a verb's ``progress``.
+
+    Parameters
+    ----------
+    bar : Progress
+    hidden : bool
+    warn : callable
+        Shows lines of trouble before the work.
+    """
+
+    def __init__(self, bar: Progress, hidden: bool, warn: Callable[[list[str]], object] = lambda _: None) -> None:
+        self._bar, self._line, self.warn = bar, _Lines(hidden), warn
+        self._task, self._done, self._total = bar.add_task("working", total=None, visible=False), 0, 0
+
+    def begin(self, total: int) -> None:
+        """Say how many steps there are."""
+        self._total = total
+        self._bar.update(self._task, total=total, visible=True)
+
+    def __call__(self, text: str, /, steps: int = 1) -> None:
+        """Say what is worked on, and how many steps are done since it was said last."""
+        self._done += steps
+        self._bar.update(self._task, description=replace_unprintable(text), advance=steps)
+        done = f"{self._done} of {self._total}" if self._total else ""
+        if loudness.verbose:
+            loudness.tell(f"{text}: {done}" if done else text)
+        else:
+            self._line.tell(text, done)
+
+
+@contextmanager
+def show_progress(*, hidden: bool, warn: Callable[[list[str]], object] = lambda _: None) -> Iterator[Steps]:
+    """Show the steps of a verb; nothing if `hidden`, or if the command line wants it quiet."""
+    hidden = hidden or loudness.quiet
+    with _bar(MofNCompleteColumn(), hidden) as bar:
+        yield Steps(bar, hidden, warn)
+
+
 @contextmanager
 def show_steps(total: int, *, hidden: bool) -> Iterator[Steps]:
     """Show how many of so many steps are done; nothing if `hidden`, or if the command line wants it quiet."""
-    hidden = hidden or loudness.quiet
-    with _bar(MofNCompleteColumn(), hidden) as bar:
-        task = bar.add_task("working", total=total)
-        line, done = _Lines(hidden), 0
-
-        def tell(text: str, /, steps: int = 1) -> None:
-            nonlocal done
-            done += steps
-            bar.update(task, description=replace_unprintable(text), advance=steps)
-            if loudness.verbose:
-                loudness.tell(f"{text}: {done} of {total}")
-            else:
-                line.tell(text, f"{done} of {total}")
-
-        yield tell
+    with show_progress(hidden=hidden) as steps:
+        steps.begin(total)
+        yield steps
 
 
 @contextmanager

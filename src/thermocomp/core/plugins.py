@@ -27,7 +27,9 @@ def find_plugins(group: Group, report: Callable[[str], object] = lambda _: None)
         if (first := found.setdefault(entry.name, entry)).value != entry.value:
             report(f"{describe_plugin(entry)} is skipped: {entry.name} is there already, {first.value}")
     if not any(entry.value.startswith("thermocomp.") for entry in found.values()) and group != "pages":
-        report(f"no {group} of thermocomp itself are installed: its installation is older than its code; install it anew")
+        report(
+            f"no {group} of thermocomp itself are installed: its installation is older than its code; install it anew"
+        )
     return found
 
 
@@ -68,5 +70,8 @@ def read_summary(entry: EntryPoint) -> str | None:
     if spec is None or spec.origin is None:
         return None
     text = Path(spec.origin).read_text(encoding="utf-8", errors="replace")
+    # a command that is made of a verb has the verb's docstring
+    if made := re.search(rf'^@command\(\s*"([\w.]+:\w+)"[^@]*?^def {entry.attr}\(', text, re.DOTALL | re.MULTILINE):
+        return read_summary(EntryPoint(entry.name, made[1], entry.group))
     found = re.search(rf'^def {entry.attr}\(.*?"""(.*?)(?:\n\s*\n|""")', text, re.DOTALL | re.MULTILINE)
     return " ".join(found[1].split()) if found else ""

@@ -61,6 +61,15 @@ def write(
 
 
 def draw(recording: Recording, findings: Sequence[Finding]) -> str:
+    """Return the figure of a recording as SVG; empty if there is nothing to draw."""
+    drawn = figure(recording, findings)
+    if not drawn.axes:
+        return ""
+    with drawing(recording.name):
+        return svg(drawn)
+
+
+def figure(recording: Recording, findings: Sequence[Finding]) -> Figure:
     """Show what each channel did, and where what was found lies; a finding's number is its place in the list.
 
     Parameters
@@ -70,24 +79,24 @@ def draw(recording: Recording, findings: Sequence[Finding]) -> str:
 
     Returns
     -------
-    str
-        SVG; empty if there is nothing to draw.
+    Figure
+        Without axes if there is nothing to draw.
     """
     shown = {q: recording.of_quantity(q) for q in _PANELS if recording.of_quantity(q)}
-    if not shown:
-        return ""
     numbers: dict[str, list[tuple[int, Finding]]] = {}
     for number, f in enumerate(findings, start=1):
         numbers.setdefault(f.channel, []).append((number, f))
     heights = [_PANELS[q] for q in shown]
     with drawing(recording.name):
-        figure = Figure(figsize=(9.6, 0.8 + 1.15 * sum(heights)), layout="constrained")
-        panels = figure.subplots(len(shown), 1, sharex=True, height_ratios=heights, squeeze=False)[:, 0]
+        made = Figure(figsize=(9.6, 0.8 + 1.15 * sum(heights)), layout="constrained")
+        if not shown:
+            return made
+        panels = made.subplots(len(shown), 1, sharex=True, height_ratios=heights, squeeze=False)[:, 0]
         for ax, (quantity, channels) in zip(panels, shown.items(), strict=True):
             _panel(ax, recording, quantity, channels, numbers)
         panels[-1].set_xlabel("time [h]")
         panels[-1].margins(x=0)
-        return svg(figure)
+        return made
 
 
 def _panel(

@@ -101,7 +101,7 @@ def export(
     int
         0 done, 1 a model was refused and left out, 2 unusable input.
     """
-    limits = replace(compensator.limits(), hold=hold, fade=fade, reading_age=reading_age)
+    limits = replace(compensator.value(), hold=hold, fade=fade, reading_age=reading_age)
     target = find_target(to)
     _check(to, target, name, date, limits)
     if dialect is not None and dialect not in target.dialects:

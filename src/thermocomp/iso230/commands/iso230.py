@@ -108,7 +108,7 @@ def iso230(
         ambient=ambient,
         models=modelfile.read(model) if model is not None else (),
         start=beginning.of(tests, mapping),
-        limits=compensator.limits(),
+        limits=compensator.value(),
         positioning=positioning,
     )
     if output is not None:

@@ -7,8 +7,9 @@ are what is known of the steady state.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,6 +88,15 @@ class Running:
     def may_stop(self) -> bool:
         """The steady state of all targets is known."""
         return all(state.known for _, state in self.states)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it for a program: what ``--json`` prints."""
+        return {
+            "phase": self.phase.kind,
+            "hours": self.seconds / 3600,
+            "may_stop": self.may_stop,
+            "states": [{"target": n, **asdict(s), "limit": s.limit, "known": s.known} for n, s in self.states],
+        }
 
     @property
     def words(self) -> str:

@@ -4,8 +4,7 @@ from pathlib import Path
 
 from thermocomp.cli.compare import compare
 from thermocomp.cli.fit import fit
-from thermocomp.cli.options import Output, StudyOptions
-from thermocomp.cli.reading import read_recordings
+from thermocomp.cli.options import Output
 from thermocomp.cli.terminal import console
 from thermocomp.core.exceptions import InputError
 from thermocomp.files.draft import refuse_existing
@@ -41,10 +40,9 @@ def demo(
     if not json:
         console.print("[bold]1. The virtual machine tool runs a drift test[/]")
     simulate("demo", output=recording, seed=seed, overwrite=overwrite, quiet=json)
-    study = StudyOptions(target=[c.name for c in read_recordings([recording], None)[0].displacements])
     if not json:
         console.print("\n[bold]2. Five methods, judged on thermal cycles they have not seen[/]")
-    compare([recording], study=study, output=report, overwrite=overwrite, json=json)
+    compare([recording], output=report, overwrite=overwrite, json=json)
     if not json:
         console.print("\n[bold]3. 'averaged', fitted to everything and frozen[/]")
-    return fit([recording], study=study, output=model, overwrite=overwrite, quiet=json)
+    return fit([recording], output=model, overwrite=overwrite, quiet=json)

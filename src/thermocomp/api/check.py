@@ -1,0 +1,113 @@
+"""What recordings hold, and what is wrong with them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+
+from thermocomp.api.inputs import Given, recordings_of
+from thermocomp.api.results import Result
+from thermocomp.core.exceptions import InputError
+from thermocomp.recordings.checks import quality
+from thermocomp.recordings.checks.findings import Finding
+from thermocomp.recordings.readers.mapping import Mapping
+from thermocomp.recordings.recording import Recording
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Checked(Result):
+    """Recordings and what was found in them.
+
+    Parameters
+    ----------
+    recordings : tuple of Recording
+    findings : tuple of sequence of Finding
+        Of each recording, the gravest first.
+    """
+
+    recordings: tuple[Recording, ...]
+    findings: tuple[Sequence[Finding], ...]
+
+    @property
+    def trouble(self) -> bool:
+        """Something is wrong that would spoil a model."""
+        return any(f.severity == "trouble" for found in self.findings for f in found)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all of it for a program: what ``--json`` prints."""
+        from thermocomp.report import records
+
+        pairs = zip(self.recordings, self.findings, strict=True)
+        return {"recordings": [records.recording(r, found) for r, found in pairs]}
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return a row per finding."""
+        rows = [
+            {"recording": r.name, "severity": f.severity, "kind": f.kind, "channel": f.channel, "text": f.text}
+            for r, found in zip(self.recordings, self.findings, strict=True)
+            for f in found
+        ]
+        return pd.DataFrame(rows, columns=["recording", "severity", "kind", "channel", "text"])
+
+    def plot(self, recording: int = 0) -> "Figure":
+        """Return every channel of a recording, with what was found marked at its rows.
+
+        Parameters
+        ----------
+        recording : int
+            Which, from 0.
+        """
+        from thermocomp.report import checks
+
+        if not 0 <= recording < len(self.recordings):
+            raise InputError(f"recording {recording}: there are {len(self.recordings)}, counted from 0")
+        return checks.figure(self.recordings[recording], self.findings[recording])
+
+    def report(self, path: str | Path, *, overwrite: bool = False) -> Path:
+        """Write the page that ``thermocomp check -o`` writes; return its path."""
+        from thermocomp.report import checks
+
+        checks.write(self.recordings, self.findings, Path(path), overwrite=overwrite)
+        return Path(path)
+
+    def __str__(self) -> str:
+        worst = (
+            f"{r.name}: " + (f"{found[0].channel} {found[0].text}".strip() if found else "nothing wrong found")
+            for r, found in zip(self.recordings, self.findings, strict=True)
+        )
+        return ". ".join(worst) + "."
+
+
+def check(recordings: Given, *, mapping: str | Path | Mapping | None = None) -> Checked:
+    """Summarise recordings and report data-quality problems; of more than three files, a line each.
+
+    Parameters
+    ----------
+    recordings : Recording, path, DataFrame, or sequence of them
+        Files (CSV, XLSX, ODS or Parquet) or tables; each is one test.
+    mapping : str, Path or Mapping, optional
+        TOML file that says what the columns of files are.
+
+    Returns
+    -------
+    Checked
+
+    Raises
+    ------
+    InputError
+        A recording cannot be used.
+
+    Examples
+    --------
+    >>> import thermocomp as tc
+    >>> found = tc.check(tc.simulate("hwang"))
+    >>> found.trouble
+    False
+    """
+    tests = recordings_of(recordings, mapping)
+    return Checked(tuple(tests), tuple(quality.check(test) for test in tests))

@@ -1,0 +1,93 @@
+"""Sensors that were chosen, for a notebook, a page and a program."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+
+from thermocomp.api.results import Result, told_trouble
+from thermocomp.core.exceptions import InputError
+from thermocomp.judging.choice import Choice
+from thermocomp.recordings.recording import Recording
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Selected(Result):
+    """Sensors that were chosen.
+
+    Parameters
+    ----------
+    choices : tuple of Choice
+    trouble : tuple of str
+    recordings : tuple of Recording
+    """
+
+    choices: tuple[Choice, ...]
+    trouble: tuple[str, ...] = ()
+    recordings: tuple[Recording, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all of it for a program: what ``--json`` prints."""
+        return {
+            "trouble": self.trouble,
+            "choices": [
+                {
+                    "method": c.method,
+                    "target": c.target,
+                    "sensors": c.sensors,
+                    "reason": c.reason,
+                    "notes": c.notes,
+                    "tables": {t.title: [dict(zip(t.columns, row, strict=True)) for row in t.rows] for t in c.tables},
+                }
+                for c in self.choices
+            ],
+        }
+
+    def report(self, path: str | Path, *, overwrite: bool = False) -> Path:
+        """Write the page that ``thermocomp select -o`` writes; return its path."""
+        from thermocomp.report import html
+
+        html.write_choices(self.choices, self.recordings, Path(path), overwrite=overwrite)
+        return Path(path)
+
+    @property
+    def sensors(self) -> dict[str, tuple[str, ...]]:
+        """Names of the chosen sensors, by target."""
+        return {c.target: c.sensors for c in self.choices}
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return a row per target; the tables behind it are in ``choices[k].tables``."""
+        return pd.DataFrame(
+            {
+                "target": [c.target for c in self.choices],
+                "method": [c.method for c in self.choices],
+                "sensors": [" ".join(c.sensors) for c in self.choices],
+                "reason": [c.reason for c in self.choices],
+            }
+        )
+
+    def plot(self, target: str | None = None) -> "Figure":
+        """Return the figure of the first choice, or of that of a target.
+
+        Raises
+        ------
+        InputError
+            There is no such target, or nothing was chosen from.
+        """
+        from thermocomp.report import selections
+
+        mine = [c for c in self.choices if target in (None, c.target)]
+        if not mine:
+            raise InputError(f"no choice for {target!r}; there are {', '.join(c.target for c in self.choices)}")
+        drawn = selections.draw(mine[0])
+        if drawn is None:
+            raise InputError(f"{mine[0].method} has nothing to draw: see {mine[0].reason}")
+        return drawn[0].figure
+
+    def __str__(self) -> str:
+        chosen = (f"{c.target}: {', '.join(c.sensors) or 'no sensor'} ({c.reason})." for c in self.choices)
+        return " ".join([*chosen, *told_trouble(self.trouble)])

@@ -1,0 +1,279 @@
+"""A command is made of its verb in Python: the same options, defaults and words, and what only a terminal needs."""
+
+import inspect
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from importlib import import_module
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+from docstring_parser import DocstringStyle, parse
+
+import thermocomp
+from thermocomp.cli.beginning import Beginning
+from thermocomp.cli.jsonoutput import print_json
+from thermocomp.cli.options import CompensatorOptions, LeftOut, Selector
+from thermocomp.cli.progress import Steps, show_progress
+from thermocomp.cli.reading import print_trouble, read_recordings
+from thermocomp.core.exceptions import InputError
+from thermocomp.files.draft import refuse_existing
+
+#: how a parameter is written on a command line, where Python takes more than a line can hold; a group of options has
+#: `value`, which makes of them what the verb takes
+ON_A_LINE: dict[str, Any] = {
+    "recordings": list[Path],
+    "recording": Path,
+    "models": list[str],
+    "model": str,
+    "targets": Annotated[list[str] | None, Parameter(name="--target")],
+    "inputs": list[str] | None,
+    "tilt": list[str] | None,
+    "probing": str | None,
+    "mapping": Path | None,
+    "leave_one": LeftOut,
+    "starts": Beginning,
+    "limits": CompensatorOptions,
+    "settings": Selector,
+}
+#: parameters that a command line has no option for: the command itself shows what they say
+SHOWN = ("progress",)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Face:
+    """What only a command line has.
+
+    Parameters
+    ----------
+    output : Path or None
+        File that was asked for.
+    overwrite : bool
+        Write over an existing one.
+    json : bool
+        Print for a program.
+    quiet : bool
+        Print nothing; for commands that call another one.
+    trouble : list of str
+        What was wrong with the recordings.
+    """
+
+    output: Path | None = None
+    overwrite: bool = False
+    json: bool = False
+    quiet: bool = False
+    trouble: list[str] = field(default_factory=list)
+
+    def warn(self, lines: list[str]) -> None:
+        """Say on stderr what is wrong with recordings, before the work."""
+        self.trouble.extend(print_trouble(lines))
+
+    def refuse_existing(self, writes: str | Callable[[Path], list[Path]], inputs: Sequence[Path]) -> None:
+        """Make sure, before any work, that the output can be written."""
+        if self.output is not None:
+            files = [self.output] if isinstance(writes, str) else writes(self.output)
+            refuse_existing(files, self.overwrite, inputs, writes if isinstance(writes, str) else "")
+
+    def write(self, writer: Callable[..., object]) -> None:
+        """Write the result into the file that was asked for, if one was."""
+        if self.output is not None:
+            writer(self.output, overwrite=self.overwrite)
+
+    def show(self, content: Callable[[], dict[str, Any]], printer: Callable[[], None]) -> None:
+        """Print a result for a program or for people."""
+        if self.quiet:
+            return
+        if self.json:
+            print_json(content())
+        else:
+            printer()
+
+
+class Verb:
+    """A function of the Python interface, as a command line sees it.
+
+    Parameters
+    ----------
+    place : str
+        Where it stands, such as ``thermocomp.api.verbs:compare``.
+    """
+
+    def __init__(self, place: str, forms: Mapping[str, Any]) -> None:
+        self.forms = ON_A_LINE | dict(forms)
+        module, _, name = place.partition(":")
+        self.function: Callable[..., Any] = getattr(import_module(module), name)
+
+    @cached_property
+    def parameters(self) -> dict[str, inspect.Parameter]:
+        """Its parameters by name, without those that are shown."""
+        return {n: p for n, p in inspect.signature(self.function).parameters.items() if n not in SHOWN}
+
+    @cached_property
+    def help(self) -> str:
+        """What it does, without its parameters."""
+        return plain("\n\n".join(_paragraphs(inspect.getdoc(self.function) or "")))
+
+    def help_of(self, parameter: str) -> str:
+        """Return what a parameter is, looked up where its text refers to another verb.
+
+        Raises
+        ------
+        LookupError
+            It is not described.
+        """
+        text = _described(self.function)[parameter]
+        if other := re.match(r"As for `(\w+)`\.?", text):
+            text = _described(getattr(thermocomp, other[1]))[parameter] + text[other.end() :]
+        return plain(text)
+
+    def call(self, given: Mapping[str, Any], progress: Steps, tell_changes: bool) -> Any:
+        """Do it: recordings are read first, and groups of options made one object.
+
+        Parameters
+        ----------
+        given : mapping
+            Values of the command line by parameter; those of other verbs are left out.
+        progress : Steps
+        tell_changes : bool
+        """
+        made = {name: value for name, value in given.items() if name in self.parameters}
+        mapping = made.get("mapping")
+        if "recordings" in self.parameters:
+            made["recordings"] = read_recordings(made["recordings"], mapping, tell=tell_changes)
+            made.pop("mapping", None)
+        for name, value in list(made.items()):
+            if isinstance(value, Beginning):
+                made[name] = value.of(made["recordings"], mapping)
+            elif self.parameters[name].kind is inspect.Parameter.VAR_KEYWORD:
+                made |= vars(made.pop(name))
+            elif is_group(type(value)):
+                made[name] = value.value()
+        if "progress" in inspect.signature(self.function).parameters:
+            made["progress"] = progress
+        return self.function(**made)
+
+    def options(self) -> list[inspect.Parameter]:
+        """Return its parameters as a command line has them."""
+        found = []
+        for name, p in self.parameters.items():
+            form = self.forms.get(name, p.annotation)
+            if is_group(form):
+                default: Any = form()
+            else:
+                default = list(p.default) if isinstance(p.default, tuple) else p.default
+                more: dict[str, Any] = {"negative": f"--no-{name.replace('_', '-')}"} if default is True else {}
+                form = Annotated[form, Parameter(help=self.help_of(name), **more)]
+            required = default is inspect.Parameter.empty
+            kind = inspect.Parameter.POSITIONAL_ONLY if required else inspect.Parameter.KEYWORD_ONLY
+            found.append(inspect.Parameter(name, kind, default=default, annotation=form))
+        return found
+
+
+def command(
+    place: str,
+    *,
+    writes: str | Callable[[Path], list[Path]] = "",
+    needs_output: bool = False,
+    forms: Mapping[str, Any] = {},
+    instead: Mapping[str, str] = {},
+    tell_changes: bool = True,
+) -> Callable[[Callable[..., int]], Callable[..., int]]:
+    """Make a command of a verb and a function that shows its result.
+
+    The function takes the result and a `Face`, and options of its own if the command has more than the verb; it returns
+    the exit code. Its docstring says what ``--output`` and its own options are, and lists the exit codes.
+
+    Parameters
+    ----------
+    place : str
+        Where the verb stands, such as ``thermocomp.api.verbs:compare``.
+    writes : str or callable
+        Ending of the file that ``--output`` names, or what returns all files that come of it; there is no such option
+        without it.
+    needs_output : bool
+        There is nothing to do without ``--output``.
+    forms : mapping
+        How parameters of this verb are written on a command line, beside `ON_A_LINE`.
+    instead : mapping
+        Verbs that do the work instead, by the option that asks for them; they judge, and write nothing.
+    tell_changes : bool
+        Say on stderr what a mapping changes in the values; False: the result says it.
+    """
+
+    def made_of(show: Callable[..., int]) -> Callable[..., int]:
+        verb = Verb(place, forms)
+        own = [p for n, p in inspect.signature(show).parameters.items() if n not in ("found", "face")]
+        described = _described(show)
+
+        def run(*positional: Any, **named: Any) -> int:
+            given = dict(zip(verb.parameters, positional, strict=False)) | named
+            extra = {p.name: given.pop(p.name, p.default) for p in own}
+            face = Face(**{f: given.pop(f) for f in ("output", "overwrite", "json", "quiet") if f in given})
+            asked = next((option for option in instead if extra[option]), "")
+            if asked and face.output is not None:
+                raise InputError(f"{face.output}: --{asked} judges a test, and writes none; leave -o out")
+            face.refuse_existing(writes, [v for v in _flat(given.values()) if isinstance(v, Path)])
+            chosen = Verb(instead[asked], forms) if asked else verb
+            with show_progress(hidden=face.json or face.quiet, warn=face.warn) as progress:
+                found = chosen.call(given, progress, tell_changes)
+            return show(found, face, **extra)
+
+        output: Any = Path if needs_output else Path | None
+        alone = [
+            _option(
+                "output",
+                output,
+                inspect.Parameter.empty if needs_output else None,
+                described.get("output", ""),
+                ["--output", "-o"],
+            ),
+            _option("overwrite", bool, False, "Write over an existing file."),
+        ]
+        mine = [_option(p.name, p.annotation, p.default, described[p.name]) for p in own]
+        json = _option("json", bool, False, "Print results for a program instead of tables.")
+        parameters = [*verb.options(), *mine, *(alone if writes else []), json]
+        run.__name__ = run.__qualname__ = show.__name__
+        run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        run.__annotations__ = {p.name: p.annotation for p in parameters}
+        run.__doc__ = verb.help
+        run.verb, run.own = verb, [p.name for p in own]  # type: ignore[attr-defined]
+        return run
+
+    return made_of
+
+
+def is_group(form: Any) -> bool:
+    """Return whether a form of the command line is a group of options."""
+    return isinstance(form, type) and getattr(form, "__dataclass_fields__", None) is not None
+
+
+def plain(text: str) -> str:
+    """Return a docstring's text without its marks."""
+    text = re.sub(r":\w+:`/?([^`]*)`", r"\1", text)
+    return re.sub(r"``?([^`]*)``?", r"\1", text)
+
+
+def _option(name: str, form: Any, default: Any, text: str, words: Sequence[str] | None = None) -> inspect.Parameter:
+    annotation = Annotated[form, Parameter(help=text, name=words)]
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+
+
+def _paragraphs(doc: str) -> list[str]:
+    """Return the paragraphs before the first heading."""
+    return re.split(r"\n\s*\n(?=[A-Z][a-z]+\n-{3,})", doc, maxsplit=1)[0].split("\n\n")
+
+
+def _described(function: Callable[..., Any]) -> dict[str, str]:
+    """Return what stands in a docstring about each parameter."""
+    found = {}
+    for p in parse(inspect.getdoc(function) or "", style=DocstringStyle.NUMPYDOC).params:
+        for name in p.arg_name.split(","):
+            # a second paragraph is for Python alone
+            found[name.strip().lstrip("*")] = " ".join((p.description or "").split("\n\n")[0].split())
+    return found
+
+
+def _flat(values: Any) -> list[Any]:
+    return [v for value in values for v in (value if isinstance(value, list) else [value])]
