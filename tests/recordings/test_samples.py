@@ -285,3 +285,9 @@ def test_three_files_of_one_test() -> None:
     assert [[r.name for r in s.earlier] for s in found.starts] == [["d0", "second"], [], ["d0"]]
     assert found.reference()[0].tolist() == found.reference()[1].tolist() == found.reference()[2].tolist()
     assert found.time[found.test == 0][[0, 200, 400]].tolist() == [0.0, 2995.0, 5990.0]
+
+
+def test_a_test_without_a_complete_row_has_no_zero() -> None:
+    samples = stack([_test("a", [1.0, 1.0], 0), _test("b", [1.0, 1.0], 1, first_missing=3)], ["z_um"])
+    with pytest.raises(RecordingError, match="b: no row has a number in all of the inputs"):
+        samples.change()

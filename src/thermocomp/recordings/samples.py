@@ -127,10 +127,10 @@ class Samples:
 
     @cached_property
     def _change(self) -> FloatArray:
-        values = self.values.copy()
+        values, reference = self.values.copy(), self.reference()  # raises where a test has no row to count from
         for window in self._windows() if self.rezeroed.any() else []:
             values[window] = robust_mean(values[window])
-        return values - self.reference()[self.test]
+        return values - reference[self.test]
 
     def _windows(self) -> Iterator[IntArray]:
         """Yield the rows that the zero of each test is averaged of, where it is not stated."""

@@ -1,0 +1,43 @@
+"""The main path in forty lines, from a recording to an axis: ``python examples/main_path.py``."""
+
+import asyncio
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import thermocomp as tc
+from thermocomp.files import modelfile
+from thermocomp.live.adapters.plain import FileSink
+from thermocomp.runtime.compensator import Compensator
+
+
+async def main() -> float:
+    """Take a machine from its recordings to corrections; return the largest deviation that is left [um]."""
+    with TemporaryDirectory() as folder:
+        *days, new_day = tc.simulate(
+            "wessel-milling"
+        )  # virtual/verbs.py; for a file tc.read("drift.csv"), api/inputs.py
+        found = tc.compare(days, "s1_um", ["ols", "mra"], leave_one="file", jobs=1)  # api/verbs.py, judging/compare.py
+        print(found)  # the do-no-harm gate: judging/do_no_harm.py
+        best = found.best["s1_um"]  # "ols": models/ols.py
+        assert best is not None, "no model may run"
+        fitted = tc.fit(days, "s1_um", best, leave_one="file", jobs=1)  # judging/study.py; freeze(): models/linear.py
+        path = fitted.save(Path(folder) / "model.json")  # files/modelfile.py
+        print(tc.assess(path, new_day))  # judged by a replay through the compensator: judging/replay.py
+
+        (model,) = modelfile.read(path)  # core/model.py
+        compensator = Compensator.of([model], tc.Limits(rate=1.0))  # runtime/compensator.py
+        sink = FileSink(path=Path(folder) / "corrections.json")  # live/adapters/plain.py; the ports: core/ports.py
+        await sink.connect(timeout=1.0)
+        state, left = compensator.start(), []  # state in, state out: runtime/state.py
+        names = [i.name for i in model.inputs]
+        for time, row in zip(new_day.time, new_day.table.to_dict("records"), strict=True):
+            reading = tc.Reading(float(time), {name: row[name] for name in names})  # core/reading.py
+            state, result = compensator.step(state, reading, now=float(time))  # gate, watch, zero, model, limits
+            await sink.apply(result.corrections)  # one change of sign in all: core/correction.py
+            left.append(row["s1_um"] - new_day.table["s1_um"].iloc[0] + result.corrections["s1_um"].offset)
+        await sink.close()
+        return max(map(abs, left))
+
+
+if __name__ == "__main__":
+    print(f"at most {asyncio.run(main()):.1f} um are left of the new day")
