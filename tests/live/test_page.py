@@ -17,7 +17,8 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.core.reading import Measurement, Reading
 from thermocomp.live.clock import ServiceClock
 from thermocomp.live.loop import Service
-from thermocomp.live.page import page, web
+from thermocomp.live.page import status as page
+from thermocomp.live.page import web
 from thermocomp.live.page.page import make_app
 from thermocomp.runtime.compensator import Compensator
 

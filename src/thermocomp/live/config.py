@@ -42,6 +42,8 @@ class Page:
         File with the token that buttons want; without one the page only shows.
     settled : float
         A drift below this in ten minutes counts as settled [um].
+    pages : tuple of str
+        Pages of other packages to serve beside, by their entry points of ``thermocomp.pages``.
     """
 
     host: str = "127.0.0.1"
@@ -49,6 +51,7 @@ class Page:
     hosts: tuple[str, ...] = ()
     token_file: str = ""
     settled: float = 1.0
+    pages: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         bare = self.host[1:-1] if self.host.startswith("[") and self.host.endswith("]") else self.host
@@ -59,6 +62,10 @@ class Page:
             raise SettingError(f"settled = {self.settled:g}: want more than 0 um in ten minutes")
         if not 0 <= self.port <= 65535:
             raise SettingError(f"port = {self.port}: want a port from 0 (any that is free) to 65535")
+        known = find_plugins("pages") if self.pages else {}
+        for name in self.pages:
+            if name not in known:
+                raise SettingError(f"pages: {name!r} is not installed; there are {', '.join(known)}")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -119,7 +119,7 @@ class Service:
             self.counts["rejected"] += 1
             return
         if left_out := self.latest.take(reading.values, tick, most):
-            self._say("link", f"more names that nothing uses than are kept; {left_out!r} and others are left out")
+            self.say("link", f"more names that nothing uses than are kept; {left_out!r} and others are left out")
         fresh = {name: value for name, (value, at) in self.latest.items() if tick - at <= most}
         (probings, self.probings), learned = (self.probings, {}), self.state.learned
         self.state, said = self.compensator.step(self.state, Reading(now, fresh), now, probings, tick)
@@ -139,7 +139,7 @@ class Service:
         if before == status:  # it is so: no news
             return
         word = f"{status.word}: {status.reason}" if status else "runs again"
-        self._say("state", f"{target} {word}, as ordered")
+        self.say("state", f"{target} {word}, as ordered")
         self._dirty = True
 
     def watch_only(self, target: str) -> None:
@@ -151,7 +151,7 @@ class Service:
         self.state = rezero(self.compensator, self.state, target, self.clock.now(), why, in_force)
         for counted_before in (self.before, self.probings):  # from the zero before
             counted_before.pop(target, None)
-        self._say("reference", f"{target} counts anew: {why}")
+        self.say("reference", f"{target} counts anew: {why}")
         self._dirty = True
 
     def measure(self, found: Measurement) -> None:
@@ -166,7 +166,7 @@ class Service:
             deviation = uncompensated(found.measured, in_force.at(found.position))
             probing = probing._replace(deviation=deviation, keys=probing.identity)
         if why := self._refuse(found, probing, in_force):
-            self._say("probing", f"{found.target} refused: {why}")
+            self.say("probing", f"{found.target} refused: {why}")
             return
         self.measured[found.target] = (found, in_force)
         self.probings[found.target] = probing
@@ -203,14 +203,14 @@ class Service:
         learned, before = dict(self.state.learned), self.before.pop(target)
         learned.pop(target, None)
         self.state = self.state._replace(learned=learned if before is None else learned | {target: before})
-        self._say("probing", f"{target}: the last probing is taken back")
+        self.say("probing", f"{target}: the last probing is taken back")
         self._dirty = True
         return ""
 
     async def fade_out(self) -> None:
         """Let all corrections go to zero, within the limits, whatever readings come or do not."""
         self._ending, last = True, self.clock.tick()
-        self._say("service", "is being stopped: corrections go to zero")
+        self.say("service", "is being stopped: corrections go to zero")
         while any(c.offset or c.slope for c in self.state.corrections.values()):
             await asyncio.sleep(0.1)
             tick = self.clock.tick()
@@ -236,14 +236,14 @@ class Service:
         if self.state_path is None:
             return cold
         if not self.state_path.exists():
-            self._say("service", f"cold start: there is no {self.state_path}")
+            self.say("service", f"cold start: there is no {self.state_path}")
             return cold
         try:
             saved = statefile.read(self.state_path, self.compensator)
         except ThermocompError as e:
             if not statefile.is_ours(self.state_path):
                 raise InputError(f"{self.state_path}: is no state file, and would be written over; name another") from e
-            self._say("service", f"cold start: {e}")
+            self.say("service", f"cold start: {e}")
             self._refused = self.state_path
             return cold
         age = (datetime.now(UTC) - saved.written).total_seconds() * self.clock.speed
@@ -252,7 +252,7 @@ class Service:
         own = {t: o for t, o in state.orders.items() if o.word != "suspended" and o.reason != CONFIGURED}
         state = state._replace(orders=cold.orders | own)
         how = "goes on" if state.references else "begins anew, with the corrections that are in force"
-        self._say("service", f"start after {age:.0f} s: {how}")
+        self.say("service", f"start after {age:.0f} s: {how}")
         return state
 
     def _put_aside(self) -> None:
@@ -282,7 +282,7 @@ class Service:
             silent = tick - self._heard
             for one in self.links():
                 for text in one.news():
-                    self._say("link", text)
+                    self.say("link", text)
             if self._ending:
                 continue
             if silent > max(2.0, 2.0 * self.clock.speed):
@@ -298,7 +298,7 @@ class Service:
                 await asyncio.to_thread(self.recorder.journal.flush)
                 if (trouble := self.recorder.journal.status().reason) != self._trouble:
                     self._trouble = trouble
-                    self._say("service", f"journal: {trouble or 'all is written again'}")
+                    self.say("service", f"journal: {trouble or 'all is written again'}")
 
     def _tell(self, said: Compensated, probings: Mapping[str, Probing]) -> None:
         before, self.said = self.said, said
@@ -306,15 +306,15 @@ class Service:
             outlet.put(said.corrections)
         for target, status in said.states.items():
             if before is None or before.states.get(target, Status("active")).word != status.word:
-                self._say("state", f"{target} {status.word}" + (f": {status.reason}" if status.reason else ""))
+                self.say("state", f"{target} {status.word}" + (f": {status.reason}" if status.reason else ""))
         for name, fault in said.failed.items():
             if before is None or before.failed.get(name) != fault:
-                self._say("sensor", f"{name} {fault}: what the others predict stands in")
+                self.say("sensor", f"{name} {fault}: what the others predict stands in")
         for name in (before.failed if before else {}).keys() - said.failed.keys():
-            self._say("sensor", f"{name} is believed again")
+            self.say("sensor", f"{name} is believed again")
         for target in probings:
             why, moved = said.refused.get(target), said.moved.get(target, 0.0)
-            self._say("probing", f"{target} refused: {why}" if why else f"{target} taken: it moves by {moved:+.1f} um")
+            self.say("probing", f"{target} refused: {why}" if why else f"{target} taken: it moves by {moved:+.1f} um")
         now = self.clock.now()
         if said.deviations and (not self.curves or now - self.curves[-1]["time"] >= EVERY):
             self.curves.append({"time": now, **self._numbers(said)})
@@ -335,7 +335,7 @@ class Service:
                 self.before[target] = learned.get(target)
             if found.beyond:
                 limit = f"where {found.limit:.1f} um ask for action"
-                self._say("probing", f"{target} was wrong by {found.residual:+.1f} um, {limit}: look for the cause")
+                self.say("probing", f"{target} was wrong by {found.residual:+.1f} um, {limit}: look for the cause")
 
     def _hear(self, sink: Sink, in_force: Mapping[str, Correction]) -> None:
         """Take what a controller says is in force, and why it has none."""
@@ -348,7 +348,7 @@ class Service:
         away, alarms = sink.suspended(), dict(sink.alarms())
         for target in alarms.keys() | self._alarms.keys():
             if alarms.get(target) != self._alarms.get(target):
-                self._say("link", f"{target}: {alarms.get(target, 'is in force as it shall be again')}")
+                self.say("link", f"{target}: {alarms.get(target, 'is in force as it shall be again')}")
         self._alarms = alarms
         for target in self.compensator.lines.keys() & in_force.keys() | away.keys() & self.compensator.lines.keys():
             order = self.state.orders.get(target)
@@ -366,7 +366,8 @@ class Service:
                 found[f"{target} +-"] = said.half_widths[target]
         return found | {f"{target} correction": c.offset for target, c in said.corrections.items()}
 
-    def _say(self, kind: str, text: str) -> None:
+    def say(self, kind: str, text: str) -> None:
+        """Put a line into the event list and the journal."""
         event = self.events.tell(self.clock.now(), kind, text)
         if event is not None and self.recorder is not None and kind != "state":
             self.recorder.alarm(*astuple(event))
@@ -381,5 +382,5 @@ class Service:
             self.not_saved = ""
         except (ThermocompError, OSError) as e:
             if self.not_saved != str(e):
-                self._say("service", f"the state is not saved: {e}")
+                self.say("service", f"the state is not saved: {e}")
             self.not_saved = str(e)

@@ -101,7 +101,8 @@ def _serve(settings: "ServiceSettings", port: int | None, *, check: bool) -> int
         host, number = listening.getsockname()[:2]
         where = f"[{host}]" if ":" in host else host
         console.print(words(f"Page: http://{where}:{number}"), soft_wrap=True)
-        work.append(web.serve(make_app(service, token, page.settled, (page.host, *page.hosts)), listening))
+        app = make_app(service, token, page.settled, (page.host, *page.hosts), page.pages)
+        work.append(web.serve(app, listening))
     asyncio.run(_run(service, settings.config.at_stop == "fade", [service.run(), *work]))
     return 0
 

@@ -1,0 +1,84 @@
+"""Orders by hand: run, hold, shadow, rezero, roll back; behind the token."""
+
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, HTTPException, Request
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.shown import escape, shorten
+from thermocomp.core.strictjson import parse_json
+from thermocomp.live.loop import Service
+from thermocomp.live.page.doors import Json
+from thermocomp.live.page.pages import Board
+from thermocomp.runtime.state import Status
+
+
+class PageOrder(BaseModel):
+    """Request body of an order."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+    target: Annotated[str, Field(max_length=200)]
+    do: Literal["run", "hold", "shadow", "rezero", "roll back"]
+
+
+def make_router(board: Board) -> APIRouter:
+    """Return ``/api/order``."""
+    router, service = APIRouter(), board.service
+
+    @router.post("/api/order", dependencies=board.orders_only())
+    async def order(request: Request) -> Json:
+        wanted = read_order(await request.body())
+        if wanted.target not in service.compensator.lines:
+            known = ", ".join(service.compensator.lines)
+            raise HTTPException(404, f"no target is named {shorten(wanted.target, 80)}; there are {known}")
+        try:
+            why = give(service, wanted)
+        except InputError as e:  # not now, such as before the first reading
+            why = str(e)
+        if why:
+            raise HTTPException(409, why)
+        return Json({"done": wanted.do, "target": wanted.target})
+
+    return router
+
+
+def read_order(body: bytes) -> PageOrder:
+    """Return the order in the body of a request.
+
+    Raises
+    ------
+    HTTPException
+        It is no JSON in UTF-8 (400), or not such an order (422).
+    """
+    try:
+        content = parse_json(body)
+    except ValueError as e:
+        raise HTTPException(400, f"body: want JSON in UTF-8: {escape(e, 200)}") from e
+    try:
+        return PageOrder.model_validate(content)
+    except ValidationError as e:
+        found = (f"{'.'.join(map(str, p['loc'])) or 'body'}: {p['msg']}" for p in e.errors(include_url=False))
+        raise HTTPException(422, escape("; ".join(found), 400)) from e
+
+
+def give(service: Service, wanted: PageOrder) -> str:
+    """Carry an order out; return why not, or the empty string.
+
+    Parameters
+    ----------
+    service : Service
+    wanted : PageOrder
+    """
+    target = wanted.target
+    if wanted.do == "rezero":
+        service.rezero(target, "by hand, at the page")
+    elif wanted.do == "roll back":
+        return service.roll_back(target)
+    elif wanted.do == "run":
+        if refused := service.compensator.shadow.get(target):
+            return f"it must not run: {refused.reason}"
+        service.order(target, None)
+    else:
+        service.order(target, Status("holding" if wanted.do == "hold" else "shadow", "by hand, at the page"))
+    return ""
