@@ -17,7 +17,7 @@ from thermocomp.core.correction import Correction, Limits
 from thermocomp.core.exceptions import InputError, ThermocompError
 from thermocomp.core.ports import LinkStatus
 from thermocomp.core.reading import Measurement, Reading
-from thermocomp.live import loop, statefile
+from thermocomp.live import inforce, statefile
 from thermocomp.live.adapters.mqtt import MqttSink, MqttSource
 from thermocomp.live.adapters.plain import FileSink
 from thermocomp.live.adapters.probes import MqttProbe
@@ -390,7 +390,7 @@ def test_what_a_controller_says_goes_before_what_a_file_says(tmp_path: Path) -> 
             say(source, 20.0 + k)
             await until(lambda k=k: service.counts["readings"] == k + 1)
             await asyncio.sleep(0.1)
-        found = service.in_force("z_um")
+        found = service.in_force.of("z_um", service.state)
         assert found is not None
         assert found.offset == 5.0
 
@@ -398,21 +398,21 @@ def test_what_a_controller_says_goes_before_what_a_file_says(tmp_path: Path) -> 
 
 
 def test_a_measurement_under_a_correction_that_nobody_knows_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(loop, "CONFIRM_WITHIN", 0.3)
+    monkeypatch.setattr(inforce, "CONFIRM_WITHIN", 0.3)
     source, controller = Given(), Controller()
     service = Service(machine(), [source], [controller])
 
     async def work() -> None:
         say(source, 20.0)
-        await until(lambda: service.in_force("z_um") is not None)
+        await until(lambda: service.in_force.of("z_um", service.state) is not None)
         controller.offset = None
         say(source, 21.0)
-        await until(lambda: service.in_force("z_um") is None)
+        await until(lambda: service.in_force.of("z_um", service.state) is None)
         service.measure(Measurement(time.time(), "z_um", 1.0, left=True))
-        assert service.probings == {}
+        assert service.probings.waiting == {}
         assert "not known" in service.events[-1].text
         service.measure(Measurement(time.time(), "z_um", 2.0, left=False))
-        assert service.probings["z_um"].deviation == 2.0
+        assert service.probings.waiting["z_um"].deviation == 2.0
 
     asyncio.run(running(service, work))
 
@@ -490,7 +490,7 @@ def test_a_new_zero_forgets_what_counted_from_the_one_before() -> None:
 def test_a_folder_that_is_gone_is_told_once(tmp_path: Path) -> None:
     service = Service(machine(), [Given()], [], state_path=tmp_path / "gone" / "state.json")
     for _ in range(5):
-        service._save()
+        service.keeper.save(service.state)
     assert sum("not saved" in e.text for e in service.events) == 1
 
 

@@ -132,7 +132,7 @@ def test_a_probing_is_charted_and_taken_back_in_one_step() -> None:
     async def work() -> None:
         service.measure(Measurement(time.time(), "z_um", 0.5, left=True, repeatability=0.1))
         fed(service, 21.0, 21.0)
-        assert service.checked[0].residual == pytest.approx(
+        assert service.probings.checked[0].residual == pytest.approx(
             0.5
         )  # deviation 2, corrected by -2: half a micrometre is left
         assert service.state.corrections["z_um"].offset < -2.2
@@ -156,9 +156,9 @@ def test_a_measurement_without_the_correction_in_it_is_the_deviation() -> None:
     service.measure(Measurement(time.time(), "z_um", 10.5, left=False, repeatability=0.1))
     service.measure(Measurement(time.time(), "nobody", 1.0, left=False))
     fed(service, 25.0)
-    assert service.checked[0].residual == pytest.approx(0.5)
+    assert service.probings.checked[0].residual == pytest.approx(0.5)
     service.measure(Measurement(time.time() - 3600.0, "z_um", 10.5, left=False))
-    assert service.probings == {}
+    assert service.probings.waiting == {}
     assert next(e.text for e in service.events if "refused" in e.text) == "nobody refused: no target is named nobody"
 
 
@@ -167,10 +167,10 @@ def test_an_implausible_one_is_refused_and_asks_for_action() -> None:
     fed(service, 20.0, 21.0)
     service.measure(Measurement(time.time(), "z_um", 400.0, left=False))
     fed(service, 21.0, 21.0)
-    assert service.checked[0].refused
-    assert service.checked[0].beyond
+    assert service.probings.checked[0].refused
+    assert service.probings.checked[0].beyond
     assert service.state.corrections["z_um"].offset == -2.0
-    assert "z_um" not in service.before
+    assert "z_um" not in service.probings.before
     assert any("look for the cause" in e.text for e in service.events)
 
 

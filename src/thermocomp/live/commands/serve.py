@@ -126,7 +126,7 @@ async def _run(service: "Service", fades: bool, work: Sequence[Coroutine[Any, An
         async with asyncio.TaskGroup() as group:
             for one in work:
                 group.create_task(one)
-    kept = f"the state is not saved: {service.not_saved}" if service.not_saved else "the state is saved"
+    kept = f"the state is not saved: {service.keeper.not_saved}" if service.keeper.not_saved else "the state is saved"
     console.print(words(f"stopped: the corrections stay as they are now; {kept}"), soft_wrap=True)
 
 

@@ -40,7 +40,7 @@ def snapshot(service: Service, settled: float) -> dict[str, Any]:
         "links": [_link(one) for one in service.links()],
         "counts": dict(service.counts),
         "rejected": said.rejected if said else "no reading yet",
-        "residuals": [checked._asdict() for checked in service.checked],
+        "residuals": [checked._asdict() for checked in service.probings.checked],
         "events": [{"time": e.time, "kind": e.kind, "text": e.text} for e in reversed(service.events)],
     }
 

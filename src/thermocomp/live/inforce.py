@@ -1,0 +1,71 @@
+"""What is in force at the controller, as its sinks confirm it."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+
+from thermocomp.core.correction import Correction
+from thermocomp.core.ports import Confirming, Sink, Suspending
+from thermocomp.live.clock import ServiceClock
+from thermocomp.live.recorder import CONFIRM_WITHIN
+from thermocomp.runtime.state import CompensatorState, Status
+
+
+class InForce:
+    """Corrections that controllers have confirmed, and their alarms.
+
+    Parameters
+    ----------
+    sinks : sequence of Sink
+    clock : ServiceClock
+    """
+
+    def __init__(self, sinks: Sequence[Sink], clock: ServiceClock) -> None:
+        # what a controller says is in force goes before what a file says
+        controllers: list[Sink] = [s for s in sinks if isinstance(s, Suspending)]
+        self._sure, self._clock = controllers or list(sinks), clock
+        self._alarms = dict[str, str]()
+        #: correction and when it was confirmed, by target [um, s]
+        self.confirmed = dict[str, tuple[Correction, float]]()
+
+    def listens_to(self, sink: Sink) -> bool:
+        """Return whether what a sink confirms counts."""
+        return sink in self._sure
+
+    def confirm(self, found: Mapping[str, Correction]) -> None:
+        """Take what a controller has confirmed."""
+        self.confirmed |= {t: (c, self._clock.tick()) for t, c in found.items()}
+
+    def of(self, target: str, state: CompensatorState) -> Correction | None:
+        """Return the correction in force: as confirmed lately, or as asked for if no sink confirms; None: not known."""
+        if not any(isinstance(sink, Confirming) for sink in self._sure):
+            return state.corrections[target]
+        found, at = self.confirmed.get(target, (None, -math.inf))
+        return found if self._clock.tick() - at <= CONFIRM_WITHIN * self._clock.speed else None
+
+    def new_alarms(self, sink: Suspending) -> Iterator[str]:
+        """Yield what has changed about corrections that are not in force as they shall be."""
+        alarms = dict(sink.alarms())
+        for target in alarms.keys() | self._alarms.keys():
+            if alarms.get(target) != self._alarms.get(target):
+                yield f"{target}: {alarms.get(target, 'is in force as it shall be again')}"
+        self._alarms = alarms
+
+
+def suspensions(
+    sink: Suspending, in_force: Mapping[str, Correction], state: CompensatorState
+) -> Iterator[tuple[str, Status | None]]:
+    """Yield targets that a controller suspends or takes back, and the order that follows; None: it runs again.
+
+    Parameters
+    ----------
+    sink : Suspending
+    in_force : mapping of str to Correction
+    state : CompensatorState
+    """
+    away = sink.suspended()
+    for target in state.corrections.keys() & (in_force.keys() | away.keys()):
+        order = state.orders.get(target)
+        if target in away and (order is None or order.word not in ("suspended", "shadow", "holding")):
+            yield target, Status("suspended", away[target])
+        elif target not in away and order is not None and order.word == "suspended":
+            yield target, None

@@ -1,0 +1,88 @@
+"""The state file of a service: read at the start, kept aside if it cannot be used, written while it runs."""
+
+import contextlib
+from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+from thermocomp.core.exceptions import InputError, ThermocompError
+from thermocomp.live import statefile
+from thermocomp.live.clock import ServiceClock
+from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.state import CompensatorState, resume, silence
+
+#: why a target is in shadow that the configuration put there
+CONFIGURED = "by configuration"
+
+
+class StateKeeper:
+    """Keeps the state of a compensator in a file.
+
+    Parameters
+    ----------
+    path : Path or None
+        None: it is not kept.
+    compensator : Compensator
+    clock : ServiceClock
+    say : callable
+        Takes a line of text for the event list.
+    """
+
+    def __init__(
+        self, path: Path | None, compensator: Compensator, clock: ServiceClock, say: Callable[[str], None]
+    ) -> None:
+        self._path, self._compensator, self._clock, self._say = path, compensator, clock, say
+        self._refused: Path | None = None
+        #: why the state was not saved, last; empty if it was
+        self.not_saved = ""
+
+    def begin(self) -> CompensatorState:
+        """Return the state to begin with: that of the file, or a cold one.
+
+        Raises
+        ------
+        InputError
+            The file is of another kind, and would be written over.
+        """
+        cold = self._compensator.start()
+        if self._path is None:
+            return cold
+        if not self._path.exists():
+            self._say(f"cold start: there is no {self._path}")
+            return cold
+        try:
+            saved = statefile.read(self._path, self._compensator)
+        except ThermocompError as e:
+            if not statefile.is_ours(self._path):
+                raise InputError(f"{self._path}: is no state file, and would be written over; name another") from e
+            self._say(f"cold start: {e}")
+            self._refused = self._path
+            return cold
+        age = (datetime.now(UTC) - saved.written).total_seconds() * self._clock.speed
+        state = resume(saved.state, cold, age, tick=self._clock.tick())
+        # what the controller or the configuration ordered is theirs to say again
+        own = {t: o for t, o in state.orders.items() if o.word != "suspended" and o.reason != CONFIGURED}
+        state = state._replace(orders=cold.orders | own)
+        how = "goes on" if state.references else "begins anew, with the corrections that are in force"
+        self._say(f"start after {age:.0f} s: {how}")
+        return state
+
+    def put_aside(self) -> None:
+        """Keep a file that could not be used under another name."""
+        if self._refused is not None:
+            with contextlib.suppress(OSError):
+                self._refused.replace(self._refused.with_name(f"{self._refused.name}.refused"))
+
+    def save(self, state: CompensatorState) -> None:
+        """Write the state; `not_saved` says why, if that fails."""
+        if self._path is None:
+            self.not_saved = "no file is configured for it"
+            return
+        try:
+            old = timedelta(seconds=silence(state, self._clock.tick()) / self._clock.speed)
+            statefile.write(state, self._compensator, self._path, datetime.now(UTC) - old)
+            self.not_saved = ""
+        except (ThermocompError, OSError) as e:
+            if self.not_saved != str(e):
+                self._say(f"the state is not saved: {e}")
+            self.not_saved = str(e)

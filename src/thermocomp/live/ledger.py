@@ -1,0 +1,137 @@
+"""Probings of a running service: which wait for the next reading, which were taken, and what they said."""
+
+from collections import deque
+from collections.abc import Callable, Mapping
+
+from thermocomp.core.correction import Correction, Deviation, uncompensated
+from thermocomp.core.reading import Measurement
+from thermocomp.live.clock import ServiceClock
+from thermocomp.live.probe import KEPT, Checked, check
+from thermocomp.live.recorder import Recorder
+from thermocomp.runtime.adaptation import Adaptation, Probing
+from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.identity import KNOWN, is_known
+from thermocomp.runtime.state import Compensated, CompensatorState
+
+
+class ProbingLedger:
+    """Takes measurements of the tool point in, and keeps what came of them.
+
+    Parameters
+    ----------
+    compensator : Compensator
+    clock : ServiceClock
+    say : callable
+        Takes a line of text for the event list.
+    recorder : Recorder or None
+        Of the journal.
+    """
+
+    def __init__(
+        self, compensator: Compensator, clock: ServiceClock, say: Callable[[str], None], recorder: Recorder | None
+    ) -> None:
+        self._compensator, self._clock, self._say, self._recorder = compensator, clock, say, recorder
+        #: that wait for the next reading, by target
+        self.waiting = dict[str, Probing]()
+        #: what was learned before the last one was taken, by target
+        self.before = dict[str, Adaptation | None]()
+        #: what probings said, the newest last
+        self.checked = deque[Checked](maxlen=KEPT)
+        self._measured = dict[str, tuple[Measurement, Correction | None]]()
+
+    def measure(self, found: Measurement, state: CompensatorState, in_force: Correction | None) -> None:
+        """Take a measurement as a probing, with the next reading.
+
+        One that contains the correction (``left`` is false: LinuxCNC's ``#5063`` is a position of the motor) is the
+        deviation as it is.
+
+        Parameters
+        ----------
+        found : Measurement
+        state : CompensatorState
+        in_force : Correction or None
+            When it was made; None: not known.
+        """
+        probing = Probing(found.measured, found.repeatability, found.position, found.keys)
+        if found.left and in_force is not None:
+            deviation = uncompensated(found.measured, in_force.at(found.position))
+            probing = probing._replace(deviation=deviation, keys=probing.identity)
+        if why := self._refuse(found, probing, state, in_force):
+            self._say(f"{found.target} refused: {why}")
+            return
+        self._measured[found.target] = (found, in_force)
+        self.waiting[found.target] = probing
+
+    def _refuse(
+        self, found: Measurement, probing: Probing, state: CompensatorState, in_force: Correction | None
+    ) -> str:
+        """Say why a measurement is not used with the next reading; the empty string if it is."""
+        target, old = found.target, self._clock.now() - self._clock.of(found.time)
+        if target not in self._compensator.lines:
+            return f"no target is named {target}"
+        if abs(old) > self._compensator.limits.reading_age:
+            return f"it is {old:.0f} s old" if old > 0 else f"its time is {-old:.0f} s ahead of the clock"
+        counted = state.references.get(target)
+        if counted is not None and self._clock.of(found.time) < counted.time:
+            return "it was made before the zero that is counted from now"
+        waiting = self.waiting.get(target)
+        if is_known(state, target, probing) or (waiting and set(waiting.identity) & set(probing.identity)):
+            return KNOWN
+        if waiting:
+            return "another one waits for the next reading"
+        unknown = found.left and in_force is None
+        return "what is in force at the controller is not known" if unknown else ""
+
+    def take(self) -> dict[str, Probing]:
+        """Return the probings that wait, for a reading; none waits afterwards."""
+        taken, self.waiting = self.waiting, {}
+        return taken
+
+    def note(
+        self,
+        probings: Mapping[str, Probing],
+        said: Compensated,
+        learned: Mapping[str, Adaptation],
+        state: CompensatorState,
+    ) -> None:
+        """Keep what came of probings.
+
+        Parameters
+        ----------
+        probings : mapping of str to Probing
+            That went with a reading.
+        said : Compensated
+            After it.
+        learned : mapping of str to Adaptation
+            Before it.
+        state : CompensatorState
+            After it.
+        """
+        for target, probing in probings.items():
+            if target in said.deviations:
+                refused, after = said.refused.get(target, ""), state.learned.get(target)
+                found = check(self._clock.now(), target, probing, said.deviations[target], after, refused)
+                self._record(found, said.deviations[target], said.moved.get(target, 0.0))
+                if not refused:
+                    self.before[target] = learned.get(target)
+
+    def _record(self, found: Checked, deviation: Deviation, moved: float) -> None:
+        self.checked.append(found)
+        if self._recorder is not None:
+            self._recorder.update(found, deviation.offset + moved)
+            if not found.refused and found.target in self._measured:  # what is not believed is no deviation
+                self._recorder.measure(found.time, *self._measured[found.target])
+        if found.beyond:
+            limit = f"where {found.limit:.1f} um ask for action"
+            self._say(f"{found.target} was wrong by {found.residual:+.1f} um, {limit}: look for the cause")
+
+    def forget(self, target: str) -> None:
+        """Drop what counts from a zero that is no longer."""
+        self.before.pop(target, None)
+        self.waiting.pop(target, None)
+
+    def take_back(self, target: str, state: CompensatorState) -> CompensatorState:
+        """Return the state without the last probing of a target; it must be in `before`."""
+        learned, before = dict(state.learned), self.before.pop(target)
+        learned.pop(target, None)
+        return state._replace(learned=learned if before is None else learned | {target: before})
