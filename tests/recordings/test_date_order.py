@@ -56,10 +56,30 @@ def test_rows_that_go_on_over_midnight_tell_the_order(form: str, clock: str, tmp
     as_it_was(read(written(tmp_path / "night.csv", OVER_NIGHT, form + clock)), OVER_NIGHT)
 
 
-@pytest.mark.parametrize("form", SLASHES)
-def test_days_in_a_row_tell_the_order(form: str, tmp_path: Path) -> None:
-    daily = series(datetime(2024, 2, 1, 7), timedelta(days=1), 12)
-    as_it_was(read(written(tmp_path / "daily.csv", daily, f"{form} %H:%M")), daily)
+def months(begin: datetime, count: int) -> list[datetime]:
+    return [begin.replace(month=begin.month + k) + timedelta(minutes=k) for k in range(count)]
+
+
+@pytest.mark.parametrize("form", SLASHES[:6])
+@pytest.mark.parametrize(
+    "instants", [series(datetime(2024, 2, 1, 7), timedelta(days=1), 12), months(datetime(2024, 4, 1, 8), 7)]
+)
+def test_one_row_a_day_may_be_one_a_month(instants: list[datetime], form: str, tmp_path: Path) -> None:
+    """The days of a month, each first of which follows another: 01/04, 01/05 ... of any machine that is measured."""
+    path = written(tmp_path / "rare.csv", instants, f"{form} %H:%M")
+    with pytest.raises(TwoReadingsError, match="no row tells which"):
+        read(path)
+    assert run(["map", str(path), "--yes"]) == 2
+
+
+@pytest.mark.parametrize(("heading", "form"), [("Time [dd/mm/yyyy]", "%m/%d/%Y"), ("Timestamp", "%Y-%d-%m")])
+def test_an_order_that_is_stated_and_breaks_the_recording_is_asked_for(heading: str, form: str, tmp_path: Path) -> None:
+    night = series(datetime(2024, 3, 5, 20), timedelta(minutes=5), 100)
+    path = written(tmp_path / "night.csv", night, f"{form} %H:%M")
+    path.write_text(path.read_text("utf-8").replace("Timestamp", heading), "utf-8")
+    with pytest.raises(TwoReadingsError, match="no row tells which"):
+        read(path)
+    as_it_was(read(path, Mapping(time=TimeColumn(heading, format=f"{form} %H:%M"))), night)
 
 
 @pytest.mark.parametrize("form", SLASHES)
@@ -158,8 +178,7 @@ def test_a_question_without_a_likely_answer_has_none_beforehand(
     [
         # automatic checks on the first of each month are four days of January otherwise
         ([f"01/0{m}/2024 {h:02}:00" for m in range(5, 9) for h in (8, 9, 10)], True),
-        # a row on each is no recording of months
-        ([f"01/0{m}/2024 08:00" for m in range(5, 9)], False),
+        ([f"01/0{m}/2024 08:00" for m in range(5, 9)], True),
         (["03/04/2024 08:00", "03/05/2024 08:00", "03/06/2024 08:00"], True),
         (["24.05.03 08:00", "24.05.03 09:00", "24.05.06 08:00"], True),
         (["19.01.01 06:00", "19.01.02 06:10", "19.02.02 06:20"], True),

@@ -46,6 +46,15 @@ PLAIN: dict[str, Form] = {
     "weekday": form("%a"),
     "long weekday": form("%A"),
 }
+#: that are dates at sight beside times of day
+BESIDE_CLOCKS: dict[str, Form] = {
+    "with a word": form("%Y-%m-%d (%a)"),
+    "with a shift": form("%d.%m.%Y early"),
+    "name of a file": form("log_%Y-%m-%d.csv"),
+    "number of a lot": form("%Y%m%d_1"),
+    "number of a part": form("P%d%m%y"),
+    "week and day": lambda t: f"KW{t.isocalendar()[1]}/{t.isoweekday()}",
+}
 #: that are only below a heading of a day
 NAMED: dict[str, Form] = {
     "backwards": form("%d%m%Y"),
@@ -56,6 +65,8 @@ NAMED: dict[str, Form] = {
     "serial with time": lambda t: f"{(t - SHEET) / DAY:.6f}",
     "day of the year": lambda t: str(int(t.strftime("%j"))),
     "slashes": form("%m/%d"),
+    "modified Julian day": lambda t: str((t - datetime(1858, 11, 17)).days),
+    "Julian day": lambda t: f"{(t - datetime(1858, 11, 17)) / DAY + 2400000.5:.5f}",
 }
 FORMS = [(what, "lot", way) for what, way in PLAIN.items()] + [
     (what, heading, way) for what, way in {**PLAIN, **NAMED}.items() for heading in ("Tag", "Date", "Messdatum")
@@ -69,6 +80,26 @@ def write(
     lines = [f"{way(t)},{s},{20 + k / 9:.3f},{k / 5:.2f}" for k, (t, s) in enumerate(rows)]
     path.write_text("\n".join([f"{heading},{name},t1_C,z_um", *lines, ""]), encoding="utf-8")
     return path
+
+
+RISING = [t + 2 * k * timedelta(hours=1) for k, t in enumerate(INSTANTS[::40])]
+
+
+@pytest.mark.parametrize("what", BESIDE_CLOCKS)
+def test_dates_among_words_are_refused_where_the_clock_passes_over_them(what: str, tmp_path: Path) -> None:
+    """Every day a later hour: as one day the clock rises, and the days between are lost."""
+    clocks = [f"{t:%H:%M:%S}" for t in RISING]
+    path = write(tmp_path / "days.csv", "lot", BESIDE_CLOCKS[what], RISING, clocks, "time")
+    with pytest.raises(TwoReadingsError, match="which is not the day"):
+        read(path)
+    assert run(["map", str(path), "--yes"]) == 2
+
+
+@pytest.mark.parametrize("what", BESIDE_CLOCKS)
+def test_dates_among_words_that_go_with_the_clock_say_nothing(what: str, tmp_path: Path) -> None:
+    day = [datetime(2024, 3, 13, 8) + timedelta(minutes=k) for k in range(40)]
+    path = write(tmp_path / "day.csv", "lot", BESIDE_CLOCKS[what], day, [f"{t:%H:%M:%S}" for t in day], "time")
+    assert read(path).time[-1] == 39 * 60.0
 
 
 RUNNING = [str(60 * k) for k in range(len(INSTANTS))]

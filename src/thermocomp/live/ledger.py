@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Callable, Mapping
 
-from thermocomp.core.correction import Correction, Deviation, uncompensated
+from thermocomp.core.correction import Correction, uncompensated
 from thermocomp.core.reading import Measurement
 from thermocomp.live.clock import ServiceClock
 from thermocomp.live.probe import KEPT, Checked, check
@@ -23,14 +23,10 @@ class ProbingLedger:
     clock : ServiceClock
     say : callable
         Takes a line of text for the event list.
-    recorder : Recorder or None
-        Of the journal.
     """
 
-    def __init__(
-        self, compensator: Compensator, clock: ServiceClock, say: Callable[[str], None], recorder: Recorder | None
-    ) -> None:
-        self._compensator, self._clock, self._say, self._recorder = compensator, clock, say, recorder
+    def __init__(self, compensator: Compensator, clock: ServiceClock, say: Callable[[str], None]) -> None:
+        self._compensator, self._clock, self._say = compensator, clock, say
         #: that wait for the next reading, by target
         self.waiting = dict[str, Probing]()
         #: what was learned before the last one was taken, by target
@@ -93,6 +89,7 @@ class ProbingLedger:
         said: Compensated,
         learned: Mapping[str, Adaptation],
         state: CompensatorState,
+        recorder: Recorder | None,
     ) -> None:
         """Keep what came of probings.
 
@@ -106,21 +103,23 @@ class ProbingLedger:
             Before it.
         state : CompensatorState
             After it.
+        recorder : Recorder or None
+            Of the journal.
         """
         for target, probing in probings.items():
             if target in said.deviations:
                 refused, after = said.refused.get(target, ""), state.learned.get(target)
                 found = check(self._clock.now(), target, probing, said.deviations[target], after, refused)
-                self._record(found, said.deviations[target], said.moved.get(target, 0.0))
+                self._record(found, said.deviations[target].offset + said.moved.get(target, 0.0), recorder)
                 if not refused:
                     self.before[target] = learned.get(target)
 
-    def _record(self, found: Checked, deviation: Deviation, moved: float) -> None:
+    def _record(self, found: Checked, after: float, recorder: Recorder | None) -> None:
         self.checked.append(found)
-        if self._recorder is not None:
-            self._recorder.update(found, deviation.offset + moved)
+        if recorder is not None:
+            recorder.update(found, after)
             if not found.refused and found.target in self._measured:  # what is not believed is no deviation
-                self._recorder.measure(found.time, *self._measured[found.target])
+                recorder.measure(found.time, *self._measured[found.target])
         if found.beyond:
             limit = f"where {found.limit:.1f} um ask for action"
             self._say(f"{found.target} was wrong by {found.residual:+.1f} um, {limit}: look for the cause")

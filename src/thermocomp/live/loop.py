@@ -58,7 +58,7 @@ class Service:
         models = self.compensator.models
         self.latest = Latest(i.name for m in models for i in (*m.inputs, *(m.watch.inputs if m.watch else ())))
         self.curves, self.in_force = Curves(self.compensator), InForce(self.sinks, self.clock)
-        self.probings = ProbingLedger(self.compensator, self.clock, partial(self.say, "probing"), self.recorder)
+        self.probings = ProbingLedger(self.compensator, self.clock, partial(self.say, "probing"))
         self.keeper = StateKeeper(self.state_path, self.compensator, self.clock, partial(self.say, "service"))
         self.outlets = [Outlet(sink, self._hear if self.in_force.listens_to(sink) else None) for sink in self.sinks]
         self.inlets = self._make_inlets()
@@ -111,7 +111,7 @@ class Service:
         if self.recorder is not None:
             self.recorder.take(now, fresh, said)
             self.recorder.count(now, self.state.references)
-        self.probings.note(probings, said, learned, self.state)
+        self.probings.note(probings, said, learned, self.state, self.recorder)
 
     def order(self, target: str, status: Status | None) -> None:
         """Suspend or resume a target; see `thermocomp.runtime.orders.order`."""

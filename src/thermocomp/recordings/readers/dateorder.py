@@ -14,15 +14,13 @@ _DAY = 86_400 * _SECOND
 _NEAR, _FAR = 1800 * _SECOND, 6 * 3600 * _SECOND
 #: a step in days that only a wrong order makes: a month is 28 days at least, and a row may come early on its last one
 _MONTH = 26
-#: changes of the date that show days in a row, and days from one to the next: a weekend may lie between
-_CHANGES, _PAUSE = 3, 4
 
 
 class DateChoice(NamedTuple):
     """An order that was chosen."""
 
     order: str  #: empty if several are possible
-    by: Literal["rising", "going on", "days in a row", ""]
+    by: Literal["rising", "going on", ""]
     why: str  #: what speaks against the others, in words
 
 
@@ -44,11 +42,9 @@ def find_order(readings: Mapping[str, IntArray]) -> DateChoice:
 
     1. in which time rises; else
     2. in which a row follows on the one before across a change of the date: at most half an hour or two usual steps
-       later, and six hours, where every other order puts about a month or more between them; else
-    3. in which rows of one a day, four or more, follow each other one to four days apart, where every other order puts
-       about a month or more between each and the next.
+       later, and six hours, where every other order puts about a month or more between them.
 
-    Tests of several rows on days with a pause between them may be a month apart as well: nothing tells.
+    Rows of one a day, and tests on days with a pause between them, may be a month apart as well: nothing tells.
     """
     begun, *others = readings.values()
     if all(np.array_equal(begun, t) for t in others):
@@ -70,10 +66,6 @@ def find_order(readings: Mapping[str, IntArray]) -> DateChoice:
             days = min(int(np.abs(steps[o])[a].max()) for o, a in zip(rest, apart, strict=True)) // _DAY
             why = f"otherwise a gap of {days} days would lie between two rows that follow each other"
             return DateChoice(order, "going on", why)
-    for order, t in tried.items():
-        if all(_are_days_in_a_row(t, other) for o, other in tried.items() if o != order):
-            why = "so they are days in a row, otherwise each would be a month or more after the one before"
-            return DateChoice(order, "days in a row", why)
     return DateChoice("", "", "")
 
 
@@ -85,11 +77,3 @@ def rises(t: IntArray) -> bool:
 def find_longest_step(t: IntArray) -> float:
     """Return the longest time between neighbouring rows, in days."""
     return float(np.diff(t).max(initial=0)) / _DAY
-
-
-def _are_days_in_a_row(t: IntArray, other: IntArray) -> bool:
-    """Return whether rows of one a day follow each other by days, and by months in another order."""
-    day, far = t // _DAY, other // _DAY
-    passed, apart = np.diff(day), np.diff(far)
-    near = ((passed >= 1) & (passed <= _PAUSE)).all()
-    return bool(len(passed) >= _CHANGES and near and (apart >= _MONTH).all())

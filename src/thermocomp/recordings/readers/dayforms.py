@@ -24,15 +24,24 @@ _BEHIND = (1, 10**2, 10**4, 10**6, 10**9)
 #: seconds since 1970 between the years 2000 and 2100, in parts of a second; days that spreadsheets count between them
 _EPOCH, _PARTS = (946_684_800, 2_240_611_200), (1, 10**3, 10**6, 10**9)
 _SERIAL = (36_526, 73_050)
+#: the same from which Julian days are counted
+_JULIAN = (2_451_544, 2_488_070)
 #: headings of a date or a day, below which numbers may be one that are not dates at sight
 _NAMED = re.compile(
-    r"(?:^|[\W_])(?:\w*(?:date|datum|tag|day|stamp|stempel)|dat|doy|dow|fecha|jour|giorno|d[ií]a|dag|data)(?:$|[\W_])"
+    r"(?:^|[\W_])(?:\w*(?:date|datum|tag|day|stamp|stempel)|dat|doy|dow|m?jd|julian|fecha|jour|giorno|d[ií]a|dag|data)(?:$|[\W_])"
 )
 _ORDINAL, _WEEK = r"(\d{4})-?(\d{3})", r"(\d{4})-?W(\d\d)-?([1-7])"
 _NO_YEAR = re.compile(r"\d{1,2}[./-]\d{1,2}[./]?")
 _MONTH = re.compile(r"\d{1,2}[-. ]{1,2}[^\W\d_]{3,9}\.?|[^\W\d_]{3,9}\.?[- ]\d{1,2}")
 _COUNTED = re.compile(r"(?:day|tag|jour|giorno|d[ií]a|dag|dia|nap|den|dzień|gün)\W{0,3}\d{1,4}\.?", re.IGNORECASE)
 _DAY_WORD = re.compile(r"(?:day|tag|jour|giorno|d[ií]a|dia)\W+\w+", re.IGNORECASE)
+#: full dates among other words
+_WITHIN = (
+    r"(?<!\d)(\d{4}([-./])\d{1,2}\2\d{1,2})(?!\d)",
+    r"(?<!\d)(\d{1,2}([-./])\d{1,2}\2(?:\d{4}|\d\d))(?!\d)",
+    r"(?<!\d)((?:19|20)\d{6})(?!\d)",
+    r"(?<!\d)(\d{6})(?!\d)",
+)
 #: headings that name a day in one language and something else in another
 _NO_DAY = ("tag", "data", "stamp", "stempel", "dag", "dat")
 _DAYS = (
@@ -112,6 +121,8 @@ def read_other_days(cells: "pd.Series[Any]", heading: str, *, beside_clock: bool
     if texts.str.fullmatch(_COUNTED).all():  # day 1
         return [texts.str.extract(r"(\d+)", expand=False).to_numpy(dtype=np.int64)]
     found = _read_texts(texts, named=named, beside_clock=beside_clock)
+    if not found and beside_clock:
+        found = _read_dates_within(texts)
     words = texts.str.fullmatch(_DAY_WORD).all() or (
         named and plain_name(heading) not in _NO_DAY and texts.str.contains(r"\d").all()
     )
@@ -139,8 +150,9 @@ def _read_numbers(numbers: NDArray[np.float64], *, named: bool) -> list[IntArray
         for parts in _PARTS:
             if _EPOCH[0] * parts <= low and high < _EPOCH[1] * parts:
                 found.append((numbers // (parts * _DAY)).astype(np.int64))
-    if named and rises and _SERIAL[0] <= low and high < _SERIAL[1]:
-        found.append(np.floor(numbers).astype(np.int64))
+    for begin, end in (_SERIAL, _JULIAN):
+        if named and rises and begin <= low and high < end:
+            found.append(np.floor(numbers).astype(np.int64))
     return found
 
 
@@ -152,14 +164,32 @@ def _read_texts(texts: "pd.Series[str]", *, named: bool, beside_clock: bool) -> 
     first = plain.iloc[0]
     if re.fullmatch(f"{_ORDINAL}|{_WEEK}", first):
         return _read_forms(plain.str.replace("-", "", regex=False), "%GW%V%u" if "W" in first else "%Y%j")
-    if re.fullmatch(r"W\d\d-?[1-7]", first):
-        return [_unwrap(d, 364) for d in _read_forms("2020" + plain.str.replace("-", "", regex=False), "%GW%V%u")]
+    week = texts.str.extract(r"^(?:KW|CW|W|wk|week) ?(\d\d?)[-/. ]?([1-7])$", flags=re.IGNORECASE)
+    if week.notna().to_numpy().all():
+        return [_unwrap(d, 364) for d in _read_forms("2020W" + week[0].str.zfill(2) + week[1], "%GW%V%u")]
     if _NO_YEAR.fullmatch(first) and (named or first.endswith(".") or (beside_clock and not _are_parts(plain))):
         bare = plain.str.rstrip("./").str.replace(r"[./]", "-", regex=True) + "-2000"
         return [_unwrap(d, 366) for d in _read_forms(bare, "%d-%m-%Y", "%m-%d-%Y")]
     if _MONTH.fullmatch(first):
         return [_unwrap(d, 366) for d in read_days(plain.str.replace(r"[-. ]+", " ", regex=True).str.strip() + " 2000")]
     return _read_weekdays(texts) or read_days(plain)
+
+
+def _read_dates_within(texts: "pd.Series[str]") -> list[IntArray]:
+    """Return the days of dates among other words: ``2024-03-05 (Tue)``, ``log_20240305_1``, ``P050324``."""
+    for form in _WITHIN:
+        parts = texts.str.extract(form, expand=True)[0]
+        if parts.notna().all():
+            return read_days(parts) if re.search(r"\D", parts.iloc[0]) else _read_digits(parts)
+    return []
+
+
+def _read_digits(parts: "pd.Series[str]") -> list[IntArray]:
+    """Return the days of dates of digits alone; of six digits only those that rise within a year or so."""
+    if len(parts.iloc[0]) == 8:
+        return _read_forms(parts, "%Y%m%d")
+    read = _read_forms(parts, "%y%m%d", "%d%m%y", "%m%d%y")
+    return [days for days in read if (np.diff(days) >= 0).all() and days[-1] - days[0] <= 366]
 
 
 def _are_parts(texts: "pd.Series[str]") -> bool:

@@ -44,7 +44,7 @@ _ZONES = {
     **dict.fromkeys(("CEST", "MESZ", "EET"), "+02:00"),
     "EEST": "+03:00",
 }
-_WORDS = {"dmy": "day/month/year", "mdy": "month/day/year", "ymd": "year/month/day"}
+_WORDS = {"dmy": "day/month/year", "mdy": "month/day/year", "ymd": "year/month/day", "ydm": "year/day/month"}
 
 
 class Parsed(NamedTuple):
@@ -106,17 +106,22 @@ def parse_stamps(text: "pd.Series[Any]", heading: str) -> Parsed | None:
         (`thermocomp.recordings.readers.dateorder.find_order`).
     """
     first = text.iloc[0].strip()
-    if _ISO.fullmatch(first):
-        return _parsed(parse(text, "ISO8601"), first, "ISO8601", ())
     shape = _STAMP.fullmatch(first)
+    if _ISO.fullmatch(first):
+        found = parse(text, "ISO8601")
+        if shape is not None:
+            _refuse_other_order(text, shape, "ymd", found)
+        return _parsed(found, first, "ISO8601", ())
     if shape is None or shape["clock"]:
         return None
     plain = _simplify(text, shape)
     orders = _orders(shape)
-    stated = find_date_order(heading)
+    stated = find_date_order(heading) if len(orders) > 1 else orders[0]
     notes: tuple[str, ...] = ()
-    if len(orders) > 1 and stated in orders:
-        orders, notes = [stated], (f"the dates are {_WORDS[stated]}, as the heading says",)
+    if stated in orders:
+        if len(orders) > 1:
+            orders, notes = [stated], (f"the dates are {_WORDS[stated]}, as the heading says",)
+        _refuse_other_order(plain, shape, stated, parse(plain, _format(shape, stated)))
     read = {"dmy": parse(plain, _format(shape, "dmy"))} if _has_points(shape) and "dmy" in orders else {}
     if not any(_is_one_stretch(stamps) for stamps in read.values()):
         read |= {order: parse(plain, _format(shape, order)) for order in orders if order not in read}
@@ -138,6 +143,21 @@ def parse_stamps(text: "pd.Series[Any]", heading: str) -> Parsed | None:
     if shape["zone"] in _ZONES and _ZONES[shape["zone"]] != "+00:00":
         notes += (f"{shape['zone']} is taken as UTC{_ZONES[shape['zone']]}",)
     return _parsed(read[best], plain.iloc[0], _format(shape, best), notes)
+
+
+def _refuse_other_order(
+    plain: "pd.Series[Any]", shape: re.Match[str], stated: str, found: "pd.Series[pd.Timestamp]"
+) -> None:
+    """Refuse an order that the heading or the year states, where rows go on from one to the next only in another."""
+    if not (shape["a"].isdigit() and shape["b"].isdigit()) or not found.notna().all():
+        return
+    if not find_longest_step(_instants(found)) >= _MONTH:
+        return
+    swapped = "".join({"d": "m", "m": "d"}.get(letter, letter) for letter in stated)
+    other = parse(plain, _format(shape, swapped))
+    read = {stated: found, swapped: other}
+    if other.notna().all() and find_order({o: _instants(s) for o, s in read.items()})[:2] == (swapped, "going on"):
+        raise AmbiguousDatesError({_shown_format(shape, o): s for o, s in read.items()}, [_WORDS[o] for o in read])
 
 
 def has_day(form: str) -> bool:
@@ -212,7 +232,7 @@ def _choose(shape: re.Match[str], read: dict[str, IntArray]) -> DateChoice:
     day_first = DateChoice("dmy", "", "")  # as wherever dates are written with points
     if choice.order == "dmy":
         return day_first
-    if choice.by == "going on" or (choice.by == "days in a row" and choice.order == "ymd"):
+    if choice.by == "going on":
         return choice
     year_first = read.get("ymd")
     if year_first is None or not rises(year_first):
