@@ -232,28 +232,9 @@ def budget(
         called = ", ".join(c.name for c in targets)
         raise FitError(f"no block to judge by has a number of each of {called}; choose for fewer targets at once")
     samples = samples.only([c.name for c in samples.inputs if c.quantity in ("temperature", "spindle_speed")])
-    chosen = []
-    learned = [samples.cycle >= 0, *(split.learn for split in splits)]
-    for sets in work_through(partial(choose_sets, samples, max_sensors), learned, _no_sets, jobs=jobs):
-        if isinstance(sets, str):
-            raise FitError(sets)
-        progress("sensors chosen")
-        chosen.append(sets)
+    chosen = _chosen(samples, splits, max_sensors, jobs, progress)
     sensors = [[tuple(temperatures[j] for j in places) for places in sets.sets] for sets in chosen]
-    pieces = [
-        (split, subset, name)
-        for split, subsets in zip(splits, sensors[1:], strict=True)
-        for name in names
-        for subset in subsets
-    ]
-    found = []
-    failures: dict[str, str] = {}
-    for piece, value in zip(pieces, work_through(partial(_unseen_rms, samples), pieces, _why, jobs=jobs), strict=True):
-        progress(f"{piece[2]} with {len(piece[1])} sensors: judged")
-        found.append(np.full(len(targets), np.nan) if isinstance(value, str) else value)
-        if isinstance(value, str):
-            failures.setdefault(piece[2], value)
-    unseen = np.reshape(found, (len(splits), len(names), len(sensors[0]), len(targets)))
+    unseen, failures = _judged(samples, splits, sensors[1:], names, jobs, progress)
     judged = [[split.judge & np.isfinite(samples.deviations[:, t]) for split in splits] for t in range(len(targets))]
     none = np.array(
         [[rms(samples.deviations[r, t], np.zeros(r.sum())) for r in blocks] for t, blocks in enumerate(judged)]
@@ -269,13 +250,51 @@ def budget(
         sensors=tuple(sensors[0]),
         models=tuple(names),
         blocks=tuple(split.block for split in splits),
-        rms=np.moveaxis(unseen, 0, -1),
+        rms=unseen,
         none=none,
         frequency=np.mean([[[n in s for n in temperatures] for s in subsets] for subsets in sensors[1:]], axis=0),
         condition=_conditions(samples, sensors[0]),
         answer=chosen[0].answer,
         failures=failures,
     )
+
+
+def _chosen(
+    samples: Samples, splits: Sequence[Split], max_sensors: int, jobs: int, progress: Progress
+) -> list[SensorSets]:
+    """Return the sets of each size, of all rows first, then of what each split learns from."""
+    learned, chosen = [samples.cycle >= 0, *(split.learn for split in splits)], []
+    for sets in work_through(partial(choose_sets, samples, max_sensors), learned, _no_sets, jobs=jobs):
+        if isinstance(sets, str):
+            raise FitError(sets)
+        progress("sensors chosen")
+        chosen.append(sets)
+    return chosen
+
+
+def _judged(
+    samples: Samples,
+    splits: Sequence[Split],
+    sensors: Sequence[Sequence[tuple[str, ...]]],
+    names: Sequence[str],
+    jobs: int,
+    progress: Progress,
+) -> tuple[FloatArray, dict[str, str]]:
+    """Return the RMS on unseen blocks, (n_models, n_sizes, n_targets, n_splits), and why models failed."""
+    pieces = [
+        (split, subset, name)
+        for split, subsets in zip(splits, sensors, strict=True)
+        for name in names
+        for subset in subsets
+    ]
+    found, failures = [], dict[str, str]()
+    for piece, value in zip(pieces, work_through(partial(_unseen_rms, samples), pieces, _why, jobs=jobs), strict=True):
+        progress(f"{piece[2]} with {len(piece[1])} sensors: judged")
+        found.append(np.full(len(samples.targets), np.nan) if isinstance(value, str) else value)
+        if isinstance(value, str):
+            failures.setdefault(piece[2], value)
+    unseen = np.reshape(found, (len(splits), len(names), len(sensors[0]), len(samples.targets)))
+    return np.moveaxis(unseen, 0, -1), failures
 
 
 def judged_blocks(samples: Samples, target: int, judging: Judging) -> BoolArray:

@@ -49,53 +49,29 @@ def choose(samples: Samples, judging: Judging, settings: Settings, *, jobs: int,
     targets = ", ".join(found.targets)
     if found.margin() is None:
         raise FitError(f"{targets}: none of the models could be judged in every block: {_failed(found)}")
-    notes = [_rule(found)]
-    if found.failures:
-        notes.append(f"Not judged with some numbers of sensors: {_failed(found)}")
-    if len(found.blocks) < len(judging.splits):
-        several = "one of the targets" if len(found.targets) > 1 else "the target"
-        notes.append(f"{len(judging.splits) - len(found.blocks)} block(s) without a number of {several} were left out.")
     recommended = found.recommended()
     m, best = np.unravel_index(int(np.nanargmin(found.mean())), found.mean().shape)
     model, place = recommended or (found.models[int(m)], int(best))
     sensors, error = found.sensors[place], float(found.mean()[found.models.index(model), place])
     told = f"{model} with {len(sensors)} of {len(found.candidates)} temperatures leaves {error:.2f} {_rms(found)} on "
     told += f"unseen cycles{_mean(found)}, instead of {found.none_mean():.2f} {found.unit}"
-    errors = [
+    tables = [
         _errors(found, judging, model, place if recommended else None),
         *([_by_target(found, model, place)] if len(found.targets) > 1 else []),
     ]
+    notes, failure = _notes(found, judging), ""
     if recommended is None:
-        why = f"no set of temperatures is clearly better than no compensation; the smallest error: {told}"
-        return Choice(
-            method="pareto",
-            target=targets,
-            sensors=(),
-            reason=why,
-            tables=tuple(errors),
-            notes=tuple(notes),
-            details=found,
-            failure=why,
-        )
-    notes[1:1] = [
-        next_to_buy(found, model, place),
-        "Sensors of each number are those whose loss `averaged` feels least when they are made up from the others, "
-        "the same for all displacements, whatever model is then trained on them. Their number was chosen by the errors "
-        "shown, so they flatter it a little.",
-    ]
-    left = found.of_targets()[found.models.index(model), place]
-    if idle := [t for t, e, none in zip(found.targets, left, found.none_of_targets(), strict=True) if e >= none]:
-        notes.insert(
-            1, f"These sensors are no better than no compensation for {', '.join(idle)}: choose for it by itself."
-        )
-    tables = [
-        *errors,
-        *([_next(found, model, place)] if len(found.sensors) > 1 else []),
-        _frequency(found, place),
-        *([_stand_ins(found, place)] if len(found.candidates) > 1 else []),
-        _repeats(candidates, sensors),
-    ]
-    reason = f"{told}; {trade_off(found, model, place)}"
+        sensors = ()
+        reason = failure = f"no set of temperatures is clearly better than no compensation; the smallest error: {told}"
+    else:
+        reason = f"{told}; {trade_off(found, model, place)}"
+        notes[1:1] = _advice(found, model, place)
+        tables += [
+            *([_next(found, model, place)] if len(found.sensors) > 1 else []),
+            _frequency(found, place),
+            *([_stand_ins(found, place)] if len(found.candidates) > 1 else []),
+            _repeats(candidates, sensors),
+        ]
     return Choice(
         method="pareto",
         target=targets,
@@ -104,7 +80,33 @@ def choose(samples: Samples, judging: Judging, settings: Settings, *, jobs: int,
         tables=tuple(tables),
         notes=tuple(notes),
         details=found,
+        failure=failure,
     )
+
+
+def _notes(found: Budget, judging: Judging) -> list[str]:
+    """Return how the number was chosen, and what could not be judged."""
+    notes = [_rule(found)]
+    if found.failures:
+        notes.append(f"Not judged with some numbers of sensors: {_failed(found)}")
+    if len(found.blocks) < len(judging.splits):
+        several = "one of the targets" if len(found.targets) > 1 else "the target"
+        notes.append(f"{len(judging.splits) - len(found.blocks)} block(s) without a number of {several} were left out.")
+    return notes
+
+
+def _advice(found: Budget, model: str, place: int) -> list[str]:
+    """Return what speaks for and against the sensors that are recommended."""
+    left = found.of_targets()[found.models.index(model), place]
+    idle = [t for t, e, none in zip(found.targets, left, found.none_of_targets(), strict=True) if e >= none]
+    none_better = f"These sensors are no better than no compensation for {', '.join(idle)}: choose for it by itself."
+    return [
+        *([none_better] if idle else []),
+        next_to_buy(found, model, place),
+        "Sensors of each number are those whose loss `averaged` feels least when they are made up from the others, "
+        "the same for all displacements, whatever model is then trained on them. Their number was chosen by the errors "
+        "shown, so they flatter it a little.",
+    ]
 
 
 def _failed(found: Budget) -> str:

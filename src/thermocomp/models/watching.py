@@ -1,5 +1,6 @@
 """How a watch over the temperatures is trained: each predicted by the others, as `averaged` predicts a displacement."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -68,16 +69,7 @@ def find_watch(samples: Samples, learn: BoolArray) -> Watch | None:
     of = PacedFeatures.of(change, step, folds >= 0, speeds, lags=LAGS, powers=POWERS, stopped=STOPPED, running=RUNNING)
     turning = np.abs(change[:, speeds]).max(axis=1, initial=0.0) > STANDS
     parts, _ = halve(folds, turning)
-    moments = of.moments(change, change[:, heat], step, parts, NOISE)
-    every = np.unique(parts[parts >= 0])
-    without = [np.setdiff1d(every, parts[folds == k]) for k in range(count)]
-    weights = np.zeros((1 + count, len(of), len(heat)))  # of all, and without each cycle
-    for k in range(len(heat)):
-        structures = of.draw(STRUCTURES, 0, [j for j in range(len(heat)) if j != k])
-        own = replace(moments, cross=moments.cross[:, :, [k]], power=moments.power[:, [k]])
-        shares, _ = share_out(own, structures)
-        for row, kept in enumerate((every, *without)):
-            weights[row, :, k] = (shares * fit_each(own, structures, kept)[..., 0]).sum(axis=0)
+    weights = _weights(of, change, step, heat, parts, folds)
     predicted = np.full((len(samples), len(heat)), np.nan)
     known = _covered(np.abs(change[:, speeds]).max(axis=1, initial=0.0), folds, samples.test)
     start = 0
@@ -91,16 +83,7 @@ def find_watch(samples: Samples, learn: BoolArray) -> Watch | None:
     wider = SAFETY * (1.0 + 1.0 / count)
     sensors = []
     for place, k in enumerate(heat):
-        off = change[:, k] - predicted[:, place]
-        still, moved = _same(samples.values[:, k], predicted[:, place], samples.time, folds)
-        limits = {
-            "off": max(OFF, wider * float(np.nanmax(np.abs(off), initial=0.0))),
-            "jump": max(JUMP, FASTEST * _jump(change[:, k], samples.time, folds, pace)),
-            "moved": max(MOVED + _resolution(samples.values[:, k]), SAFETY * moved),
-            # one that is coarse for its noise reads the same for days on a machine at rest: time says nothing of it
-            "still": STILL if still <= STILL_PART * STILL else GAP,
-            "unseen": float(np.sqrt(np.nanmean(off**2))) if np.isfinite(off).any() else 0.0,
-        }
+        limits = _limits(samples, change[:, k], predicted[:, place], folds, k, pace, wider)
         numbers = {name: float(f"{v:.4g}") for name, v in limits.items()}
         sensors.append(Watched(k, tuple(float(f"{w:.6g}") for w in weights[0, :, place]), **numbers))
     return Watch(
@@ -112,6 +95,45 @@ def find_watch(samples: Samples, learn: BoolArray) -> Watch | None:
         sensors=tuple(sensors),
         pace=pace,
     )
+
+
+def _weights(
+    of: PacedFeatures, change: FloatArray, step: FloatArray, heat: Sequence[int], parts: IntArray, folds: IntArray
+) -> FloatArray:
+    """Return what foretells each temperature, by all cycles and without each, (1 + n_cycles, n_features, n_heat)."""
+    moments = of.moments(change, change[:, list(heat)], step, parts, NOISE)
+    every = np.unique(parts[parts >= 0])
+    learned = (every, *(np.setdiff1d(every, parts[folds == k]) for k in range(int(folds.max()) + 1)))
+    weights = np.zeros((len(learned), len(of), len(heat)))
+    for k in range(len(heat)):
+        structures = of.draw(STRUCTURES, 0, [j for j in range(len(heat)) if j != k])
+        own = replace(moments, cross=moments.cross[:, :, [k]], power=moments.power[:, [k]])
+        shares, _ = share_out(own, structures)
+        for row, kept in enumerate(learned):
+            weights[row, :, k] = (shares * fit_each(own, structures, kept)[..., 0]).sum(axis=0)
+    return weights
+
+
+def _limits(
+    samples: Samples,
+    change: FloatArray,
+    predicted: FloatArray,
+    folds: IntArray,
+    column: int,
+    pace: float,
+    wider: float,
+) -> dict[str, float]:
+    """Return the limits of `Watched` for the temperature in a column."""
+    off, values = change - predicted, samples.values[:, column]
+    still, moved = _same(values, predicted, samples.time, folds)
+    return {
+        "off": max(OFF, wider * float(np.nanmax(np.abs(off), initial=0.0))),
+        "jump": max(JUMP, FASTEST * _jump(change, samples.time, folds, pace)),
+        "moved": max(MOVED + _resolution(values), SAFETY * moved),
+        # one that is coarse for its noise reads the same for days on a machine at rest: time says nothing of it
+        "still": STILL if still <= STILL_PART * STILL else GAP,
+        "unseen": float(np.sqrt(np.nanmean(off**2))) if np.isfinite(off).any() else 0.0,
+    }
 
 
 def _covered(speed: FloatArray, folds: IntArray, test: IntArray) -> BoolArray:
