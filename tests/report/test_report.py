@@ -13,7 +13,7 @@ from rich.console import Console
 from smallmachine import small_machine
 
 from thermocomp.api.results import Compared
-from thermocomp.cli.output import show_comparison
+from thermocomp.cli.terminal import print_items
 from thermocomp.files import modelfile
 from thermocomp.judging import splits, study
 from thermocomp.judging.compare import compare
@@ -21,7 +21,7 @@ from thermocomp.judging.results import Comparison
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.stacking import stack
-from thermocomp.report import figures, html
+from thermocomp.report import figures, html, printed
 from thermocomp.report.summary import cautions, summarise, verdict
 
 
@@ -106,7 +106,7 @@ def test_what_disturbances_do_is_told_beside_the_verdict(
     assert all("loss of spindle_rpm" in c for c in told)
     assert re.search(r"noise of 0.4 degC, (loss of \w+, )*loss of spindle_rpm", html.render(bad, [recording]))
     assert "worse than none with" in page
-    show_comparison(bad, None, Console(width=400))
+    print_items(printed.comparison(bad), Console(width=400))
     assert all(c in capsys.readouterr().out for c in told[:1])
     results = [r for r in Compared(bad, (recording,)).to_dict()["results"] if "robustness" in r]
     assert any("loss of spindle_rpm" in r["robustness"]["worse_than_none"] for r in results)

@@ -1,12 +1,10 @@
 """`thermocomp assess`: a model file, judged on recordings."""
 
-from functools import partial
 from pathlib import Path
 
 from thermocomp.api.results import Assessed
 from thermocomp.cli.face import CommandFace, command
-from thermocomp.cli.output import show_assess
-from thermocomp.cli.terminal import console
+from thermocomp.report import printed
 
 
 @command("thermocomp.api.verbs:assess", writes=".html", forms={"model": Path})
@@ -25,6 +23,6 @@ def assess(found: Assessed, face: CommandFace) -> int:
         on, 2 unusable input.
     """
     face.write(found.report)
-    face.show(found.to_dict, partial(show_assess, found.judged, found.recordings, face.output, console))
+    face.print(found.to_dict, printed.assess(found.judged, found.recordings), "Report")
     before = {m.honest_error.word for m in found.judged.models if m.honest_error is not None}
     return 1 if "refused" in before | {a.word for a in found.judged.overall()} else 0

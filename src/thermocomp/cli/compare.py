@@ -1,12 +1,9 @@
 """`thermocomp compare`: methods, judged beside each other."""
 
-from functools import partial
-
 from thermocomp.api.results import Compared
 from thermocomp.cli.exits import STOPPED
 from thermocomp.cli.face import CommandFace, command
-from thermocomp.cli.output import show_comparison
-from thermocomp.cli.terminal import console
+from thermocomp.report import printed
 
 
 @command("thermocomp.api.verbs:compare", writes=".html")
@@ -25,7 +22,7 @@ def compare(found: Compared, face: CommandFace) -> int:
         (what was judged until then is shown).
     """
     face.write(found.report)
-    face.show(found.to_dict, partial(show_comparison, found.comparison, face.output, console))
+    face.print(found.to_dict, printed.comparison(found.comparison), "Report")
     if found.comparison.left:
         return STOPPED
     return 0 if all(best is not None for best in found.best.values()) else 1

@@ -2,7 +2,7 @@
 
 import inspect
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
@@ -18,8 +18,10 @@ from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import CompensatorOptions, LeaveOneOut, Selector
 from thermocomp.cli.progress import Steps, show_progress
 from thermocomp.cli.reading import print_trouble, read_recordings
+from thermocomp.cli.terminal import console, print_items, words
 from thermocomp.core.exceptions import InputError
 from thermocomp.files.draft import refuse_existing
+from thermocomp.report.layout import Item
 
 #: how a parameter is written on a command line, where Python takes more than a line can hold; a group of options has
 #: `value`, which makes of them what the verb takes
@@ -89,6 +91,15 @@ class CommandFace:
             print_json(content())
         else:
             printer()
+
+    def print(self, content: Callable[[], dict[str, Any]], items: Iterable[Item], file: str) -> None:
+        """Print a result for a program or for people, and where the file is that was written."""
+        if self.quiet or self.json:
+            self.show(content, lambda: None)
+            return
+        print_items(items, console)
+        if self.output is not None:
+            console.print(f"{file}: {words(self.output)}", soft_wrap=True)
 
 
 class Verb:

@@ -1,11 +1,8 @@
 """`thermocomp select`: the few sensors that a model needs."""
 
-from functools import partial
-
 from thermocomp.api.selected import Selected
 from thermocomp.cli.face import CommandFace, command
-from thermocomp.cli.output import show_choices
-from thermocomp.cli.terminal import console
+from thermocomp.report import printed
 
 
 @command("thermocomp.api.verbs:select", writes=".html")
@@ -24,5 +21,5 @@ def select(found: Selected, face: CommandFace) -> int:
         2 unusable input.
     """
     face.write(found.report)
-    face.show(found.to_dict, partial(show_choices, found.choices, face.output, console))
+    face.print(found.to_dict, printed.choices(found.choices), "Page")
     return 1 if any(c.failure for c in found.choices) else 0

@@ -1,6 +1,6 @@
 """What a terminal shows: tables, and words that stand out."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from rich.console import Console, ConsoleOptions, ConsoleRenderable, RenderHook
@@ -9,7 +9,7 @@ from rich.segment import Segment
 from rich.table import Table
 
 from thermocomp.core.shown import replace_unprintable
-from thermocomp.report.layout import Layout, Toned, verdict
+from thermocomp.report.layout import Item, Layout, Toned, verdict
 
 
 def make_console(**how: Any) -> Console:
@@ -45,7 +45,15 @@ class _Cleaned:
 #: of all commands
 console = make_console()
 
-_TONES = {"good": "green", "doubtful": "yellow", "bad": "red", "grave": "bold red", "soft": "dim", "strong": "bold"}
+_TONES = {
+    "good": "green",
+    "doubtful": "yellow",
+    "bad": "red",
+    "grave": "bold red",
+    "soft": "dim",
+    "strong": "bold",
+    "chosen": "bold green",
+}
 _ROWS = {"best": "bold green", "none": "dim"}
 
 
@@ -65,6 +73,15 @@ def marked(text: str) -> str:
 def mark(word: str) -> str:
     """Return a verdict in its colour."""
     return marked(verdict(word))
+
+
+def print_items(items: Iterable[Item], console: Console) -> None:
+    """Print lines and tables."""
+    for item in items:
+        if isinstance(item, Layout):
+            print_table(item, console)
+        else:
+            console.print(f"{marked(item.mark) if item.mark else ''}{words(item.text)}", soft_wrap=item.whole)
 
 
 def print_table(t: Layout, console: Console, **how: Any) -> None:

@@ -118,3 +118,24 @@ def in_um(value: float | None) -> str:
     if value is None or not math.isfinite(value):
         return "–"
     return f"{round(value, 2) + 0.0:.2f}" if abs(value) < 100 else f"{value:.0f}"  # no minus zero
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line of text.
+
+    Parameters
+    ----------
+    text : str
+    mark : Toned or None
+        Words before it that stand out.
+    whole : bool
+        It is not broken where the terminal ends.
+    """
+
+    text: str
+    mark: Toned | None = None
+    whole: bool = False
+
+
+Item = Line | Layout

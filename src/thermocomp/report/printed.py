@@ -1,85 +1,70 @@
-"""What the commands print: a table for people, JSON for machines."""
+"""What a terminal shows of a result: lines and tables, in their order."""
 
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Iterator, Sequence
 
-from rich.console import Console
-
-from thermocomp.cli.terminal import mark, print_table, words
 from thermocomp.judging import coverage
-from thermocomp.judging.choice import Choice
+from thermocomp.judging.choice import Choice, Table
 from thermocomp.judging.do_no_harm import JudgedUnit
 from thermocomp.judging.faultlog import find_faults
 from thermocomp.judging.results import Assessment, Comparison
+from thermocomp.judging.robustness import Robustness
 from thermocomp.judging.study import Fitted, Judged
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.starts import Start
 from thermocomp.report import records
 from thermocomp.report.bands import describe_bands
 from thermocomp.report.faults import describe_faults, describe_held
-from thermocomp.report.layout import Column, Layout, Toned, laid_out, verdict
+from thermocomp.report.layout import Column, Item, Layout, Line, Toned, laid_out, verdict
 from thermocomp.report.losses import describe_losses
 from thermocomp.report.probings import describe_probings
 from thermocomp.report.running import describe_running
 from thermocomp.report.summary import cautions, describe_unlike
 
+BUT, NOTE = Toned("but", "doubtful"), Toned("note", "soft")
 
-def show_comparison(
-    comparison: Comparison,
-    report: Path | None,
-    console: Console,
-) -> None:
-    """Print a comparison of methods on unseen blocks."""
-    _tell_starts(comparison.starts, console)
-    console.print(f"Judged on: {words(comparison.judging.name)}")
-    print_table(_assessment_table(comparison.assessments), console)
-    print_table(_cycle_table(comparison.assessments), console)
-    for a in comparison.overall():
+
+def comparison(found: Comparison) -> Iterator[Item]:
+    """Yield a comparison of methods on unseen blocks."""
+    yield from _starts(found.starts)
+    yield Line(f"Judged on: {found.judging.name}")
+    yield _assessment_table(found.assessments)
+    yield _cycle_table(found.assessments)
+    for a in found.overall():
         if not a.accepted:
-            console.print(f"{mark(a.word)} {words(a.model)} for {words(a.target)}: {words(a.reason)}", soft_wrap=True)
-    for target in dict.fromkeys(a.target for a in comparison.assessments):
-        best = comparison.best(target)
+            yield Line(f" {a.model} for {a.target}: {a.reason}", verdict(a.word), whole=True)
+    for target in dict.fromkeys(a.target for a in found.assessments):
+        best = found.best(target)
         if best is None:
-            console.print(f"[bold red]{words(target)}: no model may run yet[/]")
+            yield Line("", Toned(f"{target}: no model may run yet", "grave"))
         else:
-            console.print(
-                f"[bold green]{words(target)}: {words(best.model)}[/], {best.metric('rms'):.2f} um RMS "
-                f"instead of {best.none_metric('rms'):.2f} um ({best.metric('reduction'):.0f} % less): "
-                f"{words(best.reason)}",
-                soft_wrap=True,
+            yield Line(
+                f", {best.metric('rms'):.2f} um RMS instead of {best.none_metric('rms'):.2f} um "
+                f"({best.metric('reduction'):.0f} % less): {best.reason}",
+                Toned(f"{target}: {best.model}", "chosen"),
+                whole=True,
             )
-    for caution in cautions(comparison):
-        console.print(f"[yellow]but[/] {words(caution)}")
-    for line in describe_running(comparison.overall()):
-        console.print(words(line))
-    if comparison.left:
-        console.print(f"[bold red]stopped:[/] {comparison.left} pairs of method and target were not judged")
-    if report is not None:
-        console.print(f"Report: {words(report)}")
+    yield from (Line(f" {caution}", BUT) for caution in cautions(found))
+    yield from map(Line, describe_running(found.overall()))
+    if found.left:
+        yield Line(f" {found.left} pairs of method and target were not judged", Toned("stopped:", "grave"))
 
 
-def show_choices(choices: Sequence[Choice], page: Path | None, console: Console) -> None:
-    """Print selections of sensors."""
-    for c in choices:
+def choices(found: Sequence[Choice]) -> Iterator[Item]:
+    """Yield selections of sensors."""
+    for c in found:
         for t in c.tables:
-            console.print(f"\n[bold]{words(c.target)}: {words(t.title)}[/]")
-            print_table(laid_out(t), console)
-        for note in c.notes:
-            console.print(f"[dim]note[/] {words(note)}")
-        console.print(
-            f"[{'red' if c.failure else 'bold green'}]{words(c.target)}: "
-            f"{words(', '.join(c.sensors) or 'no sensor')}[/]: {words(c.reason)}"
-        )
-    if page is not None:
-        console.print(f"Page: {words(page)}", soft_wrap=True)
+            yield from _titled(f"{c.target}: {t.title}", t)
+        yield from (Line(f" {note}", NOTE) for note in c.notes)
+        chosen = f"{c.target}: {', '.join(c.sensors) or 'no sensor'}"
+        yield Line(f": {c.reason}", Toned(chosen, "bad" if c.failure else "chosen"))
 
 
-def show_fit(fitted: Fitted, path: Path | None, console: Console) -> None:
-    """Print models that were fitted and written."""
+def fit(fitted: Fitted) -> Iterator[Item]:
+    """Yield models that were fitted."""
     overall = fitted.comparison.overall()
     models = [records.model(m, r2, a) for m, r2, a in zip(fitted.models, fitted.r_squared, overall, strict=True)]
-    _tell_starts(fitted.comparison.starts, console)
-    console.print(f"Judged on: {words(fitted.comparison.judging.name)}")
+    yield from _starts(fitted.comparison.starts)
+    yield Line(f"Judged on: {fitted.comparison.judging.name}")
     columns = (
         Column("target", "target"),
         Column("sensors", lambda m: len(m["sensors"]), ">"),
@@ -88,68 +73,57 @@ def show_fit(fitted: Fitted, path: Path | None, console: Console) -> None:
         Column("none RMS", "none_rms_um", ".2f", "um"),
         Column("verdict", lambda m: verdict(m["verdict"])),
     )
-    print_table(Layout(columns, models), console)
+    yield Layout(columns, models)
     for m in fitted.models:
         if m.honest_error is not None:
-            console.print(f"{mark(m.honest_error.word)} {words(m.target)}: {words(m.honest_error.why)}", soft_wrap=True)
-    for line in [
-        *describe_running(overall),
-        *describe_bands(fitted.models, overall),
-        *describe_losses(fitted.models),
-    ]:
-        console.print(words(line))
-    if path is not None:
-        console.print(f"Model file: {words(path)}", soft_wrap=True)
+            yield Line(f" {m.target}: {m.honest_error.why}", verdict(m.honest_error.word), whole=True)
+    bands = describe_bands(fitted.models, overall)
+    yield from map(Line, [*describe_running(overall), *bands, *describe_losses(fitted.models)])
 
 
-def show_assess(
-    judged: Judged,
-    recordings: Sequence[Recording],
-    report: Path | None,
-    console: Console,
-) -> None:
-    """Print how models did on recordings."""
+def assess(judged: Judged, recordings: Sequence[Recording]) -> Iterator[Item]:
+    """Yield how models did on recordings."""
     logs = find_faults(judged, recordings)
-    _tell_starts(judged.starts, console)
+    yield from _starts(judged.starts)
     for line in describe_faults(logs, recordings):
-        console.print(f"[yellow]sensor failed[/] {words(line)}", soft_wrap=True)
-    for line in describe_held(judged, logs):
-        console.print(f"[yellow]but[/] {words(line)}", soft_wrap=True)
-    print_table(_assessment_table(judged.assessments), console)
-    print_table(_cycle_table(judged.assessments), console)
-    print_table(_robustness(judged.overall()), console)
+        yield Line(f" {line}", Toned("sensor failed", "doubtful"), whole=True)
+    yield from (Line(f" {line}", BUT, whole=True) for line in describe_held(judged, logs))
+    yield _assessment_table(judged.assessments)
+    yield _cycle_table(judged.assessments)
+    yield _robustness(judged.overall())
     for a in judged.overall():
-        console.print(f"{mark(a.word)} {words(a.target)}: {words(a.reason)}", soft_wrap=True)
-        if a.robustness is not None and a.robustness.harm:
-            console.print(f"[red]harmful when disturbed[/] {words(a.target)}: {words(a.robustness.harm)}")
-        if a.robustness is not None and a.robustness.outside > 0.1:
-            share = f"{100 * a.robustness.outside:.0f} % of the rows"
-            console.print(f"[yellow]but[/] {share} are outside the range {words(a.target)} was trained in")
-        if a.robustness is not None and a.robustness.unlike > 0.1:
-            console.print(f"[yellow]but[/] {words(a.target)}: {words(describe_unlike(a.robustness))}")
-    for line in [
-        *describe_running(judged.overall()),
-        *describe_bands(judged.models, judged.overall()),
-        *describe_probings(judged.overall()),
-    ]:
-        console.print(words(line))
+        yield Line(f" {a.target}: {a.reason}", verdict(a.word), whole=True)
+        if a.robustness is not None:
+            yield from _disturbed(a.target, a.robustness)
+    bands = describe_bands(judged.models, judged.overall())
+    yield from map(Line, [*describe_running(judged.overall()), *bands, *describe_probings(judged.overall())])
     fitted = {"when fitted": judged.models[0].validity, "these recordings": judged.validity}
-    known = {name: v for name, v in fitted.items() if v is not None}
-    if known:
+    if known := {name: v for name, v in fitted.items() if v is not None}:
         covered = coverage.table(known)
-        console.print(f"\n[bold]{words(covered.title)}[/]")
-        print_table(laid_out(covered), console)
+        yield from _titled(covered.title, covered)
     for m in judged.models:
         if m.honest_error is not None and not m.accepted:
-            word = mark(f"{m.honest_error.word} when it was fitted")
-            console.print(f"{word} {words(m.target)}: {words(m.honest_error.why)}", soft_wrap=True)
-    if report is not None:
-        console.print(f"Report: {words(report)}", soft_wrap=True)
+            word = verdict(f"{m.honest_error.word} when it was fitted")
+            yield Line(f" {m.target}: {m.honest_error.why}", word, whole=True)
 
 
-def _tell_starts(begins: Sequence[tuple[str, Start]], console: Console) -> None:
-    for name, start in begins:
-        console.print(f"Start of {words(start.told(name))}")
+def _disturbed(target: str, found: Robustness) -> Iterator[Line]:
+    if found.harm:
+        yield Line(f" {target}: {found.harm}", Toned("harmful when disturbed", "bad"))
+    if found.outside > 0.1:
+        yield Line(f" {100 * found.outside:.0f} % of the rows are outside the range {target} was trained in", BUT)
+    if found.unlike > 0.1:
+        yield Line(f" {target}: {describe_unlike(found)}", BUT)
+
+
+def _titled(title: str, t: Table) -> Iterator[Item]:
+    yield Line("")
+    yield Line("", Toned(title, "strong"))
+    yield laid_out(t)
+
+
+def _starts(begins: Sequence[tuple[str, Start]]) -> Iterator[Line]:
+    return (Line(f"Start of {start.told(name)}") for name, start in begins)
 
 
 def _robustness(assessments: Sequence[Assessment]) -> Layout:
