@@ -18,6 +18,9 @@ from reviseruns import PLATE, judged
 from smallmachine import small_machine
 
 from thermocomp.api import testprogram
+from thermocomp.api.check import CheckedRecordings
+from thermocomp.api.results import Assessed, Compared
+from thermocomp.api.selected import Selected
 from thermocomp.cli.app import run
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
@@ -49,7 +52,7 @@ class Writer(NamedTuple):
     last: str  #: the one that an error names
 
 
-def _page(module: object, name: str, write: Callable[[Path], None]) -> Writer:
+def _page(module: object, name: str, write: Callable[[Path], object]) -> Writer:
     """A page, whose making takes long: its text is there already."""
 
     def go(folder: Path, version: int) -> None:
@@ -161,10 +164,10 @@ WRITERS: dict[str, Writer] = {
     "mapping": Writer(_mapping, ("raw.toml",), "raw.toml"),
     "csv": _recording("csv"),
     "parquet": _recording("parquet"),
-    "check page": _page(checks, "render", lambda p: checks.write([], [], p, overwrite=True)),
-    "report": _page(html, "render", lambda p: html.write(None, [], p, overwrite=True)),  # type: ignore[arg-type]
-    "page of assess": _page(assessed, "render", lambda p: assessed.write(None, [], p, overwrite=True)),  # type: ignore[arg-type]
-    "selection page": _page(html, "render_choices", lambda p: html.write_choices([], [], p, overwrite=True)),
+    "check page": _page(checks, "render", lambda p: CheckedRecordings((), ()).report(p, overwrite=True)),
+    "report": _page(html, "render", lambda p: Compared(None, ()).report(p, overwrite=True)),  # type: ignore[arg-type]
+    "page of assess": _page(assessed, "render", lambda p: Assessed(None, ()).report(p, overwrite=True)),  # type: ignore[arg-type]
+    "selection page": _page(html, "render_choices", lambda p: Selected(()).report(p, overwrite=True)),
     "iso230 page": _page(iso230pages, "render", lambda p: iso230pages.write([], [], [], p, overwrite=True)),
     "papers page": _page(paperpages, "render", lambda p: paperpages.write([], p, seed=0, overwrite=True)),
     "volumetric page": _page(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from thermocomp.api.inputs import Given, recordings_of
-from thermocomp.api.results import Result
+from thermocomp.api.results import Result, write_page
 from thermocomp.core.exceptions import InputError
 from thermocomp.recordings.checks import quality
 from thermocomp.recordings.checks.findings import Finding
@@ -72,8 +72,7 @@ class CheckedRecordings(Result):
         """Write the page that ``thermocomp check -o`` writes; return its path."""
         from thermocomp.report import checks
 
-        checks.write(self.recordings, self.findings, Path(path), overwrite=overwrite)
-        return Path(path)
+        return write_page(checks.render(self.recordings, self.findings), path, overwrite)
 
     def __str__(self) -> str:
         worst = (

@@ -14,10 +14,10 @@ from thermocomp.core.columns import Columns
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.explained import Explanations, explain_all
 from thermocomp.core.model import ErrorModel
+from thermocomp.files.draft import write_text
 from thermocomp.judging.faultlog import find_faults
 from thermocomp.judging.results import Assessment, Comparison
 from thermocomp.judging.study import Fitted, Judged
-from thermocomp.models.methods import deployable
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.starts import Start
@@ -56,6 +56,12 @@ class Result(ABC):
         return f"<p>{escape(str(self))}</p>{self.to_frame().to_html(index=False, float_format='{:.2f}'.format)}"
 
 
+def write_page(text: str, path: str | Path, overwrite: bool) -> Path:
+    """Write a page, whole or not at all; return its path."""
+    write_text(text, Path(path), overwrite=overwrite)
+    return Path(path)
+
+
 def starts_content(begins: Sequence[tuple[str, Start]]) -> list[dict[str, object]]:
     """Return how recordings begin, for a program."""
     return [start.content(name) for name, start in begins]
@@ -87,7 +93,7 @@ def frame_of(assessments: Sequence[Assessment]) -> pd.DataFrame:
             "half_width": [a.half_width for a in assessments],
             "sensors": [a.n_sensors[1] for a in assessments],
             "verdict": [a.word for a in assessments],
-            "deployable": [deployable(a.model) for a in assessments],
+            "deployable": [a.deployable for a in assessments],
             "reason": [a.reason for a in assessments],
         }
     )
@@ -187,8 +193,7 @@ class Compared(Result):
         """Write the page that ``thermocomp compare -o`` writes; return its path."""
         from thermocomp.report import html
 
-        html.write(self.comparison, self.recordings, Path(path), self.samples, overwrite=overwrite)
-        return Path(path)
+        return write_page(html.render(self.comparison, self.recordings, self.samples), path, overwrite)
 
     def __str__(self) -> str:
         from thermocomp.report.summary import verdict
@@ -355,8 +360,7 @@ class Assessed(Result):
         """Write the page that ``thermocomp assess -o`` writes; return its path."""
         from thermocomp.report import assessed
 
-        assessed.write(self.judged, self.recordings, Path(path), overwrite=overwrite)
-        return Path(path)
+        return write_page(assessed.render(self.judged, self.recordings), path, overwrite)
 
     def __str__(self) -> str:
         return " ".join([*(_judged(a) for a in self.judged.overall()), *told_trouble(self.trouble)])

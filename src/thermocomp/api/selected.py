@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from thermocomp.api.results import Result, told_trouble
+from thermocomp.api.results import Result, told_trouble, write_page
 from thermocomp.core.exceptions import InputError
 from thermocomp.judging.choice import Choice
 from thermocomp.recordings.recording import Recording
@@ -51,8 +51,7 @@ class Selected(Result):
         """Write the page that ``thermocomp select -o`` writes; return its path."""
         from thermocomp.report import html
 
-        html.write_choices(self.choices, self.recordings, Path(path), overwrite=overwrite)
-        return Path(path)
+        return write_page(html.render_choices(self.choices, self.recordings), path, overwrite)
 
     @property
     def sensors(self) -> dict[str, tuple[str, ...]]:

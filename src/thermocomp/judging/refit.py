@@ -15,7 +15,6 @@ from thermocomp.judging.guards import Guard, find_guard
 from thermocomp.judging.pieces import work_through
 from thermocomp.judging.results import Assessment
 from thermocomp.judging.robustness import stress, worse
-from thermocomp.models.methods import deployable
 from thermocomp.models.training import train
 from thermocomp.recordings.samples import Samples
 
@@ -67,7 +66,7 @@ def refit_accepted(
     list of Assessment
         The same, less sure of what noise or a lost sensor would make worse than none.
     """
-    wanted = [a for a in judged if a.overall and a.accepted and deployable(a.model)]
+    wanted = [a for a in judged if a.overall and a.accepted and a.deployable]
     everything = np.ones(len(samples), dtype=np.bool_)
     guard = find_guard(samples, everything, everything) if watch and wanted else None
     found = work_through(partial(_refit, samples, support, guard), wanted, _not_refitted, jobs=jobs)

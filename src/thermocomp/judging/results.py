@@ -143,6 +143,11 @@ class Assessment:
         """Judged rows with a band."""
         return np.zeros(0, np.bool_) if self.half_widths is None else np.isfinite(self.half_widths)
 
+    @property
+    def deployable(self) -> bool:
+        """Its method can be frozen, so that it may run at a machine."""
+        return deployable(self.model)
+
     def metric(self, name: str) -> float:
         """Return a metric of `thermocomp.judging.metrics`; nan if the method could not be fitted."""
         return float("nan") if self.failure else metrics.METRICS[name](self.measured, self.predicted)
@@ -244,6 +249,6 @@ class Comparison:
 
         Without one it is the accepted one with the smallest RMS, of the methods that can be deployed.
         """
-        fit = [a for a in self.overall() if a.target == target and a.accepted and deployable(a.model)]
+        fit = [a for a in self.overall() if a.target == target and a.accepted and a.deployable]
         first = {r.method for r in self.recommended if r.target == target}
         return min(fit, key=lambda a: (a.model not in first, a.metric("rms")), default=None)

@@ -6,9 +6,7 @@ A section of it is a function that makes one of what was judged, and a line in `
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from pathlib import Path
 
-from thermocomp.files.draft import write_text
 from thermocomp.judging import coverage
 from thermocomp.judging.diagnostics import Collinearity
 from thermocomp.judging.results import Assessment, Comparison
@@ -52,19 +50,6 @@ def render(judged: Judged, recordings: Sequence[Recording]) -> str:
             "measured": [figures.measured(r) for r in recordings],
         },
     )
-
-
-def write(judged: Judged, recordings: Sequence[Recording], path: Path, *, overwrite: bool = False) -> None:
-    """Write the page.
-
-    Parameters
-    ----------
-    judged, recordings
-        See `render`.
-    path, overwrite
-        See `thermocomp.files.draft.drafts`.
-    """
-    write_text(render(judged, recordings), path, overwrite=overwrite)
 
 
 def _verdict(a: Assessment) -> str:

@@ -1,7 +1,6 @@
 """What `check` found in recordings, as one offline page: the channels drawn, the findings marked at their rows."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,7 +8,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from thermocomp.core.machine import Channel
-from thermocomp.files.draft import write_text
 from thermocomp.recordings.checks.findings import Finding
 from thermocomp.recordings.recording import Recording
 from thermocomp.report import records
@@ -43,21 +41,6 @@ def render(recordings: Sequence[Recording], findings: Sequence[Sequence[Finding]
         recordings=[_recording(r, found) for r, found in zip(recordings, findings, strict=True)],
         remedy=records.remedy,
     )
-
-
-def write(
-    recordings: Sequence[Recording], findings: Sequence[Sequence[Finding]], path: Path, *, overwrite: bool = False
-) -> None:
-    """Write the page.
-
-    Parameters
-    ----------
-    recordings, findings
-        See `render`.
-    path, overwrite
-        See `thermocomp.files.draft.drafts`.
-    """
-    write_text(render(recordings, findings), path, overwrite=overwrite)
 
 
 def draw(recording: Recording, findings: Sequence[Finding]) -> str:

@@ -1,7 +1,6 @@
 """Numbers, then a dict, then a template, then one offline HTML file."""
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
@@ -10,7 +9,6 @@ from markupsafe import Markup
 from thermocomp import __version__
 from thermocomp.core.paceddynamic import PacedDynamic
 from thermocomp.core.shown import replace_unprintable
-from thermocomp.files.draft import write_text
 from thermocomp.judging.choice import Choice
 from thermocomp.judging.results import Assessment, Comparison
 from thermocomp.recordings.recording import Recording
@@ -114,44 +112,6 @@ def render_choices(choices: Sequence[Choice], recordings: Sequence[Recording]) -
         choices=choices,
         figures=[selections.draw(c) for c in choices],
     )
-
-
-def write_choices(
-    choices: Sequence[Choice], recordings: Sequence[Recording], path: Path, *, overwrite: bool = False
-) -> None:
-    """Write a selection of sensors as a page.
-
-    Parameters
-    ----------
-    choices, recordings
-        See `render_choices`.
-    path, overwrite
-        See `thermocomp.files.draft.drafts`.
-    """
-    write_text(render_choices(choices, recordings), path, overwrite=overwrite)
-
-
-def write(
-    comparison: Comparison,
-    recordings: Sequence[Recording],
-    path: Path,
-    samples: Samples | None = None,
-    *,
-    overwrite: bool = False,
-) -> None:
-    """Write the report.
-
-    Parameters
-    ----------
-    comparison : Comparison
-    recordings : sequence of Recording
-    path : Path
-    samples : Samples, optional
-        See `render`.
-    overwrite : bool
-        See `thermocomp.files.draft.drafts`.
-    """
-    write_text(render(comparison, recordings, samples), path, overwrite=overwrite)
 
 
 def page(template: str, **content: Any) -> str:
