@@ -33,7 +33,7 @@ GIVEN = {
     "nc/revision/job.py": {"_write": 3},
     "live/journal/journal.py": {"_set_aside": 1},  # a journal that is damaged is moved aside, not lost
     "nc/revision/ncprogram.py": {"open_to_write": 1, "replace_lines": 1},
-    "live/loop.py": {"_put_aside": 1},  # a state that is refused is moved aside, not lost
+    "live/keeper.py": {"put_aside": 1},  # a state that is refused is moved aside, not lost
 }
 #: who writes files; each is a kind in `allwriters.WRITERS`, or stands behind one
 WRITING = {
@@ -46,9 +46,7 @@ WRITING = {
     "files/jsonfile.py",
     "recordings/readers/recordings.py",
     "api/testprogram.py",
-    "report/assessed.py",
-    "report/checks.py",
-    "report/html.py",
+    "api/results.py",
     "iso230/report/iso230.py",
     "papers/report/papers.py",
     "volumetric/report/volumetric.py",
