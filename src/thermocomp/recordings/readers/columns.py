@@ -14,7 +14,7 @@ from thermocomp.recordings.headings import Meaning, understand
 from thermocomp.recordings.readers.cellkinds import Kinds
 from thermocomp.recordings.readers.mapping import ColumnMap, Mapping, Place
 from thermocomp.recordings.readers.tables import tell_places
-from thermocomp.recordings.readers.timecolumns import find_position, find_time
+from thermocomp.recordings.readers.timecolumns import TimePlan, find_position, find_time
 
 FloatArray = NDArray[np.float64]
 
@@ -100,18 +100,10 @@ class ColumnPlan:
 
     Parameters
     ----------
-    time : int
-        Position of the time column.
+    times : TimePlan
+        The columns that hold the time.
     time_unit : str
         A unit of time, ``timestamp``, or empty if neither heading nor mapping says.
-    date : int or None
-        Position of a column of dates that goes with a time of day.
-    half : int or None
-        Position of a column of AM and PM.
-    fraction : int or None
-        Position of a column of milliseconds that goes with whole seconds.
-    unused : tuple of int
-        Positions of further columns that hold dates.
     beside : tuple of int
         Positions of further columns that must hold the same times: one beside each channel.
     cycle : int or None
@@ -125,12 +117,8 @@ class ColumnPlan:
     notes : tuple of str
     """
 
-    time: int
+    times: TimePlan
     time_unit: str
-    date: int | None
-    half: int | None
-    fraction: int | None
-    unused: tuple[int, ...]
     beside: tuple[int, ...]
     cycle: int | None
     columns: tuple[PlannedColumn, ...]
@@ -170,18 +158,18 @@ def plan(
     """
     meanings = _understand_all(headings, mapping, source)
     try:
-        time, date, half, fraction, unused, told = find_time(headings, meanings, mapping, source, kinds, head)
+        times = find_time(headings, meanings, mapping, source, kinds, head)
     except RecordingError:
         _refuse_twins(headings, mapping, source)
         raise
-    notes = [*told]
+    time, notes = times.time, [*times.notes]
     twins = [k for k, heading in enumerate(headings) if heading and heading == headings[time] and k != time]
     beside = () if mapping.time.column else tuple(twins)
     _refuse_twins(headings, mapping, source, headings[time] if beside else "")
     cycle = _find_cycle(headings, mapping, source)
     columns: list[PlannedColumn] = []
     tables: dict[int, str] = {}
-    ignored = {k for k in (time, date, half, fraction, cycle, *beside) if k is not None}
+    ignored = {k for k in (time, times.date, times.half, times.fraction, cycle, *beside) if k is not None}
     for name, rule in mapping.columns.items():
         place = rule.column or name
         if rule.role == "ignore" and isinstance(place, str) and place not in headings:
@@ -217,19 +205,14 @@ def plan(
     said = None if is_stamp else meanings[time]
     time_unit, note = _time_unit(headings[time], said, mapping, source)
     notes.extend([note] if note else [])
-    aliases = _aliases(columns, headings, meanings)
     return ColumnPlan(
-        time=time,
+        times=times,
         time_unit=time_unit,
-        date=date,
-        half=half,
-        fraction=fraction,
-        unused=unused,
         beside=beside,
         cycle=cycle,
         columns=tuple(columns),
         left_out=tuple(left_out),
-        aliases=aliases,
+        aliases=_aliases(columns, headings, meanings),
         notes=tuple(notes),
     )
 
