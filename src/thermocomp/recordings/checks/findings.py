@@ -123,6 +123,12 @@ def cut(name: str, rows: IntArray, time: FloatArray, reason: str) -> Remedy:
     return {"clean": [{"do": "cut", "channels": [name], "times": times, "reason": reason}]}
 
 
+def cut_out(severity: Severity, channel: Channel, kind: str, text: str, rows: IntArray, time: FloatArray) -> Finding:
+    """Return a finding of rows that are sound without the values of a channel; to take these out is its remedy."""
+    remedy = cut(channel.name, rows, time, kind)
+    return Finding(severity=severity, channel=channel.name, kind=kind, text=text, rows=rows, remedy=remedy)
+
+
 def column(name: str, **keys: object) -> Remedy:
     """Return what a mapping says of the column of a channel."""
     return {"columns": {name: keys}}
