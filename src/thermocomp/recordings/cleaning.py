@@ -8,13 +8,10 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
 from thermocomp.core.exceptions import InputError
 from thermocomp.recordings.rows import Instant, Rows
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 #: places that are listed
 MOST_LISTED = 40
@@ -303,7 +300,7 @@ def _step(x: FloatArray, first: int, name: str, owner: str) -> float:
     return float(np.mean(x[after]) - np.mean(x[before]) - slope * middle)
 
 
-def _listed(places: Sequence[str], at: NDArray[np.intp]) -> str:
+def _listed(places: Sequence[str], at: IntArray) -> str:
     """Return places in words, neighbours as one stretch."""
     if not places:
         return ""

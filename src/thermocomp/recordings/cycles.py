@@ -5,12 +5,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.exceptions import RecordingError
-
-FloatArray = NDArray[np.float64]
-
 
 #: shorter runs and stops of the spindle do not split a test [s]
 SPLITS = 300.0
@@ -112,7 +109,7 @@ def split_by_labels(labels: Sequence[object]) -> tuple[Cycle, ...]:
     return tuple(Cycle(n, a, b) for n, a, b in zip(names, starts, [*starts[1:], len(text)], strict=True))
 
 
-def _drop_short(time: FloatArray, turning: NDArray[np.bool_], *, state: bool, shorter_than: float) -> NDArray[np.bool_]:
+def _drop_short(time: FloatArray, turning: BoolArray, *, state: bool, shorter_than: float) -> BoolArray:
     """Return `turning` with the stretches of `state` that are too short turned over; the first and last one stay."""
     edges = np.flatnonzero(np.diff(turning)) + 1
     bounds = [0, *edges.tolist(), len(turning)]

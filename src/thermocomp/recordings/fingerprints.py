@@ -12,12 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
 from thermocomp.core.fingerprints import Prints, Runs, pack_marks, unpack_marks
 from thermocomp.recordings.samples import Samples
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
-BoolArray = NDArray[np.bool_]
 Marks = NDArray[np.uint32]
 
 #: differences in a run

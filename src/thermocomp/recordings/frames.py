@@ -6,16 +6,15 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.core.instants import seconds
 from thermocomp.core.machine import Channel
 from thermocomp.core.units import find_unit
 from thermocomp.recordings.cycles import Cycle, find_cycles, make_single_cycle, split_by_labels
 from thermocomp.recordings.headings import Meaning, understand
-
-FloatArray = NDArray[np.float64]
 
 
 def parts_of(

@@ -9,16 +9,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
 from thermocomp.core.exceptions import RecordingError
 from thermocomp.core.inputs import Input
 from thermocomp.core.learned import Learned, probe_noise
 from thermocomp.core.machine import Channel
 from thermocomp.core.zero import FIRST_READING, Zeroing, first_rows, robust_mean
 from thermocomp.recordings.starts import Start
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
-BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

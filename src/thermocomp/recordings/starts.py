@@ -7,15 +7,12 @@ from itertools import pairwise
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
 from thermocomp.core.zero import Zeroing, first_rows, robust_mean
 from thermocomp.recordings.recording import Recording
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 Word = Literal["cold", "continued", "rezeroed", "known"]
 #: what the words mean, for tables and errors

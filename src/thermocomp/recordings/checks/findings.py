@@ -8,12 +8,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
 from thermocomp.core.exceptions import Remedy
 from thermocomp.core.machine import Channel
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
-BoolArray = NDArray[np.bool_]
 
 Severity = Literal["trouble", "warning", "info"]
 SEVERITIES: tuple[Severity, ...] = ("trouble", "warning", "info")

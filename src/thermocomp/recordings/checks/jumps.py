@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from thermocomp.recordings.checks.findings import BoolArray, Finding, FloatArray, IntArray, Signal, at_row, cut_out
+from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
+from thermocomp.recordings.checks.findings import Finding, Signal, at_row, cut_out
 
 #: smallest step that is told, by quantity [degC, um, urad]
 LEAST = {"temperature": 1.5, "displacement": 5.0, "angle": 20.0}

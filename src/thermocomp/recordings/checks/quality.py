@@ -4,15 +4,13 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
 from thermocomp.core.machine import Channel
 from thermocomp.recordings.checks import suspects
 from thermocomp.recordings.checks.clocks import clocks
 from thermocomp.recordings.checks.findings import (
     SEVERITIES,
-    BoolArray,
     Finding,
-    FloatArray,
-    IntArray,
     Severity,
     Signal,
     at_row,

@@ -5,7 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from thermocomp.recordings.checks.findings import BoolArray, Finding, FloatArray, Signal, at_row, count, cut_out
+from thermocomp.core.arrays import BoolArray, FloatArray
+from thermocomp.recordings.checks.findings import Finding, Signal, at_row, count, cut_out
 
 #: most rows of one spike; what stays away longer is told as two steps
 LONGEST = 10

@@ -5,16 +5,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from thermocomp.recordings.checks.findings import (
-    BoolArray,
-    Finding,
-    FloatArray,
-    Severity,
-    Signal,
-    at_row,
-    cut_out,
-    runs,
-)
+from thermocomp.core.arrays import BoolArray, FloatArray
+from thermocomp.recordings.checks.findings import Finding, Severity, Signal, at_row, cut_out, runs
 
 #: rows that a value must stand still for
 SHORTEST = 30

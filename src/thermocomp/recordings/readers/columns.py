@@ -5,8 +5,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import RecordingError, UnitError
 from thermocomp.core.machine import Channel
 from thermocomp.core.units import Unit, find_unit
@@ -15,8 +15,6 @@ from thermocomp.recordings.readers.cellkinds import Kinds
 from thermocomp.recordings.readers.mapping import ColumnMap, Mapping, Place
 from thermocomp.recordings.readers.tables import tell_places
 from thermocomp.recordings.readers.timecolumns import TimePlan, find_position, find_time
-
-FloatArray = NDArray[np.float64]
 
 #: below this no absolute temperature of a machine lies [K]
 _COLDEST = 200.0

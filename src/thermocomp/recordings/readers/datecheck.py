@@ -6,18 +6,17 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import Remedy, TwoReadingsError
 from thermocomp.recordings.readers.cellkinds import CLOCK, find_kind, is_compact_date, plain_clocks, plain_dates
-from thermocomp.recordings.readers.dayforms import IntArray, read_other_days
+from thermocomp.recordings.readers.dateorder import IntArray
+from thermocomp.recordings.readers.dayforms import read_other_days
 from thermocomp.recordings.readers.filecells import FileCells
 from thermocomp.recordings.readers.numbers import is_filler
 from thermocomp.recordings.readers.stamps import has_day, read_days
 from thermocomp.recordings.readers.tables import FileTable
 from thermocomp.recordings.readers.timecolumns import has_passed, is_ignored
-
-FloatArray = NDArray[np.float64]
 
 _DAY = 86_400.0
 #: clocks are set, for summer time too [s]

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import InputError, RecordingError, TwoReadingsError
 from thermocomp.files.draft import draft
 from thermocomp.recordings.cleaning import clean
@@ -31,8 +31,6 @@ from thermocomp.recordings.readers.tables import EMBEDDED, FileTable, defuse, re
 from thermocomp.recordings.readers.times import read_times
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.rows import Rows
-
-FloatArray = NDArray[np.float64]
 
 #: notes of one recording, and characters of a note or an error
 _MOST_NOTES = 100

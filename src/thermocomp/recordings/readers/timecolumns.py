@@ -2,10 +2,9 @@
 
 import re
 from collections.abc import Callable, Sequence
-from difflib import get_close_matches
 from typing import NamedTuple
 
-from thermocomp.core.exceptions import RecordingError
+from thermocomp.core.exceptions import RecordingError, tell_nearest
 from thermocomp.recordings.headings import BRACKETS, Meaning, is_time_name, plain_name
 from thermocomp.recordings.readers.cellkinds import Kinds
 from thermocomp.recordings.readers.dayforms import names_day
@@ -125,8 +124,7 @@ def find_position(place: Place, headings: Sequence[str], table: str, source: str
         raise RecordingError(f"{source}: mapping {table}: there are {len(headings)} columns, and no number {place}")
     if place in headings:
         return list(headings).index(place)
-    near = get_close_matches(place, headings, n=3, cutoff=0.5)
-    hint = f"the nearest are {', '.join(near)}" if near else f"there are {', '.join(h for h in headings if h)}"
+    hint = tell_nearest(place, filter(None, headings), cutoff=0.5)
     raise RecordingError(f"{source}: mapping {table}: the file has no column {place!r}; {hint}")
 
 

@@ -4,13 +4,11 @@ from typing import Any, NoReturn
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray, IntArray
 from thermocomp.core.exceptions import RecordingError, TwoReadingsError
 from thermocomp.recordings.readers.filecells import FileCells
 from thermocomp.recordings.readers.tables import skip_row
-
-FloatArray = NDArray[np.float64]
 
 _DAY = 86_400.0
 _ZONE = (
@@ -19,9 +17,7 @@ _ZONE = (
 )
 
 
-def refuse_falling(
-    wrong: NDArray[np.intp], time: FloatArray, shown: "pd.Series[Any]", start: str, file: FileCells
-) -> NoReturn:
+def refuse_falling(wrong: IntArray, time: FloatArray, shown: "pd.Series[Any]", start: str, file: FileCells) -> NoReturn:
     """Refuse times that do not rise.
 
     Parameters

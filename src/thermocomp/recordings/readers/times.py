@@ -5,8 +5,8 @@ from typing import Any, NoReturn
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.exceptions import RecordingError, TwoReadingsError
 from thermocomp.core.units import find_unit
 from thermocomp.recordings.readers.cellkinds import CLOCK, HALF, plain_clocks, plain_dates
@@ -15,9 +15,6 @@ from thermocomp.recordings.readers.stamps import AmbiguousDatesError, Parsed, ha
 from thermocomp.recordings.readers.tables import tell_places
 from thermocomp.recordings.readers.timefaults import refuse_falling, refuse_passed, refuse_set_forward
 from thermocomp.recordings.readers.timehints import find_formats
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 #: seconds since 1970 between the years 2000 and 2100, whole or in parts of a second
 _EPOCH = 946684800.0, 2240611200.0

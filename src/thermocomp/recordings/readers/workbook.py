@@ -162,9 +162,7 @@ def _table(
         {k: columns[k][:n_rows] if k < len(columns) else empty for k in range(len(headings))}, copy=False
     )
     told = (*notes, *tell_layout(places, layout, "row"), *tell_end(places[begin + n_rows :], "row"))
-    return FrameTable(
-        str(path), tuple(headings), frame, places[begin : begin + n_rows], notes=told, decimal=options.decimal
-    )
+    return FrameTable(path, tuple(headings), frame, places[begin : begin + n_rows], notes=told, decimal=options.decimal)
 
 
 def _count_remarks(head: Sequence[Row], tail: Sequence[Row]) -> int:
