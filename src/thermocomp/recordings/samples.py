@@ -152,6 +152,11 @@ class Samples:
         steps[np.flatnonzero(np.diff(self.test, prepend=-1))] = np.inf
         return steps
 
+    def interval(self, rows: BoolArray) -> float:
+        """Return the usual time between rows of a test [s]; 1 where there is none."""
+        steps = self.dt()[rows]
+        return float(np.median(steps[np.isfinite(steps)])) if np.isfinite(steps).any() else 1.0
+
     def learned(self, target: int, rows: BoolArray, before: int | None = None) -> Learned:
         """Return what some rows show of a target.
 

@@ -121,7 +121,15 @@ def cut(name: str, rows: IntArray, time: FloatArray, reason: str) -> Remedy:
 
 
 def cut_out(severity: Severity, channel: Channel, kind: str, text: str, rows: IntArray, time: FloatArray) -> Finding:
-    """Return a finding of rows that are sound without the values of a channel; to take these out is its remedy."""
+    """Return a finding whose remedy is to take out the values that it concerns.
+
+    Parameters
+    ----------
+    severity, channel, kind, text, rows
+        See `Finding`.
+    time : ndarray of shape (n_rows,)
+        Of all rows [s].
+    """
     remedy = cut(channel.name, rows, time, kind)
     return Finding(severity=severity, channel=channel.name, kind=kind, text=text, rows=rows, remedy=remedy)
 
