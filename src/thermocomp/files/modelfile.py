@@ -58,10 +58,6 @@ def loads(text: str, source: str = "model") -> tuple[ErrorModel, ...]:
     source : str
         What to call it in an error.
 
-    Returns
-    -------
-    tuple of ErrorModel
-
     Raises
     ------
     ModelFileError

@@ -53,10 +53,6 @@ def loads(text: str, source: str = "position model") -> tuple[PositionModel, ...
     source : str
         What to call it in an error.
 
-    Returns
-    -------
-    tuple of PositionModel
-
     Raises
     ------
     ModelFileError

@@ -169,10 +169,6 @@ class Samples:
         before : int, optional
             The last value is that of the last row before this one in its test, or in the files that it goes on from, 0
             without any; without it, that of the last row of all.
-
-        Returns
-        -------
-        Learned
         """
         y = self.deviations[:, target]
         known = rows & np.isfinite(y)

@@ -52,10 +52,6 @@ def stack(
     starts : Start or sequence of Start, optional
         How each recording begins, or all of them; found out if not given.
 
-    Returns
-    -------
-    Samples
-
     Raises
     ------
     InputError

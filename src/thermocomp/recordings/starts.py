@@ -169,10 +169,6 @@ def find_starts(
     absolute : bool
         Temperatures are taken as they are: their zero is known.
 
-    Returns
-    -------
-    tuple of Start
-
     Raises
     ------
     InputError

@@ -35,12 +35,7 @@ _SOME_DATE = re.compile(
 
 
 def holds_date(text: str) -> bool:
-    """Return whether a text holds a date, or a day, among other words.
-
-    Parameters
-    ----------
-    text : str
-    """
+    """Return whether a text holds a date, or a day, among other words."""
     return _SOME_DATE.search(text) is not None
 
 

@@ -69,11 +69,6 @@ def guess(table: FileTable, mapping: Mapping) -> tuple[Remedy, ...]:
 def guess_columns(table: FileTable, mapping: Mapping) -> list[tuple[str, list[Remedy]]]:
     """Guess what columns of numbers are that neither heading nor mapping explains.
 
-    Parameters
-    ----------
-    table : FileTable
-    mapping : Mapping
-
     Returns
     -------
     list of (str, list of Remedy)

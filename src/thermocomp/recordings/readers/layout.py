@@ -135,10 +135,6 @@ def tell_layout(numbers: Sequence[int], layout: FileLayout, word: str) -> tuple[
     layout : FileLayout
     word : str
         What a row is called there.
-
-    Returns
-    -------
-    tuple of str
     """
     found = []
     above = [numbers[k] for k in range(layout.heading) if k != layout.units]
@@ -184,10 +180,6 @@ def join_units(headings: Sequence[str], units: Sequence[str], rows: Sequence[Seq
     headings, units : sequence of str
     rows : sequence of sequence of str
         Cells of the first rows of the table.
-
-    Returns
-    -------
-    list of str
     """
     said = [_bare(unit) for unit in units]
     found = []

@@ -140,11 +140,6 @@ class FileLimits:
 def check_file(path: Path, limits: FileLimits) -> None:
     """Refuse what is no file, such as a pipe or a device (also through a link), and a file that is too large.
 
-    Parameters
-    ----------
-    path : Path
-    limits : FileLimits
-
     Raises
     ------
     RecordingError

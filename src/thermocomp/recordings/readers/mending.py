@@ -158,10 +158,6 @@ def mend(path: str | Path, text: str, decide: Decide) -> Mended:
     decide : callable
         Answers a `Question`.
 
-    Returns
-    -------
-    Mended
-
     Raises
     ------
     InputError
@@ -189,15 +185,6 @@ def mend(path: str | Path, text: str, decide: Decide) -> Mended:
 
 def read_or_offer(path: str | Path, mapping: Mapping | None = None) -> Recording:
     """Read one test from a file; an error of it offers a mapping, filled in, in a note of its own.
-
-    Parameters
-    ----------
-    path : str or Path
-    mapping : Mapping, optional
-
-    Returns
-    -------
-    Recording
 
     Raises
     ------

@@ -23,11 +23,6 @@ _OPEN = {**dict.fromkeys(_TEXTS, open_csv), ".xlsx": open_workbook, ".ods": open
 def open_table(path: str | Path, mapping: Mapping) -> tuple[FileTable, str]:
     """Open a file without understanding what its columns are.
 
-    Parameters
-    ----------
-    path : str or Path
-    mapping : Mapping
-
     Returns
     -------
     FileTable

@@ -152,12 +152,6 @@ def _translated(path: Path) -> Iterator[None]:
 def open_parquet(path: Path, options: ReadOptions, limits: FileLimits) -> FileTable:
     """Open a Parquet file.
 
-    Parameters
-    ----------
-    path : Path
-    options : ReadOptions
-    limits : FileLimits
-
     Raises
     ------
     RecordingError

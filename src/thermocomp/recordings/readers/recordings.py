@@ -80,10 +80,6 @@ def read_rows(
     extra : sequence of str
         Headings of columns, whatever they hold, to be read too if they are there.
 
-    Returns
-    -------
-    Rows
-
     Raises
     ------
     RecordingError, UnitError
@@ -189,10 +185,6 @@ def make_recording(rows: Rows, time: FloatArray, table: pd.DataFrame, labels: Se
         Some of the channels.
     labels : sequence of object, optional
         Thermal cycle of each row.
-
-    Returns
-    -------
-    Recording
     """
     origin = float(time[0])
     recording = Recording(

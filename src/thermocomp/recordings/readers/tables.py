@@ -148,10 +148,6 @@ def clean_heading(cell: object) -> str:
 
     White space at its ends is gone, the name that pandas gives an index without one, and the apostrophe before what a
     spreadsheet would calculate (`defuse`).
-
-    Parameters
-    ----------
-    cell : object
     """
     text = restore(str(cell).strip())
     return "" if _NAMELESS.fullmatch(text) else text
