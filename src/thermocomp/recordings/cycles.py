@@ -76,11 +76,8 @@ def find_cycles(
         running = filled[a:b][turning[a:b]]
         speeds = np.unique(np.round(running)) if running.size else np.array([0.0])
         # a measured speed jitters: more than a handful of values is told as a range
-        text = (
-            f"{np.median(running):.0f}"
-            if running.size and np.ptp(running) <= 0.05 * top
-            else (f"{speeds.min():.0f}-{speeds.max():.0f}")
-        )
+        steady = running.size and np.ptp(running) <= 0.05 * top
+        text = f"{np.median(running):.0f}" if steady else f"{speeds.min():.0f}-{speeds.max():.0f}"
         cycles.append(Cycle(f"{number} ({text} 1/min)", a, b))
     return tuple(cycles)
 

@@ -95,10 +95,9 @@ class Start:
 
     def told(self, name: str) -> str:
         """Return it in words, such as ``b: continued from a (goes on from an earlier file ...); stated``."""
-        before = f" from {', '.join(r.name for r in self.earlier)}" if self.word == "continued" else ""
-        after = (
-            f"; what went before: {', '.join(r.name for r in self.earlier)}" if before == "" and self.earlier else ""
-        )
+        names = ", ".join(r.name for r in self.earlier)
+        before = f" from {names}" if self.word == "continued" else ""
+        after = f"; what went before: {names}" if self.earlier and not before else ""
         return f"{name}: {self.word}{before} ({WORDS[self.word]}{after}); {self.why}"
 
 
@@ -260,9 +259,8 @@ def _tolerance(recording: Recording, name: str) -> float:
     values = values[np.isfinite(values)]
     if len(values) < 2:
         return NEAR
-    noise = (
-        float(np.median(np.abs(np.diff(values)))) / 0.954
-    )  # of a normal law: the difference has sqrt(2) of its noise
+    # of a normal law: the difference has sqrt(2) of its noise
+    noise = float(np.median(np.abs(np.diff(values)))) / 0.954
     return max(NEAR, SHARE * float(np.ptp(values)), LOUD * noise)
 
 

@@ -220,11 +220,8 @@ def _read_numbers(raw: FloatArray, file: FileCells) -> tuple[FloatArray, str, tu
     if _SERIAL[0] <= raw.min() and raw.max() < _SERIAL[1] and any(w in heading.casefold() for w in _DATE_WORDS):
         milliseconds = np.rint(raw * 86400e3)
         start = pd.Timestamp(milliseconds[0] / 1e3 + _SERIAL_BEGIN, unit="s").isoformat()
-        return (
-            (milliseconds - milliseconds[0]) / 1e3,
-            start,
-            (f"{heading!r} is taken as days since 1899-12-30, as Excel counts",),
-        )
+        note = f"{heading!r} is taken as days since 1899-12-30, as Excel counts"
+        return (milliseconds - milliseconds[0]) / 1e3, start, (note,)
     ways: list[dict[str, str]] = [{"unit": unit} for unit in find_likely_units(raw)]
     if compact := raw.min() > 19e12 and raw.max() < 21e12:  # written without signs: 20240305080010
         ways = [{"format": "%Y%m%d%H%M%S"}]

@@ -279,10 +279,8 @@ def _ods_rows(path: Path, wanted: int, limits: FileLimits) -> Generator[Row]:
                 number, table = number + (event == "start"), element
             elif event == "end" and element.tag == f"{_TABLE}table-row" and table is not None:
                 if number == wanted:
-                    row, times = (
-                        _ods_cells(element, limits.columns),
-                        int(element.get(f"{_TABLE}number-rows-repeated", "1")),
-                    )
+                    row = _ods_cells(element, limits.columns)
+                    times = int(element.get(f"{_TABLE}number-rows-repeated", "1"))
                     if row:
                         for _ in range(empty):
                             yield ()
