@@ -82,9 +82,9 @@ def find_cycles(
     return tuple(cycles)
 
 
-def make_single_cycle(n_rows: int, name: str = "whole test") -> tuple[Cycle, ...]:
+def make_single_cycle(n_rows: int) -> tuple[Cycle, ...]:
     """Return one cycle that covers everything."""
-    return (Cycle(name, 0, n_rows),)
+    return (Cycle("whole test", 0, n_rows),)
 
 
 def split_by_labels(labels: Sequence[object]) -> tuple[Cycle, ...]:

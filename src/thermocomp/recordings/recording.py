@@ -135,7 +135,7 @@ class Recording:
         InputError
             A column that was named is not there, or an array has another length.
         """
-        return cls(**parts_of(table, time=time, units=units, cycles=cycles, name=name))
+        return cls(**parts_of(table, time=time, units=units or {}, cycles=cycles, name=name))
 
     def to_frame(self) -> pd.DataFrame:
         """Return the table with the time since the first row in front, as ``time_s``."""

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cache, partial
 
 import numpy as np
 
@@ -11,9 +12,9 @@ from thermocomp.core.exceptions import RecordingError, UnitError
 from thermocomp.core.machine import Channel
 from thermocomp.core.units import Unit, find_unit
 from thermocomp.recordings.headings import Meaning, understand
-from thermocomp.recordings.readers.cellkinds import Kinds
+from thermocomp.recordings.readers.dayforms import find_column_kind
 from thermocomp.recordings.readers.mapping import ColumnMap, Mapping, Place
-from thermocomp.recordings.readers.tables import tell_places
+from thermocomp.recordings.readers.tables import FileTable, tell_places
 from thermocomp.recordings.readers.timecolumns import TimePlan, find_position, find_time
 
 #: below this no absolute temperature of a machine lies [K]
@@ -125,26 +126,8 @@ class ColumnPlan:
     notes: tuple[str, ...] = ()
 
 
-def plan(
-    headings: Sequence[str],
-    mapping: Mapping,
-    source: str,
-    kinds: Kinds,
-    head: Callable[[int], list[str]] = lambda _: [],
-) -> ColumnPlan:
+def plan(table: FileTable, mapping: Mapping) -> ColumnPlan:
     """Decide which columns are read, and as what.
-
-    Parameters
-    ----------
-    headings : sequence of str
-        The file's headings; an empty one is passed over.
-    mapping : Mapping
-    source : str
-        The file, for messages.
-    kinds : callable
-        Tells what the cells of a column hold.
-    head : callable
-        Returns the first filled ones of a column.
 
     Raises
     ------
@@ -154,9 +137,11 @@ def plan(
     UnitError
         A unit is unknown, or the one in the heading cannot measure what the mapping states.
     """
+    headings, source = table.headings, str(table.path)
+    kinds = cache(partial(find_column_kind, table))
     meanings = _understand_all(headings, mapping, source)
     try:
-        times = find_time(headings, meanings, mapping, source, kinds, head)
+        times = find_time(table, meanings, mapping, kinds)
     except RecordingError:
         _refuse_twins(headings, mapping, source)
         raise

@@ -4,7 +4,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from datetime import datetime, timedelta
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ from thermocomp.recordings.cycles import Cycle, find_cycles, make_single_cycle, 
 from thermocomp.recordings.headings import understand
 from thermocomp.recordings.readers.columns import ColumnPlan, PlannedColumn, plan
 from thermocomp.recordings.readers.datecheck import check_dates
-from thermocomp.recordings.readers.dayforms import find_column_kind, find_day_columns
+from thermocomp.recordings.readers.dayforms import find_day_columns
 from thermocomp.recordings.readers.dayhalves import join_halves
 from thermocomp.recordings.readers.filecells import FileCells
 from thermocomp.recordings.readers.guesses import guess
@@ -104,7 +103,7 @@ def _read_rows(source: Path, mapping: Mapping, *, rising: bool, extra: Sequence[
         mapping = mapping.over(described)
         notes.extend(damage)
     with _guessing(table, mapping):
-        columns = plan(table.headings, mapping, str(source), cache(lambda k: find_column_kind(table, k)), table.head)
+        columns = plan(table, mapping)
     notes.extend(columns.notes)
     more = {h: table.headings.index(h) for h in extra if h in table.headings}
     file, others, told = _load(source, mapping, table, columns, [*more.values()])
@@ -167,7 +166,7 @@ def _load(
     if is_stamp and times.half is not None:
         names = table.headings[times.time], table.headings[times.half]
         both = cells[times.time], cells[times.half]
-        cells[times.time], told = join_halves(*both, mapping.time.format, table, str(source), names)
+        cells[times.time], told = join_halves(*both, mapping.time.format, table, names)
         notes += told
     return FileCells(source, mapping, table, columns, cells, is_stamp), others, notes
 

@@ -166,7 +166,7 @@ class CsvTable:
         }
 
 
-def open_csv(path: Path, options: ReadOptions, limits: FileLimits = FileLimits()) -> CsvTable:
+def open_csv(path: Path, options: ReadOptions, limits: FileLimits) -> CsvTable:
     """Find out how a text file is written: one pass over its lines, none of which is kept.
 
     Parameters

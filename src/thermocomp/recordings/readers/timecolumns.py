@@ -1,7 +1,7 @@
 """Which columns of a file hold the time: found by headings, and by what the cells hold."""
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from thermocomp.core.exceptions import RecordingError, tell_nearest
@@ -10,6 +10,7 @@ from thermocomp.recordings.readers.cellkinds import Kinds
 from thermocomp.recordings.readers.dayforms import names_day
 from thermocomp.recordings.readers.dayhalves import are_halves, says_halves
 from thermocomp.recordings.readers.mapping import Mapping, Place
+from thermocomp.recordings.readers.tables import FileTable
 
 #: headings of a time without unit, those that say more first
 _BARE = (
@@ -50,28 +51,17 @@ class TimePlan(NamedTuple):
     notes: tuple[str, ...]
 
 
-def find_time(
-    headings: Sequence[str],
-    meanings: Sequence[Meaning | None],
-    mapping: Mapping,
-    source: str,
-    kinds: Kinds,
-    head: Callable[[int], list[str]] = lambda _: [],
-) -> TimePlan:
+def find_time(table: FileTable, meanings: Sequence[Meaning | None], mapping: Mapping, kinds: Kinds) -> TimePlan:
     """Find the time column, and the column of dates where the time column holds only a time of day.
 
     Parameters
     ----------
-    headings : sequence of str
+    table : FileTable
     meanings : sequence of Meaning or None
         Of the headings.
     mapping : Mapping
-    source : str
-        The file, for messages.
     kinds : callable
         Tells what a column holds.
-    head : callable
-        Returns the first filled cells of a column.
 
     Raises
     ------
@@ -79,6 +69,7 @@ def find_time(
         There is no time column, or the mapping names one that is not there.
     """
     notes: list[str] = []
+    headings, source = table.headings, str(table.path)
     if mapping.time.column:
         time = find_position(mapping.time.column, headings, "[time]", source)
         date = find_position(mapping.time.date, headings, "[time]", source) if mapping.time.date else None
@@ -93,7 +84,7 @@ def find_time(
     if kinds(time) in ("clock", "stamp"):
         found = (k for k, h in enumerate(headings) if k not in (time, date) and not is_ignored(h, k, mapping))
         named = (k for k in found if meanings[k] is None and headings[k] not in mapping.columns)
-        half = next((k for k in named if says_halves(headings[k]) or are_halves(head(k), headings[k])), None)
+        half = next((k for k in named if says_halves(headings[k]) or are_halves(table.head(k), headings[k])), None)
     used = (time, date, half, fraction)
     twins = {k for k, heading in enumerate(headings) if heading and heading == headings[time]}
     unused = [k for k in range(len(headings)) if k not in used and k not in twins and kinds(k) in ("date", "stamp")]

@@ -46,12 +46,10 @@ def refuse_falling(wrong: IntArray, time: FloatArray, shown: "pd.Series[Any]", s
     if len(steps) > 1 and (steps < 0).all():
         raise RecordingError(f"{text}: the newest row comes first; sort the rows by time, the oldest first")
     # a clock that is set back falls by an hour less one interval
-    if local and abs(steps[row - 1] - np.median(steps) + 3600) < 300:
-        raise RecordingError(f"{text}, perhaps as the clock was set back (daylight saving): {_ZONE}")
-    if local and _may_be_set_back(start, time, row):
-        raise RecordingError(
-            f"{text}, perhaps as the clock was set back (daylight saving) while nothing was recorded: {_ZONE}"
-        )
+    recorded = bool(abs(steps[row - 1] - np.median(steps) + 3600) < 300)
+    if local and (recorded or _may_be_set_back(start, time, row)):
+        when = "" if recorded else " while nothing was recorded"
+        raise RecordingError(f"{text}, perhaps as the clock was set back (daylight saving){when}: {_ZONE}")
     never_again = steps[row - 1] < 0 and time[row:].max() < time[row - 1]
     if is_stamp and steps[row - 1] < 0 and abs(steps[row - 1] + 43_200) <= max(600, 2 * float(np.median(steps))):
         raise TwoReadingsError(
