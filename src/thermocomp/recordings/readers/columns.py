@@ -57,8 +57,9 @@ class PlannedColumn:
                 [{"columns": {self.channel.name: {"column": heading, **said}}} for said in _DOUBTFUL],
             )
 
+    @np.errstate(over="ignore", invalid="ignore")
     def convert(
-        self, raw: FloatArray, missing: Sequence[float] = (), place: Callable[[int], str] = "row {}".format
+        self, raw: FloatArray, missing: Sequence[float], place: Callable[[int], str]
     ) -> tuple[FloatArray, tuple[str, ...]]:
         """Return the values in the house unit, nan where missing, and notes on what was replaced, and where."""
         notes = []
@@ -90,7 +91,12 @@ class PlannedColumn:
                     f"{beyond.size} of {len(raw)} cells: {tell_places(beyond.tolist(), place)}"
                 )
         values = values if self.unit.scale == 1 else values * self.unit.scale
-        return (values + self.unit.shift if self.unit.shift else values), tuple(notes)
+        values = values + self.unit.shift if self.unit.shift else values
+        if (infinite := np.isinf(values)).any():
+            cells = f"{infinite.sum()} cells"
+            notes.append(f"{self.channel.name}: infinite by its scale or unit, taken as missing, in {cells}")
+            values = np.where(infinite, np.nan, values)
+        return values, tuple(notes)
 
 
 @dataclass(frozen=True)

@@ -95,8 +95,9 @@ def join_halves(
         row = int(unknown[0])
         says = "is empty" if pd.isna(halves.iloc[row]) else f"{str(halves.iloc[row])!r} is neither AM nor PM"
         raise RecordingError(
-            f"{table.path}: {table.place(row)}, column {half!r}: {says}, beside the time {clocks.iloc[row]}; fill it in, or "
-            f'if it has nothing to do with the time, leave it out by a mapping: [columns."{half}"] role = "ignore"',
+            f"{table.path}: {table.place(row)}, column {half!r}: {says}, beside the time {clocks.iloc[row]}; fill it "
+            "in, or if it has nothing to do with the time, leave it out by a mapping: "
+            f'[columns."{half}"] role = "ignore"',
             [skip_row(table, row)] if 4 * unknown.size <= len(clocks) else [],
         )
     texts = clocks.astype(str).str.strip()

@@ -16,7 +16,7 @@ from thermocomp.files.draft import draft
 from thermocomp.recordings.cleaning import clean
 from thermocomp.recordings.cycles import Cycle, find_cycles, make_single_cycle, split_by_labels
 from thermocomp.recordings.headings import understand
-from thermocomp.recordings.readers.columns import ColumnPlan, PlannedColumn, plan
+from thermocomp.recordings.readers.columns import ColumnPlan, plan
 from thermocomp.recordings.readers.datecheck import check_dates
 from thermocomp.recordings.readers.dayforms import find_day_columns
 from thermocomp.recordings.readers.dayhalves import join_halves
@@ -116,7 +116,7 @@ def _read_rows(source: Path, mapping: Mapping, *, rising: bool, extra: Sequence[
     for column in columns.columns:
         raw = file.cells[column.index].to_numpy(dtype=np.float64)
         column.refuse_doubtful(raw, table.headings[column.index], str(source))
-        data[column.channel.name], found = _convert(column, raw, mapping.read.missing, table)
+        data[column.channel.name], found = column.convert(raw, mapping.read.missing, table.place)
         changed.extend(found)
     left_out = [k for k in columns.left_out if k not in more.values()]
     numeric = [k for k in left_out if table.is_number(k, empty=False)]
@@ -305,19 +305,6 @@ def _times(file: FileCells, *, rising: bool) -> tuple[FloatArray, str, tuple[str
     if not np.isfinite(time).all():
         raise RecordingError(f"{where}: the times are too far apart for a number; correct them")
     return time, start, notes
-
-
-def _convert(
-    column: PlannedColumn, raw: FloatArray, missing: Sequence[float], table: FileTable
-) -> tuple[FloatArray, tuple[str, ...]]:
-    """Return the values of a column; one that a scale or a unit makes infinite is missing."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        values, notes = column.convert(raw, missing, table.place)
-    infinite = np.isinf(values)
-    if not infinite.any():
-        return values, notes
-    note = f"{column.channel.name}: infinite by its scale or unit, taken as missing, in {infinite.sum()} cells"
-    return np.where(infinite, np.nan, values), (*notes, note)
 
 
 def _shorten(notes: Sequence[str], left_out: int) -> tuple[str, ...]:
