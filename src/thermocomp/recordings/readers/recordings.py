@@ -160,7 +160,10 @@ def _load(
     unknown = [k for k, h in enumerate(table.headings) if h and k not in known]
     others = find_day_columns(table, unknown, beside_clock=is_stamp)
     maybe = [times.date, times.half, *times.unused, *others, columns.cycle, *extra]
-    maybe, numbers = ([*clocks, *maybe], numbers) if is_stamp else (maybe, [*numbers, *clocks])
+    if is_stamp:
+        maybe = [*clocks, *maybe]
+    else:
+        numbers += clocks
     texts = [k for k in maybe if k is not None and k not in numbers]
     cells, notes = table.load(list(dict.fromkeys(numbers)), list(dict.fromkeys(texts)))
     if is_stamp and times.half is not None:
@@ -168,7 +171,8 @@ def _load(
         both = cells[times.time], cells[times.half]
         cells[times.time], told = join_halves(*both, mapping.time.format, table, names)
         notes += told
-    return FileCells(source, mapping, table, columns, cells, is_stamp), others, notes
+    file = FileCells(source=source, mapping=mapping, table=table, columns=columns, cells=cells, is_stamp=is_stamp)
+    return file, others, notes
 
 
 def make_recording(rows: Rows, time: FloatArray, table: pd.DataFrame, labels: Sequence[Any] | None) -> Recording:
