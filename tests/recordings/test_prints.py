@@ -16,7 +16,8 @@ from smallmachine import small_machine
 from thermocomp.core.fingerprints import Prints, unpack_marks
 from thermocomp.core.machine import Channel
 from thermocomp.recordings.cycles import make_single_cycle
-from thermocomp.recordings.fingerprints import LENGTH, fingerprint, overlap, repeats
+from thermocomp.recordings.fingerprints import LENGTH, fingerprint
+from thermocomp.recordings.overlaps import overlap, repeats
 from thermocomp.recordings.readers.recordings import read
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.stacking import stack

@@ -58,10 +58,14 @@ def explain_unknown(what: str, name: str, known: Iterable[str], path: tuple[str 
     path : tuple of str or int
         Where it stands, see `SettingError`.
     """
+    return SettingError(f"there is no {what} {name!r}; {tell_nearest(name, known)}", path)
+
+
+def tell_nearest(name: str, known: Iterable[str], cutoff: float = 0.4) -> str:
+    """Return in words which names are like one that nobody knows, or else which there are."""
     known = list(known)
-    near = get_close_matches(name, known, n=3, cutoff=0.4)
-    hint = f"the nearest are {', '.join(near)}" if near else f"there are {', '.join(known)}"
-    return SettingError(f"there is no {what} {name!r}; {hint}", path)
+    near = get_close_matches(name, known, n=3, cutoff=cutoff)
+    return f"the nearest are {', '.join(near)}" if near else f"there are {', '.join(known)}"
 
 
 class RecordingError(InputError):

@@ -69,7 +69,7 @@ class Runs:
 
 @dataclass(frozen=True)
 class Prints:
-    """Fingerprints of the rows a model learned from; made and looked up by `thermocomp.recordings.fingerprints`.
+    """Fingerprints of the rows a model learned from; made by `thermocomp.recordings.fingerprints`.
 
     Parameters
     ----------

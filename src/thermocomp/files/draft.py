@@ -253,10 +253,6 @@ def refuse_existing(paths: Sequence[Path], overwrite: bool, inputs: Sequence[Pat
 def find_place(target: Path) -> Path:
     """Return where a file is really written: links are followed, the last one even if it leads to nothing.
 
-    Parameters
-    ----------
-    target : Path
-
     Returns
     -------
     Path

@@ -4,6 +4,7 @@ import hashlib
 import json
 import re
 from dataclasses import dataclass, field, make_dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -12,7 +13,6 @@ from pydantic_core import ErrorDetails, SchemaValidator
 
 from thermocomp.core.exceptions import InputError, ModelFileError, SettingError
 from thermocomp.core.shown import replace_unprintable
-from thermocomp.files.draft import write_text
 from thermocomp.files.plaintext import list_errors, read_text
 
 #: bytes of a file, at most; models of additive curves over 9,000 rows had 8 million each before they were thinned
@@ -92,18 +92,20 @@ def _lay_out(value: Any, depth: int = 1) -> str:
     return f"{first}{line}{f',{line}'.join(parts)}{line[:-1]}{last}"
 
 
-def unpack(kind: Format, reader: SchemaValidator, text: str, source: str) -> Any:
+def unpack(kind: Format, entry: Any, text: str, source: str, **shared: Any) -> Any:
     """Return what is in the text of a file: its ``models``, and what stands once for all of them.
 
     Parameters
     ----------
     kind : Format
         What it must be.
-    reader : SchemaValidator
-        What they must be; see `reader_of`.
+    entry : type
+        What each of the models must be.
     text : str
     source : str
         What to call it in an error.
+    **shared : type
+        What may stand once for all of them.
 
     Raises
     ------
@@ -125,13 +127,14 @@ def unpack(kind: Format, reader: SchemaValidator, text: str, source: str) -> Any
             f"'{kind.command}'"
         )
     try:
-        return reader.validate_json(text)  # the text: keys in the order of the file
+        return _reader_of(entry, **shared).validate_json(text)  # the text: keys in the order of the file
     except ValidationError as e:
         errors = [_tell(error, content) for error in e.errors(include_url=False)]
         raise ModelFileError(list_errors(source, errors)) from e
 
 
-def reader_of(entry: Any, **shared: Any) -> SchemaValidator:
+@cache
+def _reader_of(entry: Any, **shared: Any) -> SchemaValidator:
     """Return what reads the models of a file, each of the type `entry`, and what may stand once for all of them.
 
     Strict: a number in quotes, a missing or an unknown key is damage, not something to guess at. Of a list of numbers
@@ -155,17 +158,6 @@ def _stop_at_first(schema: Any) -> None:
     elif isinstance(schema, list):
         for inner in schema:
             _stop_at_first(inner)
-
-
-def write(text: str, path: str | Path, *, overwrite: bool) -> None:
-    """Write the text of a file.
-
-    Raises
-    ------
-    InputError
-        See `thermocomp.files.draft.drafts`.
-    """
-    write_text(text, Path(path), overwrite=overwrite)
 
 
 def read(kind: Format, path: str | Path) -> tuple[str, str]:

@@ -2,12 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict, replace
-from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, get_args
 
 from pydantic import Discriminator
-from pydantic_core import SchemaValidator
 
 from thermocomp.core.additive import Additive
 from thermocomp.core.autoregressive import Autoregressive, AutoregressiveNet
@@ -19,6 +17,7 @@ from thermocomp.core.paceddynamic import PacedDynamic
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.watch import Watch
 from thermocomp.files import jsonfile
+from thermocomp.files.draft import write_text
 
 #: as it stands in the file
 FORMAT = jsonfile.MODELS.name
@@ -27,11 +26,6 @@ Family = Polynomial | LinearDynamic | PacedDynamic | Network | Additive | Autore
 #: as it stands in a file, by its ``family``
 Entry = Annotated[Family, Discriminator("family")]
 FAMILIES: dict[str, type[ErrorModel]] = {f.family: f for f in get_args(Family)}
-
-
-@cache
-def _reader() -> SchemaValidator:
-    return jsonfile.reader_of(Entry, watch=Watch)
 
 
 def dumps(models: Sequence[ErrorModel]) -> str:
@@ -64,16 +58,12 @@ def loads(text: str, source: str = "model") -> tuple[ErrorModel, ...]:
     source : str
         What to call it in an error.
 
-    Returns
-    -------
-    tuple of ErrorModel
-
     Raises
     ------
     ModelFileError
         Not JSON, not a model file, of a newer version, altered or incomplete; the message lists all places.
     """
-    found = jsonfile.unpack(jsonfile.MODELS, _reader(), text, source)
+    found = jsonfile.unpack(jsonfile.MODELS, Entry, text, source, watch=Watch)
     if any(m.watch is not None for m in found.models):
         raise ModelFileError(f"{source}: a watch stands in a model: it stands once in the file, beside its models")
     models = tuple(replace(m, watch=found.watch) for m in found.models) if found.watch else tuple(found.models)
@@ -89,7 +79,7 @@ def write(models: Sequence[ErrorModel], path: str | Path, *, overwrite: bool = F
     InputError
         The file exists and `overwrite` is False.
     """
-    jsonfile.write(dumps(models), path, overwrite=overwrite)
+    write_text(dumps(models), Path(path), overwrite=overwrite)
 
 
 def read(path: str | Path) -> tuple[ErrorModel, ...]:

@@ -2,17 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields
-from functools import cache
 from pathlib import Path
 from typing import Annotated
 
 from pydantic import Discriminator
-from pydantic_core import SchemaValidator
 
 from thermocomp.core.position import PositionModel
 from thermocomp.core.profile import Profile
 from thermocomp.core.provenance import Provenance
 from thermocomp.files import jsonfile, modelfile
+from thermocomp.files.draft import write_text
 
 #: as it stands in the file
 FORMAT = jsonfile.POSITION_MODELS.name
@@ -27,11 +26,6 @@ class _Entry(PositionModel):
     offset: modelfile.Entry | None = field()
     slopes: tuple[modelfile.Entry, ...] = field()
     provenance: Provenance | None = field()
-
-
-@cache
-def _reader() -> SchemaValidator:
-    return jsonfile.reader_of(_Entry)
 
 
 def dumps(models: Sequence[PositionModel]) -> str:
@@ -59,16 +53,12 @@ def loads(text: str, source: str = "position model") -> tuple[PositionModel, ...
     source : str
         What to call it in an error.
 
-    Returns
-    -------
-    tuple of PositionModel
-
     Raises
     ------
     ModelFileError
         Not JSON, no position model, of a newer version, altered or incomplete; the message lists all places.
     """
-    entries = jsonfile.unpack(jsonfile.POSITION_MODELS, _reader(), text, source).models
+    entries = jsonfile.unpack(jsonfile.POSITION_MODELS, _Entry, text, source).models
     return tuple(PositionModel(**{f.name: getattr(e, f.name) for f in fields(e)}) for e in entries)
 
 
@@ -80,7 +70,7 @@ def write(models: Sequence[PositionModel], path: str | Path, *, overwrite: bool 
     InputError
         The file exists and `overwrite` is False.
     """
-    jsonfile.write(dumps(models), path, overwrite=overwrite)
+    write_text(dumps(models), Path(path), overwrite=overwrite)
 
 
 def read(path: str | Path) -> tuple[PositionModel, ...]:

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
 from thermocomp.judging.splits import Judging
-from thermocomp.recordings.fingerprints import overlap, repeats
+from thermocomp.recordings.overlaps import overlap, repeats
 from thermocomp.recordings.samples import Samples
 
 BoolArray = NDArray[np.bool_]

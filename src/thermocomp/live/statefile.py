@@ -5,17 +5,16 @@ import json
 import math
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from pydantic import AwareDatetime
-from pydantic_core import SchemaValidator
 
 from thermocomp.core.exceptions import InputError, ModelFileError
 from thermocomp.core.zero import MOST, Gathered
 from thermocomp.files import jsonfile
+from thermocomp.files.draft import write_text
 from thermocomp.files.modelfile import entry_of
 from thermocomp.files.typed import decode, encode, want
 from thermocomp.runtime.compensator import Compensator
@@ -51,11 +50,6 @@ class Saved:
 
     written: datetime
     state: CompensatorState
-
-
-@cache
-def _reader() -> SchemaValidator:
-    return jsonfile.reader_of(_Stored)
 
 
 def fingerprint(compensator: Compensator) -> str:
@@ -109,7 +103,7 @@ def loads(text: str, compensator: Compensator, source: str = "state") -> Saved:
         Not JSON, not a state file, of a newer version, altered, incomplete, of other models, or no state that these
         models can be in.
     """
-    (stored,) = jsonfile.unpack(KIND, _reader(), text, source).models[:1]
+    (stored,) = jsonfile.unpack(KIND, _Stored, text, source).models[:1]
     if stored.models != fingerprint(compensator):
         raise ModelFileError(f"{source}: the state of other models; start without it, or with the models it belongs to")
     try:
@@ -136,7 +130,7 @@ def write(state: CompensatorState, compensator: Compensator, path: str | Path, w
     InputError
         It cannot be written there.
     """
-    jsonfile.write(dumps(state, compensator, written), path, overwrite=True)
+    write_text(dumps(state, compensator, written), Path(path), overwrite=True)
 
 
 def read(path: str | Path, compensator: Compensator) -> Saved:

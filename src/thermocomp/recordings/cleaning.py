@@ -8,13 +8,10 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
 from thermocomp.core.exceptions import InputError
 from thermocomp.recordings.rows import Instant, Rows
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 #: places that are listed
 MOST_LISTED = 40
@@ -221,19 +218,14 @@ class Swap(Step):
         a, b = rows.columns(self.channels, self.name)
         kinds = {c.name: c.quantity for c in rows.channels}
         if kinds[a] != kinds[b]:
-            raise InputError(
-                f"{rows.source}: {self.name}: {a} is a {kinds[a]} and {b} a {kinds[b]}: no two plugs change"
-            )
+            unlike = f"{a} is a {kinds[a]} and {b} a {kinds[b]}"
+            raise InputError(f"{rows.source}: {self.name}: {unlike}: no two plugs change")
         begin = rows.seconds(self.at, self.name)
         moved = rows.time >= begin - _SAME
-        table = rows.table.copy()
-        table[a], table[b] = (
-            np.where(moved, rows.table[b], rows.table[a]),
-            np.where(moved, rows.table[a], rows.table[b]),
-        )
-        return replace(rows, table=table).noted(
-            f"swap: {a} and {b}, {int(moved.sum())} rows from {begin:.10g} s on{self._why()}"
-        )
+        x, y = rows.table[a], rows.table[b]
+        table = rows.table.assign(**{a: np.where(moved, y, x), b: np.where(moved, x, y)})
+        note = f"swap: {a} and {b}, {int(moved.sum())} rows from {begin:.10g} s on{self._why()}"
+        return replace(rows, table=table).noted(note)
 
 
 @dataclass(frozen=True)
@@ -303,7 +295,7 @@ def _step(x: FloatArray, first: int, name: str, owner: str) -> float:
     return float(np.mean(x[after]) - np.mean(x[before]) - slope * middle)
 
 
-def _listed(places: Sequence[str], at: NDArray[np.intp]) -> str:
+def _listed(places: Sequence[str], at: IntArray) -> str:
     """Return places in words, neighbours as one stretch."""
     if not places:
         return ""

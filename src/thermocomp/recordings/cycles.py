@@ -5,12 +5,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.exceptions import RecordingError
-
-FloatArray = NDArray[np.float64]
-
 
 #: shorter runs and stops of the spindle do not split a test [s]
 SPLITS = 300.0
@@ -79,18 +76,15 @@ def find_cycles(
         running = filled[a:b][turning[a:b]]
         speeds = np.unique(np.round(running)) if running.size else np.array([0.0])
         # a measured speed jitters: more than a handful of values is told as a range
-        text = (
-            f"{np.median(running):.0f}"
-            if running.size and np.ptp(running) <= 0.05 * top
-            else (f"{speeds.min():.0f}-{speeds.max():.0f}")
-        )
+        steady = running.size and np.ptp(running) <= 0.05 * top
+        text = f"{np.median(running):.0f}" if steady else f"{speeds.min():.0f}-{speeds.max():.0f}"
         cycles.append(Cycle(f"{number} ({text} 1/min)", a, b))
     return tuple(cycles)
 
 
-def make_single_cycle(n_rows: int, name: str = "whole test") -> tuple[Cycle, ...]:
+def make_single_cycle(n_rows: int) -> tuple[Cycle, ...]:
     """Return one cycle that covers everything."""
-    return (Cycle(name, 0, n_rows),)
+    return (Cycle("whole test", 0, n_rows),)
 
 
 def split_by_labels(labels: Sequence[object]) -> tuple[Cycle, ...]:
@@ -112,7 +106,7 @@ def split_by_labels(labels: Sequence[object]) -> tuple[Cycle, ...]:
     return tuple(Cycle(n, a, b) for n, a, b in zip(names, starts, [*starts[1:], len(text)], strict=True))
 
 
-def _drop_short(time: FloatArray, turning: NDArray[np.bool_], *, state: bool, shorter_than: float) -> NDArray[np.bool_]:
+def _drop_short(time: FloatArray, turning: BoolArray, *, state: bool, shorter_than: float) -> BoolArray:
     """Return `turning` with the stretches of `state` that are too short turned over; the first and last one stay."""
     edges = np.flatnonzero(np.diff(turning)) + 1
     bounds = [0, *edges.tolist(), len(turning)]

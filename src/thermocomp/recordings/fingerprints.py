@@ -5,19 +5,16 @@ It is hashed. Rows are known again where a run of the target and a run of an inp
 places of the same order. The decision `0019-overlap` tells what is found and what is not.
 """
 
-from collections.abc import Iterator
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.core.fingerprints import Prints, Runs, pack_marks, unpack_marks
+from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
+from thermocomp.core.fingerprints import Prints, Runs, pack_marks
 from thermocomp.recordings.samples import Samples
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
-BoolArray = NDArray[np.bool_]
 Marks = NDArray[np.uint32]
 
 #: differences in a run
@@ -32,10 +29,6 @@ BYTES = 14_000
 WAYS = 4
 #: a run that comes again within so many of its lengths is something periodic
 PERIOD = 5
-#: runs long that a match has to be where no input says anything, such as a spindle speed
-ALONE = 5
-#: tests whose intervals differ by less are read at one rate
-SAME_RATE = 0.05
 #: least mean of the third differences where rounding hides the noise [resolution]; of a smooth curve it is 1.03 at most
 ROUGH = 1.2
 
@@ -59,7 +52,7 @@ class _Windows(NamedTuple):
     margin: FloatArray  #: how far the nearest difference is from being rounded otherwise [step]
 
 
-class _Rows(NamedTuple):
+class TargetRows(NamedTuple):
     """Rows in which the target has a number, of all tests."""
 
     at: IntArray  #: where they stand in the samples
@@ -88,7 +81,7 @@ def fingerprint(samples: Samples, target: int, learn: BoolArray, *, thin: bool =
     Prints or None
         None if no run says enough to be known again.
     """
-    rows = _rows(samples, target)
+    rows = find_rows(samples, target)
     if len(rows.at) <= LENGTH:
         return None
     first, *others = (samples.targets[target], *samples.inputs)
@@ -114,71 +107,16 @@ def fingerprint(samples: Samples, target: int, learn: BoolArray, *, thin: bool =
     if not any(run.rows for run in runs):
         return None
     steps = {name: float(scales[name].step) for name in names}
-    return Prints(_interval(samples, learn), _stretches(samples, learn), steps, tuple(runs))
-
-
-def overlap(prints: Prints, samples: Samples, target: int) -> IntArray:
-    """Find rows that were learned from.
-
-    Parameters
-    ----------
-    prints : Prints
-        Of the rows that were learned from.
-    samples : Samples
-    target : int
-        Index into ``samples.targets``; it is looked up under the target's prints whatever its name.
-
-    Returns
-    -------
-    ndarray of int of shape (n_rows,)
-        Row that was learned from, about, counted through all tests; -1 where a row is new.
-    """
-    everything = np.ones(len(samples), dtype=np.bool_)
-    return _overlap(prints, samples, target, _interval(samples, everything), own=False)
-
-
-def repeats(samples: Samples, target: int) -> IntArray:
-    """Find rows that repeat earlier ones, of the same test or of another.
-
-    Parameters
-    ----------
-    samples : Samples
-    target : int
-        Index into ``samples.targets``.
-
-    Returns
-    -------
-    ndarray of int of shape (n_rows,)
-        Row of the samples that is repeated, about; -1 where there is none.
-    """
-    # tests that were read at other intervals may be copies with fewer rows
-    intervals = [_interval(samples, samples.test == k) for k in range(len(samples.test_names))]
-    rates: list[float] = []
-    for interval in intervals:
-        if all(abs(interval / rate - 1.0) > SAME_RATE for rate in rates):
-            rates.append(interval)
-    group = np.array([np.abs(np.log(i / np.array(rates))).argmin() for i in intervals])[samples.test]
-    source = np.full(len(samples), -1, dtype=np.intp)
-    for k in range(len(rates)):
-        prints = fingerprint(samples, target, group == k, thin=False)
-        for other in range(k, len(rates)):
-            rows = np.flatnonzero(group == other)
-            if prints is None:
-                continue
-            if other == k:
-                found = _overlap(prints, samples, target, rates[k], own=True)[rows]
-            else:
-                found = _overlap(prints, samples.take(rows), target, rates[other], own=False)
-            source[rows] = np.where(source[rows] < 0, found, source[rows])
-    return source
+    return Prints(samples.interval(learn), _stretches(samples, learn), steps, tuple(runs))
 
 
 # -- runs ----------------------------------------------------------------------------------------------------------
 
 
-def _rows(samples: Samples, target: int) -> _Rows:
+def find_rows(samples: Samples, target: int) -> TargetRows:
+    """Return the rows in which the target of an index into ``samples.targets`` has a number."""
     at = np.flatnonzero(np.isfinite(samples.deviations[:, target]))
-    return _Rows(at, np.searchsorted(samples.test[at], samples.test[at]))
+    return TargetRows(at, np.searchsorted(samples.test[at], samples.test[at]))
 
 
 def _scale(x: FloatArray) -> _Scale:
@@ -206,8 +144,19 @@ def _rounded(x: FloatArray, step: float, stride: int) -> FloatArray:
     return np.asarray((x[stride:] - x[:-stride]) / step)
 
 
-def _marks(x: FloatArray, step: float, stride: int, length: int = LENGTH) -> Marks:
-    """Return the hash of the run that begins at each row; 0 where a value is missing."""
+def hash_runs(x: FloatArray, step: float, stride: int, length: int = LENGTH) -> Marks:
+    """Return the hash of the run that begins at each row; 0 where a value is missing.
+
+    Parameters
+    ----------
+    x : ndarray of shape (n_rows,)
+    step : float
+        What differences are rounded to [unit of x].
+    stride : int
+        Rows between the rows of a run.
+    length : int
+        Differences in a run.
+    """
     ratio = _rounded(x, step, stride)
     finite = np.isfinite(ratio)
     moves = np.rint(np.where(finite, np.clip(ratio, -1e15, 1e15), 0.0)).astype(np.int64).astype(np.uint64)
@@ -221,13 +170,13 @@ def _marks(x: FloatArray, step: float, stride: int, length: int = LENGTH) -> Mar
     return np.where(whole, short, np.uint32(0))
 
 
-def _windows(x: FloatArray, scale: _Scale, stride: int, rows: _Rows) -> _Windows:
+def _windows(x: FloatArray, scale: _Scale, stride: int, rows: TargetRows) -> _Windows:
     """Return the runs of a channel, and which of them can be known again."""
     ratio = np.nan_to_num(_rounded(x, scale.step, stride))
     moves = np.rint(ratio)
     n = len(moves) - (LENGTH - 1) * stride
     inside = rows.starts(LENGTH * stride)
-    mark = np.where(inside, _marks(x, scale.step, stride), np.uint32(0))
+    mark = np.where(inside, hash_runs(x, scale.step, stride), np.uint32(0))
     off = 0.5 - np.abs(ratio - moves)
     bends = moves[stride:] - moves[:-stride]
     rough = np.minimum(np.abs(bends[stride:] - bends[:-stride]), 2.0)
@@ -236,7 +185,7 @@ def _windows(x: FloatArray, scale: _Scale, stride: int, rows: _Rows) -> _Windows
         margin = np.minimum(margin, off[k * stride :][:n])
         if k < LENGTH - 2:
             roughness += rough[k * stride :][:n]
-    telling = (mark > 0) & _seldom(mark, _marks(x, scale.step, stride, LENGTH // 2), stride)
+    telling = (mark > 0) & _seldom(mark, hash_runs(x, scale.step, stride, LENGTH // 2), stride)
     if scale.step <= scale.resolution:
         telling &= roughness >= ROUGH * (LENGTH - 2)
     return _Windows(mark, telling, _moving(x, scale, rows)[LENGTH * stride // 2 :][:n], margin)
@@ -263,7 +212,7 @@ def _seldom(mark: Marks, halves: Marks, stride: int) -> BoolArray:
     return np.asarray(seldom[:n] & seldom[later:][:n] & ~periodic)
 
 
-def _moving(x: FloatArray, scale: _Scale, rows: _Rows) -> BoolArray:
+def _moving(x: FloatArray, scale: _Scale, rows: TargetRows) -> BoolArray:
     """Return the rows around which a channel moves: its mean before and after differs by more than its noise."""
     finite = np.isfinite(x)
     filled = np.interp(np.arange(len(x)), np.flatnonzero(finite), x[finite])
@@ -317,117 +266,3 @@ def _stretches(samples: Samples, learn: BoolArray) -> tuple[tuple[int, int], ...
     test = np.where(learn, samples.test, -1)
     ends = [0, *(np.flatnonzero(np.diff(test)) + 1).tolist(), len(test)]
     return tuple((a, b) for a, b in pairwise(ends) if test[a] >= 0)
-
-
-def _interval(samples: Samples, rows: BoolArray) -> float:
-    steps = samples.dt()[rows]
-    return float(np.median(steps[np.isfinite(steps)])) if np.isfinite(steps).any() else 1.0
-
-
-# -- looking up ----------------------------------------------------------------------------------------------------
-
-
-def _overlap(prints: Prints, samples: Samples, target: int, interval: float, *, own: bool) -> IntArray:
-    source = np.full(len(samples), -1, dtype=np.intp)
-    rows = _rows(samples, target)
-    columns = {c.name: samples.values[rows.at, j] for j, c in enumerate(samples.inputs)}
-    first, *others = prints.steps
-    columns = {first: samples.deviations[rows.at, target]} | {n: columns[n] for n in others if n in columns}
-    for run, stride in _tries(prints, interval):
-        if LENGTH * stride >= len(rows.at):
-            continue
-        inside = rows.starts(LENGTH * stride)
-        marks = {n: np.where(inside, _marks(x, prints.steps[n], stride), 0) for n, x in columns.items()}
-        found, of = _matches(run, marks)
-        there = unpack_marks(run.rows).astype(np.intp)[of]
-        # long runs are for files that have other rows than those that were learned from: fewer, or more
-        new = ~np.isin(samples.test[rows.at[found]], np.unique(samples.test[source >= 0]))
-        if own:
-            new &= there + LENGTH * stride <= rows.at[found]
-        _fill(source, prints, run, stride, rows, found[new], of[new], own=own)
-    return source
-
-
-def _tries(prints: Prints, interval: float) -> Iterator[tuple[Runs, int]]:
-    """Yield runs, and the rows between rows by which they may be found: as they are, and for as much time."""
-    rate = prints.interval / interval
-    for run in prints.runs:
-        yield run, run.stride
-        stride = max(1, round(run.stride * rate))
-        if stride != run.stride and abs(stride / (run.stride * rate) - 1.0) < 0.01:
-            yield run, stride
-
-
-def _matches(run: Runs, marks: dict[str, Marks]) -> tuple[IntArray, IntArray]:
-    """Return where a run of the target and one of an input are those of a run that is kept, and of which."""
-    first, *others = run.marks
-    stored = {name: unpack_marks(text) for name, text in run.marks.items()}
-    known, which = np.unique(stored[first], return_index=True)
-    if known.size == 0:
-        return np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp)
-    place = np.minimum(np.searchsorted(known, marks[first]), known.size - 1)
-    same = which[place]
-    alike = np.full(len(same), not others)
-    for name in others:
-        if name in marks:
-            alike |= (marks[name] == stored[name][same]) & (marks[name] > 0)
-    found = np.flatnonzero((marks[first] == known[place]) & (marks[first] > 0) & alike)
-    return found, same[found]
-
-
-def _fill(
-    source: IntArray,
-    prints: Prints,
-    run: Runs,
-    stride: int,
-    rows: _Rows,
-    found: IntArray,
-    of: IntArray,
-    *,
-    own: bool,
-) -> None:
-    """Write into `source` the rows between matches that follow each other, and those beside them that may be known."""
-    learned, moving = unpack_marks(run.rows).astype(np.intp), unpack_marks(run.moving) > 0
-    scale = stride / run.stride
-    usual = float(np.median(np.diff(learned))) if learned.size > 1 else 0.0
-    for mine in _chains(rows.at[found], learned[of], rows.test[found], scale, max(3.0 * usual, 2.0 * LENGTH)):
-        here, there = rows.at[found[mine]], learned[of[mine]]
-        end = int(rows.at[found[mine[-1]] + LENGTH * stride])
-        # one place may be chance: two that move, more than a run long, are not; without an input it takes more
-        least = (1.5 if len(run.marks) > 1 else ALONE) * LENGTH * stride
-        if np.count_nonzero(moving[of[mine]]) < 2 or end - here[0] < least:
-            continue
-        low, high = (0, 0) if own else _reach(prints, learned, there)
-        whole = rows.at[rows.test == rows.test[found[mine[0]]]]
-        a = max(int(here[0] - low * scale), int(whole[0]))
-        b = min(max(int(here[-1] + high * scale), end), int(whole[-1]))
-        span = np.arange(a, b + 1)
-        beyond = np.minimum(span - here[0], 0) + np.maximum(span - here[-1], 0)
-        guess = np.interp(span, here, there) + beyond / scale
-        source[a : b + 1] = np.where(source[a : b + 1] < 0, np.maximum(guess, 0).astype(np.intp), source[a : b + 1])
-
-
-def _chains(here: IntArray, there: IntArray, test: IntArray, scale: float, bridge: float) -> Iterator[IntArray]:
-    """Yield matches that follow each other as the learned rows did; a few rows may be gone or altered between them."""
-    if not len(here):
-        return
-    went, should = np.diff(here), scale * np.diff(there)
-    slack = LENGTH + 0.05 * should
-    on = (should > 0) & (np.diff(test) == 0) & (went <= should + slack) & ((went >= should - slack) | (went <= bridge))
-    yield from np.split(np.arange(len(here)), np.flatnonzero(~on) + 1)
-
-
-def _reach(prints: Prints, learned: IntArray, there: IntArray) -> tuple[int, int]:
-    """Return how many learned rows before the first match and after the last one may be known too.
-
-    Up to the next run that is kept, or three times as far as matches are apart, as not every run is found again; never
-    beyond what was learned from.
-    """
-    usual = 3 * max(LENGTH, int(there[-1] - there[0]) // max(len(there) - 1, 1))
-    begin, last = int(there[0]), int(there[-1])
-    first = next((a for a, b in prints.learned if a <= begin < b), begin)
-    stop = next((b for a, b in prints.learned if a <= last < b), last + 1)
-    before, after = learned[learned < begin], learned[learned > last]
-    low = begin - int(before[-1]) if before.size else begin - first
-    high = int(after[0]) - last if after.size else stop - 1 - last
-    return min(max(low, usual), begin - first), min(max(high, usual), stop - 1 - last)

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.core.instants import seconds
 from thermocomp.core.machine import Channel
@@ -15,33 +15,17 @@ from thermocomp.core.units import find_unit
 from thermocomp.recordings.cycles import Cycle, find_cycles, make_single_cycle, split_by_labels
 from thermocomp.recordings.headings import Meaning, understand
 
-FloatArray = NDArray[np.float64]
-
 
 def parts_of(
-    table: pd.DataFrame,
-    *,
-    time: str | ArrayLike | None = None,
-    units: Mapping[str, str] | None = None,
-    cycles: str | Sequence[object] | None = None,
-    name: str = "table",
+    table: pd.DataFrame, *, time: Any, units: Mapping[str, str], cycles: str | Sequence[object] | None, name: str
 ) -> dict[str, Any]:
-    """Return what a recording of a table is made of; see `thermocomp.recordings.recording.Recording.from_dataframe`.
+    """Return the arguments of the `Recording` of a table.
 
     Parameters
     ----------
-    table : DataFrame of shape (n_rows, n_columns)
-    time : str or array-like of shape (n_rows,), optional
-    units : mapping of str to str, optional
-    cycles : str or sequence of object of shape (n_rows,), optional
-    name : str
-
-    Returns
-    -------
-    dict of str to object
-        Arguments of `Recording`.
+    table, time, units, cycles, name
+        See `thermocomp.recordings.recording.Recording.from_dataframe`.
     """
-    units = dict(units or {})
     columns = [str(c) for c in table.columns]
     twice = sorted({c for c in columns if columns.count(c) > 1})
     if twice:

@@ -6,6 +6,7 @@ from difflib import get_close_matches
 
 from thermocomp.core.exceptions import UnitError
 from thermocomp.core.units import SPELLINGS, Unit, find_unit, is_unit
+from thermocomp.recordings.words import split_words
 
 # What may stand behind the last underscore. Not m, in, Hz, 1: coolant_in, mains_Hz, t_1 mean other things.
 SUFFIXES = {
@@ -23,84 +24,11 @@ _BEHIND = re.compile(
     r"|(?P<base2>.*\S)\s+(?:/|in)\s+(?P<unit2>K|s|ms|min|h)"
 )
 #: units of what is no use here; they are no slips of the pen
-_OTHERS = frozenset(
-    (
-        *(
-            "%",
-            "°",
-            "deg",
-            "grad",
-            "rad",
-            "rev",
-            "v",
-            "mv",
-            "vdc",
-            "vac",
-            "a",
-            "ma",
-            "adc",
-            "aac",
-            "w",
-            "kw",
-            "va",
-            "wh",
-            "kwh",
-        ),
-        *(
-            "n",
-            "kn",
-            "nm",
-            "ncm",
-            "bar",
-            "mbar",
-            "pa",
-            "kpa",
-            "mpa",
-            "hpa",
-            "psi",
-            "l/min",
-            "l/h",
-            "m3/h",
-            "ml/min",
-            "gpm",
-        ),
-        *(
-            "kg",
-            "g",
-            "mg",
-            "ohm",
-            "ω",
-            "kohm",
-            "kω",
-            "mm/s",
-            "m/s",
-            "mm/rev",
-            "g/m3",
-            "db",
-            "dba",
-            "khz",
-            "mhz",
-            "%rh",
-            "%rf",
-        ),
-        *(
-            "% rh",
-            "% rf",
-            "bit",
-            "inc",
-            "counts",
-            "digits",
-            "w/m2",
-            "j",
-            "kj",
-            "var",
-            "cos phi",
-            "ppm",
-            "1/k",
-            "um/s",
-            "rad/s",
-        ),
-    )
+_OTHERS = split_words(
+    "%, °, deg, grad, rad, rev, v, mv, vdc, vac, a, ma, adc, aac, w, kw, va, wh, kwh, n, kn, nm, ncm, bar",
+    "mbar, pa, kpa, mpa, hpa, psi, l/min, l/h, m3/h, ml/min, gpm, kg, g, mg, ohm, ω, kohm, kω, mm/s, m/s",
+    "mm/rev, g/m3, db, dba, khz, mhz, %rh, %rf, % rh, % rf, bit, inc, counts, digits, w/m2, j, kj, var",
+    "cos phi, ppm, 1/k, um/s, rad/s",
 )
 # In brackets anything but what would turn any frequency into a spindle speed, or a number into a channel.
 _NOT_IN_BRACKETS = ("", "1")
@@ -125,50 +53,15 @@ _DIFFERENCE = re.compile(
     r"Δ.*|.*\b(?:delta|diff\w*|rise|dT\d*|d[Tt]emp\w*)\b.*|.*(?:erwärmung|übertemp|temperaturdiff|-änderung).*", re.I
 )
 #: headings of a time column, without their unit, in several languages
-_TIMES = frozenset(
-    (
-        *("time", "timestamp", "date", "datetime", "date_time", "t", "elapsed", "zeit", "zeitstempel", "messzeit"),
-        *(
-            "laufzeit",
-            "temps",
-            "horodatage",
-            "tempo",
-            "tiempo",
-            "timestamps",
-            "time stamp",
-            "date time",
-            "elapsed time",
-        ),
-        *("date/time", "datum/uhrzeit", "datum/zeit", "datum uhrzeit", "datum und uhrzeit", "date/heure", "fecha/hora"),
-        *("data/ora", "date and time", "date & time", "date&time", "datumzeit", "datum_uhrzeit", "datetime64", "_time"),
-        *("zeitpunkt", "time (utc)", "utc", "utc time", "local time", "run time", "test time", "epoch", "unix time"),
-        *(
-            "unix",
-            "dauer",
-            "duration",
-            "durée",
-            "durata",
-            "duración",
-            "czas",
-            "čas",
-            "tijd",
-            "tid",
-            "time of measurement",
-        ),
-        *(
-            "dattim",
-            "date time stamp",
-            "datum",
-            "fecha",
-            "data",
-            "tag",
-            "day",
-            "messzeitpunkt",
-            "abs. time",
-            "rel. time",
-        ),
-        *("absolute time", "relative time", "relativzeit", "absolutzeit", "uhrzeit", "clock", "time of day", "x_value"),
-    )
+_TIMES = split_words(
+    "time, timestamp, date, datetime, date_time, t, elapsed, zeit, zeitstempel, messzeit, laufzeit, temps",
+    "horodatage, tempo, tiempo, timestamps, time stamp, date time, elapsed time, date/time, datum/uhrzeit",
+    "datum/zeit, datum uhrzeit, datum und uhrzeit, date/heure, fecha/hora, data/ora, date and time",
+    "date & time, date&time, datumzeit, datum_uhrzeit, datetime64, _time, zeitpunkt, time (utc), utc",
+    "utc time, local time, run time, test time, epoch, unix time, unix, dauer, duration, durée, durata",
+    "duración, czas, čas, tijd, tid, time of measurement, dattim, date time stamp, datum, fecha, data, tag",
+    "day, messzeitpunkt, abs. time, rel. time, absolute time, relative time, relativzeit, absolutzeit",
+    "uhrzeit, clock, time of day, x_value",
 )
 #: letters of a date or time in a heading, such as hh:mm:ss and TT.MM.JJJJ
 _FORMAT = re.compile(r"(?i)[dtgmyjahsf]{1,4}(?:[^a-zäöü]+[dtgmyjahsfp]{1,4})+")
@@ -223,12 +116,6 @@ def understand(heading: str) -> Meaning | None:
         meant = find_unit(meant.symbol, _kind_of_length(base, meant.symbol))
     # one word, so that the name can go into a formula or a controller
     return Meaning(f"{'_'.join(base.split())}_{HOUSE_SUFFIX[meant.house]}", base, meant)
-
-
-def _suffix(heading: str) -> str:
-    """Return the unit behind the last underscore of a heading, as it is written there."""
-    ends = (s for s in SUFFIXES if heading.endswith(f"_{s}") and len(heading) > len(s) + 1)
-    return max(ends, key=len, default="")
 
 
 def _kind_of_length(base: str, symbol: str) -> str:

@@ -7,15 +7,11 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray, IntArray
 from thermocomp.core.components import BY_CODE
 from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.recordings.recording import Recording
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.intp]
 
 #: what is measured, by the unit of the error
 QUANTITY = {"um": "displacement", "urad": "angle"}

@@ -4,20 +4,18 @@ import hashlib
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from difflib import get_close_matches
 from functools import cached_property
 from pathlib import PurePath
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from thermocomp.core.exceptions import InputError, RecordingError
+from thermocomp.core.arrays import FloatArray
+from thermocomp.core.exceptions import InputError, RecordingError, tell_nearest
 from thermocomp.core.machine import Channel
 from thermocomp.recordings.cycles import Cycle
 from thermocomp.recordings.frames import parts_of
-
-FloatArray = NDArray[np.float64]
 
 AMBIENT = re.compile(r"(?:^|[_\W])(air|ambient|room|workshop|environment|umgebung)(?:$|[_\W])", re.IGNORECASE)
 
@@ -137,7 +135,7 @@ class Recording:
         InputError
             A column that was named is not there, or an array has another length.
         """
-        return cls(**parts_of(table, time=time, units=units, cycles=cycles, name=name))
+        return cls(**parts_of(table, time=time, units=units or {}, cycles=cycles, name=name))
 
     def to_frame(self) -> pd.DataFrame:
         """Return the table with the time since the first row in front, as ``time_s``."""
@@ -192,9 +190,7 @@ class Recording:
         for c in self.channels:
             if c.name == wanted:
                 return c
-        names = [c.name for c in self.channels]
-        near = get_close_matches(name, names, n=3, cutoff=0.4)
-        hint = f"the nearest are {', '.join(near)}" if near else f"there are {', '.join(names)}"
+        hint = tell_nearest(name, [c.name for c in self.channels])
         raise InputError(f"{PurePath(self.source).name or self.name}: no channel is named {name!r}; {hint}")
 
     def has(self, name: str) -> bool:

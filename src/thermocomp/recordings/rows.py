@@ -3,17 +3,14 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
-from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from thermocomp.core.exceptions import InputError
+from thermocomp.core.arrays import FloatArray, IntArray
+from thermocomp.core.exceptions import InputError, tell_nearest
 from thermocomp.core.machine import Channel
-
-FloatArray = NDArray[np.float64]
 
 #: a time as seconds since the first row of the file [s], or as a timestamp
 Instant = float | datetime | str
@@ -73,7 +70,7 @@ class Rows:
     changed: tuple[str, ...] = ()
     compensation: str = ""
 
-    def kept(self, rows: NDArray[np.intp]) -> "Rows":
+    def kept(self, rows: IntArray) -> "Rows":
         """Return some of the rows."""
         numbers = rows.tolist()
         return replace(
@@ -130,8 +127,7 @@ class Rows:
         known = [str(c) for c in self.table.columns]
         for name in names:
             if name not in known:
-                near = get_close_matches(name, known, n=3, cutoff=0.4)
-                hint = f"the nearest are {', '.join(near)}" if near else f"there are {', '.join(known)}"
+                hint = tell_nearest(name, known)
                 raise InputError(f"{self.source}: {owner}: no channel is named {name!r}; {hint}")
         return list(names)
 

@@ -9,16 +9,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
 from thermocomp.core.exceptions import RecordingError
 from thermocomp.core.inputs import Input
 from thermocomp.core.learned import Learned, probe_noise
 from thermocomp.core.machine import Channel
 from thermocomp.core.zero import FIRST_READING, Zeroing, first_rows, robust_mean
 from thermocomp.recordings.starts import Start
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
-BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,6 +152,11 @@ class Samples:
         steps[np.flatnonzero(np.diff(self.test, prepend=-1))] = np.inf
         return steps
 
+    def interval(self, rows: BoolArray) -> float:
+        """Return the usual time between rows of a test [s]; 1 where there is none."""
+        steps = self.dt()[rows]
+        return float(np.median(steps[np.isfinite(steps)])) if np.isfinite(steps).any() else 1.0
+
     def learned(self, target: int, rows: BoolArray, before: int | None = None) -> Learned:
         """Return what some rows show of a target.
 
@@ -167,10 +169,6 @@ class Samples:
         before : int, optional
             The last value is that of the last row before this one in its test, or in the files that it goes on from, 0
             without any; without it, that of the last row of all.
-
-        Returns
-        -------
-        Learned
         """
         y = self.deviations[:, target]
         known = rows & np.isfinite(y)

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
 from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.core.machine import Channel
 from thermocomp.core.zero import Zeroing
@@ -13,10 +13,6 @@ from thermocomp.recordings.compensated import refuse_compensated
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.starts import Start, bridge_files, find_resting_rows, find_starts, level
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
-BoolArray = NDArray[np.bool_]
 
 #: quantities nothing is predicted from, and why
 NO_INPUTS = {
@@ -55,10 +51,6 @@ def stack(
         Over how long the start is averaged; as `Zeroing` says if not given, by the first recording's spindle speed.
     starts : Start or sequence of Start, optional
         How each recording begins, or all of them; found out if not given.
-
-    Returns
-    -------
-    Samples
 
     Raises
     ------

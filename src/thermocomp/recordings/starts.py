@@ -7,15 +7,12 @@ from itertools import pairwise
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
 from thermocomp.core.zero import Zeroing, first_rows, robust_mean
 from thermocomp.recordings.recording import Recording
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 Word = Literal["cold", "continued", "rezeroed", "known"]
 #: what the words mean, for tables and errors
@@ -98,10 +95,9 @@ class Start:
 
     def told(self, name: str) -> str:
         """Return it in words, such as ``b: continued from a (goes on from an earlier file ...); stated``."""
-        before = f" from {', '.join(r.name for r in self.earlier)}" if self.word == "continued" else ""
-        after = (
-            f"; what went before: {', '.join(r.name for r in self.earlier)}" if before == "" and self.earlier else ""
-        )
+        names = ", ".join(r.name for r in self.earlier)
+        before = f" from {names}" if self.word == "continued" else ""
+        after = f"; what went before: {names}" if self.earlier and not before else ""
         return f"{name}: {self.word}{before} ({WORDS[self.word]}{after}); {self.why}"
 
 
@@ -171,10 +167,6 @@ def find_starts(
         What counts as the start.
     absolute : bool
         Temperatures are taken as they are: their zero is known.
-
-    Returns
-    -------
-    tuple of Start
 
     Raises
     ------
@@ -267,9 +259,8 @@ def _tolerance(recording: Recording, name: str) -> float:
     values = values[np.isfinite(values)]
     if len(values) < 2:
         return NEAR
-    noise = (
-        float(np.median(np.abs(np.diff(values)))) / 0.954
-    )  # of a normal law: the difference has sqrt(2) of its noise
+    # of a normal law: the difference has sqrt(2) of its noise
+    noise = float(np.median(np.abs(np.diff(values)))) / 0.954
     return max(NEAR, SHARE * float(np.ptp(values)), LOUD * noise)
 
 

@@ -53,10 +53,9 @@ def with_tilts(tests: Sequence[Recording], tilts: Sequence[str]) -> tuple[list[R
                 if probe.quantity != "displacement":
                     raise InputError(f"{test.name}: {probe.name} is a {probe.quantity}; probes measure displacements")
             lean = 1e3 * (test.table[tip.name] - test.table[spindle.name]) / distance
-            table = test.table.copy().assign(**{name: lean if name[0] == "A" else -lean})
-            place = (
-                f"tilt about {'X' if name[0] == 'A' else 'Y'} by {tip.name} and {spindle.name}, {distance:g} mm apart"
-            )
+            table = test.table.assign(**{name: lean if name[0] == "A" else -lean})
+            about = "X" if name[0] == "A" else "Y"
+            place = f"tilt about {about} by {tip.name} and {spindle.name}, {distance:g} mm apart"
             found[k] = replace(test, table=table, channels=(*test.channels, Channel(name, "angle", "urad", place)))
         names.append(name)
     return found, names

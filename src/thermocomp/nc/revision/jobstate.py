@@ -2,14 +2,13 @@
 
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
-from functools import cache
 from pathlib import Path
 
 from pydantic import AwareDatetime
-from pydantic_core import SchemaValidator
 
 from thermocomp.core.exceptions import InputError, ModelFileError
 from thermocomp.files import jsonfile
+from thermocomp.files.draft import write_text
 from thermocomp.nc.thermal.jobstate import JobState
 
 KIND = jsonfile.Format("thermocomp-job-state", 1, "state file of a job", "thermocomp revise")
@@ -28,11 +27,6 @@ class SavedJob:
 
     written: AwareDatetime
     state: JobState
-
-
-@cache
-def _reader() -> SchemaValidator:
-    return jsonfile.reader_of(SavedJob)
 
 
 def dumps(state: JobState, written: datetime) -> str:
@@ -63,7 +57,7 @@ def loads(text: str, source: str = "state of a job") -> SavedJob:
     ModelFileError
         Not JSON, not a state file, of a newer version, altered or incomplete.
     """
-    jobs: list[SavedJob] = jsonfile.unpack(KIND, _reader(), text, source).models
+    jobs: list[SavedJob] = jsonfile.unpack(KIND, SavedJob, text, source).models
     if len(jobs) > 1:
         raise ModelFileError(f"{source}: holds the states of {len(jobs)} jobs: want one")
     saved = jobs[0]
@@ -86,7 +80,7 @@ def write(state: JobState, written: datetime, path: str | Path, *, overwrite: bo
     InputError
         The file exists and `overwrite` is False.
     """
-    jsonfile.write(dumps(state, written), path, overwrite=overwrite)
+    write_text(dumps(state, written), Path(path), overwrite=overwrite)
 
 
 def read(path: str | Path) -> SavedJob:

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from thermocomp.core import lagbank
-from thermocomp.recordings.checks.findings import BoolArray, Finding, FloatArray, Signal
+from thermocomp.core.arrays import BoolArray, FloatArray
+from thermocomp.recordings.checks.findings import Finding, Signal
 
 #: time constants of what heat does behind the spindle [s]
 _LAGS = (120.0, 400.0, 1200.0, 3600.0, 10800.0)

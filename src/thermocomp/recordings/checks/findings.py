@@ -8,12 +8,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
 from thermocomp.core.exceptions import Remedy
 from thermocomp.core.machine import Channel
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
-BoolArray = NDArray[np.bool_]
 
 Severity = Literal["trouble", "warning", "info"]
 SEVERITIES: tuple[Severity, ...] = ("trouble", "warning", "info")
@@ -121,6 +118,20 @@ def cut(name: str, rows: IntArray, time: FloatArray, reason: str) -> Remedy:
     parts = np.split(ordered, np.flatnonzero(np.diff(ordered) > 1) + 1)
     times = [float(time[p[0]]) if len(p) == 1 else [float(time[p[0]]), float(time[p[-1]])] for p in parts if len(p)]
     return {"clean": [{"do": "cut", "channels": [name], "times": times, "reason": reason}]}
+
+
+def cut_out(severity: Severity, channel: Channel, kind: str, text: str, rows: IntArray, time: FloatArray) -> Finding:
+    """Return a finding whose remedy is to take out the values that it concerns.
+
+    Parameters
+    ----------
+    severity, channel, kind, text, rows
+        See `Finding`.
+    time : ndarray of shape (n_rows,)
+        Of all rows [s].
+    """
+    remedy = cut(channel.name, rows, time, kind)
+    return Finding(severity=severity, channel=channel.name, kind=kind, text=text, rows=rows, remedy=remedy)
 
 
 def column(name: str, **keys: object) -> Remedy:

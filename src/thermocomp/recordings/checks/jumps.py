@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from thermocomp.recordings.checks.findings import BoolArray, Finding, FloatArray, IntArray, Signal, at_row, cut
+from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
+from thermocomp.recordings.checks.findings import Finding, Signal, at_row, cut_out
 
 #: smallest step that is told, by quantity [degC, um, urad]
 LEAST = {"temperature": 1.5, "displacement": 5.0, "angle": 20.0}
@@ -161,15 +162,7 @@ def _step(mine: Edges, lone: list[int], time: FloatArray) -> Finding:
             f"is off by {up:+.3g} {channel.unit} from {at_row(first, time)} to {at_row(last - 1, time)}, by a step "
             "that no other channel shares and that comes back: delete these values"
         )
-        rows = np.arange(first - 1, last)
-        return Finding(
-            severity="trouble",
-            channel=channel.name,
-            kind="step",
-            text=text,
-            rows=rows,
-            remedy=cut(channel.name, rows, time, "step"),
-        )
+        return cut_out("trouble", channel, "step", text, np.arange(first - 1, last), time)
     more = f", the largest of {len(lone)} such steps" if len(lone) > 1 else ""
     text = (
         f"steps by {height:+.3g} {channel.unit} at {at_row(row, time)}{more}, which no other channel shares: a sensor "

@@ -4,21 +4,19 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
 from thermocomp.core.machine import Channel
 from thermocomp.recordings.checks import suspects
 from thermocomp.recordings.checks.clocks import clocks
 from thermocomp.recordings.checks.findings import (
     SEVERITIES,
-    BoolArray,
     Finding,
-    FloatArray,
-    IntArray,
     Severity,
     Signal,
     at_row,
     column,
     count,
-    cut,
+    cut_out,
     runs,
     speed_changes,
 )
@@ -180,17 +178,9 @@ def _wild_finding(channel: Channel, values: FloatArray, wild: IntArray, time: Fl
         f"{values[row]:g} at {at_row(row, time)}: no {channel.quantity} of a machine; check unit, scale, zero and "
         "sensor"
     )
-    every = wild.size == np.isfinite(values).sum()
-    if every:
+    if wild.size == np.isfinite(values).sum():
         return Finding("trouble", channel.name, "implausible", text)
-    return Finding(
-        severity="trouble",
-        channel=channel.name,
-        kind="implausible",
-        text=text,
-        rows=wild,
-        remedy=cut(channel.name, wild, time, "implausible"),
-    )
+    return cut_out("trouble", channel, "implausible", text, wild, time)
 
 
 def _constant_finding(channel: Channel, x: FloatArray) -> Finding:
@@ -286,16 +276,10 @@ def _code_finding(channel: Channel, values: FloatArray, coded: BoolArray, time: 
             f"{count(int(coded.sum()), 'value')} of {len(values)}, the first at {at_row(first, time)}, hold {codes}, a "
             f"code for a missing value; mark it by a mapping, missing = [{codes}]"
         )
-    said = {"role": "ignore"} if every else {"missing": np.unique(values[coded]).tolist()}
     rows = None if every else np.flatnonzero(coded)
-    return Finding(
-        severity="trouble",
-        channel=channel.name,
-        kind="missing-value code",
-        text=text,
-        rows=rows,
-        remedy=column(channel.name, **said),
-    )
+    said = {"role": "ignore"} if every else {"missing": np.unique(values[coded]).tolist()}
+    mark, kind = column(channel.name, **said), "missing-value code"
+    return Finding(severity="trouble", channel=channel.name, kind=kind, text=text, rows=rows, remedy=mark)
 
 
 def _missing(name: str, values: FloatArray, time: FloatArray, *, probed: bool) -> Iterator[Finding]:

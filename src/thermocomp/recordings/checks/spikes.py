@@ -5,7 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from thermocomp.recordings.checks.findings import BoolArray, Finding, FloatArray, Signal, at_row, count, cut
+from thermocomp.core.arrays import BoolArray, FloatArray
+from thermocomp.recordings.checks.findings import Finding, Signal, at_row, count, cut_out
 
 #: most rows of one spike; what stays away longer is told as two steps
 LONGEST = 10
@@ -52,15 +53,11 @@ def spikes(signal: Signal, time: FloatArray, moved: BoolArray) -> Iterator[Findi
     top = int(hits[np.argmax(height[hits])])
     lengths = np.diff(np.flatnonzero(np.diff(hits, prepend=-5, append=len(x) + 5) != 1))
     width = f" of {'up to ' * (len(lengths) > 1)}{lengths.max()} rows" if lengths.max() > 1 else ""
-    yield Finding(
-        severity="trouble" if height[top] > span else "warning",
-        channel=signal.channel.name,
-        kind="spike",
-        text=f"{count(len(lengths), 'spike')}{width}, the highest by {height[top]:.3g} {signal.channel.unit} at "
-        f"{at_row(int(rows[top]), time)} (usual noise {off:.2g}); delete the values or look for a loose contact",
-        rows=rows[hits],
-        remedy=cut(signal.channel.name, rows[hits], time, "spike"),
+    text = (
+        f"{count(len(lengths), 'spike')}{width}, the highest by {height[top]:.3g} {signal.channel.unit} at "
+        f"{at_row(int(rows[top]), time)} (usual noise {off:.2g}); delete the values or look for a loose contact"
     )
+    yield cut_out("trouble" if height[top] > span else "warning", signal.channel, "spike", text, rows[hits], time)
 
 
 def _singles(x: FloatArray, span: float) -> tuple[float, FloatArray, FloatArray]:

@@ -5,7 +5,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from thermocomp.recordings.checks.findings import BoolArray, Finding, FloatArray, Severity, Signal, at_row, cut, runs
+from thermocomp.core.arrays import BoolArray, FloatArray
+from thermocomp.recordings.checks.findings import Finding, Severity, Signal, at_row, cut_out, runs
 
 #: rows that a value must stand still for
 SHORTEST = 30
@@ -50,14 +51,7 @@ def stuck(signal: Signal, time: FloatArray) -> Iterator[Finding]:
         )
         # the first value of each stretch may have been measured
         concerned = np.concatenate([rows[starts[j] + 1 : starts[j] + lengths[j]] for j in sorted(hits)])
-        yield Finding(
-            severity=severity,
-            channel=channel.name,
-            kind="stuck",
-            text=text,
-            rows=concerned,
-            remedy=cut(channel.name, concerned, time, "stuck"),
-        )
+        yield cut_out(severity, channel, "stuck", text, concerned, time)
     if coarse:
         text = f"moves in steps of {step:g} {channel.unit} over a span of {span:.3g}; a finer resolution would help"
         yield Finding("info", channel.name, "quantised", text)

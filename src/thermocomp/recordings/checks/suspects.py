@@ -4,7 +4,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from thermocomp.recordings.checks.findings import Finding, FloatArray, Severity, Signal, column
+from thermocomp.core.arrays import FloatArray
+from thermocomp.recordings.checks.findings import Finding, Severity, Signal, column
 
 _ABSOLUTE = 273.15
 

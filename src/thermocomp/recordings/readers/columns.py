@@ -3,20 +3,19 @@
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cache, partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import RecordingError, UnitError
 from thermocomp.core.machine import Channel
 from thermocomp.core.units import Unit, find_unit
 from thermocomp.recordings.headings import Meaning, understand
-from thermocomp.recordings.readers.cellkinds import Kinds
+from thermocomp.recordings.readers.dayforms import find_column_kind
 from thermocomp.recordings.readers.mapping import ColumnMap, Mapping, Place
-from thermocomp.recordings.readers.tables import tell_places
-from thermocomp.recordings.readers.timecolumns import find_position, find_time
-
-FloatArray = NDArray[np.float64]
+from thermocomp.recordings.readers.tables import FileTable, tell_places
+from thermocomp.recordings.readers.timecolumns import TimePlan, find_position, find_time
 
 #: below this no absolute temperature of a machine lies [K]
 _COLDEST = 200.0
@@ -58,8 +57,9 @@ class PlannedColumn:
                 [{"columns": {self.channel.name: {"column": heading, **said}}} for said in _DOUBTFUL],
             )
 
+    @np.errstate(over="ignore", invalid="ignore")
     def convert(
-        self, raw: FloatArray, missing: Sequence[float] = (), place: Callable[[int], str] = "row {}".format
+        self, raw: FloatArray, missing: Sequence[float], place: Callable[[int], str]
     ) -> tuple[FloatArray, tuple[str, ...]]:
         """Return the values in the house unit, nan where missing, and notes on what was replaced, and where."""
         notes = []
@@ -91,7 +91,12 @@ class PlannedColumn:
                     f"{beyond.size} of {len(raw)} cells: {tell_places(beyond.tolist(), place)}"
                 )
         values = values if self.unit.scale == 1 else values * self.unit.scale
-        return (values + self.unit.shift if self.unit.shift else values), tuple(notes)
+        values = values + self.unit.shift if self.unit.shift else values
+        if (infinite := np.isinf(values)).any():
+            cells = f"{infinite.sum()} cells"
+            notes.append(f"{self.channel.name}: infinite by its scale or unit, taken as missing, in {cells}")
+            values = np.where(infinite, np.nan, values)
+        return values, tuple(notes)
 
 
 @dataclass(frozen=True)
@@ -100,18 +105,10 @@ class ColumnPlan:
 
     Parameters
     ----------
-    time : int
-        Position of the time column.
+    times : TimePlan
+        The columns that hold the time.
     time_unit : str
         A unit of time, ``timestamp``, or empty if neither heading nor mapping says.
-    date : int or None
-        Position of a column of dates that goes with a time of day.
-    half : int or None
-        Position of a column of AM and PM.
-    fraction : int or None
-        Position of a column of milliseconds that goes with whole seconds.
-    unused : tuple of int
-        Positions of further columns that hold dates.
     beside : tuple of int
         Positions of further columns that must hold the same times: one beside each channel.
     cycle : int or None
@@ -125,12 +122,8 @@ class ColumnPlan:
     notes : tuple of str
     """
 
-    time: int
+    times: TimePlan
     time_unit: str
-    date: int | None
-    half: int | None
-    fraction: int | None
-    unused: tuple[int, ...]
     beside: tuple[int, ...]
     cycle: int | None
     columns: tuple[PlannedColumn, ...]
@@ -139,26 +132,8 @@ class ColumnPlan:
     notes: tuple[str, ...] = ()
 
 
-def plan(
-    headings: Sequence[str],
-    mapping: Mapping,
-    source: str,
-    kinds: Kinds,
-    head: Callable[[int], list[str]] = lambda _: [],
-) -> ColumnPlan:
+def plan(table: FileTable, mapping: Mapping) -> ColumnPlan:
     """Decide which columns are read, and as what.
-
-    Parameters
-    ----------
-    headings : sequence of str
-        The file's headings; an empty one is passed over.
-    mapping : Mapping
-    source : str
-        The file, for messages.
-    kinds : callable
-        Tells what the cells of a column hold.
-    head : callable
-        Returns the first filled ones of a column.
 
     Raises
     ------
@@ -168,20 +143,22 @@ def plan(
     UnitError
         A unit is unknown, or the one in the heading cannot measure what the mapping states.
     """
+    headings, source = table.headings, str(table.path)
+    kinds = cache(partial(find_column_kind, table))
     meanings = _understand_all(headings, mapping, source)
     try:
-        time, date, half, fraction, unused, told = find_time(headings, meanings, mapping, source, kinds, head)
+        times = find_time(table, meanings, mapping, kinds)
     except RecordingError:
         _refuse_twins(headings, mapping, source)
         raise
-    notes = [*told]
+    time, notes = times.time, [*times.notes]
     twins = [k for k, heading in enumerate(headings) if heading and heading == headings[time] and k != time]
     beside = () if mapping.time.column else tuple(twins)
     _refuse_twins(headings, mapping, source, headings[time] if beside else "")
     cycle = _find_cycle(headings, mapping, source)
     columns: list[PlannedColumn] = []
     tables: dict[int, str] = {}
-    ignored = {k for k in (time, date, half, fraction, cycle, *beside) if k is not None}
+    ignored = {k for k in (time, times.date, times.half, times.fraction, cycle, *beside) if k is not None}
     for name, rule in mapping.columns.items():
         place = rule.column or name
         if rule.role == "ignore" and isinstance(place, str) and place not in headings:
@@ -217,19 +194,14 @@ def plan(
     said = None if is_stamp else meanings[time]
     time_unit, note = _time_unit(headings[time], said, mapping, source)
     notes.extend([note] if note else [])
-    aliases = _aliases(columns, headings, meanings)
     return ColumnPlan(
-        time=time,
+        times=times,
         time_unit=time_unit,
-        date=date,
-        half=half,
-        fraction=fraction,
-        unused=unused,
         beside=beside,
         cycle=cycle,
         columns=tuple(columns),
         left_out=tuple(left_out),
-        aliases=aliases,
+        aliases=_aliases(columns, headings, meanings),
         notes=tuple(notes),
     )
 

@@ -2,24 +2,21 @@
 
 import re
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import Remedy, TwoReadingsError
 from thermocomp.recordings.readers.cellkinds import CLOCK, find_kind, is_compact_date, plain_clocks, plain_dates
-from thermocomp.recordings.readers.columns import ColumnPlan
-from thermocomp.recordings.readers.dayforms import IntArray, read_other_days
-from thermocomp.recordings.readers.mapping import Mapping
+from thermocomp.recordings.readers.dateorder import IntArray
+from thermocomp.recordings.readers.dayforms import read_other_days
+from thermocomp.recordings.readers.filecells import FileCells
 from thermocomp.recordings.readers.numbers import is_filler
 from thermocomp.recordings.readers.stamps import has_day, read_days
 from thermocomp.recordings.readers.tables import FileTable
 from thermocomp.recordings.readers.timecolumns import has_passed, is_ignored
-
-FloatArray = NDArray[np.float64]
 
 _DAY = 86_400.0
 #: clocks are set, for summer time too [s]
@@ -38,12 +35,7 @@ _SOME_DATE = re.compile(
 
 
 def holds_date(text: str) -> bool:
-    """Return whether a text holds a date, or a day, among other words.
-
-    Parameters
-    ----------
-    text : str
-    """
+    """Return whether a text holds a date, or a day, among other words."""
     return _SOME_DATE.search(text) is not None
 
 
@@ -62,33 +54,15 @@ def holds_own_date(table: FileTable, number: int) -> bool:
     return row is not None and any(map(holds_date, cells.iloc[row].dropna().astype(str)))
 
 
-def check_dates(
-    time: FloatArray,
-    cells: pd.DataFrame,
-    columns: ColumnPlan,
-    mapping: Mapping,
-    table: FileTable,
-    source: Path,
-    *,
-    is_stamp: bool,
-    others: Sequence[int] = (),
-) -> tuple[str, ...]:
+def check_dates(time: FloatArray, file: FileCells, others: Sequence[int] = ()) -> tuple[str, ...]:
     """Refuse times without a date of their own that do not go with the dates of another column.
 
     Parameters
     ----------
     time : ndarray of shape (n_rows,)
         Since the first row [s].
-    cells : DataFrame
-        With the columns of dates that were not used, named by position.
-    columns : ColumnPlan
-    mapping : Mapping
-    table : FileTable
-        That the cells come from.
-    source : Path
-        The file.
-    is_stamp : bool
-        The times are no numbers.
+    file : FileCells
+        With the columns of dates that were not used.
     others : sequence of int
         Further columns of dates, in forms that no timestamp has (`thermocomp.recordings.readers.dayforms`).
 
@@ -103,40 +77,37 @@ def check_dates(
         Tests of several days would become one.
     """
     notes = []
-    heading = table.headings[columns.time]
+    heading, table, is_stamp, form = file.heading, file.table, file.is_stamp, file.mapping.time.format
+    date = file.times.date
     # a number has no date even where the mapping names the column of one
-    ignores = not is_stamp or (mapping.time.format and not has_day(mapping.time.format))
-    more = (columns.date,) if columns.date is not None and ignores else ()
-    clock = _find_clock(cells, columns, mapping, table) if is_stamp else None
+    ignores = not is_stamp or (form and not has_day(form))
+    more = (date,) if date is not None and ignores else ()
+    clock = _find_clock(file) if is_stamp else None
     others = (*others, *more) if clock is not None else others
-    for k in dict.fromkeys((*columns.unused, *more, *others)):
-        name, ignored = table.headings[k] or k + 1, is_ignored(table.headings[k], k, mapping)
-        row = (
-            _find_other(time, cells[k], table.headings[k], clock, is_stamp=is_stamp)
-            if k in others
-            else _find_contradiction(time, cells[k], clock)
-        )
+    for k in dict.fromkeys((*file.times.unused, *more, *others)):
+        cells, name = file.cells[k], table.headings[k] or k + 1
+        ignored = is_ignored(table.headings[k], k, file.mapping)
+        mend = f"name it in a mapping, [time] column = {_quoted(heading)} and date = {_quoted(name)}"
+        if k in others:
+            row = _find_other(time, cells, table.headings[k], clock, is_stamp=is_stamp)
+        else:
+            row = _find_contradiction(time, cells, clock)
         if row is None:
-            if is_stamp and k not in others and columns.date is None and not has_passed(heading) and not ignored:
-                notes.append(
-                    f"left out: {name!r} holds dates, and {heading!r} only a time of day: name it in a mapping, "
-                    f"[time] column = {_quoted(heading)} and date = {_quoted(name)}"
-                )
+            if is_stamp and k not in others and date is None and not has_passed(heading) and not ignored:
+                notes.append(f"left out: {name!r} holds dates, and {heading!r} only a time of day: {mend}")
             continue
+        first = cells.dropna().iloc[0]
         said = (
-            f"{name!r} says {_shown(cells[k].iloc[row])} in {table.place(row)}, which is not the day "
-            f"{time[row] / 3600:.2f} h after {_shown(cells[k].dropna().iloc[0])}, as the time in {heading!r} says"
+            f"{name!r} says {_shown(cells.iloc[row])} in {table.place(row)}, which is not the day "
+            f"{time[row] / 3600:.2f} h after {_shown(first)}, as the time in {heading!r} says"
         )
         if ignored:
             notes.append(f"left out, as the mapping says: {said}; the times between the rows may be wrong by days")
             continue
-        use: Remedy = {"time": {"column": heading, "date": name, **({"format": ""} if mapping.time.format else {})}}
-        usable = (
-            is_stamp and k != columns.date and (k not in others or is_compact_date([str(cells[k].dropna().iloc[0])]))
-        )
-        mend = f"name it in a mapping, [time] column = {_quoted(heading)} and date = {_quoted(name)}"
+        use: Remedy = {"time": {"column": heading, "date": name, **({"format": ""} if form else {})}}
+        usable = is_stamp and k != date and (k not in others or is_compact_date([str(first)]))
         raise TwoReadingsError(
-            f"{source}: column {said}; if it holds the dates of the rows, "
+            f"{file.source}: column {said}; if it holds the dates of the rows, "
             f'{mend if usable else "split the file into tests"}; if not, leave it out, role = "ignore"',
             [*([use] if usable else []), {"columns": {str(name): {"column": name, "role": "ignore"}}}],
         )
@@ -196,25 +167,25 @@ def _runs_on(days: IntArray, t: FloatArray) -> bool:
     return bool((np.diff(t)[np.diff(days) != 0] <= 2 * _usual(t)).all())
 
 
-def _find_clock(cells: pd.DataFrame, columns: ColumnPlan, mapping: Mapping, table: FileTable) -> float | None:
+def _find_clock(file: FileCells) -> float | None:
     """Return the time of day of the first row [s]; None where the times are not known to be of a day."""
-    form, texts = mapping.time.format, cells[columns.time].astype(str).str.strip()
-    if has_passed(table.headings[columns.time]):
+    form, texts, date = file.mapping.time.format, file.cells[file.times.time].astype(str).str.strip(), file.times.date
+    if has_passed(file.heading):
         return None
     if form:
         if not re.search(r"%[HIXTRc]", form):
             return None
-        shown = texts.iloc[0] if columns.date is None else f"{cells[columns.date].iloc[0]} {texts.iloc[0]}"
+        shown = texts.iloc[0] if date is None else f"{file.cells[date].iloc[0]} {texts.iloc[0]}"
         first = pd.to_datetime(shown, format=form, errors="coerce")
-    elif columns.date is not None:
+    elif date is not None:
         return None
     else:
-        parts = plain_clocks(texts).str.extract(CLOCK)
+        clocks = plain_clocks(texts)
+        parts = clocks.str.extract(CLOCK)
         if parts["days"].notna().any() or (pd.to_numeric(parts["hours"]) > 23).any():
             return None
-        first = pd.to_datetime(plain_clocks(texts).iloc[0].replace(".", ""), errors="coerce")
-    return (
-        None
-        if pd.isna(first)
-        else float((first.tz_localize(None) - first.tz_localize(None).normalize()).total_seconds())
-    )
+        first = pd.to_datetime(clocks.iloc[0].replace(".", ""), errors="coerce")
+    if pd.isna(first):
+        return None
+    plain = first.tz_localize(None)
+    return float((plain - plain.normalize()).total_seconds())

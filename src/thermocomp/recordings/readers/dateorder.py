@@ -32,10 +32,6 @@ def find_order(readings: Mapping[str, IntArray]) -> DateChoice:
     readings : mapping of str to ndarray of shape (n_rows,)
         Instants under each order [ns], all of which are dates.
 
-    Returns
-    -------
-    DateChoice
-
     Notes
     -----
     An order is taken if it is the only one

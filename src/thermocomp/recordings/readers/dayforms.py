@@ -6,15 +6,14 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.recordings.headings import plain_name
 from thermocomp.recordings.readers.cellkinds import Kind, find_kind, plain_dates
+from thermocomp.recordings.readers.dateorder import IntArray
 from thermocomp.recordings.readers.numbers import is_filler
 from thermocomp.recordings.readers.stamps import parse, read_days
 from thermocomp.recordings.readers.tables import FileTable
-
-IntArray = NDArray[np.int64]
 
 #: columns of numbers by their type that are looked into
 _MOST = 100
@@ -132,7 +131,7 @@ def read_other_days(cells: "pd.Series[Any]", heading: str, *, beside_clock: bool
     return found
 
 
-def _read_numbers(numbers: NDArray[np.float64], *, named: bool) -> list[IntArray]:
+def _read_numbers(numbers: FloatArray, *, named: bool) -> list[IntArray]:
     found: list[IntArray] = []
     rises = bool((np.diff(numbers) >= 0).all())
     low, high = numbers.min(), numbers.max()

@@ -58,7 +58,7 @@ def says_halves(heading: str) -> bool:
 
 
 def join_halves(
-    clocks: "pd.Series[Any]", halves: "pd.Series[Any]", form: str, table: FileTable, where: str, names: tuple[str, str]
+    clocks: "pd.Series[Any]", halves: "pd.Series[Any]", form: str, table: FileTable, names: tuple[str, str]
 ) -> "tuple[pd.Series[Any], tuple[str, ...]]":
     """Return times of day with AM or PM behind them, as their column says; and how they were read.
 
@@ -72,8 +72,6 @@ def join_halves(
         Format of the times that a mapping gives; empty: none.
     table : FileTable
         That the cells come from.
-    where : str
-        The file, for messages.
     names : tuple of str
         Headings of both columns.
 
@@ -97,8 +95,9 @@ def join_halves(
         row = int(unknown[0])
         says = "is empty" if pd.isna(halves.iloc[row]) else f"{str(halves.iloc[row])!r} is neither AM nor PM"
         raise RecordingError(
-            f"{where}: {table.place(row)}, column {half!r}: {says}, beside the time {clocks.iloc[row]}; fill it in, or "
-            f'if it has nothing to do with the time, leave it out by a mapping: [columns."{half}"] role = "ignore"',
+            f"{table.path}: {table.place(row)}, column {half!r}: {says}, beside the time {clocks.iloc[row]}; fill it "
+            "in, or if it has nothing to do with the time, leave it out by a mapping: "
+            f'[columns."{half}"] role = "ignore"',
             [skip_row(table, row)] if 4 * unknown.size <= len(clocks) else [],
         )
     texts = clocks.astype(str).str.strip()
@@ -110,7 +109,7 @@ def join_halves(
             return clocks, ()
         row = int(wrong[0])
         raise TwoReadingsError(
-            f"{where}: {table.place(row)}: {half!r} says {halves.iloc[row]}, and {time!r} {clocks.iloc[row]}"
+            f"{table.path}: {table.place(row)}: {half!r} says {halves.iloc[row]}, and {time!r} {clocks.iloc[row]}"
             + (
                 ", of 24 hours, as other rows show: correct the one or the other, "
                 if whole_day

@@ -21,11 +21,6 @@ _LONE_CR = re.compile(rb"\r(?![\r\n])")
 def bring_to_utf8(path: Path, limits: FileLimits) -> tuple[bytes | None, tuple[str, ...]]:
     """Return a file as UTF-8 with line ends of its own time, and what was done, if it has neither.
 
-    Parameters
-    ----------
-    path : Path
-    limits : FileLimits
-
     Returns
     -------
     data : bytes or None
@@ -62,10 +57,6 @@ def bring_to_utf8(path: Path, limits: FileLimits) -> tuple[bytes | None, tuple[s
 
 def find_encoding(lines: Iterable[bytes]) -> str:
     """Return in which encoding lines that are not UTF-8 make most sense.
-
-    Parameters
-    ----------
-    lines : iterable of bytes
 
     Returns
     -------

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import InputError, Remedy, UnitError
 from thermocomp.core.units import HOUSE_UNITS
 from thermocomp.recordings.headings import HOUSE_SUFFIX, Meaning, understand
@@ -16,8 +16,6 @@ from thermocomp.recordings.readers.mapping import Mapping
 from thermocomp.recordings.readers.tables import FileTable
 from thermocomp.recordings.readers.timecolumns import find_parts
 from thermocomp.recordings.readers.times import find_likely_units
-
-FloatArray = NDArray[np.float64]
 
 #: columns that are guessed about
 MOST_GUESSES = 100
@@ -70,11 +68,6 @@ def guess(table: FileTable, mapping: Mapping) -> tuple[Remedy, ...]:
 
 def guess_columns(table: FileTable, mapping: Mapping) -> list[tuple[str, list[Remedy]]]:
     """Guess what columns of numbers are that neither heading nor mapping explains.
-
-    Parameters
-    ----------
-    table : FileTable
-    mapping : Mapping
 
     Returns
     -------

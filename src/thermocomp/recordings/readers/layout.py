@@ -8,6 +8,7 @@ from typing import NamedTuple
 from thermocomp.core.units import is_unit
 from thermocomp.recordings.headings import BRACKETS, find_date_order, is_foreign_unit, is_time_name, is_understood
 from thermocomp.recordings.readers.numbers import is_filler, is_number_like
+from thermocomp.recordings.words import split_words
 
 #: dates and times of day, in all their habits
 _TIME = re.compile(
@@ -20,25 +21,20 @@ _LONGEST = 60
 #: share of the columns of numbers that have one in a row of the table
 _ROW = 0.5
 #: what stands for no unit in a row of units, in small letters: of numbers that have none, and before the row
-_NO_UNIT = frozenset(
-    (
-        *("", "-", "--", "---", "1", "n/a", "na", "none", "unitless", "ohne", "rn", "no", "nr", "#", "count", "index"),
-        *("unit", "units", "einheit", "einheiten", "unité", "unités", "unità", "unidad", "unidades", "eenheid"),
-        *("jednotka", "jednostka", "enhet", "enhed", "单位", "単位"),
-    )
+_NO_UNIT = {""} | split_words(
+    "-, --, ---, 1, n/a, na, none, unitless, ohne, rn, no, nr, #, count, index, unit, units, einheit",
+    "einheiten, unité, unités, unità, unidad, unidades, eenheid, jednotka, jednostka, enhet, enhed, 单位, 単位",
 )
 #: text rows between the headings and the first row of numbers
 _MOST_BETWEEN = 12
 #: rows at the end of a file that may be none of its table
 MOST_REMARKS = 40
 #: words before a row of statistics, in small letters
-_STATISTICS = frozenset(
-    (
-        *("min", "max", "avg", "mean", "std", "stdev", "std dev", "sum", "total", "count", "range", "median", "rms"),
-        *("minimum", "maximum", "average", "standard deviation", "mittel", "mittelwert", "durchschnitt", "summe"),
-        *("anzahl", "spannweite", "standardabweichung", "stabw", "moyenne", "somme", "media", "promedio", "max-min"),
-        *("average value", "minwert", "maxwert", "minimalwert", "maximalwert", "ø", "sigma", "peak-peak", "delta"),
-    )
+_STATISTICS = split_words(
+    "min, max, avg, mean, std, stdev, std dev, sum, total, count, range, median, rms, minimum, maximum",
+    "average, standard deviation, mittel, mittelwert, durchschnitt, summe, anzahl, spannweite",
+    "standardabweichung, stabw, moyenne, somme, media, promedio, max-min, average value, minwert, maxwert",
+    "minimalwert, maximalwert, ø, sigma, peak-peak, delta",
 )
 
 
@@ -139,10 +135,6 @@ def tell_layout(numbers: Sequence[int], layout: FileLayout, word: str) -> tuple[
     layout : FileLayout
     word : str
         What a row is called there.
-
-    Returns
-    -------
-    tuple of str
     """
     found = []
     above = [numbers[k] for k in range(layout.heading) if k != layout.units]
@@ -188,10 +180,6 @@ def join_units(headings: Sequence[str], units: Sequence[str], rows: Sequence[Seq
     headings, units : sequence of str
     rows : sequence of sequence of str
         Cells of the first rows of the table.
-
-    Returns
-    -------
-    list of str
     """
     said = [_bare(unit) for unit in units]
     found = []

@@ -1,7 +1,7 @@
 """What the readers take at most: every limit in one place, so that no file costs more time or memory than it may."""
 
 import stat
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Final
 
@@ -9,23 +9,11 @@ from thermocomp.core.exceptions import InputError, RecordingError
 
 #: bytes that a small file may become when it is unpacked: a few seconds of work
 _UNPACKED_FREE: Final = 64 << 20
-#: what each limit counts, for messages
-_COUNTED: Final = {
-    "file_bytes": "bytes",
-    "recoded_bytes": "bytes of a text in another encoding",
-    "line_bytes": "bytes in a line or a text",
-    "cell_characters": "characters in a cell",
-    "heading_characters": "characters in a heading",
-    "columns": "columns",
-    "rows": "rows",
-    "cells": "cells",
-    "skipped_lines": "lines that are no rows (comments, blank lines)",
-    "sheets": "sheets",
-    "sheet_rows": "rows of a sheet",
-    "row_elements": "XML elements in one row or one other part of the workbook",
-    "growth": "times its size when it is unpacked",
-    "cycles": "thermal cycles",
-}
+
+
+def _limit(most: int, counts: str) -> int:
+    """Return the field of a limit, with what it counts, for messages."""
+    return field(default=most, metadata={"counts": counts})
 
 
 @dataclass(frozen=True)
@@ -67,20 +55,20 @@ class FileLimits:
         Thermal cycles take hours; a column that has more labels numbers something else.
     """
 
-    file_bytes: int = 8 << 30
-    recoded_bytes: int = 1 << 30
-    line_bytes: int = 4_000_000
-    cell_characters: int = 32_767
-    heading_characters: int = 1_000
-    columns: int = 10_000
-    rows: int = 100_000_000
-    cells: int = 500_000_000
-    skipped_lines: int = 1_000_000
-    sheets: int = 100
-    sheet_rows: int = 1_048_576
-    row_elements: int = 200_000
-    growth: int = 100
-    cycles: int = 10_000
+    file_bytes: int = _limit(8 << 30, "bytes")
+    recoded_bytes: int = _limit(1 << 30, "bytes of a text in another encoding")
+    line_bytes: int = _limit(4_000_000, "bytes in a line or a text")
+    cell_characters: int = _limit(32_767, "characters in a cell")
+    heading_characters: int = _limit(1_000, "characters in a heading")
+    columns: int = _limit(10_000, "columns")
+    rows: int = _limit(100_000_000, "rows")
+    cells: int = _limit(500_000_000, "cells")
+    skipped_lines: int = _limit(1_000_000, "lines that are no rows (comments, blank lines)")
+    sheets: int = _limit(100, "sheets")
+    sheet_rows: int = _limit(1_048_576, "rows of a sheet")
+    row_elements: int = _limit(200_000, "XML elements in one row or one other part of the workbook")
+    growth: int = _limit(100, "times its size when it is unpacked")
+    cycles: int = _limit(10_000, "thermal cycles")
 
     def __post_init__(self) -> None:
         for f in fields(self):
@@ -106,9 +94,10 @@ class FileLimits:
         """
         most = getattr(self, name)
         if found > most:
+            counts = next(f.metadata["counts"] for f in fields(self) if f.name == name)
             raise RecordingError(
-                f"{where}: over {most:,} {_COUNTED[name]} (at least {found:,}), which are not read: delete what is no "
-                f"part of the recording, or raise the limit in a mapping, [limits] {name} = {2 * found}"
+                f"{where}: over {most:,} {counts} (at least {found:,}), which are not read: delete what is no part of "
+                f"the recording, or raise the limit in a mapping, [limits] {name} = {2 * found}"
             )
 
     def check_table(self, rows: int, columns: int, where: object) -> None:
@@ -150,11 +139,6 @@ class FileLimits:
 
 def check_file(path: Path, limits: FileLimits) -> None:
     """Refuse what is no file, such as a pipe or a device (also through a link), and a file that is too large.
-
-    Parameters
-    ----------
-    path : Path
-    limits : FileLimits
 
     Raises
     ------

@@ -5,15 +5,13 @@ from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray, IntArray
 from thermocomp.core.exceptions import InputError, RecordingError, UnitError
 from thermocomp.recordings.profiles import QUANTITY, Profiles
 from thermocomp.recordings.readers.mapping import Mapping
 from thermocomp.recordings.readers.recordings import make_recording, read_rows
 from thermocomp.recordings.rows import Rows
-
-FloatArray = NDArray[np.float64]
 
 #: names of the axis' own position, besides that of the axis
 _POSITIONS = ("position_mm", "pos_mm")
@@ -157,7 +155,7 @@ def _place_columns(rows: Rows, position: str, axis: str, owner: str) -> dict[str
     return {axis: found[0], **others}
 
 
-def _states(rows: Rows, column: str, at: FloatArray) -> NDArray[np.intp]:
+def _states(rows: Rows, column: str, at: FloatArray) -> IntArray:
     """Return the number of the thermal state of each row, from 0."""
     if column and column not in rows.extra:
         raise InputError(f"{rows.source}: there is no column {column!r} that tells the state")
@@ -182,7 +180,7 @@ def _states(rows: Rows, column: str, at: FloatArray) -> NDArray[np.intp]:
     return np.cumsum(begins).astype(np.intp) - 1
 
 
-def _refuse_unsorted(rows: Rows, at: FloatArray, state: NDArray[np.intp], own: int, column: str) -> None:
+def _refuse_unsorted(rows: Rows, at: FloatArray, state: IntArray, own: int, column: str) -> None:
     last: dict[tuple[float, ...], float] = {}
     for k, point in enumerate(at.tolist()):
         if k and state[k] != state[k - 1]:
@@ -209,7 +207,7 @@ def _in_order(at: FloatArray, axis: str) -> FloatArray:
     return points
 
 
-def _mean(values: FloatArray, first: NDArray[np.intp]) -> FloatArray:
+def _mean(values: FloatArray, first: IntArray) -> FloatArray:
     """Return the mean over the rows of each state; equal values stay what they are to the last bit."""
     out = np.full((len(first), values.shape[1]), np.nan)
     for k, rows in enumerate(np.split(values, first[1:])):

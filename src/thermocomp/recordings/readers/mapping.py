@@ -320,12 +320,8 @@ def _explain_step(error: ErrorDetails) -> str:
     loc = error["loc"]
     table = f"[[clean]] number {int(loc[1]) + 1}" if len(loc) > 1 else "[[clean]]"
     if len(loc) < 4:
-        steps = ", ".join(repr(do) for do in _STEPS)
-        return (
-            f"{table}: must be a table with do = one of {steps}"
-            if "tag" in error["type"]
-            else f"{table}: {error['msg']}"
-        )
+        want = f"must be a table with do = one of {', '.join(map(repr, _STEPS))}"
+        return f"{table}: {want if 'tag' in error['type'] else error['msg']}"
     key = str(loc[3])
     if error["type"] == "unexpected_keyword_argument":
         return _unknown_key(table, key, _STEPS[str(loc[2])])

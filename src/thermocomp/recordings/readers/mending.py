@@ -16,7 +16,8 @@ from thermocomp.recordings.checks.quality import check
 from thermocomp.recordings.readers.datecheck import holds_date, holds_own_date
 from thermocomp.recordings.readers.guesses import guess_columns, understand_or_none
 from thermocomp.recordings.readers.mapping import ADAPTER, ColumnMap, Mapping, check_content
-from thermocomp.recordings.readers.recordings import open_table, read
+from thermocomp.recordings.readers.opening import open_table
+from thermocomp.recordings.readers.recordings import read
 from thermocomp.recordings.recording import Recording
 
 #: what may be asked about one file: rows that are passed over one by one, for the most part
@@ -157,10 +158,6 @@ def mend(path: str | Path, text: str, decide: Decide) -> Mended:
     decide : callable
         Answers a `Question`.
 
-    Returns
-    -------
-    Mended
-
     Raises
     ------
     InputError
@@ -168,7 +165,7 @@ def mend(path: str | Path, text: str, decide: Decide) -> Mended:
     """
     owner = str(path)
     dialogue = _Dialogue(Draft(text), decide, path)
-    table = dialogue.until(lambda: open_table(path, dialogue.draft.mapping(owner)))
+    table = dialogue.until(lambda: open_table(path, dialogue.draft.mapping(owner)))[0]
     mapping = dialogue.draft.mapping(owner)
     if not mapping.read.only_mapped:
         for shown, options in guess_columns(table, mapping):
@@ -188,15 +185,6 @@ def mend(path: str | Path, text: str, decide: Decide) -> Mended:
 
 def read_or_offer(path: str | Path, mapping: Mapping | None = None) -> Recording:
     """Read one test from a file; an error of it offers a mapping, filled in, in a note of its own.
-
-    Parameters
-    ----------
-    path : str or Path
-    mapping : Mapping, optional
-
-    Returns
-    -------
-    Recording
 
     Raises
     ------
@@ -297,7 +285,7 @@ class _Dialogue:
         if not _skips(error.remedies[0]):
             return False
         try:
-            table = open_table(self.path, self.draft.mapping(str(self.path)))
+            table, _ = open_table(self.path, self.draft.mapping(str(self.path)))
         except InputError:  # a row of too many cells or too few, which the message holds
             return holds_date(str(error).removeprefix(str(self.path)))
         return holds_own_date(table, error.remedies[0]["read"]["skip"][-1])

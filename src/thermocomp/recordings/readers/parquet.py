@@ -116,7 +116,7 @@ class ParquetTable:
         if row != self.n_rows:
             raise RecordingError(f"{self.path}: says it has {self.n_rows} rows, and has {row}; write it anew")
         columns = {k: pd.concat(p, ignore_index=True) for k, p in parts.items()}
-        numbered, notes = convert_all(self, str(self.path), {k: columns[k] for k in written}, self.decimal)
+        numbered, notes = convert_all(self, {k: columns[k] for k in written}, self.decimal)
         data = {**columns, **values, **numbered}
         return pd.DataFrame({k: data[k] for k in wanted}, copy=False), notes
 
@@ -151,12 +151,6 @@ def _translated(path: Path) -> Iterator[None]:
 
 def open_parquet(path: Path, options: ReadOptions, limits: FileLimits) -> FileTable:
     """Open a Parquet file.
-
-    Parameters
-    ----------
-    path : Path
-    options : ReadOptions
-    limits : FileLimits
 
     Raises
     ------

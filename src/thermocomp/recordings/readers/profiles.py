@@ -109,10 +109,6 @@ def read(
     layout : {'wide', 'long'}, optional
         A row per thermal state and a column per position, or a row per position; found out if not given.
 
-    Returns
-    -------
-    Profiles
-
     Raises
     ------
     RecordingError
@@ -243,10 +239,6 @@ def from_recording(recording: Recording, options: ProfileOptions | str) -> Profi
 
 def read_places(path: str | Path) -> dict[str, Place]:
     """Read a TOML that says where each column of a wide table was measured.
-
-    Parameters
-    ----------
-    path : str or Path
 
     Returns
     -------

@@ -1,48 +1,39 @@
 """Recordings as files: CSV, XLSX and Parquet in, CSV and Parquet out."""
 
-import hashlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from datetime import datetime, timedelta
-from difflib import get_close_matches
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
-from pydantic import ValidationError
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import InputError, RecordingError, TwoReadingsError
 from thermocomp.files.draft import draft
 from thermocomp.recordings.cleaning import clean
 from thermocomp.recordings.cycles import Cycle, find_cycles, make_single_cycle, split_by_labels
 from thermocomp.recordings.headings import understand
-from thermocomp.recordings.readers.columns import ColumnPlan, PlannedColumn, plan
+from thermocomp.recordings.readers.columns import ColumnPlan, plan
 from thermocomp.recordings.readers.datecheck import check_dates
-from thermocomp.recordings.readers.dayforms import find_column_kind, find_day_columns
+from thermocomp.recordings.readers.dayforms import find_day_columns
 from thermocomp.recordings.readers.dayhalves import join_halves
+from thermocomp.recordings.readers.filecells import FileCells
 from thermocomp.recordings.readers.guesses import guess
 from thermocomp.recordings.readers.leftout import refuse_nameless, why_left_out
-from thermocomp.recordings.readers.limits import FileLimits, check_file
-from thermocomp.recordings.readers.mapping import ADAPTER, ColumnMap, Mapping, ReadOptions, TimeColumn
-from thermocomp.recordings.readers.parquet import open_parquet
-from thermocomp.recordings.readers.tables import EMBEDDED, FileTable, defuse, restore, skip_row
-from thermocomp.recordings.readers.textfile import open_csv
+from thermocomp.recordings.readers.limits import FileLimits
+from thermocomp.recordings.readers.mapping import ADAPTER, ColumnMap, Mapping, TimeColumn
+from thermocomp.recordings.readers.opening import open_table, read_embedded
+from thermocomp.recordings.readers.tables import EMBEDDED, FileTable, defuse, restore
 from thermocomp.recordings.readers.times import read_times
-from thermocomp.recordings.readers.workbook import open_workbook
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.rows import Rows
-
-FloatArray = NDArray[np.float64]
 
 #: notes of one recording, and characters of a note or an error
 _MOST_NOTES = 100
 _MOST_SAID = 2_000
-
-ENDINGS = (".csv", ".tsv", ".txt", ".dat", ".asc", ".xlsx", ".ods", ".parquet")
 
 
 def read(path: str | Path, mapping: Mapping | None = None) -> Recording:
@@ -88,10 +79,6 @@ def read_rows(
     extra : sequence of str
         Headings of columns, whatever they hold, to be read too if they are there.
 
-    Returns
-    -------
-    Rows
-
     Raises
     ------
     RecordingError, UnitError
@@ -109,52 +96,27 @@ def read_rows(
 
 
 def _read_rows(source: Path, mapping: Mapping, *, rising: bool, extra: Sequence[str]) -> Rows:
-    table, sha256 = _opened(source, mapping.read, mapping.limits)
+    table, sha256 = open_table(source, mapping)
     notes = [*table.notes]
     if table.embedded:
-        described, note = _described(table.embedded, source)
+        described, damage = read_embedded(table.embedded, source)
         mapping = mapping.over(described)
-        notes.extend(note)
+        notes.extend(damage)
     with _guessing(table, mapping):
-        columns = plan(table.headings, mapping, str(source), cache(lambda k: find_column_kind(table, k)), table.head)
+        columns = plan(table, mapping)
     notes.extend(columns.notes)
-    is_stamp = columns.time_unit == "timestamp" or not (columns.time_unit or table.is_number(columns.time))
-    numbers = [c.index for c in columns.columns]
     more = {h: table.headings.index(h) for h in extra if h in table.headings}
-    if is_stamp and columns.fraction is not None:
-        numbers.append(columns.fraction)
-    times = [columns.time, *columns.beside]
-    known = {*numbers, *times, columns.cycle, columns.date, columns.half, columns.fraction, *columns.unused}
-    others = find_day_columns(
-        table, [k for k, h in enumerate(table.headings) if h and k not in known], beside_clock=is_stamp
-    )
-    numbers += [] if is_stamp else times
-    maybe = (
-        *(times if is_stamp else ()),
-        columns.date,
-        columns.half,
-        *columns.unused,
-        *others,
-        columns.cycle,
-        *more.values(),
-    )
-    texts = [k for k in maybe if k is not None]
-    cells, told = table.load(list(dict.fromkeys(numbers)), list(dict.fromkeys(t for t in texts if t not in numbers)))
+    file, others, told = _load(source, mapping, table, columns, [*more.values()])
     notes.extend(told)
-    if is_stamp and columns.half is not None:
-        names = table.headings[columns.time], table.headings[columns.half]
-        clocks, halves = cells[columns.time], cells[columns.half]
-        cells[columns.time], told = join_halves(clocks, halves, mapping.time.format, table, str(source), names)
-        notes.extend(told)
-    time, start, told = _times(cells, columns, mapping, table, source, is_stamp=is_stamp, rising=rising)
+    time, start, told = _times(file, rising=rising)
     notes.extend(told)
-    if not start or columns.date is not None:
-        notes.extend(check_dates(time, cells, columns, mapping, table, source, is_stamp=is_stamp, others=others))
+    if not start or columns.times.date is not None:
+        notes.extend(check_dates(time, file, others))
     data, changed = {}, list[str]()
     for column in columns.columns:
-        raw = cells[column.index].to_numpy(dtype=np.float64)
+        raw = file.cells[column.index].to_numpy(dtype=np.float64)
         column.refuse_doubtful(raw, table.headings[column.index], str(source))
-        data[column.channel.name], found = _convert(column, raw, mapping.read.missing, table)
+        data[column.channel.name], found = column.convert(raw, mapping.read.missing, table.place)
         changed.extend(found)
     left_out = [k for k in columns.left_out if k not in more.values()]
     numeric = [k for k in left_out if table.is_number(k, empty=False)]
@@ -171,8 +133,8 @@ def _read_rows(source: Path, mapping: Mapping, *, rising: bool, extra: Sequence[
         start=start or mapping.time.start,
         table=pd.DataFrame(data, copy=False),
         channels=tuple(c.channel for c in columns.columns),
-        labels=_labels(cells, columns, table, source),
-        extra={h: cells[k].tolist() for h, k in more.items()},
+        labels=_labels(file),
+        extra={h: file.cells[k].tolist() for h, k in more.items()},
         min_run=mapping.cycles.min_run_s,
         min_stop=mapping.cycles.min_stop_s,
         most_cycles=mapping.limits.cycles,
@@ -183,6 +145,34 @@ def _read_rows(source: Path, mapping: Mapping, *, rising: bool, extra: Sequence[
         compensation=mapping.compensation,
     )
     return _zeroed(clean(rows, mapping.clean), columns) if mapping.clean else rows
+
+
+def _load(
+    source: Path, mapping: Mapping, table: FileTable, columns: ColumnPlan, extra: Sequence[int]
+) -> tuple[FileCells, list[int], tuple[str, ...]]:
+    """Read the columns of a plan, and those that may hold dates; say which these are, and what was made of cells."""
+    times = columns.times
+    is_stamp = columns.time_unit == "timestamp" or not (columns.time_unit or table.is_number(times.time))
+    clocks = [times.time, *columns.beside]
+    numbers = [c.index for c in columns.columns]
+    numbers += [times.fraction] if is_stamp and times.fraction is not None else []
+    known = {*numbers, *clocks, columns.cycle, times.date, times.half, times.fraction, *times.unused}
+    unknown = [k for k, h in enumerate(table.headings) if h and k not in known]
+    others = find_day_columns(table, unknown, beside_clock=is_stamp)
+    maybe = [times.date, times.half, *times.unused, *others, columns.cycle, *extra]
+    if is_stamp:
+        maybe = [*clocks, *maybe]
+    else:
+        numbers += clocks
+    texts = [k for k in maybe if k is not None and k not in numbers]
+    cells, notes = table.load(list(dict.fromkeys(numbers)), list(dict.fromkeys(texts)))
+    if is_stamp and times.half is not None:
+        names = table.headings[times.time], table.headings[times.half]
+        both = cells[times.time], cells[times.half]
+        cells[times.time], told = join_halves(*both, mapping.time.format, table, names)
+        notes += told
+    file = FileCells(source=source, mapping=mapping, table=table, columns=columns, cells=cells, is_stamp=is_stamp)
+    return file, others, notes
 
 
 def make_recording(rows: Rows, time: FloatArray, table: pd.DataFrame, labels: Sequence[Any] | None) -> Recording:
@@ -198,10 +188,6 @@ def make_recording(rows: Rows, time: FloatArray, table: pd.DataFrame, labels: Se
         Some of the channels.
     labels : sequence of object, optional
         Thermal cycle of each row.
-
-    Returns
-    -------
-    Recording
     """
     origin = float(time[0])
     recording = Recording(
@@ -282,63 +268,6 @@ def _as_written(name: str, *, as_text: bool) -> str:
     return defuse(name) if as_text or restore(name) != name else name
 
 
-def open_table(path: str | Path, mapping: Mapping) -> FileTable:
-    """Open a file without understanding what its columns are.
-
-    Parameters
-    ----------
-    path : str or Path
-    mapping : Mapping
-
-    Returns
-    -------
-    FileTable
-
-    Raises
-    ------
-    RecordingError
-        It cannot be read as a table.
-    """
-    return _opened(Path(path), mapping.read, mapping.limits)[0]
-
-
-def _opened(path: Path, options: ReadOptions, limits: FileLimits) -> tuple[FileTable, str]:
-    """Return the raw table and the SHA-256 of the file."""
-    ending = path.suffix.lower()
-    if ending not in ENDINGS:
-        raise RecordingError(
-            f"{path}: files ending in {ending or 'nothing'!r} are not read; save it as one of {', '.join(ENDINGS)}"
-        )
-    try:
-        check_file(path, limits)
-        with path.open("rb") as f:
-            sha256 = hashlib.file_digest(f, "sha256").hexdigest()
-        if ending in (".xlsx", ".ods"):
-            return open_workbook(path, options, limits), sha256
-        if ending == ".parquet":
-            return open_parquet(path, options, limits), sha256
-        return open_csv(path, options, limits), sha256
-    except FileNotFoundError as e:
-        others = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
-        near = get_close_matches(path.name, others, n=1)
-        raise RecordingError(f"{path}: no such file{f'; did you mean {near[0]}?' if near else ''}") from e
-    except OSError as e:
-        raise RecordingError(f"{path}: cannot be read: {e.strerror or e}") from e
-    except ValueError as e:  # a name that no file can have
-        raise RecordingError(f"{str(path)!r}: cannot be read: {e}") from e
-
-
-def _described(text: str, source: Path) -> tuple[Mapping, list[str]]:
-    """Return thermocomp's own description of the columns; nothing but a note if another program has damaged it."""
-    try:
-        return ADAPTER.validate_json(text), []
-    except ValidationError as e:
-        reason = e.errors()[0]["msg"]
-        return Mapping(), [f"thermocomp's own description of the columns is damaged ({reason}) and not used"]
-    except InputError as e:
-        raise type(e)(f"{source}: {e}") from e
-
-
 def _zeroed(rows: Rows, columns: ColumnPlan) -> Rows:
     """Let columns that count from their first value do so where that was cut."""
     table = rows.table
@@ -368,20 +297,11 @@ def _guessing(table: FileTable, mapping: Mapping) -> Iterator[None]:
         raise
 
 
-def _times(
-    cells: pd.DataFrame,
-    columns: ColumnPlan,
-    mapping: Mapping,
-    table: FileTable,
-    source: Path,
-    *,
-    is_stamp: bool,
-    rising: bool,
-) -> tuple[FloatArray, str, tuple[str, ...]]:
-    where = f"{source}: column {table.headings[columns.time]!r}"
+def _times(file: FileCells, *, rising: bool) -> tuple[FloatArray, str, tuple[str, ...]]:
+    where = f"{file.source}: column {file.heading!r}"
     try:
         with np.errstate(over="ignore", invalid="ignore"):
-            time, start, notes = read_times(cells, columns, mapping, table, source, is_stamp=is_stamp, rising=rising)
+            time, start, notes = read_times(file, rising=rising)
     except (ValueError, OverflowError, TypeError) as e:  # a format that is none, a year that no clock has
         raise RecordingError(
             f"{where}: the times cannot be read ({e}); correct [time] format in the mapping or in the file's first line"
@@ -391,19 +311,6 @@ def _times(
     return time, start, notes
 
 
-def _convert(
-    column: PlannedColumn, raw: FloatArray, missing: Sequence[float], table: FileTable
-) -> tuple[FloatArray, tuple[str, ...]]:
-    """Return the values of a column; one that a scale or a unit makes infinite is missing."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        values, notes = column.convert(raw, missing, table.place)
-    infinite = np.isinf(values)
-    if not infinite.any():
-        return values, notes
-    note = f"{column.channel.name}: infinite by its scale or unit, taken as missing, in {infinite.sum()} cells"
-    return np.where(infinite, np.nan, values), (*notes, note)
-
-
 def _shorten(notes: Sequence[str], left_out: int) -> tuple[str, ...]:
     """Return notes as far as a user can read them, and the number of the others."""
     found = [n if len(n) <= _MOST_SAID else f"{n[:_MOST_SAID]} ..." for n in notes]
@@ -411,17 +318,13 @@ def _shorten(notes: Sequence[str], left_out: int) -> tuple[str, ...]:
     return (*found[:_MOST_NOTES], *([f"left out or replaced: {more:,} more columns"] if more else []))
 
 
-def _labels(cells: pd.DataFrame, columns: ColumnPlan, table: FileTable, source: Path) -> list[Any] | None:
-    if columns.cycle is None:
+def _labels(file: FileCells) -> list[Any] | None:
+    cycle = file.columns.cycle
+    if cycle is None:
         return None
-    labels = cells[columns.cycle]
-    if labels.isna().any():
-        row = int(np.flatnonzero(labels.isna())[0])
-        raise RecordingError(
-            f"{source}: {table.place(row)}, column {table.headings[columns.cycle]!r}: the cycle's label is missing; "
-            "every row belongs to a cycle",
-            [skip_row(table, row)],
-        )
+    labels = file.cells[cycle]
+    for row in np.flatnonzero(labels.isna())[:1]:
+        raise file.refuse_row(int(row), "the cycle's label is missing; every row belongs to a cycle", cycle)
     return [restore(label) if isinstance(label, str) else label for label in labels.tolist()]
 
 

@@ -8,13 +8,11 @@ from typing import Any, NoReturn, Protocol
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.exceptions import RecordingError, Remedy
 from thermocomp.recordings.readers.limits import FileLimits
 from thermocomp.recordings.readers.numbers import Notation, Signs, is_filler, is_number_like, is_word
-
-FloatArray = NDArray[np.float64]
 
 #: before thermocomp's own description of the columns, as a comment line or a Parquet attribute
 EMBEDDED = "thermocomp"
@@ -33,6 +31,10 @@ _NAMELESS = re.compile(r"Unnamed: \d+")
 
 class FileTable(Protocol):
     """The cells of a file before anybody knows what its columns mean."""
+
+    @property
+    def path(self) -> Path:
+        """The file, for messages."""
 
     @property
     def headings(self) -> tuple[str, ...]:
@@ -73,8 +75,7 @@ class FrameTable:
 
     Parameters
     ----------
-    source : str
-        The file, for messages.
+    path : Path
     headings : tuple of str
     frame : DataFrame
         Cells as they are; columns named by position.
@@ -86,7 +87,7 @@ class FrameTable:
         Decimal sign of numbers that are texts, if it is known beforehand.
     """
 
-    source: str
+    path: Path
     headings: tuple[str, ...]
     frame: pd.DataFrame
     rows: Sequence[int]
@@ -106,7 +107,7 @@ class FrameTable:
         """Read columns; see `FileTable.load`."""
         data = {k: self.frame[k] for k in texts}
         written = {k: self.frame[k] for k in numbers if not pd.api.types.is_numeric_dtype(self.frame[k].dtype)}
-        values, notes = convert_all(self, self.source, written, self.decimal)
+        values, notes = convert_all(self, written, self.decimal)
         for k in numbers:
             data[k] = pd.Series(values[k] if k in written else as_floats(self.frame[k]))
         return pd.DataFrame(data, copy=False), notes
@@ -147,10 +148,6 @@ def clean_heading(cell: object) -> str:
 
     White space at its ends is gone, the name that pandas gives an index without one, and the apostrophe before what a
     spreadsheet would calculate (`defuse`).
-
-    Parameters
-    ----------
-    cell : object
     """
     text = restore(str(cell).strip())
     return "" if _NAMELESS.fullmatch(text) else text
@@ -216,33 +213,28 @@ def check_headings(path: Path, headings: Sequence[str], n_rows: int, limits: Fil
         raise RecordingError(f"{path}: a heading line but no rows below it; the recording is empty")
 
 
-def refuse_cell(
-    table: FileTable, source: str, row: int, column: int, cell: object, cause: Exception | None = None
-) -> NoReturn:
+def refuse_cell(table: FileTable, row: int, column: int, cell: object) -> NoReturn:
     """Tell which cell holds text where a number belongs.
 
     Parameters
     ----------
     table : FileTable
-    source : str
-        The file.
     row, column : int
         Position of the cell in `table`.
     cell : object
         What it holds.
-    cause : Exception, optional
-        What it was noticed by.
 
     Raises
     ------
     RecordingError
         Always.
     """
+    heading = table.headings[column]
     raise RecordingError(
-        f"{source}: {table.place(row)}, column {table.headings[column]!r}: {str(cell)!r} is not a number; correct the "
-        'cell, leave it empty for a missing value, or leave the column out by a mapping with role = "ignore"',
-        [skip_row(table, row), {"columns": {table.headings[column]: {"role": "ignore"}}}],
-    ) from cause
+        f"{table.path}: {table.place(row)}, column {heading!r}: {str(cell)!r} is not a number; correct the cell, leave "
+        'it empty for a missing value, or leave the column out by a mapping with role = "ignore"',
+        [skip_row(table, row), {"columns": {heading: {"role": "ignore"}}}],
+    )
 
 
 def skip_row(table: FileTable, row: int) -> Remedy:
@@ -250,15 +242,15 @@ def skip_row(table: FileTable, row: int) -> Remedy:
     return {"read": {"skip": [int(table.place(row).split()[-1])]}}
 
 
-def decide(signs: Signs, stated: str, delimiter: str, source: str) -> Notation:
+def decide(signs: Signs, stated: str, delimiter: str, path: Path) -> Notation:
     """Return how the numbers of a file are written; see `thermocomp.recordings.readers.numbers.Signs.decide`.
 
     Parameters
     ----------
     signs : Signs
     stated, delimiter : str
-    source : str
-        The file.
+    path : Path
+        Of the file, for the message.
 
     Raises
     ------
@@ -268,19 +260,17 @@ def decide(signs: Signs, stated: str, delimiter: str, source: str) -> Notation:
     try:
         return signs.decide(stated, delimiter) or Notation(".")
     except RecordingError as e:
-        raise RecordingError(f"{source}: {e}", e.remedies) from e
+        raise RecordingError(f"{path}: {e}", e.remedies) from e
 
 
 def convert_all(
-    table: FileTable, source: str, columns: Mapping[int, "pd.Series[Any]"], decimal: str
+    table: FileTable, columns: Mapping[int, "pd.Series[Any]"], decimal: str
 ) -> tuple[dict[int, FloatArray], tuple[str, ...]]:
     """Read the numbers of columns whose cells are texts, all in one notation; see `convert`.
 
     Parameters
     ----------
     table : FileTable
-    source : str
-        The file.
     columns : mapping of int to Series
         By their position in `table`.
     decimal : str
@@ -289,10 +279,10 @@ def convert_all(
     signs = Signs()
     for cells in columns.values():
         signs.add(cell for cell in cells if isinstance(cell, str))
-    notation = decide(signs, decimal, "", source)
+    notation = decide(signs, decimal, "", table.path)
     values, notes = dict[int, FloatArray](), list[str]()
     for k, cells in columns.items():
-        values[k], found = convert(table, source, k, cells, notation)
+        values[k], found = convert(table, k, cells, notation)
         notes += found
     return values, (*tell_notation(notation), *notes)
 
@@ -306,15 +296,13 @@ def tell_notation(notation: Notation) -> tuple[str, ...]:
 
 
 def convert(
-    table: FileTable, source: str, column: int, cells: "pd.Series[Any]", notation: Notation
+    table: FileTable, column: int, cells: "pd.Series[Any]", notation: Notation
 ) -> tuple[FloatArray, tuple[str, ...]]:
     """Read the numbers of a column whose cells are texts.
 
     Parameters
     ----------
     table : FileTable
-    source : str
-        The file.
     column : int
         Position of the column in `table`.
     cells : Series
@@ -344,11 +332,11 @@ def convert(
             if grouped < 0 and any(s in cell.strip() for s in notation.thousands):
                 grouped = int(row)
         elif not isinstance(cell, str) or not is_filler(cell):
-            refuse_cell(table, source, int(row), column, cell)
+            refuse_cell(table, int(row), column, cell)
         elif is_word(cell):
             words.setdefault(cell.strip(), []).append(int(row))
     if grouped >= 0:
-        _refuse_mixed(table, source, column, cells, grouped)
+        _refuse_mixed(table, column, cells, grouped)
     return values, tuple(
         f"{table.headings[column]}: {word!r}, taken as missing, in {len(rows)} of {len(cells)} cells: "
         f"{tell_places(rows, table.place)}"
@@ -356,7 +344,7 @@ def convert(
     )
 
 
-def read_plain(cells: "pd.Series[Any]", decimal: str) -> tuple[FloatArray, NDArray[np.bool_]]:
+def read_plain(cells: "pd.Series[Any]", decimal: str) -> tuple[FloatArray, BoolArray]:
     """Return numbers without separators of thousands, and where a cell is filled with anything else."""
     filled = cells.notna().to_numpy()
     texts = cells.map(lambda c: isinstance(c, str)).to_numpy(dtype=np.bool_) if cells.dtype == object else filled
@@ -379,13 +367,13 @@ def tell_places(rows: Sequence[int], place: Callable[[int], str]) -> str:
     return ", ".join(place(int(k)) for k in rows[:_MOST_TOLD]) + " ..." * (len(rows) > _MOST_TOLD)
 
 
-def _refuse_mixed(table: FileTable, source: str, column: int, cells: "pd.Series[Any]", grouped: int) -> None:
+def _refuse_mixed(table: FileTable, column: int, cells: "pd.Series[Any]", grouped: int) -> None:
     """Refuse thousands with and without separator in one column: the separator may be a decimal sign there."""
     for row, cell in enumerate(cells):
         if isinstance(cell, str) and _UNGROUPED.match(cell.strip()):
             raise RecordingError(
-                f"{source}: column {table.headings[column]!r}: {table.place(grouped)} has {cells.iloc[grouped]!r} with "
-                f"a separator of thousands, {table.place(row)} has {cell!r} without; write both in one way"
+                f"{table.path}: column {table.headings[column]!r}: {table.place(grouped)} has {cells.iloc[grouped]!r} "
+                f"with a separator of thousands, {table.place(row)} has {cell!r} without; write both in one way"
             )
 
 

@@ -111,11 +111,11 @@ class CsvTable:
             # pandas takes True for a number
             frame[k] = frame[k].map(lambda cell: str(cell) if isinstance(cell, bool | np.bool_) else cell)
             signs.add(cell for cell in frame[k] if isinstance(cell, str))
-        notation = decide(signs, decimal if self.decimal or signs.proven else "", self.delimiter, str(self.path))
+        notation = decide(signs, decimal if self.decimal or signs.proven else "", self.delimiter, self.path)
         notes = tell_notation(notation)
         for k in numbers:
             if k in written:
-                frame[k], found = convert(self, str(self.path), k, frame[k], notation)
+                frame[k], found = convert(self, k, frame[k], notation)
                 notes += found
         return frame, notes
 
@@ -166,7 +166,7 @@ class CsvTable:
         }
 
 
-def open_csv(path: Path, options: ReadOptions, limits: FileLimits = FileLimits()) -> CsvTable:
+def open_csv(path: Path, options: ReadOptions, limits: FileLimits) -> CsvTable:
     """Find out how a text file is written: one pass over its lines, none of which is kept.
 
     Parameters

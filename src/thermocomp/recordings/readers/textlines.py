@@ -145,10 +145,6 @@ def open_lines(path: Path, data: bytes | None, options: ReadOptions, limits: Fil
     options : ReadOptions
     limits : FileLimits
 
-    Returns
-    -------
-    Lines
-
     Raises
     ------
     RecordingError

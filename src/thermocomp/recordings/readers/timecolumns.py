@@ -1,16 +1,16 @@
 """Which columns of a file hold the time: found by headings, and by what the cells hold."""
 
 import re
-from collections.abc import Callable, Sequence
-from difflib import get_close_matches
+from collections.abc import Sequence
 from typing import NamedTuple
 
-from thermocomp.core.exceptions import RecordingError
+from thermocomp.core.exceptions import RecordingError, tell_nearest
 from thermocomp.recordings.headings import BRACKETS, Meaning, is_time_name, plain_name
 from thermocomp.recordings.readers.cellkinds import Kinds
 from thermocomp.recordings.readers.dayforms import names_day
 from thermocomp.recordings.readers.dayhalves import are_halves, says_halves
 from thermocomp.recordings.readers.mapping import Mapping, Place
+from thermocomp.recordings.readers.tables import FileTable
 
 #: headings of a time without unit, those that say more first
 _BARE = (
@@ -51,28 +51,17 @@ class TimePlan(NamedTuple):
     notes: tuple[str, ...]
 
 
-def find_time(
-    headings: Sequence[str],
-    meanings: Sequence[Meaning | None],
-    mapping: Mapping,
-    source: str,
-    kinds: Kinds,
-    head: Callable[[int], list[str]] = lambda _: [],
-) -> TimePlan:
+def find_time(table: FileTable, meanings: Sequence[Meaning | None], mapping: Mapping, kinds: Kinds) -> TimePlan:
     """Find the time column, and the column of dates where the time column holds only a time of day.
 
     Parameters
     ----------
-    headings : sequence of str
+    table : FileTable
     meanings : sequence of Meaning or None
         Of the headings.
     mapping : Mapping
-    source : str
-        The file, for messages.
     kinds : callable
         Tells what a column holds.
-    head : callable
-        Returns the first filled cells of a column.
 
     Raises
     ------
@@ -80,6 +69,7 @@ def find_time(
         There is no time column, or the mapping names one that is not there.
     """
     notes: list[str] = []
+    headings, source = table.headings, str(table.path)
     if mapping.time.column:
         time = find_position(mapping.time.column, headings, "[time]", source)
         date = find_position(mapping.time.date, headings, "[time]", source) if mapping.time.date else None
@@ -94,7 +84,7 @@ def find_time(
     if kinds(time) in ("clock", "stamp"):
         found = (k for k, h in enumerate(headings) if k not in (time, date) and not is_ignored(h, k, mapping))
         named = (k for k in found if meanings[k] is None and headings[k] not in mapping.columns)
-        half = next((k for k in named if says_halves(headings[k]) or are_halves(head(k), headings[k])), None)
+        half = next((k for k in named if says_halves(headings[k]) or are_halves(table.head(k), headings[k])), None)
     used = (time, date, half, fraction)
     twins = {k for k, heading in enumerate(headings) if heading and heading == headings[time]}
     unused = [k for k in range(len(headings)) if k not in used and k not in twins and kinds(k) in ("date", "stamp")]
@@ -125,8 +115,7 @@ def find_position(place: Place, headings: Sequence[str], table: str, source: str
         raise RecordingError(f"{source}: mapping {table}: there are {len(headings)} columns, and no number {place}")
     if place in headings:
         return list(headings).index(place)
-    near = get_close_matches(place, headings, n=3, cutoff=0.5)
-    hint = f"the nearest are {', '.join(near)}" if near else f"there are {', '.join(h for h in headings if h)}"
+    hint = tell_nearest(place, filter(None, headings), cutoff=0.5)
     raise RecordingError(f"{source}: mapping {table}: the file has no column {place!r}; {hint}")
 
 

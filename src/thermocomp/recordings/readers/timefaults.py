@@ -1,18 +1,14 @@
 """Times that cannot be those of a recording: they fall, or the clock was set."""
 
-from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray, IntArray
 from thermocomp.core.exceptions import RecordingError, TwoReadingsError
-from thermocomp.recordings.readers.columns import ColumnPlan
-from thermocomp.recordings.readers.mapping import Mapping
-from thermocomp.recordings.readers.tables import FileTable, skip_row
-
-FloatArray = NDArray[np.float64]
+from thermocomp.recordings.readers.filecells import FileCells
+from thermocomp.recordings.readers.tables import skip_row
 
 _DAY = 86_400.0
 _ZONE = (
@@ -21,16 +17,7 @@ _ZONE = (
 )
 
 
-def refuse_falling(
-    wrong: NDArray[np.intp],
-    time: FloatArray,
-    shown: "pd.Series[Any]",
-    table: FileTable,
-    where: str,
-    start: str,
-    *,
-    is_stamp: bool,
-) -> NoReturn:
+def refuse_falling(wrong: IntArray, time: FloatArray, shown: "pd.Series[Any]", start: str, file: FileCells) -> NoReturn:
     """Refuse times that do not rise.
 
     Parameters
@@ -41,33 +28,28 @@ def refuse_falling(
         [s]
     shown : Series
         Times as the file has them.
-    table : FileTable
-    where : str
-        File and column, for the message.
     start : str
         Date and time of the first row; empty if there is none.
-    is_stamp : bool
-        They are dates with times.
+    file : FileCells
 
     Raises
     ------
     RecordingError
         They do not, with the first row.
     """
+    is_stamp, table = file.is_stamp, file.table
     row, local = int(wrong[0]), is_stamp and pd.Timestamp(start).tzinfo is None
     what = "comes twice" if time[row] == time[row - 1] else f"is before {shown.iloc[row - 1]}"
     more = f" ({wrong.size} rows like this)" if wrong.size > 1 else ""
-    text = f"{where.format(table.place(row))}: time {shown.iloc[row]} {what}, in {table.place(row - 1)}{more}"
+    text = f"{file.at(row)}: time {shown.iloc[row]} {what}, in {table.place(row - 1)}{more}"
     steps = np.diff(time)
     if len(steps) > 1 and (steps < 0).all():
         raise RecordingError(f"{text}: the newest row comes first; sort the rows by time, the oldest first")
     # a clock that is set back falls by an hour less one interval
-    if local and abs(steps[row - 1] - np.median(steps) + 3600) < 300:
-        raise RecordingError(f"{text}, perhaps as the clock was set back (daylight saving): {_ZONE}")
-    if local and _may_be_set_back(start, time, row):
-        raise RecordingError(
-            f"{text}, perhaps as the clock was set back (daylight saving) while nothing was recorded: {_ZONE}"
-        )
+    recorded = bool(abs(steps[row - 1] - np.median(steps) + 3600) < 300)
+    if local and (recorded or _may_be_set_back(start, time, row)):
+        when = "" if recorded else " while nothing was recorded"
+        raise RecordingError(f"{text}, perhaps as the clock was set back (daylight saving){when}: {_ZONE}")
     never_again = steps[row - 1] < 0 and time[row:].max() < time[row - 1]
     if is_stamp and steps[row - 1] < 0 and abs(steps[row - 1] + 43_200) <= max(600, 2 * float(np.median(steps))):
         raise TwoReadingsError(
@@ -94,15 +76,7 @@ def _may_be_set_back(start: str, time: FloatArray, row: int) -> bool:
     return after.weekday() == 6 and after.month in (4, 10, 11) and after.hour <= 3 and before.hour <= 3
 
 
-def refuse_passed(
-    time: FloatArray,
-    start: str,
-    cells: pd.DataFrame,
-    columns: ColumnPlan,
-    mapping: Mapping,
-    table: FileTable,
-    source: Path,
-) -> None:
+def refuse_passed(time: FloatArray, start: str, file: FileCells) -> None:
     """Refuse times that begin with zero and run on where the date changes: they passed, and are none of the day.
 
     Parameters
@@ -111,62 +85,49 @@ def refuse_passed(
         [s]
     start : str
         Date and time of the first row; empty if there is none.
-    cells : DataFrame
-        As they are written.
-    columns : ColumnPlan
-    mapping : Mapping
-    table : FileTable
-    source : Path
-        The file, for the message.
+    file : FileCells
 
     Raises
     ------
     TwoReadingsError
         They do.
     """
-    if columns.date is None or mapping.time.format or not start:
+    if file.times.date is None or file.mapping.time.format or not start:
         return
-    dates, begin = cells[columns.date], pd.Timestamp(start)
+    dates, begin = file.cells[file.times.date], pd.Timestamp(start)
     changes = (dates != dates.shift()).to_numpy(dtype=np.bool_)[1:]
     steps = np.diff(time)
     usual = float(np.median(steps[~changes])) if not changes.all() else 0.0
     more = steps - _DAY
     rows = np.flatnonzero(changes & (more > 0) & (more <= 2 * usual)) + 1
     if rows.size and (begin - begin.normalize()).total_seconds() <= usual:
-        heading, name = table.headings[columns.time], table.headings[columns.date]
+        heading, name = file.heading, file.table.headings[file.times.date]
         raise TwoReadingsError(
-            f"{source}: {table.place(int(rows[0]))}: {name!r} changes, and {heading!r}, which begins with zero, runs "
-            f"on by {more[rows[0] - 1]:g} s: time that passed, or a pause of a whole day? If it is time that passed, "
-            f'leave out {name!r} in a mapping: [time] column = "{heading}" and [columns."{name}"] role = "ignore"; if '
-            "not, say how both are written: [time] column, date and format",
+            f"{file.source}: {file.table.place(int(rows[0]))}: {name!r} changes, and {heading!r}, which begins with "
+            f"zero, runs on by {more[rows[0] - 1]:g} s: time that passed, or a pause of a whole day? If it is time "
+            f'that passed, leave out {name!r} in a mapping: [time] column = "{heading}" and [columns."{name}"] role = '
+            '"ignore"; if not, say how both are written: [time] column, date and format',
             [{"time": {"column": heading}, "columns": {name: {"role": "ignore"}}}],
         )
 
 
-def refuse_set_forward(
-    time: FloatArray, steps: FloatArray, start: str, table: FileTable, source: Path, heading: str
-) -> None:
+def refuse_set_forward(time: FloatArray, start: str, file: FileCells) -> None:
     """Refuse a gap of an hour where clocks are set forward: the file does not say whether an hour passed.
 
     Parameters
     ----------
     time : ndarray of shape (n_rows,)
         [s]
-    steps : ndarray of shape (n_rows - 1,)
-        [s]
     start : str
         Date and time of the first row; empty if there is none.
-    table : FileTable
-    source : Path
-        The file, for the message.
-    heading : str
-        Of the column of times.
+    file : FileCells
 
     Raises
     ------
     TwoReadingsError
         There is one.
     """
+    steps = np.diff(time)
     usual = float(np.median(steps)) if steps.size else np.inf
     if not usual <= 900:
         return
@@ -175,7 +136,7 @@ def refuse_set_forward(
         spring = after.month in (3, 4, 9, 10, 11) and after.weekday() in (4, 5, 6) and before.hour <= 3
         if spring and after.hour == before.hour + (1 if after.minute >= before.minute else 2):
             raise TwoReadingsError(
-                f"{source}: {table.place(int(row))}, column {heading!r}: an hour is missing between {before} and "
+                f"{file.at(int(row))}: an hour is missing between {before} and "
                 f"{after}, perhaps as the clock was set forward (daylight saving), perhaps as nothing was recorded: "
                 f"{_ZONE}",
                 [{"time": {"zone": "UTC"}}],

@@ -27,12 +27,7 @@ _MOST = 3
 
 
 def find_formats(cells: "pd.Series[str]") -> list[str]:
-    """Return formats in which all cells are times, in the letters of `datetime.strptime`.
-
-    Parameters
-    ----------
-    cells : Series of str
-    """
+    """Return formats in which all cells are times, in the letters of `datetime.strptime`."""
     first = cells.iloc[0].strip()
     joined = (f"{date}{join}{clock}" for date, join, clock in product(_DATES, (" ", "T", "-", "_", ""), _CLOCKS))
     fitting = [form for form in (*_ALONE, *joined) if _fits(first, form)]

@@ -1,24 +1,20 @@
 """Times of a recording: numbers with a unit, timestamps, or times of day."""
 
 import re
-from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.exceptions import RecordingError, TwoReadingsError
 from thermocomp.core.units import find_unit
 from thermocomp.recordings.readers.cellkinds import CLOCK, HALF, plain_clocks, plain_dates
-from thermocomp.recordings.readers.columns import ColumnPlan
-from thermocomp.recordings.readers.mapping import Mapping
+from thermocomp.recordings.readers.filecells import FileCells
 from thermocomp.recordings.readers.stamps import AmbiguousDatesError, Parsed, has_day, parse, parse_stamps
-from thermocomp.recordings.readers.tables import FileTable, skip_row, tell_places
+from thermocomp.recordings.readers.tables import tell_places
 from thermocomp.recordings.readers.timefaults import refuse_falling, refuse_passed, refuse_set_forward
 from thermocomp.recordings.readers.timehints import find_formats
-
-FloatArray = NDArray[np.float64]
 
 #: seconds since 1970 between the years 2000 and 2100, whole or in parts of a second
 _EPOCH = 946684800.0, 2240611200.0
@@ -30,30 +26,12 @@ _DATE_WORDS = ("date", "datum", "dat", "stamp", "stempel", "fecha")
 _DAY = 86_400_000_000_000  # [ns]
 
 
-def read_times(
-    cells: pd.DataFrame,
-    columns: ColumnPlan,
-    mapping: Mapping,
-    table: FileTable,
-    source: Path,
-    *,
-    is_stamp: bool,
-    rising: bool,
-) -> tuple[FloatArray, str, tuple[str, ...]]:
+def read_times(file: FileCells, *, rising: bool) -> tuple[FloatArray, str, tuple[str, ...]]:
     """Read the times of a recording's rows.
 
     Parameters
     ----------
-    cells : DataFrame
-        With the columns of time and date, named by position.
-    columns : ColumnPlan
-    mapping : Mapping
-    table : FileTable
-        That the cells come from.
-    source : Path
-        The file.
-    is_stamp : bool
-        They are timestamps, no numbers.
+    file : FileCells
     rising : bool
         Each must be later than the one before; else it must not be earlier.
 
@@ -71,156 +49,130 @@ def read_times(
     RecordingError
         A time is missing, cannot be read, can be read in two ways, or does not rise.
     """
-    heading = table.headings[columns.time]
-    shown = cells[columns.time]
-    for k in columns.beside:
-        other = np.flatnonzero(((cells[k] != shown) & ~(cells[k].isna() & shown.isna())).to_numpy())
-        if other.size:
+    times, beside, table, source = file.times, file.columns.beside, file.table, file.source
+    shown, zone = file.cells[times.time], file.mapping.time.zone
+    for k in beside:
+        other = file.cells[k]
+        row = next(iter(np.flatnonzero(((other != shown) & ~(other.isna() & shown.isna())).to_numpy())), None)
+        if row is not None:
             raise RecordingError(
-                f"{source}: columns {columns.time + 1} and {k + 1} are both named {heading!r} and hold different "
-                f"times, such as {shown.iloc[other[0]]} and {cells[k].iloc[other[0]]} in "
-                f"{table.place(int(other[0]))}; channels that were sampled at different times are no recording: "
-                "resample them to one time"
+                f"{source}: columns {times.time + 1} and {k + 1} are both named {file.heading!r} and hold different "
+                f"times, such as {shown.iloc[row]} and {other.iloc[row]} in {table.place(int(row))}; channels that "
+                "were sampled at different times are no recording: resample them to one time"
             )
     notes: tuple[str, ...] = ()
-    if columns.beside:
-        notes = (
-            f"columns {', '.join(str(k + 1) for k in columns.beside)} hold the same times as column {columns.time + 1}",
-        )
-    if is_stamp:
-        if columns.date is not None:
-            shown = _join_dates(cells, columns, mapping, table, source)
-        time, start, found = _read_stamps(shown, columns, mapping, table, source)
-        refuse_passed(time, start, cells, columns, mapping, table, source)
+    if beside:
+        notes = (f"columns {', '.join(str(k + 1) for k in beside)} hold the same times as column {times.time + 1}",)
+    if file.is_stamp:
+        if times.date is not None:
+            shown = _join_dates(file, times.date)
+        time, start, found = _read_stamps(shown, file)
+        refuse_passed(time, start, file)
     else:
         raw = shown.to_numpy(dtype=np.float64)
-        missing = np.flatnonzero(~np.isfinite(raw))
-        if missing.size:
-            _refuse_missing(table, source, int(missing[0]), heading)
-        time, start, found = _read_numbers(raw, heading, columns, mapping, source)
+        _refuse_missing(~np.isfinite(raw), file)
+        time, start, found = _read_numbers(raw, file)
     notes += found
-    if columns.fraction is not None and is_stamp:
-        part = cells[columns.fraction].to_numpy(dtype=np.float64)
+    if times.fraction is not None and file.is_stamp:
+        part = file.cells[times.fraction].to_numpy(dtype=np.float64)
         if part.any() and (time % 1 == 0).all():
             time = ((time * 1000 + part) - part[0]) / 1000
-            notes += (f"{table.headings[columns.fraction]!r} is added to the time",)
-    if mapping.time.zone and start and pd.Timestamp(start).tzinfo is None:
-        time, start = _in_zone(time, start, mapping.time.zone, f"{source}: column {heading!r}")
-        notes += (f"{heading!r} is taken as the time in {mapping.time.zone}",)
+            notes += (f"{table.headings[times.fraction]!r} is added to the time",)
+    if zone and start and pd.Timestamp(start).tzinfo is None:
+        time, start = _in_zone(time, start, zone, f"{source}: column {file.heading!r}")
+        notes += (f"{file.heading!r} is taken as the time in {zone}",)
     steps = np.diff(time)
     wrong = np.flatnonzero(~(steps > 0) if rising else steps < 0) + 1
     if wrong.size:
-        where = f"{source}: {{}}, column {heading!r}"
-        refuse_falling(wrong, time, shown, table, where, start, is_stamp=is_stamp)
-    if is_stamp and start and pd.Timestamp(start).tzinfo is None:
-        refuse_set_forward(time, steps, start, table, source, heading)
+        refuse_falling(wrong, time, shown, start, file)
+    if file.is_stamp and start and pd.Timestamp(start).tzinfo is None:
+        refuse_set_forward(time, start, file)
     return time, start, notes
 
 
-def _read_stamps(
-    cells: "pd.Series[Any]", columns: ColumnPlan, mapping: Mapping, table: FileTable, source: Path
-) -> tuple[FloatArray, str, tuple[str, ...]]:
+def _read_stamps(cells: "pd.Series[Any]", file: FileCells) -> tuple[FloatArray, str, tuple[str, ...]]:
     """Read timestamps, times of day, or durations; mixed offsets (summer time) are brought to one clock."""
-    heading, wanted = table.headings[columns.time], mapping.time.format
-    if cells.isna().any():
-        _refuse_missing(table, source, int(np.flatnonzero(cells.isna())[0]), heading)
+    wanted = file.mapping.time.format
+    _refuse_missing(cells.isna().to_numpy(), file)
     if pd.api.types.is_timedelta64_dtype(cells.dtype):
         return _seconds(cells - cells.iloc[0]), "", ()
     if pd.api.types.is_datetime64_any_dtype(cells.dtype):
         return _seconds(cells - cells.iloc[0]), cells.iloc[0].isoformat(), ()
     text = cells.astype(str)
     first = text.iloc[0].strip()
-    if not wanted and columns.date is None and (CLOCK.fullmatch(first) or HALF.fullmatch(first)):
-        return _read_clock(text, table, source, heading)
+    if not wanted and file.times.date is None and (CLOCK.fullmatch(first) or HALF.fullmatch(first)):
+        return _read_clock(text, file)
     if wanted:
         begin = pd.to_datetime(text.iloc[:1], format=wanted, errors="coerce").iloc[0]
         dated = has_day(wanted) and re.search("%[YycxDFG]", wanted) is not None and not pd.isna(begin)
         found: Parsed | None = Parsed(parse(text, wanted), begin.isoformat() if dated else "", ())
     else:
-        titles = [table.headings[k] for k in (columns.date, columns.time) if k is not None]
+        keys = file.time_keys
+        titled = keys.get("date", file.heading)
         try:
-            found = parse_stamps(text, titles[0])
+            found = parse_stamps(text, titled)
         except AmbiguousDatesError as e:
             ways = " or ".join(f'format = "{form}"' for form in e.readings)
-            place = {"column": heading, **({"date": titles[0]} if columns.date is not None else {})}
-            where = ", ".join(f'{key} = "{title}"' for key, title in place.items())
             differ = e.differ()
             raise (TwoReadingsError if differ else RecordingError)(
-                f"{source}: {table.place(0)}, column {titles[0]!r}: {first!r} can be read as {e}, and no row "
-                f"tells which{f' ({e.tell()})' if differ else ''}; say how it is written in a mapping: [time] {where} "
-                f"and {ways}",
-                [{"time": {**place, "format": form}} for form in e.readings],
+                f"{file.source}: {file.table.place(0)}, column {titled!r}: {first!r} can be read as {e}, and no row "
+                f"tells which{f' ({e.tell()})' if differ else ''}; say how it is written in a mapping: [time] "
+                f"{_told(keys)} and {ways}",
+                [{"time": {**keys, "format": form}} for form in e.readings],
             ) from e
     if found is None or pd.isna(found.stamps.iloc[0]):
-        _refuse_form(text, columns, wanted, table, source)
+        _refuse_form(text, file)
     stamps, start, notes = found
-    bad = np.flatnonzero(stamps.isna())
-    if bad.size:
-        row = int(bad[0])
-        raise RecordingError(
-            f"{source}: {table.place(row)}, column {heading!r}: {text.iloc[row]!r} is not a timestamp like "
-            f"{first!r}; correct or delete the row",
-            [skip_row(table, row)],
-        )
+    _refuse_unlike(stamps.isna().to_numpy(), text, f"a timestamp like {first!r}", file)
     return _seconds(stamps - stamps.iloc[0]), start, notes
 
 
-def _join_dates(
-    cells: pd.DataFrame, columns: ColumnPlan, mapping: Mapping, table: FileTable, source: Path
-) -> "pd.Series[str]":
+def _join_dates(file: FileCells, date: int) -> "pd.Series[str]":
     """Return dates with their times of day behind them; where a format is given, as they stand in the file."""
-    dates, clocks = cells[columns.date], cells[columns.time]
+    dates, clocks, form = file.cells[date], file.cells[file.times.time], file.mapping.time.format
     lost = np.flatnonzero(dates.isna() & clocks.notna())
     if lost.size:
-        row, name = int(lost[0]), table.headings[columns.date or 0]
         more = f" (in {lost.size} rows, of {len(dates)})" if lost.size > 1 else ""
-        raise RecordingError(
-            f"{source}: {table.place(row)}, column {name!r}: the date is missing{more}; the time of day "
-            f"{clocks.iloc[row]} is there: write its date into every row",
-            [skip_row(table, row)] if 4 * lost.size <= len(dates) else [],
-        )
+        said = f"the date is missing{more}; the time of day {clocks.iloc[lost[0]]} is there: write its date into every"
+        raise file.refuse_row(int(lost[0]), f"{said} row", date, skip=4 * lost.size <= len(dates))
     there = dates.notna() & clocks.notna()
-    form, plain = mapping.time.format, plain_dates(dates) + " " + plain_clocks(clocks)
+    plain = plain_dates(dates) + " " + plain_clocks(clocks)
     if form and pd.isna(pd.to_datetime(plain.iloc[0], format=form, utc=True, errors="coerce")):
         written = dates.astype(str).str.strip().str.removesuffix(".0") + " " + clocks.astype(str).str.strip()
         return written.where(there)
     return plain.where(there)
 
 
-def _refuse_form(text: "pd.Series[str]", columns: ColumnPlan, wanted: str, table: FileTable, source: Path) -> NoReturn:
+def _refuse_form(text: "pd.Series[str]", file: FileCells) -> NoReturn:
     """Refuse times in a form that is not known, with formats that fit."""
-    heading, first = table.headings[columns.time], text.iloc[0].strip()
-    place = {"column": heading}
-    if columns.date is not None:
-        place["date"] = table.headings[columns.date]
-    forms = find_formats(text)
-    where = ", ".join(f'{key} = "{title}"' for key, title in place.items())
+    keys, forms, wanted = file.time_keys, find_formats(text), file.mapping.time.format
     ways = " or ".join(f'format = "{form}"' for form in forms) or "format, in the letters of strptime"
     hint = f"does not fit the format {wanted!r}" if wanted else "is not an ISO timestamp"
-    if columns.date is not None and not forms:
-        ways += f'; if {place["date"]!r} holds no dates, leave it out: role = "ignore"'
+    if "date" in keys and not forms:
+        ways += f'; if {keys["date"]!r} holds no dates, leave it out: role = "ignore"'
     # minutes and seconds alone: the hours may be lost
     doubtful = len(forms) > 1 or not any(map(has_day, forms))
     raise (TwoReadingsError if doubtful and forms else RecordingError)(
-        f"{source}: {table.place(0)}, column {heading!r}: {first!r} {hint}; say how it is written in a mapping: [time] "
-        f"{where} and {ways}",
-        [{"time": {**place, "format": form}} for form in forms],
+        f"{file.at(0)}: {text.iloc[0].strip()!r} {hint}; say how it is written in a mapping: [time] {_told(keys)} and "
+        f"{ways}",
+        [{"time": {**keys, "format": form}} for form in forms],
     )
 
 
-def _read_clock(
-    text: "pd.Series[Any]", table: FileTable, source: Path, heading: str
-) -> tuple[FloatArray, str, tuple[str, ...]]:
+def _told(keys: dict[str, str]) -> str:
+    return ", ".join(f'{key} = "{title}"' for key, title in keys.items())
+
+
+def _read_clock(text: "pd.Series[Any]", file: FileCells) -> tuple[FloatArray, str, tuple[str, ...]]:
     """Read times of day, or times that have passed: neither says the day."""
     first = text.iloc[0].strip()
     halves = HALF.fullmatch(first) is not None
     parts = text.str.strip().str.extract(CLOCK)
     if not halves and pd.isna(parts["seconds"].iloc[0]):
         raise TwoReadingsError(
-            f"{source}: {table.place(0)}, column {heading!r}: {first!r} can be read as hours and minutes or as "
-            f'minutes and seconds; say how it is written in a mapping: [time] column = "{heading}" and format = '
-            '"%H:%M" or format = "%M:%S"',
-            [{"time": {"column": heading, "format": form}} for form in ("%H:%M", "%M:%S")],
+            f"{file.at(0)}: {first!r} can be read as hours and minutes or as minutes and seconds; say how it is "
+            f'written in a mapping: [time] column = "{file.heading}" and format = "%H:%M" or format = "%M:%S"',
+            [{"time": {"column": file.heading, "format": form}} for form in ("%H:%M", "%M:%S")],
         )
     if halves:
         upper = text.str.strip().str.upper().str.replace(r" ?([AP])\.?M\.?$", r" \1M", regex=True)
@@ -234,14 +186,7 @@ def _read_clock(
             for c in (parts["days"].fillna("0"), parts["hours"], parts["minutes"], texts)
         )
         seconds = ((days * 24 + hours) * 60 + minutes) * 60 + rest
-    bad = np.flatnonzero(~np.isfinite(seconds))
-    if bad.size:
-        row = int(bad[0])
-        raise RecordingError(
-            f"{source}: {table.place(row)}, column {heading!r}: {text.iloc[row]!r} is not a time like {first!r}; "
-            "correct or delete the row",
-            [skip_row(table, row)],
-        )
+    _refuse_unlike(~np.isfinite(seconds), text, f"a time like {first!r}", file)
     # exact where the file has no more than nanoseconds
     whole = np.rint(seconds * 1e9).astype(np.int64)
     steps = np.diff(whole)
@@ -249,20 +194,19 @@ def _read_clock(
     midnights = (steps < 0) & (steps + _DAY > 0) & (steps + _DAY <= 2 * usual)
     if not midnights.any() or whole.max() >= _DAY:
         return (whole - whole[0]) / 1e9, "", ()
-    places = tell_places((np.flatnonzero(midnights) + 1).tolist(), table.place)
+    places = tell_places((np.flatnonzero(midnights) + 1).tolist(), file.table.place)
     days_on = np.concatenate([[0], np.cumsum(midnights)])
     return (whole - whole[0] + days_on * _DAY) / 1e9, "", (f"the time of day goes over midnight in {places}",)
 
 
-def _read_numbers(
-    raw: FloatArray, heading: str, columns: ColumnPlan, mapping: Mapping, source: Path
-) -> tuple[FloatArray, str, tuple[str, ...]]:
+def _read_numbers(raw: FloatArray, file: FileCells) -> tuple[FloatArray, str, tuple[str, ...]]:
     """Read times that are numbers: seconds that passed, or counted from 1970 or as spreadsheets count days."""
-    if columns.time_unit:
-        unit = find_unit(columns.time_unit, "time")
+    heading = file.heading
+    if file.columns.time_unit:
+        unit = find_unit(file.columns.time_unit, "time")
         time = (raw - raw[0]) * unit.scale if unit.scale >= 1 else (raw - raw[0]) / round(1 / unit.scale)
         known = unit.scale in (1, 1e-3)
-        counted = known and _EPOCH[0] <= raw[0] * unit.scale < _EPOCH[1] and not mapping.time.start
+        counted = known and _EPOCH[0] <= raw[0] * unit.scale < _EPOCH[1] and not file.mapping.time.start
         if not counted:
             return time, "", ()
         note = f"{heading!r} counts from 1970-01-01 UTC"
@@ -276,18 +220,15 @@ def _read_numbers(
     if _SERIAL[0] <= raw.min() and raw.max() < _SERIAL[1] and any(w in heading.casefold() for w in _DATE_WORDS):
         milliseconds = np.rint(raw * 86400e3)
         start = pd.Timestamp(milliseconds[0] / 1e3 + _SERIAL_BEGIN, unit="s").isoformat()
-        return (
-            (milliseconds - milliseconds[0]) / 1e3,
-            start,
-            (f"{heading!r} is taken as days since 1899-12-30, as Excel counts",),
-        )
+        note = f"{heading!r} is taken as days since 1899-12-30, as Excel counts"
+        return (milliseconds - milliseconds[0]) / 1e3, start, (note,)
     ways: list[dict[str, str]] = [{"unit": unit} for unit in find_likely_units(raw)]
     if compact := raw.min() > 19e12 and raw.max() < 21e12:  # written without signs: 20240305080010
         ways = [{"format": "%Y%m%d%H%M%S"}]
     raise (RecordingError if compact else TwoReadingsError)(
-        f"{source}: column {heading!r} holds numbers from {raw[0]:.14g} to {raw[-1]:.14g} and says no unit: seconds, "
-        f'minutes, hours or milliseconds? Put it behind the name, such as "{heading} [s]", or write a mapping: [time] '
-        f'column = "{heading}" and unit = "s"',
+        f"{file.source}: column {heading!r} holds numbers from {raw[0]:.14g} to {raw[-1]:.14g} and says no unit: "
+        f'seconds, minutes, hours or milliseconds? Put it behind the name, such as "{heading} [s]", or write a '
+        f'mapping: [time] column = "{heading}" and unit = "s"',
         [{"time": {"column": heading, **way}} for way in ways],
     )
 
@@ -325,8 +266,13 @@ def _seconds(passed: "pd.Series[pd.Timedelta]") -> FloatArray:
     return np.asarray(passed.dt.total_seconds(), dtype=np.float64)
 
 
-def _refuse_missing(table: FileTable, source: Path, row: int, heading: str) -> None:
-    raise RecordingError(
-        f"{source}: {table.place(row)}, column {heading!r}: the time is missing; fill it in or delete the row",
-        [skip_row(table, row)],
-    )
+def _refuse_missing(missing: BoolArray, file: FileCells) -> None:
+    if missing.any():
+        raise file.refuse_row(int(missing.argmax()), "the time is missing; fill it in or delete the row")
+
+
+def _refuse_unlike(odd: BoolArray, text: "pd.Series[str]", what: str, file: FileCells) -> None:
+    """Refuse cells that are not like the first one."""
+    if odd.any():
+        row = int(odd.argmax())
+        raise file.refuse_row(row, f"{text.iloc[row]!r} is not {what}; correct or delete the row")

@@ -21,11 +21,6 @@ def check_unzipped(path: Path, limits: FileLimits) -> None:
 
     What the zip file says of its sizes is not believed. Parts of a workbook never define entities.
 
-    Parameters
-    ----------
-    path : Path
-    limits : FileLimits
-
     Raises
     ------
     RecordingError

@@ -162,9 +162,7 @@ def _table(
         {k: columns[k][:n_rows] if k < len(columns) else empty for k in range(len(headings))}, copy=False
     )
     told = (*notes, *tell_layout(places, layout, "row"), *tell_end(places[begin + n_rows :], "row"))
-    return FrameTable(
-        str(path), tuple(headings), frame, places[begin : begin + n_rows], notes=told, decimal=options.decimal
-    )
+    return FrameTable(path, tuple(headings), frame, places[begin : begin + n_rows], notes=told, decimal=options.decimal)
 
 
 def _count_remarks(head: Sequence[Row], tail: Sequence[Row]) -> int:
@@ -281,10 +279,8 @@ def _ods_rows(path: Path, wanted: int, limits: FileLimits) -> Generator[Row]:
                 number, table = number + (event == "start"), element
             elif event == "end" and element.tag == f"{_TABLE}table-row" and table is not None:
                 if number == wanted:
-                    row, times = (
-                        _ods_cells(element, limits.columns),
-                        int(element.get(f"{_TABLE}number-rows-repeated", "1")),
-                    )
+                    row = _ods_cells(element, limits.columns)
+                    times = int(element.get(f"{_TABLE}number-rows-repeated", "1"))
                     if row:
                         for _ in range(empty):
                             yield ()

@@ -1,0 +1,9 @@
+"""Arrays by what stands in them."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+#: positions and numbers of rows
+IntArray = NDArray[np.intp]

@@ -1,0 +1,177 @@
+"""Rows that a model has learned from are found again, whatever file they stand in; see the decision `0019-overlap`."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from thermocomp.core.arrays import IntArray
+from thermocomp.core.fingerprints import Prints, Runs, unpack_marks
+from thermocomp.recordings.fingerprints import LENGTH, Marks, TargetRows, find_rows, fingerprint, hash_runs
+from thermocomp.recordings.samples import Samples
+
+#: runs long that a match has to be where no input says anything, such as a spindle speed
+ALONE = 5
+#: tests whose intervals differ by less are read at one rate
+SAME_RATE = 0.05
+
+
+def overlap(prints: Prints, samples: Samples, target: int) -> IntArray:
+    """Find rows that were learned from.
+
+    Parameters
+    ----------
+    prints : Prints
+        Of the rows that were learned from.
+    samples : Samples
+    target : int
+        Index into ``samples.targets``; it is looked up under the target's prints whatever its name.
+
+    Returns
+    -------
+    ndarray of int of shape (n_rows,)
+        Row that was learned from, about, counted through all tests; -1 where a row is new.
+    """
+    everything = np.ones(len(samples), dtype=np.bool_)
+    return _overlap(prints, samples, target, samples.interval(everything), own=False)
+
+
+def repeats(samples: Samples, target: int) -> IntArray:
+    """Find rows that repeat earlier ones, of the same test or of another.
+
+    Parameters
+    ----------
+    samples : Samples
+    target : int
+        Index into ``samples.targets``.
+
+    Returns
+    -------
+    ndarray of int of shape (n_rows,)
+        Row of the samples that is repeated, about; -1 where there is none.
+    """
+    # tests that were read at other intervals may be copies with fewer rows
+    intervals = [samples.interval(samples.test == k) for k in range(len(samples.test_names))]
+    rates: list[float] = []
+    for interval in intervals:
+        if all(abs(interval / rate - 1.0) > SAME_RATE for rate in rates):
+            rates.append(interval)
+    group = np.array([np.abs(np.log(i / np.array(rates))).argmin() for i in intervals])[samples.test]
+    source = np.full(len(samples), -1, dtype=np.intp)
+    for k in range(len(rates)):
+        prints = fingerprint(samples, target, group == k, thin=False)
+        for other in range(k, len(rates)):
+            rows = np.flatnonzero(group == other)
+            if prints is None:
+                continue
+            if other == k:
+                found = _overlap(prints, samples, target, rates[k], own=True)[rows]
+            else:
+                found = _overlap(prints, samples.take(rows), target, rates[other], own=False)
+            source[rows] = np.where(source[rows] < 0, found, source[rows])
+    return source
+
+
+def _overlap(prints: Prints, samples: Samples, target: int, interval: float, *, own: bool) -> IntArray:
+    source = np.full(len(samples), -1, dtype=np.intp)
+    rows = find_rows(samples, target)
+    columns = {c.name: samples.values[rows.at, j] for j, c in enumerate(samples.inputs)}
+    first, *others = prints.steps
+    columns = {first: samples.deviations[rows.at, target]} | {n: columns[n] for n in others if n in columns}
+    for run, stride in _tries(prints, interval):
+        if LENGTH * stride >= len(rows.at):
+            continue
+        inside = rows.starts(LENGTH * stride)
+        marks = {n: np.where(inside, hash_runs(x, prints.steps[n], stride), 0) for n, x in columns.items()}
+        found, of = _matches(run, marks)
+        there = unpack_marks(run.rows).astype(np.intp)[of]
+        # long runs are for files that have other rows than those that were learned from: fewer, or more
+        new = ~np.isin(samples.test[rows.at[found]], np.unique(samples.test[source >= 0]))
+        if own:
+            new &= there + LENGTH * stride <= rows.at[found]
+        _fill(source, prints, run, stride, rows, found[new], of[new], own=own)
+    return source
+
+
+def _tries(prints: Prints, interval: float) -> Iterator[tuple[Runs, int]]:
+    """Yield runs, and the rows between rows by which they may be found: as they are, and for as much time."""
+    rate = prints.interval / interval
+    for run in prints.runs:
+        yield run, run.stride
+        stride = max(1, round(run.stride * rate))
+        if stride != run.stride and abs(stride / (run.stride * rate) - 1.0) < 0.01:
+            yield run, stride
+
+
+def _matches(run: Runs, marks: dict[str, Marks]) -> tuple[IntArray, IntArray]:
+    """Return where a run of the target and one of an input are those of a run that is kept, and of which."""
+    first, *others = run.marks
+    stored = {name: unpack_marks(text) for name, text in run.marks.items()}
+    known, which = np.unique(stored[first], return_index=True)
+    if known.size == 0:
+        return np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp)
+    place = np.minimum(np.searchsorted(known, marks[first]), known.size - 1)
+    same = which[place]
+    alike = np.full(len(same), not others)
+    for name in others:
+        if name in marks:
+            alike |= (marks[name] == stored[name][same]) & (marks[name] > 0)
+    found = np.flatnonzero((marks[first] == known[place]) & (marks[first] > 0) & alike)
+    return found, same[found]
+
+
+def _fill(
+    source: IntArray,
+    prints: Prints,
+    run: Runs,
+    stride: int,
+    rows: TargetRows,
+    found: IntArray,
+    of: IntArray,
+    *,
+    own: bool,
+) -> None:
+    """Write into `source` the rows between matches that follow each other, and those beside them that may be known."""
+    learned, moving = unpack_marks(run.rows).astype(np.intp), unpack_marks(run.moving) > 0
+    scale = stride / run.stride
+    usual = float(np.median(np.diff(learned))) if learned.size > 1 else 0.0
+    for mine in _chains(rows.at[found], learned[of], rows.test[found], scale, max(3.0 * usual, 2.0 * LENGTH)):
+        here, there = rows.at[found[mine]], learned[of[mine]]
+        end = int(rows.at[found[mine[-1]] + LENGTH * stride])
+        # one place may be chance: two that move, more than a run long, are not; without an input it takes more
+        least = (1.5 if len(run.marks) > 1 else ALONE) * LENGTH * stride
+        if np.count_nonzero(moving[of[mine]]) < 2 or end - here[0] < least:
+            continue
+        low, high = (0, 0) if own else _reach(prints, learned, there)
+        whole = rows.at[rows.test == rows.test[found[mine[0]]]]
+        a = max(int(here[0] - low * scale), int(whole[0]))
+        b = min(max(int(here[-1] + high * scale), end), int(whole[-1]))
+        span = np.arange(a, b + 1)
+        beyond = np.minimum(span - here[0], 0) + np.maximum(span - here[-1], 0)
+        guess = np.interp(span, here, there) + beyond / scale
+        source[a : b + 1] = np.where(source[a : b + 1] < 0, np.maximum(guess, 0).astype(np.intp), source[a : b + 1])
+
+
+def _chains(here: IntArray, there: IntArray, test: IntArray, scale: float, bridge: float) -> Iterator[IntArray]:
+    """Yield matches that follow each other as the learned rows did; a few rows may be gone or altered between them."""
+    if not len(here):
+        return
+    went, should = np.diff(here), scale * np.diff(there)
+    slack = LENGTH + 0.05 * should
+    on = (should > 0) & (np.diff(test) == 0) & (went <= should + slack) & ((went >= should - slack) | (went <= bridge))
+    yield from np.split(np.arange(len(here)), np.flatnonzero(~on) + 1)
+
+
+def _reach(prints: Prints, learned: IntArray, there: IntArray) -> tuple[int, int]:
+    """Return how many learned rows before the first match and after the last one may be known too.
+
+    Up to the next run that is kept, or three times as far as matches are apart, as not every run is found again; never
+    beyond what was learned from.
+    """
+    usual = 3 * max(LENGTH, int(there[-1] - there[0]) // max(len(there) - 1, 1))
+    begin, last = int(there[0]), int(there[-1])
+    first = next((a for a, b in prints.learned if a <= begin < b), begin)
+    stop = next((b for a, b in prints.learned if a <= last < b), last + 1)
+    before, after = learned[learned < begin], learned[learned > last]
+    low = begin - int(before[-1]) if before.size else begin - first
+    high = int(after[0]) - last if after.size else stop - 1 - last
+    return min(max(low, usual), begin - first), min(max(high, usual), stop - 1 - last)

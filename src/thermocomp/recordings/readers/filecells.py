@@ -1,0 +1,63 @@
+"""`FileCells`: the cells that were read of a file, with all that is known of them."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+
+from thermocomp.core.exceptions import RecordingError
+from thermocomp.recordings.readers.columns import ColumnPlan
+from thermocomp.recordings.readers.mapping import Mapping
+from thermocomp.recordings.readers.tables import FileTable, skip_row
+from thermocomp.recordings.readers.timecolumns import TimePlan
+
+
+@dataclass(frozen=True)
+class FileCells:
+    """The cells that were read of a file, before they are times, numbers and labels.
+
+    Parameters
+    ----------
+    source : Path
+        The file.
+    mapping : Mapping
+    table : FileTable
+        That the cells come from.
+    columns : ColumnPlan
+    cells : DataFrame
+        Columns named by their position in the file.
+    is_stamp : bool
+        The times are timestamps, no numbers.
+    """
+
+    source: Path
+    mapping: Mapping
+    table: FileTable
+    columns: ColumnPlan
+    cells: pd.DataFrame
+    is_stamp: bool
+
+    @property
+    def times(self) -> TimePlan:
+        """The columns that hold the time."""
+        return self.columns.times
+
+    @property
+    def heading(self) -> str:
+        """Heading of the column of times."""
+        return self.table.headings[self.times.time]
+
+    @property
+    def time_keys(self) -> dict[str, str]:
+        """What a mapping says of the columns that hold the time: ``column``, and ``date`` where there is one."""
+        date = self.times.date
+        return {"column": self.heading, **({"date": self.table.headings[date]} if date is not None else {})}
+
+    def at(self, row: int, column: int | None = None) -> str:
+        """Say where a cell stands; that of the time where no column is given."""
+        heading = self.table.headings[self.times.time if column is None else column]
+        return f"{self.source}: {self.table.place(row)}, column {heading!r}"
+
+    def refuse_row(self, row: int, text: str, column: int | None = None, *, skip: bool = True) -> RecordingError:
+        """Return the error of a cell; to pass over its row is a remedy unless `skip` is False."""
+        return RecordingError(f"{self.at(row, column)}: {text}", [skip_row(self.table, row)] if skip else ())

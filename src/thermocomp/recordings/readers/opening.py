@@ -1,0 +1,66 @@
+"""Files become tables whose cells nobody has understood yet, by their endings."""
+
+import hashlib
+from collections.abc import Callable
+from difflib import get_close_matches
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from thermocomp.core.exceptions import InputError, RecordingError
+from thermocomp.recordings.readers.limits import FileLimits, check_file
+from thermocomp.recordings.readers.mapping import ADAPTER, Mapping, ReadOptions
+from thermocomp.recordings.readers.parquet import open_parquet
+from thermocomp.recordings.readers.tables import FileTable
+from thermocomp.recordings.readers.textfile import open_csv
+from thermocomp.recordings.readers.workbook import open_workbook
+
+_TEXTS = (".csv", ".tsv", ".txt", ".dat", ".asc")
+_OPEN: dict[str, Callable[[Path, ReadOptions, FileLimits], FileTable]]
+_OPEN = {**dict.fromkeys(_TEXTS, open_csv), ".xlsx": open_workbook, ".ods": open_workbook, ".parquet": open_parquet}
+
+
+def open_table(path: str | Path, mapping: Mapping) -> tuple[FileTable, str]:
+    """Open a file without understanding what its columns are.
+
+    Returns
+    -------
+    FileTable
+    str
+        SHA-256 of the file.
+
+    Raises
+    ------
+    RecordingError
+        It cannot be read as a table.
+    """
+    path = Path(path)
+    ending = path.suffix.lower()
+    if ending not in _OPEN:
+        raise RecordingError(
+            f"{path}: files ending in {ending or 'nothing'!r} are not read; save it as one of {', '.join(_OPEN)}"
+        )
+    try:
+        check_file(path, mapping.limits)
+        with path.open("rb") as f:
+            sha256 = hashlib.file_digest(f, "sha256").hexdigest()
+        return _OPEN[ending](path, mapping.read, mapping.limits), sha256
+    except FileNotFoundError as e:
+        others = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
+        near = get_close_matches(path.name, others, n=1)
+        raise RecordingError(f"{path}: no such file{f'; did you mean {near[0]}?' if near else ''}") from e
+    except OSError as e:
+        raise RecordingError(f"{path}: cannot be read: {e.strerror or e}") from e
+    except ValueError as e:  # a name that no file can have
+        raise RecordingError(f"{str(path)!r}: cannot be read: {e}") from e
+
+
+def read_embedded(text: str, source: Path) -> tuple[Mapping, list[str]]:
+    """Return thermocomp's own description of the columns; nothing but a note if another program has damaged it."""
+    try:
+        return ADAPTER.validate_json(text), []
+    except ValidationError as e:
+        reason = e.errors()[0]["msg"]
+        return Mapping(), [f"thermocomp's own description of the columns is damaged ({reason}) and not used"]
+    except InputError as e:
+        raise type(e)(f"{source}: {e}") from e

@@ -1,0 +1,6 @@
+"""Sets of words, as they are easiest to read: many in a line."""
+
+
+def split_words(*lines: str) -> frozenset[str]:
+    """Return the words of lines in which a comma and a blank stand between two."""
+    return frozenset(word for line in lines for word in line.split(", "))
