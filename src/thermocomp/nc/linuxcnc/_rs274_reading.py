@@ -8,8 +8,8 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterable
 
-#: lines that are read beyond those of the program: without a move, a dwell or the like between them, and in all. A line
-#: takes some 5 us, so that either is reached within seconds
+#: lines that are read beyond those of the program: without a move of an axis between them, and in all. A line takes
+#: 5 to 15 us, so that either is reached within seconds
 MOST_IDLE = 300_000
 MOST = 1_200_000
 #: moves, dwells and the like of one line, as of a cycle with many repeats or pecks; and of all, beyond `CALLS` per line
@@ -49,8 +49,8 @@ class ProgramReading:
         self.folders = [os.path.realpath(folder) for folder in folders]
         self.where = where
         self.idle, self.most = lines + MOST_IDLE, lines + MOST
-        self.lines = self.acted = 0  # read, in all and when something was done last
-        self.calls = self.before = 0  # in all, and before the line
+        self.lines = self.moved = 0  # read, in all and when an axis moved last
+        self.acted = self.calls = self.before = 0  # lines and calls before the one that does something; calls in all
         self.most_calls = CALLS * lines + MOST_CALLS
         self.watched: list[tuple[int, bool]] = []
 
@@ -74,22 +74,24 @@ class ProgramReading:
     def count_line(self) -> None:
         """Take in that a line is read; refuse a program whose loop does not end."""
         self.lines += 1
-        if self.lines < self.acted + self.idle and self.lines < self.most:
+        if self.lines < self.moved + self.idle and self.lines < self.most:
             return
         self.watched.append(self.where())
         if len(self.watched) < WATCHED:
             return
-        idle = self.lines >= self.acted + self.idle
+        idle = self.lines >= self.moved + self.idle
         count = f"{MOST_IDLE if idle else MOST:,}"
-        what = f"{count} lines without a move, a dwell or a tool change" if idle else f"more than {count} lines"
+        what = f"{count} lines without a move of an axis" if idle else f"more than {count} lines"
         raise RefusedError(
             self.find_loop(),
             f"the loop here has run {what}: it seems to have no end; write a condition that becomes false, or let one "
             "program run fewer passes",
         )
 
-    def count_call(self) -> str | None:
-        """Take in that a line does something; return why it does too much."""
+    def count_call(self, *, moved: bool) -> str | None:
+        """Take in that a line does something, and whether an axis moves; return why it does too much."""
+        if moved:
+            self.moved = self.lines
         if self.acted != self.lines:
             self.acted, self.before = self.lines, self.calls
         self.calls += 1
