@@ -28,7 +28,7 @@ def question(text: str, **stated: Any) -> str:
     "text",
     [
         "X100. F50",
-        "G4 P0.5\nG4 P2.\nG4 P0",
+        "G4 P0.5\nG4 P1.25\nG4 P0",
         "G98 G81 X1. Y2. Z-1. R1. F50\nX3.\nG80",
         "G43 H1 Z5.",
         "G10 L2 P1 X5. Y0",
@@ -54,6 +54,11 @@ def question(text: str, **stated: Any) -> str:
         "G98 G82 X1. Z-1. R1. P0\nX2.\nG82 X3.\nG80",
         "G2 X10. Y0 I5. J0 P1",
         "G18 G8\nG17",
+        "#1=ACOS[-0.5]\nX#1",
+        "G42 D1 X1.\nG40",
+        "G18 G98\nG17 G81 X1. Y2. Z-1. R1.\nG80\nG19\nG17",
+        "G98 G81 X1. Y2. Z-1. R1.\nG91 G81 X1. Z-2. R-1.\nX3.\nG80 G90",
+        "G98 G81 X1. Y2. Z-1. R1.\nG80\nG91 X1.\nG90",
     ],
 )
 def test_what_both_read_alike_is_not_asked_for(text: str) -> None:
@@ -65,8 +70,10 @@ def test_what_both_read_alike_is_not_asked_for(text: str) -> None:
     [
         (
             "G04P500",
-            "G4 P500 is 500 s for LinuxCNC, and 0.5 s for a Fanuc: write the point if it is in seconds (P500.)",
+            "G4 P500 is 500 s for LinuxCNC, and 0.5 s for a Fanuc: say --controller, or for a Fanuc write G4 X, which",
         ),
+        ("G4 P500.", "G4 P500. is 500 s for LinuxCNC and a Haas, and a Fanuc takes P in milliseconds without a point"),
+        ("G98 G82 X1. Z-1. R1. P2.", "G82 P2. is 2 s for LinuxCNC and a Haas"),
         ("g4 p [#1*2]", "G4 P[..] is in seconds for LinuxCNC"),
         (
             "X 1 0 0",
@@ -109,6 +116,9 @@ def test_what_both_read_alike_is_not_asked_for(text: str) -> None:
         ("G20\nF10", "F10 is 10 in per minute for LinuxCNC"),
         ("X[FIX[#1/2]]", "FIX, FUP, MOD or ROUND rounds other numbers"),
         ("X[#1 MOD 3]", "FIX, FUP, MOD or ROUND"),
+        ("#101=ASIN[-0.5]", "ASIN or ATAN below zero is such an angle in LinuxCNC, and 360 degrees more in a Fanuc"),
+        ("#101 = atan [-1.] / [1.]", "ASIN or ATAN below zero"),
+        ("X[2.*asin[#1]]", "ASIN or ATAN below zero"),
         ("X#5221", "#5221 from #1000 on has other meanings"),
         ("# 3001 = 0", "#3001 from #1000 on"),
         ("X#[#1+5000]", "#[..] from #1000 on"),
@@ -134,6 +144,20 @@ def test_what_both_read_alike_is_not_asked_for(text: str) -> None:
         ("G43.1 Z1.", "G43.1 makes its words the tool's length in LinuxCNC"),
         ("G43.2 H1", "G43.2 adds a tool's length"),
         ("G43 H00", "G43 H00 is the length of the tool in the spindle for LinuxCNC, and none for a Fanuc"),
+        ("G41 X5.", "G41 without D is the radius of the tool in the spindle for LinuxCNC, and the last D for a Fanuc"),
+        ("G42", "G42 without D is the radius"),
+        ("G42 D00 X5.", "G42 D00 is the radius of the tool in the spindle for LinuxCNC, and none for a Fanuc"),
+        *((f"G18 G98 G8{n} X1. Y2. Z-1. R1. P0", f"G8{n} in G18 or G19 drills across") for n in (1, 2, 5, 9)),
+        (
+            "G98 G19 G81 X1. Y2. Z-1. R1.",
+            "G81 in G18 or G19 drills across that plane in LinuxCNC, and along Z in a Fanuc",
+        ),
+        ("G98 G81 X1. Y2. Z-1. R1.\nG91 X3.", "G81 in G91 goes on with R and depth of lines before"),
+        (
+            "M48",
+            "M48 is for LinuxCNC: overrides on; on a Fanuc or Haas it does what the machine's maker has made of it",
+        ),
+        ("M49", "M49 is for LinuxCNC: overrides off"),
         ("G70 P1 Q2", "G70 is another cycle"),
         ("G71 P1 Q2", "G71 is another cycle"),
         ("G72 I5. J0 L6.", "G72 is another cycle"),
@@ -252,9 +276,28 @@ def test_what_only_a_fanuc_takes_is_named(text: str) -> None:
     assert "say --controller fanuc (dwells, cycles and lengths are others there), or --controller linuxcnc" in found
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "G21 G90 O1001",
+        "%O1000",
+        "%  O1000 (PLATE)",
+        "G21G90O1001",
+        "T1(MILL)O1",
+        "N5 G90 : 1001",
+        "O1001 G90",
+        "G1 X1. O 1 0 0 0",
+        "#1=5. O1000",
+    ],
+)
+def test_a_program_number_behind_words_is_a_fanucs(text: str) -> None:
+    found = question(f"{text}\n{BEGIN}{END}")
+    assert f"line 1: {text!r} is how a Fanuc's or Haas's programs begin: say --controller fanuc" in found
+
+
 def test_habits_answer_for_lengths_only() -> None:
     comment = f"; the plate\n{BEGIN}"
-    assert question(f"{comment}X100\nG43\nG61\nG20\nF10\n{END}") == ""
+    assert question(f"{comment}X100\nG43\nG41\nG61\nG20\nF10\n{END}") == ""
     assert "G4 P500 is 500 s" in question(f"{comment}G4 P500\n{END}")
     assert "X100 is 100 mm" in question(f"{BEGIN}X100;\nY0;\n{END}")
     arc = "G2 X10 Y0. I5. J0\n"

@@ -24,6 +24,9 @@ BODY = "G21 G90\nS3000 M3\nG0 X0 Y0 Z5.\nG1 Z-1. F100\nX100. F50\n{}X0\nX100.\nX
         "G0 X1.\nM30\nO1000\n",
         "O1000 G90\n",
         "o<part>\n",
+        "G21 G90 O1000\n",
+        "%O1000\n",
+        "%  O1000\n",
     ],
 )
 def test_a_program_number_counts_wherever_it_is(

@@ -258,6 +258,20 @@ def test_what_is_not_certain_is_refused(text: str, line: int, reason: str, monke
     assert len(caught.value.reason) > 15
 
 
+#: what moves no axis
+STILL = [
+    "S3000 M3\nM5",
+    "G10 L2 P1 X#1",
+    "G90 F100.",
+    "G4 X1.",
+    "G 04 P100",
+    "G92 X0. Y0.",
+    "(X1.)",
+    "T1 M6",
+    "G52 X#1",
+]
+
+
 def test_it_ends_where_too_much_comes_out(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("thermocomp.nc.expansion.unroll.MOST", 2000)
     endless = unroll(["#1=0\n", "WHILE[#1LT1]DO1\n", "#1=#1-1\n", "G0 X1.\n", "END1\n"], FANUC)
@@ -281,8 +295,10 @@ def test_it_ends_where_too_much_comes_out(monkeypatch: pytest.MonkeyPatch) -> No
         ("M98 P2\nM30\nO2\nN5 X1.\nIF[1EQ1]GOTO5\nM99", 4, "no variable changes"),
         ("N1 M98 P2\nN3 M30\nO2\nM99 P1", 1, "no variable changes"),
         # a counter runs away
-        ("#1=0\nN10 #1=#1+1\nGOTO10", 2, "200,000 lines and written none"),
+        ("#1=0\nN10 #1=#1+1\nGOTO10", 2, "200,000 lines and moved no axis"),
         ("#1=9\nWHILE[#1GT0]DO1\n#2=0\nWHILE[#2LT3]DO2\n#2=#2+1\nEND2\n#1=#1+1\nEND1", 2, "200,000 lines and"),
+        *((f"#1=9\nN1 #1=#1+1\n{text}\nGOTO1", 2, "200,000 lines and moved no axis") for text in STILL),
+        ("#1=9\nN1 #1=#1+1\nM98 P2\nGOTO1\nM30\nO2\n#3=1\n#3=2\nM5\nM99", 2, "200,000 lines and moved no axis"),
         ("#1=9\nWHILE[#1GT0]DO1\n#1=#1+1\nX#1\nEND1", 2, "more than 220,000 lines that would be"),
         ("#1=9\nN1 #1=#1+1\nM98 P2\nGOTO1\nM30\nO2\n#3=1\n#3=2\n#3=3\nX#1\nM99", 2, "more than 1,000,000 lines"),
     ],
@@ -311,6 +327,13 @@ def test_a_long_loop_is_written_out() -> None:
     rows = ["#1=0\n", "WHILE[#1LT400]DO1\n", "#2=0\n", "WHILE[#2LT500]DO2\n", "G1 X#2 Y#1 F1000\n", "#2=#2+1\n"]
     lines = unroll([*rows, "END2\n", "#1=#1+1\n", "END1\n", "M30\n"], FANUC)
     assert sum(text.startswith("G1") for text, _ in lines) == 200_000
+
+
+def test_lines_that_move_nothing_are_written_if_they_end() -> None:
+    """More than a loop may have, once each; and in loops with a move now and then."""
+    loop = "#1=0\nWHILE[#1LT3]DO1\n#2=0\nWHILE[#2LT30000]DO2\n#2=#2+1\nEND2\nX#1\n#1=#1+1\nEND1\nM30\n"
+    out = [text for text, _ in unroll(["F100.\n"] * 210_000 + list(split_lines(loop)), FANUC)]
+    assert (len(out), out[-4:]) == (210_004, ["X0.\n", "X1.\n", "X2.\n", "M30\n"])
 
 
 def test_lines_that_are_skipped_call_nothing() -> None:

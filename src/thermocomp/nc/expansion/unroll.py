@@ -17,7 +17,7 @@ from thermocomp.nc.parser.expressions import Key
 from thermocomp.nc.parser.line import Assignment, Line, Word
 from thermocomp.nc.parser.tokens import read_line
 
-#: lines beyond those of the file that are written at most, and run at most: in all, and without one that is written;
+#: lines beyond those of the file that are written at most, and run at most: in all, and without one that moves an axis;
 #: a line that is run takes some 10 us, so that all of them are reached within seconds
 MOST: Final = 220_000
 MOST_STEPS: Final = 1_000_000
@@ -33,6 +33,10 @@ _IF = re.compile(r"IF(?P<condition>\[.*\])(?:GOTO(?P<goto>[0-9]+|[#\[].*)|THEN(?
 _LOOP = re.compile(r"(?:WH(?:ILE)?(?P<condition>\[.*\]))?DO(?P<loop>[123])")
 _END = re.compile(r"END(?P<loop>[123])")
 _GOTO = re.compile(r"GO(?:TO)?(?P<goto>[0-9]+|[#\[].*)")
+#: a line that is written moves no axis without an axis word, nor where a dwell, an offset or a rotation takes it
+_AXIS = re.compile(r"[XYZABC]", re.IGNORECASE)
+_STILL = re.compile(r"G[ \t]*0*(?:4|10|52|68|92)(?![0-9.])", re.IGNORECASE)
+_COMMENT = re.compile(r"\([^()]*\)?")
 _SET = re.compile(r"(#.*?)=(.*)")
 #: letters whose numbers count, and have no point
 _COUNTS: Final = frozenset("GMTHDSLNOP")
@@ -89,7 +93,7 @@ class _Unroller:
         self._file = File(texts)
         self._setup = setup
         self._inch = bool(setup.inch)
-        self._written = self._steps = self._wrote = 0
+        self._written = self._steps = self._moved = 0
         self._passes: dict[int, tuple[int, int]] = {}  # by the line that was gone back to: how often, and when last
         self._acted = False
         self._read_lines: dict[int, Line | None] = {}
@@ -354,14 +358,16 @@ class _Unroller:
 
     def _step(self, line: int) -> None:
         self._steps += 1
-        if self._steps - self._wrote > MOST_IDLE + len(self._texts):
-            raise self._endless(line, f"{MOST_IDLE:,} lines and written none")
+        if self._steps - self._moved > MOST_IDLE + len(self._texts):
+            raise self._endless(line, f"{MOST_IDLE:,} lines and moved no axis")
         if self._steps > MOST_STEPS + len(self._texts):
             raise self._endless(line, f"more than {MOST_STEPS:,} lines")
 
     def _out(self, text: str, line: int) -> tuple[str, int]:
         self._written += 1
-        self._wrote = self._steps
+        code = _COMMENT.sub("", text) if "(" in text else text
+        if _AXIS.search(code) and not _STILL.search(code):
+            self._moved = self._steps
         if self._acted and self._written > MOST + len(self._texts):
             raise self._endless(line, f"more than {MOST:,} lines that would be written")
         return text, line

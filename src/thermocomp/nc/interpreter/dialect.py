@@ -15,7 +15,8 @@ from typing import Final, Literal, NamedTuple
 
 from thermocomp.core.exceptions import ProgramError
 from thermocomp.nc.interpreter.codes import G_CODES, M_CODES, find_owner_of_p
-from thermocomp.nc.interpreter.openwords import DOUBTS, DRILLS, InForce, LineWords, list_open_words, read_number
+from thermocomp.nc.interpreter.inforce import DRILLS, InForce, LineWords, read_number
+from thermocomp.nc.interpreter.openwords import DOUBTS, list_open_words
 from thermocomp.nc.parser.tokens import read_line
 
 Whose = Literal["linuxcnc", "fanuc"]
@@ -40,6 +41,8 @@ _O_WORD = re.compile(
 )
 _NUMBER_ALONE = re.compile(r"[O:][0-9]+")
 _PROGRAM_NUMBER = re.compile(r"[O:][0-9]+|O?<[^<>]*>$")
+# behind other words of its line, or the % that begins a tape; X1O5 is a slip of the pen
+_NUMBER_BEHIND = re.compile(r"(?:[ \t%]|[GMN][0-9.]+)[O:][ \t]*[0-9]+(?![0-9]*[ \t]*\.)")
 _FANUC_FLOW = re.compile(r"IF\{\}(?:GOTO|THEN)|GO(?:TO)?[0-9#{]|WH(?:ILE)?\{\}DO[0-9]|DO[0-9#]|END[0-9]")
 _FANUC_OUTPUT = re.compile(r"DPRNT|BPRNT|POPEN|PCLOS|SETVN")
 _FANUC_CORNER = re.compile(r",[RCA]")
@@ -55,7 +58,7 @@ _FANUC_M: Final = M_CODES["fanuc"].keys() - M_CODES["linuxcnc"].keys()
 #: no code of a Fanuc or a Haas, whatever its options; others of LinuxCNC are (G7, G28.1, G33, G43.1, M60 ...)
 _LINUXCNC_G: Final = frozenset((5.2, 5.3, 33.1, 38.2, 38.3, 38.4, 38.5, 59.1, 59.2, 59.3, 90.1, 91.1, 92.2, 92.3))
 #: kinds of open words that a hint decides
-_USUAL: Final = ("length", "feed", "g43", "exact", "radius", "state", "behind")
+_USUAL: Final = ("length", "feed", "g41", "g43", "exact", "radius", "state", "behind")
 #: kinds of open words that are named
 _NAMED: Final = 5
 
@@ -205,7 +208,7 @@ class _Scan:
         text = text.upper()
         if _ACTIVE.search(text):
             self._hint("a comment for LinuxCNC")
-        self._code, *rest = _COMMENT.sub("", text).split(";")
+        self._code, *rest = _COMMENT.sub(" ", text).split(";")
         block = _squeeze(self._code)
         self._ended = self._ended or (block == "%" and self._began)
         self._began = self._began or bool(block)
@@ -246,6 +249,9 @@ class _Scan:
             self._sign("linuxcnc", "an O-word, which only LinuxCNC has")
             return
         if _PROGRAM_NUMBER.match(body):
+            self._sign("fanuc", _BEGINS)
+            return
+        if _NUMBER_BEHIND.search(self._code):
             self._sign("fanuc", _BEGINS)
             return
         if len(head["delete"] or "") > 1 or head["again"]:

@@ -2,12 +2,20 @@
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Final, NamedTuple
 
-from thermocomp.nc.interpreter.codes import CYCLES, M_CODES, USED_BY
+from thermocomp.nc.interpreter.codes import M_CODES
+from thermocomp.nc.interpreter.inforce import (
+    ARC_WORDS,
+    ARCS,
+    DRILLS,
+    MOTIONS,
+    TAKES_AXES,
+    InForce,
+    LineWords,
+    read_number,
+)
 
-DRILLS: Final = frozenset(float(code[1:]) for code in CYCLES)
 _DWELLS: Final = (74.0, 82.0, 84.0, 86.0, 89.0)
 #: LinuxCNC does not begin them without P
 _WANT_P: Final = (82.0, 86.0, 89.0)
@@ -15,15 +23,12 @@ _TAPS: Final = (74.0, 84.0)
 _PECKS: Final = (73.0, 83.0)
 _OTHER_CYCLES: Final = (76.0, 87.0, 88.0)
 _LATHE_CYCLES: Final = (70.0, 71.0, 71.1, 71.2, 72.0, 72.1, 72.2)
-_TAKES_AXES: Final = frozenset((4.0, 10.0, 28.0, 30.0, 52.0, 53.0, 92.0))
-_TURNS: Final = (7.0, 8.0, 18.0, 33.0, 76.0, 96.0)
-_ARCS: Final = (2.0, 3.0)
 _LENGTHS: Final = "XYZABCIJKRQ"
-_ARC_WORDS: Final = "XYZIJKR"
 _AXES: Final = "XYZABCUVW"
 _LOGIC = re.compile(r"(?<![A-Z])(?:AND|X?OR)(?![A-Z])")
 _ROUNDING = re.compile(r"(?<![A-Z])(?:FIX|FUP|MOD|ROUND)(?![A-Z])")
 _BARE = re.compile(r"[-+]?0*[1-9][0-9]*").fullmatch
+_ANGLE = re.compile(r"(?<![A-Z])(?:ASIN|ATAN)(?![A-Z])")
 _VARIABLE = re.compile(r"#(?:0*[1-9][0-9]{3,}|#[#0-9]*|\[)")
 
 _SHIFT = (
@@ -60,85 +65,11 @@ _G10 = (
 )
 #: LinuxCNC's, and of a Fanuc's machine what its maker has made of them
 _MAKERS_M: Final = {n: code.does for n, code in M_CODES["linuxcnc"].items() if n not in M_CODES["fanuc"]}
+_MAKERS_M |= {n: M_CODES["linuxcnc"][n].does for n in (48.0, 49.0)}  # also where thermocomp takes them for a Fanuc's
 _STATE: Final = (70.0, 71.0, 72.0, 73.0)
+_SAY: Final = "say --controller"
+_SAY_DWELL: Final = f"{_SAY}, or for a Fanuc write G4 X, which takes seconds with a point"
 _CALL = "is taken by LinuxCNC from files of its own, and by a Fanuc from its memory: write the moves out"
-
-
-@dataclass
-class InForce:
-    """What is in force in a program, as far as it counts here.
-
-    Parameters
-    ----------
-    whole : bool
-        It is stated what a length without a decimal point is.
-    retract : bool
-        It is stated whether G98 or G99 is in force.
-    motion : float
-        Its G code; -1 before the first one.
-    begins : bool
-        The line has put it in force.
-    absolute : bool
-    unit : str
-        With a blank before it; empty if it is not known.
-    per_turn : bool
-        The feed counts per turn (G95).
-    mixed : int
-        Arcs that have lengths with points and without: they close only if the latter are whole.
-    drilled, changed, milled, lathe : bool
-        There has been a cycle for holes, an M6, a word of Y, a code of lathes.
-    """
-
-    whole: bool
-    retract: bool = False
-    motion: float = -1.0
-    begins: bool = False
-    absolute: bool = True
-    unit: str = ""
-    per_turn: bool = False
-    mixed: int = 0
-    drilled: bool = False
-    changed: bool = False
-    milled: bool = False
-    lathe: bool = False
-
-    @property
-    def mill(self) -> bool:
-        """Whether it is no lathe."""
-        return self.milled and not self.lathe
-
-    def takes_p(self, line: "LineWords") -> bool:
-        """Return whether a P may belong to the motion of a line, which has been taken in."""
-        moves = not line.values.keys().isdisjoint(_ARC_WORDS)
-        return moves and self.motion in (*_ARCS, *DRILLS) and _TAKES_AXES.isdisjoint(line.g)
-
-    @property
-    def feed(self) -> bool:
-        """Whether a feed without a point is read in two ways."""
-        return not self.whole and (self.per_turn or self.unit == " in")
-
-    def take(self, line: "LineWords") -> None:
-        """Take the codes of a line in."""
-        codes = set(line.g)
-        before = self.motion
-        for code in (*_MOTIONS, 80.0):
-            if code in codes:
-                self.motion = code
-        self.begins = self.motion != before
-        if 90.0 in codes or 91.0 in codes:
-            self.absolute = 90.0 in codes
-        if 20.0 in codes or 21.0 in codes:
-            self.unit = " in" if 20.0 in codes else " mm"
-        if not codes.isdisjoint((93.0, 94.0, 95.0)):
-            self.per_turn = 95.0 in codes
-        self.drilled = self.drilled or not codes.isdisjoint(DRILLS)
-        self.changed = self.changed or 6.0 in line.m
-        self.milled = self.milled or "Y" in line.values
-        self.lathe = self.lathe or not codes.isdisjoint(_TURNS)
-        self.retract = self.retract or 98.0 in codes or 99.0 in codes
-
-
-_MOTIONS: Final = (0.0, 1.0, 2.0, 3.0, 33.0, *sorted(DRILLS))
 
 
 class OpenWord(NamedTuple):
@@ -147,37 +78,6 @@ class OpenWord(NamedTuple):
     kind: str
     text: str
     readings: str  #: and what to write instead
-
-
-@dataclass
-class LineWords:
-    """Words of a line.
-
-    Parameters
-    ----------
-    code : str
-        The line without comments, in upper case.
-    g, m : list of float
-        Numbers of its codes; -1 of those that are computed.
-    computed : str
-        The first of these; empty if there is none.
-    values : dict of str to str
-        All others, as they are written.
-    p_of : str
-        The code that P belongs to; empty if there is none.
-    """
-
-    code: str
-    g: list[float]
-    m: list[float]
-    computed: str
-    values: dict[str, str]
-    p_of: str = ""
-
-    def linuxcncs_user_of_p(self) -> str:
-        """Return the first code that P may belong to in LinuxCNC; empty if there is none."""
-        codes = (*(f"G{n:g}" for n in self.g), *(f"M{n:g}" for n in self.m))
-        return next((code for code in codes if code in USED_BY["linuxcnc"]["P"]), "")
 
 
 def list_open_words(line: LineWords, force: InForce) -> Iterator[OpenWord]:
@@ -203,11 +103,11 @@ def list_open_words(line: LineWords, force: InForce) -> Iterator[OpenWord]:
     if 10.0 in codes and not _sets_origin(values, force):
         words = "".join(f" {letter}{values[letter]}" for letter in "LP" if letter in values)
         yield OpenWord("g10", f"G10{words}", _G10)
-    if 53.0 in codes and force.motion in (1.0, *_ARCS):
+    if 53.0 in codes and force.motion in (1.0, *ARCS):
         what = "moves by the feed in LinuxCNC under G1, and as a rapid in a Fanuc: write G53 G0"
         yield OpenWord("g53", "G53", what)
     yield from _open_places(codes, values)
-    if force.motion in _ARCS and force.takes_p(line) and read_number(values.get("P", "1")) != 1.0:
+    if force.motion in ARCS and force.takes_p(line) and read_number(values.get("P", "1")) != 1.0:
         what = "counts the turns of an arc in LinuxCNC, and nothing in a Fanuc: write each turn on a line of its own"
         yield OpenWord("turns", f"P{values['P']}", what)
     for letter in "UVW":
@@ -220,7 +120,7 @@ def list_open_words(line: LineWords, force: InForce) -> Iterator[OpenWord]:
         unit = f"{force.unit or ' mm'} per {'turn' if force.per_turn else 'minute'}"
         what = f"is {int(values['F'])}{unit} for LinuxCNC, and may be in least increments for a Fanuc: write the point"
         yield OpenWord("feed", f"F{values['F']}", f"{what} (F{values['F']}.)")
-    if force.motion in DRILLS and not values.keys().isdisjoint("XYZABC") and codes.isdisjoint(_TAKES_AXES):
+    if force.motion in DRILLS and not values.keys().isdisjoint("XYZABC") and codes.isdisjoint(TAKES_AXES):
         yield from _open_cycle(codes, values, force)
     if 4.0 not in codes and not (force.whole or 19.0 in line.m):
         yield from _open_lengths(codes, values, force)
@@ -228,7 +128,7 @@ def list_open_words(line: LineWords, force: InForce) -> Iterator[OpenWord]:
 
 def _open_dwell(values: dict[str, str]) -> Iterator[OpenWord]:
     if _counts(values.get("P")):
-        yield OpenWord("dwell", f"G4 P{values['P']}", _seconds(values["P"]))
+        yield OpenWord("dwell", f"G4 P{values['P']}", _seconds(values["P"], _SAY_DWELL))
     if beside := [letter for letter in _AXES if letter in values]:
         what = "moves in LinuxCNC, and a Fanuc takes X or U for the time: write the move on a line of its own"
         yield OpenWord("dwell and move", f"{beside[0]}{values[beside[0]]} beside G4", what)
@@ -238,12 +138,23 @@ def _open_places(codes: set[float], values: dict[str, str]) -> Iterator[OpenWord
     if not codes.isdisjoint((28.0, 30.0)) and values.keys().isdisjoint(_AXES):
         code = "G28" if 28.0 in codes else "G30"
         yield OpenWord("home", code, "without axes moves all in LinuxCNC, and none in a Fanuc: name the axes")
+    if side := next((f"G{n:g}" for n in (41.0, 42.0) if n in codes), None):
+        yield from _open_radius(side, values.get("D"))
     if 43.0 in codes and "H" not in values:
         what = "is the tool in the spindle for LinuxCNC, and the last H for a Fanuc: write H"
         yield OpenWord("g43", "G43 without H", what)
     if 43.0 in codes and read_number(values.get("H", "")) == 0.0:
         what = "is the length of the tool in the spindle for LinuxCNC, and none for a Fanuc: write its number, or G49"
         yield OpenWord("g43", f"G43 H{values['H']}", what)
+
+
+def _open_radius(side: str, number: str | None) -> Iterator[OpenWord]:
+    if number is None:
+        what = "is the radius of the tool in the spindle for LinuxCNC, and the last D for a Fanuc: write D"
+        yield OpenWord("g41", f"{side} without D", what)
+    elif read_number(number) == 0.0:
+        what = "is the radius of the tool in the spindle for LinuxCNC, and none for a Fanuc: write its number, or G40"
+        yield OpenWord("g41", f"{side} D{number}", what)
 
 
 def _open_machine(line: LineWords) -> Iterator[OpenWord]:
@@ -273,6 +184,12 @@ def _open_expressions(line: LineWords) -> Iterator[OpenWord]:
     if _ROUNDING.search(line.code):
         what = "rounds other numbers in a Fanuc than in LinuxCNC (below zero, or ROUND within a word): do without it"
         yield OpenWord("rounding", "FIX, FUP, MOD or ROUND", what)
+    if _ANGLE.search(line.code):
+        what = (
+            "below zero is such an angle in LinuxCNC, and 360 degrees more in a Fanuc that is set so (parameter 6004): "
+            "write the angle as a number"
+        )
+        yield OpenWord("angle", "ASIN or ATAN", what)
     if variable := _VARIABLE.search("".join(line.code.split())):
         what = "from #1000 on has other meanings in LinuxCNC than in a Fanuc: use #1 to #999, by their number"
         yield OpenWord("variable", variable[0].replace("[", "[..]"), what)
@@ -288,7 +205,7 @@ def _open_lathe(codes: set[float], values: dict[str, str], force: InForce) -> It
         what = "without M6 changes the tool on a Fanuc's lathe, and only picks it in LinuxCNC: write M6"
         yield OpenWord("tool", f"T{values['T']}", what)
     cycle = next((f"G{n:g}" for n in (90.0, 94.0) if n in codes), None)
-    if cycle and codes.isdisjoint((*_MOTIONS, *_TAKES_AXES)) and {"X", "Z"} <= values.keys() and "Y" not in values:
+    if cycle and codes.isdisjoint((*MOTIONS, *TAKES_AXES)) and {"X", "Z"} <= values.keys() and "Y" not in values:
         what = "with X and Z is a turning cycle on a Fanuc's lathe: write it on a line of its own"
         yield OpenWord("turning", cycle, what)
 
@@ -319,18 +236,30 @@ def _sets_origin(values: dict[str, str], force: InForce) -> bool:
 
 def _open_cycle(codes: set[float], values: dict[str, str], force: InForce) -> Iterator[OpenWord]:
     motion, code = force.motion, f"G{force.motion:g}"
-    if motion in _DWELLS and _counts(values.get("P")):
-        yield OpenWord("cycle dwell", f"{code} P{values['P']}", _seconds(values["P"]))
+    if motion == 86.0 and read_number(values.get("P", "0")) != 0.0:
+        what = "dwells in LinuxCNC, and a Fanuc's G86 has no dwell: write P0, or the moves out"
+        yield OpenWord("cycle dwell", f"G86 P{values['P']}", what)
+    elif motion in _DWELLS and _counts(values.get("P")):
+        yield OpenWord("cycle dwell", f"{code} P{values['P']}", _seconds(values["P"], _SAY))
     elif motion in _WANT_P and force.begins and "P" not in values:
         what = "is refused by LinuxCNC where the cycle begins, and dwells by no word in a Fanuc: write P0, or how long"
         yield OpenWord("no dwell", f"{code} without P", what)
-    elif motion == 86.0 and read_number(values.get("P", "0")) != 0.0:
-        what = "dwells in LinuxCNC, and a Fanuc's G86 has no dwell: write P0, or the moves out"
-        yield OpenWord("cycle dwell", f"G86 P{values['P']}", what)
     if "L" in values or ("K" in values and motion not in _OTHER_CYCLES):
         letter = "L" if "L" in values else "K"
         what = "repeats: in L for LinuxCNC and a Haas, in K for a Fanuc: write the holes out"
         yield OpenWord("repeats", f"{code} {letter}{values[letter]}", what)
+    if force.across:
+        what = (
+            "in G18 or G19 drills across that plane in LinuxCNC, and along Z in a Fanuc unless it is set otherwise "
+            "(parameter 5101): write G17, or the moves out"
+        )
+        yield OpenWord("across", code, what)
+    if force.kept not in (None, force.absolute):
+        what = (
+            "goes on with R and depth of lines before, which are places in G90 and ways in G91: LinuxCNC reads them "
+            "anew, and a Fanuc as it is made: write all words of the cycle, behind G80"
+        )
+        yield OpenWord("kept", f"{code} in G{90 if force.absolute else 91}", what)
     if not force.retract:
         what = "goes back to R in LinuxCNC (G99), and to the level before in a Fanuc (G98): write G98 or G99"
         yield OpenWord("retract", f"{code} before G98 or G99", what)
@@ -348,8 +277,8 @@ def _open_lengths(codes: set[float], values: dict[str, str], force: InForce) -> 
     """Yield the first length without a point, and count the arcs that show what such lengths are."""
     drills = force.motion in DRILLS
     bare = {letter: value for letter, value in values.items() if _is_bare(value)}
-    if force.motion in _ARCS and not bare.keys().isdisjoint(_ARC_WORDS):
-        force.mixed += any("." in values.get(letter, "") for letter in _ARC_WORDS)
+    if force.motion in ARCS and not bare.keys().isdisjoint(ARC_WORDS):
+        force.mixed += any("." in values.get(letter, "") for letter in ARC_WORDS)
     for letter in _LENGTHS:
         counts = (letter == "K" and drills) or (letter == "Q" and not drills) or (letter == "R" and 10.0 in codes)
         if letter not in bare or counts:
@@ -365,26 +294,15 @@ def _open_lengths(codes: set[float], values: dict[str, str], force: InForce) -> 
         return
 
 
-def read_number(value: str) -> float:
-    """Return the value of a plain number; -1 of all else."""
-    try:
-        return float(value)
-    except ValueError:
-        return -1.0
-
-
 def _counts(value: str | None) -> bool:
-    """Return whether a dwell may be in seconds or milliseconds: with a point all who take it read seconds."""
-    return value is not None and "." not in value and read_number(value) != 0.0
+    """Return whether a dwell may be in seconds or milliseconds: a fraction is in seconds for all who take it."""
+    return value is not None and (number := read_number(value)) != 0.0 and number % 1.0 == 0.0
 
 
-def _seconds(value: str) -> str:
+def _seconds(value: str, advice: str) -> str:
     number = read_number(value)
     if number < 0.0:
-        return (
-            "is in seconds for LinuxCNC, and in milliseconds for a Fanuc: write a number, with its point if in seconds"
-        )
-    return (
-        f"is {number:g} s for LinuxCNC, and {number / 1000.0:g} s for a Fanuc: write the point if it is in seconds "
-        f"(P{value}.)"
-    )
+        return f"is in seconds for LinuxCNC, and in milliseconds for a Fanuc: {advice}"
+    if "." in value:
+        return f"is {number:g} s for LinuxCNC and a Haas, and a Fanuc takes P in milliseconds without a point: {advice}"
+    return f"is {number:g} s for LinuxCNC, and {number / 1000.0:g} s for a Fanuc: {advice}"

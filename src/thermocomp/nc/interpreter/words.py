@@ -124,6 +124,13 @@ class Reader:
         if self._controller == "fanuc":
             if owner == "G54":
                 return f"G54 with P: write G54.1 P{words.values['P']:g} for an additional coordinate system"
+            if letter in "RPQ" and "M19" in words.codes:
+                word = f"{letter}{words.words[letter].value.strip()}"
+                return (
+                    f"M19 with {word} turns the spindle to an angle, in the way that the machine's maker has chosen, "
+                    "which is not followed; M19 alone is, and neither moves an axis: revise the program without "
+                    f"{word}, and write it back behind M19 in the revised one"
+                )
             other = USED_BY["linuxcnc"].get(letter, frozenset())
             theirs = owner if owner in other else next((c for c in words.codes if c in other and c[0] == "G"), "")
             if theirs:

@@ -168,12 +168,12 @@ class Canon:
 
     def tell(self, kind: str, *numbers: float) -> None:
         self.where()
-        self.act()
+        self.act(moved=kind == "tap")
         self.record(kind, *numbers)
 
-    def act(self) -> None:
-        """Count a move, a dwell or the like."""
-        if (reason := self.reading.count_call()) is None:
+    def act(self, *, moved: bool) -> None:
+        """Count a move, a dwell or the like; only what moves an axis shows that a loop is getting on."""
+        if (reason := self.reading.count_call(moved=moved)) is None:
             return
         # a line runs to its end whatever a call answers, which may take for ever: nothing but the process can end it
         self.where()
@@ -311,6 +311,7 @@ class Canon:
         points = [n if i % 3 == 2 else self.length(n) for i, n in enumerate(numbers)]
         self.place = (points[-3] / MM, points[-2] / MM, *self.place[2:])
         self.where()
+        self.act(moved=True)
         self.extra("curve", [order, *points])
 
     # --- what the module tells ---
@@ -321,22 +322,22 @@ class Canon:
             self.move_to(state.sequence_number)
 
     def straight_traverse(self, *place: float) -> None:
+        self.act(moved=place != self.place)
         self.place = place
-        self.act()
         self.records.append(RECORD.pack(RAPID, 9, self.line, *place, 0.0))
         if len(self.records) >= BLOCK:
             self.flush()
 
     def straight_feed(self, *place: float) -> None:
+        self.act(moved=place != self.place)
         self.place = place
-        self.act()
         self.records.append(RECORD.pack(FEED, 9, self.line, *place, 0.0))
         if len(self.records) >= BLOCK:
             self.flush()
 
     def straight_probe(self, *place: float) -> None:
+        self.act(moved=place != self.place)
         self.place = place
-        self.act()
         self.records.append(RECORD.pack(PROBE, 9, self.line, *place, 0.0))
         if len(self.records) >= BLOCK:
             self.flush()
@@ -348,7 +349,7 @@ class Canon:
         plane = {1: 17, 2: 19, 3: 18}[self.plane]
         self.place = (*at, *more)
         centre = (centre1 * MM, centre2 * MM, turns, plane, *(0.0,) * 6)
-        self.act()
+        self.act(moved=True)
         self.records.append(RECORD.pack(CENTRE, 4, self.line, *centre))
         self.records.append(RECORD.pack(ARC, 9, self.line, *self.place, 0.0))
         if len(self.records) >= BLOCK:

@@ -5,19 +5,25 @@ Part of the script `_rs274_child.py`: standard library only.
 
 import os
 import re
+import time
 from collections import Counter
 from collections.abc import Callable, Iterable
 
-#: lines that are read beyond those of the program: without a move, a dwell or the like between them, and in all. A line
-#: takes some 5 us, so that either is reached within seconds
+#: lines that are read beyond those of the program: without a move of an axis between them, and in all. A line takes
+#: 5 to 15 us, so that either is reached within seconds
 MOST_IDLE = 300_000
 MOST = 1_200_000
+#: processor time without a move [s], looked at every so many lines, once more lines have been read than the program
+#: has: a line that changes the tool or calls a file takes far more
+MOST_SECONDS = 5.0
+LOOK = 1024
 #: moves, dwells and the like of one line, as of a cycle with many repeats or pecks; and of all, beyond `CALLS` per line
 MOST_OF_LINE = 100_000
 MOST_CALLS = 5_000_000
 CALLS = 20
-#: lines that are watched then, to find the loop
+#: lines that are watched then, to find the loop; fewer where they are slow
 WATCHED = 20_000
+WATCHED_SLOW = 4_000
 LOOP = re.compile(r"(?i)^[\s/N0-9.]*O.*[\]>0-9\s](WHILE|DO|REPEAT)\b")
 
 
@@ -49,8 +55,10 @@ class ProgramReading:
         self.folders = [os.path.realpath(folder) for folder in folders]
         self.where = where
         self.idle, self.most = lines + MOST_IDLE, lines + MOST
-        self.lines = self.acted = 0  # read, in all and when something was done last
-        self.calls = self.before = 0  # in all, and before the line
+        self.lines = self.moved = 0  # read, in all and when an axis moved last
+        self.own = lines + LOOK
+        self.looked, self.since, self.late = 0, time.process_time(), False  # line, time of the last look with a move
+        self.acted = self.calls = self.before = 0  # lines and calls before the one that does something; calls in all
         self.most_calls = CALLS * lines + MOST_CALLS
         self.watched: list[tuple[int, bool]] = []
 
@@ -74,22 +82,35 @@ class ProgramReading:
     def count_line(self) -> None:
         """Take in that a line is read; refuse a program whose loop does not end."""
         self.lines += 1
-        if self.lines < self.acted + self.idle and self.lines < self.most:
+        if not self.lines % LOOK:
+            self.look_at_time()
+        idle = self.lines >= self.moved + self.idle
+        late = self.late and self.lines > self.moved + self.own
+        if not (idle or late) and self.lines < self.most:
             return
         self.watched.append(self.where())
-        if len(self.watched) < WATCHED:
+        if len(self.watched) < (WATCHED_SLOW if late else WATCHED):
             return
-        idle = self.lines >= self.acted + self.idle
-        count = f"{MOST_IDLE if idle else MOST:,}"
-        what = f"{count} lines without a move, a dwell or a tool change" if idle else f"more than {count} lines"
+        count = f"{MOST_IDLE:,} lines" if idle else f"{MOST_SECONDS:g} s of processor time"
+        what = f"{count} without a move of an axis" if idle or late else f"more than {MOST:,} lines"
         raise RefusedError(
             self.find_loop(),
             f"the loop here has run {what}: it seems to have no end; write a condition that becomes false, or let one "
             "program run fewer passes",
         )
 
-    def count_call(self) -> str | None:
-        """Take in that a line does something; return why it does too much."""
+    def look_at_time(self) -> None:
+        """See how long no axis has moved."""
+        now = time.process_time()
+        if self.moved > self.looked:
+            self.since = now
+        self.looked = self.lines
+        self.late = now - self.since > MOST_SECONDS
+
+    def count_call(self, *, moved: bool) -> str | None:
+        """Take in that a line does something, and whether an axis moves; return why it does too much."""
+        if moved:
+            self.moved = self.lines
         if self.acted != self.lines:
             self.acted, self.before = self.lines, self.calls
         self.calls += 1

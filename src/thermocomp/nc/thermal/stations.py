@@ -13,6 +13,8 @@ AXES = "XYZ"
 _NUMBER = r"-?\d+(?:\.\d+)?"
 #: x_um, z, z_at_200, x_at_z-50_um
 _NAME = re.compile(rf"([xyz])(?:_at_([xyz]?)({_NUMBER})(?:mm)?)?(?:_um)?", re.IGNORECASE)
+#: y1_um, but not yaw
+_BEGINS = re.compile(r"[xyz](?![a-z])", re.IGNORECASE)
 #: Z, X at Z 200 mm
 _PLACE = re.compile(rf"([xyz])(?:\s+at\s+([xyz])\s*=?\s*({_NUMBER}\s*[a-z]*))?", re.IGNORECASE)
 
@@ -138,9 +140,11 @@ def _by_name(model: ErrorModel, targets: Sequence[str]) -> Station:
             return Station(axis, model)
         if along or axis == "Z":  # x_at_200 could be a place along X as well as along Z
             return Station(axis, model, along or axis, float(at))
+    begins = _BEGINS.match(model.target)
+    meant = begins[0].upper() if begins else "Z"
     raise InputError(
         f"the name of the target {model.target!r} does not say which axis it is; say --axis "
-        f'{model.target}=Z, or --axis "{model.target}=Z at Z 200 mm"; targets are {", ".join(targets)}'
+        f'{model.target}={meant}, or --axis "{model.target}={meant} at Z 200 mm"; targets are {", ".join(targets)}'
     )
 
 

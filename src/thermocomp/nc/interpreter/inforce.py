@@ -1,0 +1,139 @@
+"""What is in force in a program, and the words of a line, as far as it counts for whose program it is."""
+
+from dataclasses import dataclass
+from typing import Final
+
+from thermocomp.nc.interpreter.codes import CYCLES, USED_BY
+
+DRILLS: Final = frozenset(float(code[1:]) for code in CYCLES)
+MOTIONS: Final = (0.0, 1.0, 2.0, 3.0, 33.0, *sorted(DRILLS))
+#: they take the axis words of their line for themselves
+TAKES_AXES: Final = frozenset((4.0, 10.0, 28.0, 30.0, 52.0, 53.0, 92.0))
+ARCS: Final = (2.0, 3.0)
+ARC_WORDS: Final = "XYZIJKR"
+_TURNS: Final = (7.0, 8.0, 18.0, 33.0, 76.0, 96.0)
+
+
+@dataclass
+class LineWords:
+    """Words of a line.
+
+    Parameters
+    ----------
+    code : str
+        The line without comments, in upper case.
+    g, m : list of float
+        Numbers of its codes; -1 of those that are computed.
+    computed : str
+        The first of these; empty if there is none.
+    values : dict of str to str
+        All others, as they are written.
+    p_of : str
+        The code that P belongs to; empty if there is none.
+    """
+
+    code: str
+    g: list[float]
+    m: list[float]
+    computed: str
+    values: dict[str, str]
+    p_of: str = ""
+
+    def linuxcncs_user_of_p(self) -> str:
+        """Return the first code that P may belong to in LinuxCNC; empty if there is none."""
+        codes = (*(f"G{n:g}" for n in self.g), *(f"M{n:g}" for n in self.m))
+        return next((code for code in codes if code in USED_BY["linuxcnc"]["P"]), "")
+
+
+@dataclass
+class InForce:
+    """What is in force in a program, as far as it counts here.
+
+    Parameters
+    ----------
+    whole : bool
+        It is stated what a length without a decimal point is.
+    retract : bool
+        It is stated whether G98 or G99 is in force.
+    motion : float
+        Its G code; -1 before the first one.
+    begins : bool
+        The line has put it in force.
+    absolute : bool
+    across : bool
+        Holes are drilled in another plane than XY (G18, G19).
+    kept : bool or None
+        What `absolute` was when the cycle's words were written; None if they are not.
+    unit : str
+        With a blank before it; empty if it is not known.
+    per_turn : bool
+        The feed counts per turn (G95).
+    mixed : int
+        Arcs that have lengths with points and without: they close only if the latter are whole.
+    drilled, changed, milled, lathe : bool
+        There has been a cycle for holes, an M6, a word of Y, a code of lathes.
+    """
+
+    whole: bool
+    retract: bool = False
+    motion: float = -1.0
+    begins: bool = False
+    absolute: bool = True
+    across: bool = False
+    kept: bool | None = None
+    unit: str = ""
+    per_turn: bool = False
+    mixed: int = 0
+    drilled: bool = False
+    changed: bool = False
+    milled: bool = False
+    lathe: bool = False
+
+    @property
+    def mill(self) -> bool:
+        """Whether it is no lathe."""
+        return self.milled and not self.lathe
+
+    def takes_p(self, line: LineWords) -> bool:
+        """Return whether a P may belong to the motion of a line, which has been taken in."""
+        moves = not line.values.keys().isdisjoint(ARC_WORDS)
+        return moves and self.motion in (*ARCS, *DRILLS) and TAKES_AXES.isdisjoint(line.g)
+
+    @property
+    def feed(self) -> bool:
+        """Whether a feed without a point is read in two ways."""
+        return not self.whole and (self.per_turn or self.unit == " in")
+
+    def take(self, line: LineWords) -> None:
+        """Take the codes of a line in."""
+        codes = set(line.g)
+        before = self.motion
+        for code in (*MOTIONS, 80.0):
+            if code in codes:
+                self.motion = code
+        self.begins = self.motion != before
+        if 90.0 in codes or 91.0 in codes:
+            self.absolute = 90.0 in codes
+        if not codes.isdisjoint((17.0, 18.0, 19.0)):
+            self.across = 17.0 not in codes
+        if self.begins:
+            self.kept = None
+        if self.motion in DRILLS and {"R", "Z"} <= line.values.keys() and TAKES_AXES.isdisjoint(codes):
+            self.kept = self.absolute
+        if 20.0 in codes or 21.0 in codes:
+            self.unit = " in" if 20.0 in codes else " mm"
+        if not codes.isdisjoint((93.0, 94.0, 95.0)):
+            self.per_turn = 95.0 in codes
+        self.drilled = self.drilled or not codes.isdisjoint(DRILLS)
+        self.changed = self.changed or 6.0 in line.m
+        self.milled = self.milled or "Y" in line.values
+        self.lathe = self.lathe or not codes.isdisjoint(_TURNS)
+        self.retract = self.retract or 98.0 in codes or 99.0 in codes
+
+
+def read_number(value: str) -> float:
+    """Return the value of a plain number; -1 of all else."""
+    try:
+        return float(value)
+    except ValueError:
+        return -1.0
