@@ -155,8 +155,12 @@ class Listener:
             begin(pieces())
 
 
+def silent(_: str, steps: int = 1) -> None:
+    """Say nothing."""
+
+
 #: hears nothing
-SILENT = Listener(lambda *_: None)
+SILENT = Listener(silent)
 
 
 @dataclass(frozen=True, eq=False)

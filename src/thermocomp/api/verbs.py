@@ -6,7 +6,17 @@ from pathlib import Path
 from typing import Any, Literal
 
 from thermocomp.api.explain import models_of
-from thermocomp.api.inputs import Given, LeaveOne, Listener, Starts, prepare, recordings_of, starts_of, trouble_of
+from thermocomp.api.inputs import (
+    Given,
+    LeaveOne,
+    Listener,
+    Starts,
+    prepare,
+    recordings_of,
+    silent,
+    starts_of,
+    trouble_of,
+)
 from thermocomp.api.results import Assessed, Compared, FittedModels
 from thermocomp.api.selected import Selected
 from thermocomp.core.correction import Limits
@@ -26,10 +36,6 @@ from thermocomp.recordings.readers.mapping import Mapping
 DEFAULT_MODELS = ("ols", "partial-f", "mra", "dynamic", "averaged")
 SelectionMethod = Literal["pareto", "subsets", "grouping", "partial-f", "stepwise", "ace"]
 Policy = Literal["clip", "hold", "fade"]
-
-
-def _silent(_: str, steps: int = 1) -> None:
-    """Say nothing."""
 
 
 def compare(
@@ -52,7 +58,7 @@ def compare(
     limits: Limits | None = Limits(),
     jobs: int = -1,
     scheduler: str | None = None,
-    progress: Callable[[str], None] = _silent,
+    progress: Callable[[str], None] = silent,
 ) -> Compared:
     """Compare methods on thermal cycles they have not seen, beside no compensation.
 
@@ -190,7 +196,7 @@ def fit(
     accept_unproven: str | None = None,
     jobs: int = -1,
     scheduler: str | None = None,
-    progress: Callable[[str], None] = _silent,
+    progress: Callable[[str], None] = silent,
 ) -> FittedModels:
     """Fit a model, judge it on thermal cycles it has not seen, and write it with its honest error.
 
@@ -277,7 +283,7 @@ def assess(
     harm_margin: float | None = None,
     limits: Limits = Limits(),
     probing: str | Probings | None = None,
-    progress: Callable[[str], None] = _silent,
+    progress: Callable[[str], None] = silent,
 ) -> Assessed:
     """Judge a model file on recordings: per cycle, with noise, with each sensor lost, outside its range.
 
@@ -350,7 +356,7 @@ def select(
     mapping: str | Path | Mapping | None = None,
     jobs: int = -1,
     scheduler: str | None = None,
-    progress: Callable[..., None] = _silent,
+    progress: Callable[..., None] = silent,
     **settings: Any,
 ) -> Selected:
     """Choose the few temperature sensors that a model needs.
