@@ -66,5 +66,5 @@ def test_marks_of_a_docstring_are_no_part_of_the_help() -> None:
 
 
 def test_options_of_the_verb_that_is_not_asked_for_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(tc.ThermocompError, match="writes none"):
+    with pytest.raises(tc.ThermocompError, match="writes no file"):
         MADE["plan"]([tmp_path / "a.csv"], running=True, output=tmp_path / "b.ngc")

@@ -22,6 +22,7 @@ SLOW = (
     "assess",
     "compare",
     "fit",
+    "iso230",
     "plan",
     "revise",
     "select",

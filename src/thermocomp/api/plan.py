@@ -8,18 +8,8 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from thermocomp.api import testprogram
-from thermocomp.api.inputs import (
-    Given,
-    LeaveOne,
-    Listener,
-    Prepared,
-    Starts,
-    judging_of,
-    prepare,
-    recordings_of,
-    silent,
-    trouble_of,
-)
+from thermocomp.api.inputs import Given, LeaveOne, Prepared, Starts, judging_of, prepare, recordings_of, trouble_of
+from thermocomp.api.keywords import Listener, silent
 from thermocomp.api.results import Result
 from thermocomp.api.testprogram import Dialect
 from thermocomp.core.exceptions import InputError

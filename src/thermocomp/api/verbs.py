@@ -6,17 +6,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 from thermocomp.api.explain import models_of
-from thermocomp.api.inputs import (
-    Given,
-    LeaveOne,
-    Listener,
-    Starts,
-    prepare,
-    recordings_of,
-    silent,
-    starts_of,
-    trouble_of,
-)
+from thermocomp.api.inputs import Given, LeaveOne, Starts, prepare, recordings_of, starts_of, trouble_of
+from thermocomp.api.keywords import Listener, settings_of, silent
 from thermocomp.api.results import Assessed, Compared, FittedModels
 from thermocomp.api.selected import Selected
 from thermocomp.core.correction import Limits
@@ -111,7 +102,7 @@ def compare(
         Dask scheduler whose workers do the work in place of these processes, such as ``tcp://192.168.1.20:8786``: see
         :doc:`/many_recordings`.
     progress : callable
-        Called with a line of text after each piece of work; see `thermocomp.api.inputs.Listener`.
+        Called with a line of text after each piece of work; see `thermocomp.api.keywords.Listener`.
 
     Returns
     -------
@@ -395,11 +386,7 @@ def select(
     """
     if method not in ("pareto", "subsets", "grouping", "partial-f", "stepwise", "ace"):
         raise InputError(f"method {method!r}: want pareto, subsets, grouping, partial-f, stepwise or ace")
-    try:
-        chosen = Settings(**settings)
-    except TypeError as e:
-        known = ", ".join(Settings.__dataclass_fields__)
-        raise InputError(f"select: {str(e).partition(') ')[2]}; the settings are {known}") from e
+    chosen = settings_of(Settings, settings, "select")
     chosen.check(method)
     listener = Listener(progress)
     ready = prepare(

@@ -218,11 +218,13 @@ def command(
 
     def made_of(show: Callable[..., int]) -> Callable[..., int]:
         verb = Verb(place, forms, words, reads)
+        options = verb.options()
+        defaults = {p.name: p.default for p in options if p.default is not p.empty}
         own = [p for n, p in inspect.signature(show).parameters.items() if n not in ("found", "face")]
         described = _described(show)
 
         def run(*positional: Any, **named: Any) -> int:
-            given = dict(zip(verb.words, positional, strict=False)) | named
+            given = defaults | dict(zip(verb.words, positional, strict=False)) | named
             extra = {p.name: given.pop(p.name, p.default) for p in own}
             face = Face(**{f: given.pop(f) for f in ("output", "overwrite", "json", "quiet") if f in given})
             asked = next((option for option in instead if extra[option]), "")
@@ -244,7 +246,7 @@ def command(
         ]
         mine = [_option(p.name, p.annotation, p.default, described[p.name]) for p in own]
         json = _option("json", bool, False, "Print results for a program instead of tables.")
-        parameters = [*verb.options(), *mine, *(alone if writes else []), json]
+        parameters = [*options, *mine, *(alone if writes else []), json]
         run.__name__ = run.__qualname__ = show.__name__
         run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
         run.__annotations__ = {p.name: p.annotation for p in parameters}

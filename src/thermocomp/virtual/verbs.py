@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from thermocomp.api.inputs import Listener, silent
+from thermocomp.api.keywords import Listener, silent
 from thermocomp.recordings.recording import Recording
 from thermocomp.virtual import datasets
 from thermocomp.virtual.protocol import Experiment, Physics
