@@ -36,7 +36,7 @@ async def main() -> float:
             await sink.apply(result.corrections)  # one change of sign in all: core/correction.py
             left.append(row["s1_um"] - new_day.table["s1_um"].iloc[0] + result.corrections["s1_um"].offset)
         await sink.close()
-        return max(map(abs, left))
+        return float(max(map(abs, left)))
 
 
 if __name__ == "__main__":

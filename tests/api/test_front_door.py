@@ -17,7 +17,8 @@ from sklearn.pipeline import make_pipeline
 from smallmachine import small_machine
 
 import thermocomp as tc
-from thermocomp.api.results import Assessed, Compared, FittedModels, Result, Selected
+from thermocomp.api.results import Assessed, Compared, FittedModels, Result
+from thermocomp.api.selected import Selected
 from thermocomp.api.verbs import SelectionMethod
 from thermocomp.core.exceptions import InputError
 from thermocomp.judging import splits

@@ -54,10 +54,11 @@ class DaskCluster:
 
     def _start(self, *words: str, folders: tuple[Path, ...] = ()) -> "subprocess.Popen[bytes]":
         path = os.pathsep.join(map(str, (*folders, *_FOLDERS)))
+        environment = {k: v for k, v in os.environ.items() if not k.endswith("_NUM_THREADS")}
         with (self.folder / f"{words[0]}-{len(self.nannies)}.log").open("wb") as log:
             return subprocess.Popen(
                 [sys.executable, "-m", "dask", *words, "--no-dashboard"],
-                env={**os.environ, **self.environment, "PYTHONPATH": path},
+                env={**environment, **self.environment, "PYTHONPATH": path},
                 cwd=self.folder,
                 stdout=log,
                 stderr=subprocess.STDOUT,

@@ -144,13 +144,13 @@ def test_where_all_counts_anew_nothing_is_said_of_the_band(comparison: Compariso
 def test_the_tables_and_lines_say_it(comparison: Comparison, capsys: pytest.CaptureFixture[str]) -> None:
     console = Console(width=120)
     whole = of(comparison, "averaged")[-1]
-    show_comparison(comparison, None, (), console, as_json=False)
+    show_comparison(comparison, None, console)
     shown = " ".join(capsys.readouterr().out.split())
     assert "held" in shown
     assert f"{100 * whole.coverage:.0f} %" in shown
     assert "90 % band by assumption, 3 cycles" in shown
     bare = replace(comparison, assessments=tuple(of(comparison, "ols")))
-    show_comparison(bare, None, (), console, as_json=False)
+    show_comparison(bare, None, console)
     assert "band" not in capsys.readouterr().out.replace("dead band", "")
 
 
@@ -159,14 +159,14 @@ def test_who_fits_and_assesses_is_told(samples: Samples, capsys: pytest.CaptureF
     fitted = study.fit(samples, "averaged", splits.leave_one_cycle_out(samples))
     (model,) = fitted.models
     assert model.band is not None
-    show_fit(fitted, Path("model.json"), (), console, as_json=False)
+    show_fit(fitted, Path("model.json"), console)
     shown = capsys.readouterr().out
     assert model.band.tell("um") in shown
     assert f"held {100 * fitted.comparison.overall()[0].coverage:.0f} % of the judged rows" in shown
     assert "(90 % band by assumption, 3 cycles)" in shown
     tests = [small_machine((1500.0, 2000.0), seed=3)]
     judged = study.assess([model], tests)
-    show_assess(judged, tests, (), console, as_json=False)
+    show_assess(judged, tests, None, console)
     shown = capsys.readouterr().out
     assert "90 % band by assumption, 4 cycles: half-width at least" in shown
     assert 0.0 < judged.overall()[0].half_width < 100.0

@@ -1,6 +1,5 @@
 """The report: one offline page that a real browser shows."""
 
-import json
 import re
 import shutil
 import subprocess
@@ -13,6 +12,7 @@ import pytest
 from rich.console import Console
 from smallmachine import small_machine
 
+from thermocomp.api.results import Compared
 from thermocomp.cli.output import show_comparison
 from thermocomp.files import modelfile
 from thermocomp.judging import splits, study
@@ -106,10 +106,9 @@ def test_what_disturbances_do_is_told_beside_the_verdict(
     assert all("loss of spindle_rpm" in c for c in told)
     assert re.search(r"noise of 0.4 degC, (loss of \w+, )*loss of spindle_rpm", html.render(bad, [recording]))
     assert "worse than none with" in page
-    show_comparison(bad, None, [], Console(width=400), as_json=False)
+    show_comparison(bad, None, Console(width=400))
     assert all(c in capsys.readouterr().out for c in told[:1])
-    show_comparison(bad, None, [], Console(width=400), as_json=True)
-    results = [r for r in json.loads(capsys.readouterr().out)["results"] if "robustness" in r]
+    results = [r for r in Compared(bad, (recording,)).to_dict()["results"] if "robustness" in r]
     assert any("loss of spindle_rpm" in r["robustness"]["worse_than_none"] for r in results)
 
 

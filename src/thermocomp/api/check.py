@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Checked(Result):
+class CheckedRecordings(Result):
     """Recordings and what was found in them.
 
     Parameters
@@ -83,7 +83,7 @@ class Checked(Result):
         return ". ".join(worst) + "."
 
 
-def check(recordings: Given, *, mapping: str | Path | Mapping | None = None) -> Checked:
+def check(recordings: Given, *, mapping: str | Path | Mapping | None = None) -> CheckedRecordings:
     """Summarise recordings and report data-quality problems; of more than three files, a line each.
 
     Parameters
@@ -95,7 +95,7 @@ def check(recordings: Given, *, mapping: str | Path | Mapping | None = None) -> 
 
     Returns
     -------
-    Checked
+    CheckedRecordings
 
     Raises
     ------
@@ -106,8 +106,8 @@ def check(recordings: Given, *, mapping: str | Path | Mapping | None = None) -> 
     --------
     >>> import thermocomp as tc
     >>> found = tc.check(tc.simulate("hwang"))
-    >>> found.trouble
-    False
+    >>> len(found.to_frame()), found.trouble
+    (2, False)
     """
     tests = recordings_of(recordings, mapping)
-    return Checked(tuple(tests), tuple(quality.check(test) for test in tests))
+    return CheckedRecordings(tuple(tests), tuple(quality.check(test) for test in tests))

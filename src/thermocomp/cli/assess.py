@@ -4,13 +4,13 @@ from functools import partial
 from pathlib import Path
 
 from thermocomp.api.results import Assessed
-from thermocomp.cli.face import Face, command
+from thermocomp.cli.face import CommandFace, command
 from thermocomp.cli.output import show_assess
 from thermocomp.cli.terminal import console
 
 
 @command("thermocomp.api.verbs:assess", writes=".html", forms={"model": Path})
-def assess(found: Assessed, face: Face) -> int:
+def assess(found: Assessed, face: CommandFace) -> int:
     """Show it.
 
     Parameters

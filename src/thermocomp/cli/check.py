@@ -2,14 +2,14 @@
 
 from functools import partial
 
-from thermocomp.api.check import Checked
+from thermocomp.api.check import CheckedRecordings
 from thermocomp.cli.checked import show_check
-from thermocomp.cli.face import Face, command
+from thermocomp.cli.face import CommandFace, command
 from thermocomp.cli.terminal import console
 
 
 @command("thermocomp.api.check:check", writes=".html", tell_changes=False)
-def check(found: Checked, face: Face) -> int:
+def check(found: CheckedRecordings, face: CommandFace) -> int:
     """Show it.
 
     Parameters

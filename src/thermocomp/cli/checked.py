@@ -6,7 +6,7 @@ from typing import Any
 
 from rich.console import Console
 
-from thermocomp.api.check import Checked
+from thermocomp.api.check import CheckedRecordings
 from thermocomp.cli.terminal import marked, print_table, words
 from thermocomp.recordings.checks.findings import Finding
 from thermocomp.recordings.recording import Recording
@@ -20,7 +20,7 @@ MANY = 3
 _FULL = 4
 
 
-def show_check(found: Checked, page: Path | None, console: Console) -> None:
+def show_check(found: CheckedRecordings, page: Path | None, console: Console) -> None:
     """Print what recordings hold and what is wrong with them; of more than three, one line each."""
     contents = found.to_dict()["recordings"]
     if len(contents) > MANY:

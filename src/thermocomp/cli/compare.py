@@ -4,13 +4,13 @@ from functools import partial
 
 from thermocomp.api.results import Compared
 from thermocomp.cli.exits import STOPPED
-from thermocomp.cli.face import Face, command
+from thermocomp.cli.face import CommandFace, command
 from thermocomp.cli.output import show_comparison
 from thermocomp.cli.terminal import console
 
 
 @command("thermocomp.api.verbs:compare", writes=".html")
-def compare(found: Compared, face: Face) -> int:
+def compare(found: Compared, face: CommandFace) -> int:
     """Show it.
 
     Parameters

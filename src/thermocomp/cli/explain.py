@@ -2,13 +2,13 @@
 
 from pathlib import Path
 
-from thermocomp.cli.face import Face, command
+from thermocomp.cli.face import CommandFace, command
 from thermocomp.cli.terminal import console, words
 from thermocomp.core.explained import Explanations
 
 
 @command("thermocomp.api.explain:explain", forms={"model": Path})
-def explain(found: Explanations, face: Face) -> int:
+def explain(found: Explanations, face: CommandFace) -> int:
     """Show it.
 
     Returns

@@ -20,8 +20,9 @@ def needs(extra: str) -> Iterator[None]:
     """Turn a failing import of one of the extra's modules into a `MissingExtraError`."""
     try:
         yield
-    except ModuleNotFoundError as e:
-        missing = (e.name or "").split(".")[0]
+    except ImportError as e:
+        # a command that cannot be imported says why beneath
+        missing = (e.name or getattr(e.__cause__, "name", None) or "").split(".")[0]
         if missing in EXTRAS[extra]:
             raise MissingExtraError(extra, missing) from e
         raise

@@ -15,7 +15,7 @@ from docstring_parser import DocstringStyle, parse
 import thermocomp
 from thermocomp.cli.beginning import Beginning
 from thermocomp.cli.jsonoutput import print_json
-from thermocomp.cli.options import CompensatorOptions, LeftOut, Selector
+from thermocomp.cli.options import CompensatorOptions, LeaveOneOut, Selector
 from thermocomp.cli.progress import Steps, show_progress
 from thermocomp.cli.reading import Reader, print_trouble, read_recordings
 from thermocomp.core.exceptions import InputError
@@ -32,7 +32,7 @@ ON_A_LINE: dict[str, Any] = {
     "tilt": list[str] | None,
     "probing": str | None,
     "mapping": Path | None,
-    "leave_one": LeftOut,
+    "leave_one": LeaveOneOut,
     "starts": Beginning,
     "limits": CompensatorOptions,
     "settings": Selector,
@@ -44,7 +44,7 @@ Writes = Callable[[Path, Mapping[str, Any]], list[Path]]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Face:
+class CommandFace:
     """What only a command line has.
 
     Parameters
@@ -192,8 +192,8 @@ def command(
 ) -> Callable[[Callable[..., int]], Callable[..., int]]:
     """Make a command of a verb and a function that shows its result.
 
-    The function takes the result and a `Face`, and options of its own if the command has more than the verb; it returns
-    the exit code. Its docstring says what ``--output`` and its own options are, and lists the exit codes.
+    The function takes the result and a `CommandFace`, and options of its own if the command has more than the verb; it
+    returns the exit code. Its docstring says what ``--output`` and its own options are, and lists the exit codes.
 
     Parameters
     ----------
@@ -226,7 +226,7 @@ def command(
         def run(*positional: Any, **named: Any) -> int:
             given = defaults | dict(zip(verb.words, positional, strict=False)) | named
             extra = {p.name: given.pop(p.name, p.default) for p in own}
-            face = Face(**{f: given.pop(f) for f in ("output", "overwrite", "json", "quiet") if f in given})
+            face = CommandFace(**{f: given.pop(f) for f in ("output", "overwrite", "json", "quiet") if f in given})
             asked = next((option for option in instead if extra[option]), "")
             if asked and face.output is not None:
                 raise InputError(f"{face.output}: --{asked.strip('_')} writes no file; leave -o out")

@@ -3,13 +3,13 @@
 from functools import partial
 
 from thermocomp.api.results import FittedModels
-from thermocomp.cli.face import Face, command
+from thermocomp.cli.face import CommandFace, command
 from thermocomp.cli.output import show_fit
 from thermocomp.cli.terminal import console
 
 
 @command("thermocomp.api.verbs:fit", writes=".json", needs_output=True)
-def fit(found: FittedModels, face: Face) -> int:
+def fit(found: FittedModels, face: CommandFace) -> int:
     """Show it.
 
     Parameters

@@ -20,7 +20,7 @@ OptionalOutput = Annotated[Path | None, Parameter(name=["--output", "-o"])]
 
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
-class LeftOut:
+class LeaveOneOut:
     """What is judged in turn, each on models that were fitted without it.
 
     Parameters

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from thermocomp.api.plan import EVERY, Planned
 from thermocomp.api.testprogram import Dialect, picture_of, sheet_of
-from thermocomp.cli.face import Face, command
+from thermocomp.cli.face import CommandFace, command
 from thermocomp.cli.terminal import console, print_table, words
 from thermocomp.core.exceptions import InputError
 from thermocomp.judging.settling.stopping import Running
@@ -27,7 +27,7 @@ def files_of(program: Path) -> list[Path]:
 )
 def plan(
     found: Planned | Running,
-    face: Face,
+    face: CommandFace,
     *,
     dialect: Dialect = "linuxcnc",
     probe_every: float = EVERY,

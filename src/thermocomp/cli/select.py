@@ -3,13 +3,13 @@
 from functools import partial
 
 from thermocomp.api.selected import Selected
-from thermocomp.cli.face import Face, command
+from thermocomp.cli.face import CommandFace, command
 from thermocomp.cli.output import show_choices
 from thermocomp.cli.terminal import console
 
 
 @command("thermocomp.api.verbs:select", writes=".html")
-def select(found: Selected, face: Face) -> int:
+def select(found: Selected, face: CommandFace) -> int:
     """Show it.
 
     Parameters
