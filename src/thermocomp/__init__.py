@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from thermocomp.core.model import ErrorModel
     from thermocomp.core.polynomial import Polynomial
     from thermocomp.core.reading import Reading
+    from thermocomp.export.verbs import export
     from thermocomp.iso230.verbs import iso230
     from thermocomp.models.ace import ACE
     from thermocomp.models.ace_monotone import MonotoneACE
@@ -65,6 +66,7 @@ _PUBLIC = {
     "plan": "thermocomp.api.plan",
     "may_stop": "thermocomp.api.plan",
     "explain": "thermocomp.api.explain",
+    "export": "thermocomp.export.verbs",
     "iso230": "thermocomp.iso230.verbs",
     "position": "thermocomp.volumetric.verbs",
     "volumetric": "thermocomp.volumetric.verbs",
@@ -144,6 +146,7 @@ __all__ = [
     "check",
     "compare",
     "explain",
+    "export",
     "fit",
     "freeze",
     "iso230",

@@ -21,6 +21,7 @@ SLOW = (
     "SigmoidNet",
     "assess",
     "compare",
+    "export",
     "fit",
     "iso230",
     "plan",

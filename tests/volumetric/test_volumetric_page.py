@@ -13,6 +13,7 @@ from thermocomp.core.structure import Structure
 from thermocomp.files.machines import read_machine
 from thermocomp.recordings.readers import recordings
 from thermocomp.recordings.recording import Recording
+from thermocomp.report.html import write_page
 from thermocomp.volumetric.judging.volumetric import Volumetric, study
 from thermocomp.volumetric.report import volumetric as page
 from thermocomp.volumetric.report import volumetric_figures as figures
@@ -37,7 +38,7 @@ def texts(svg: str) -> list[str]:
 
 def test_the_page_says_all_of_it(found: Volumetric, tmp_path: Path) -> None:
     path = tmp_path / "page.html"
-    page.write(found, path)
+    write_page(page.render(found), path)
     text = path.read_text(encoding="utf-8")
     assert volumetric_tables.headline(found) in text
     assert "X 0 to 600 mm, Y -200 to 200 mm, Z 0 to 500 mm" in text

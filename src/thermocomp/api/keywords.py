@@ -43,12 +43,12 @@ class Listener:
     """
 
     def __init__(self, progress: Callable[..., object]) -> None:
-        self._progress = progress
+        self.tell = progress
         self.warn: Callable[[list[str]], object] = getattr(progress, "warn", lambda _: None)
 
     def begin(self, pieces: Callable[[], int]) -> None:
         """Say how many pieces of work there are; they are counted only for who wants to know."""
-        if (begin := getattr(self._progress, "begin", None)) is not None:
+        if (begin := getattr(self.tell, "begin", None)) is not None:
             begin(pieces())
 
 

@@ -17,7 +17,7 @@ from thermocomp.cli.beginning import Beginning
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import CompensatorOptions, LeaveOneOut, Selector
 from thermocomp.cli.progress import Steps, show_progress
-from thermocomp.cli.reading import Reader, print_trouble, read_recordings
+from thermocomp.cli.reading import RecordingReader, print_trouble, read_recordings
 from thermocomp.core.exceptions import InputError
 from thermocomp.files.draft import refuse_existing
 
@@ -105,7 +105,7 @@ class Verb:
     """
 
     def __init__(
-        self, place: str, forms: Mapping[str, Any], words: Sequence[str] = (), reads: Mapping[str, Reader] = {}
+        self, place: str, forms: Mapping[str, Any], words: Sequence[str] = (), reads: Mapping[str, RecordingReader] = {}
     ) -> None:
         self.forms = ON_A_LINE | dict(forms)
         self.reads = reads
@@ -186,7 +186,7 @@ def command(
     needs_output: bool = False,
     forms: Mapping[str, Any] = {},
     words: Sequence[str] = (),
-    reads: Mapping[str, Reader] = {"recordings": read_recordings},
+    reads: Mapping[str, RecordingReader] = {"recordings": read_recordings},
     instead: Mapping[str, str] = {},
     tell_changes: bool = True,
 ) -> Callable[[Callable[..., int]], Callable[..., int]]:
@@ -239,9 +239,11 @@ def command(
                 found = chosen.call(given, progress, tell_changes)
             return show(found, face, **extra)
 
-        output: Any = (Path, inspect.Parameter.empty) if needs_output and not instead else (Path | None, None)
+        required = needs_output and not instead
+        output: Any = Path if required else Path | None
+        none: Any = inspect.Parameter.empty if required else None
         alone = [
-            _option("output", *output, described.get("output", ""), ["--output", "-o"]),
+            _option("output", output, none, described.get("output", ""), ["--output", "-o"]),
             _option("overwrite", bool, False, "Write over an existing file."),
         ]
         mine = [_option(p.name, p.annotation, p.default, described[p.name]) for p in own]

@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 _stderr = make_console(stderr=True)
 
 
-class Reader(Protocol):
+class RecordingReader(Protocol):
     """Reads what a parameter of a verb takes from the files that a command line names."""
 
-    def __call__(self, paths: Any, mapping: Path | None, *, tell: bool = True) -> Any: ...  # noqa: D102
+    def __call__(self, paths: Any, mapping: Path | None, /, *, tell: bool = True) -> Any: ...  # noqa: D102
 
 
 def read_recordings(paths: list[Path], mapping: Path | None, *, tell: bool = True) -> "list[Recording]":

@@ -60,9 +60,9 @@ class Evaluated:
     def report(self, path: str | Path, *, overwrite: bool = False) -> Path:
         """Write the page that ``thermocomp iso230 -o`` writes; return its path."""
         from thermocomp.iso230.report import iso230 as pages
+        from thermocomp.report.html import write_page
 
-        pages.write(self.thermal, self.settlings, self.positioned, Path(path), overwrite=overwrite)
-        return Path(path)
+        return write_page(pages.render(self.thermal, self.settlings, self.positioned), path, overwrite=overwrite)
 
 
 def iso230(
@@ -77,7 +77,7 @@ def iso230(
     starts: Starts = None,
     positioning: Sequence[str | Path] = (),
     mapping: str | Path | Mapping | None = None,
-    progress: Callable[..., object] = silent,
+    progress: Callable[..., None] = silent,
 ) -> Evaluated:
     """Evaluate thermal tests after ISO 230-3 and positioning tests after ISO 230-2, and the time constants of channels.
 

@@ -154,6 +154,12 @@ def write(
     write_text(render(comparison, recordings, samples), path, overwrite=overwrite)
 
 
+def write_page(text: str, path: str | Path, *, overwrite: bool = False) -> Path:
+    """Write a page that is rendered; return its path."""
+    write_text(text, Path(path), overwrite=overwrite)
+    return Path(path)
+
+
 def page(template: str, **content: Any) -> str:
     """Return a page of a template; all of them name the version."""
     return environment().get_template(template).render(version=__version__, **content)

@@ -15,7 +15,7 @@ def simulate(
     physics: Physics | None = None,
     seed: int = 0,
     noise: float | None = None,
-    progress: Callable[..., object] = silent,
+    progress: Callable[..., None] = silent,
 ) -> list[Recording]:
     """Record an experiment on a virtual machine.
 

@@ -86,7 +86,7 @@ def position(
     component: str | Sequence[str],
     *,
     accept_unproven: str | None = None,
-    progress: Callable[..., object] = silent,
+    progress: Callable[..., None] = silent,
     **settings: Any,
 ) -> Positioned:
     """Fit position-dependent errors: cold profiles and thermal slopes, judged on what they have not seen.
@@ -203,10 +203,10 @@ class VolumetricErrors:
 
     def report(self, path: str | Path, *, overwrite: bool = False) -> Path:
         """Write the page that ``thermocomp volumetric -o`` writes; return its path."""
+        from thermocomp.report.html import write_page
         from thermocomp.volumetric.report import volumetric as pages
 
-        pages.write(self.study, Path(path), overwrite=overwrite)
-        return Path(path)
+        return write_page(pages.render(self.study), path, overwrite=overwrite)
 
 
 def volumetric(
@@ -218,7 +218,7 @@ def volumetric(
     grid: int | None = None,
     tool_length: float | None = None,
     time: Sequence[float] | None = None,
-    progress: Callable[..., object] = silent,
+    progress: Callable[..., None] = silent,
 ) -> VolumetricErrors:
     r"""Tell the error of the tool's tip at a point and all over the work volume, and what corrections leave of it.
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from thermocomp.cli.face import Face, command
+from thermocomp.cli.face import CommandFace, command
 from thermocomp.cli.reading import read_recordings
 from thermocomp.cli.terminal import console, make_console, print_table, words
 from thermocomp.core.exceptions import RecordingError
@@ -41,7 +41,7 @@ def read_tests(paths: list[Path], mapping: Path | None, *, tell: bool = True) ->
     words=("recordings",),
     reads={"recordings": read_tests},
 )
-def iso230(found: Evaluated, face: Face) -> int:
+def iso230(found: Evaluated, face: CommandFace) -> int:
     """Show it.
 
     Parameters

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from thermocomp.cli.face import Face, command
+from thermocomp.cli.face import CommandFace, command
 from thermocomp.cli.terminal import console, print_table, words
 from thermocomp.recordings.recording import Recording
 from thermocomp.report import records
@@ -32,7 +32,7 @@ def _number(output: Path, tests: int) -> list[Path]:
     words=("experiment",),
     instead={"list_": "thermocomp.virtual.verbs:experiments"},
 )
-def simulate(found: list[Recording] | list[Experiment], face: Face, *, list_: bool = False) -> int:  # noqa: ARG001 - asks for the other verb
+def simulate(found: list[Recording] | list[Experiment], face: CommandFace, *, list_: bool = False) -> int:  # noqa: ARG001 - asks for the other verb
     """Show it.
 
     Parameters

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from thermocomp.cli.face import Face, command
+from thermocomp.cli.face import CommandFace, command
 from thermocomp.cli.terminal import console
 from thermocomp.volumetric.commands.positiontables import show_positioned
 from thermocomp.volumetric.positionsettings import PositionSettings
@@ -30,7 +30,7 @@ class Fitting(PositionSettings):  # noqa: D101 - that of the settings, which the
     words=("recordings",),
     reads={},
 )
-def position(found: Positioned, face: Face) -> int:
+def position(found: Positioned, face: CommandFace) -> int:
     """Show it.
 
     Parameters

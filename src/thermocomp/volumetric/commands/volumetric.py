@@ -3,7 +3,7 @@
 from functools import partial
 from pathlib import Path
 
-from thermocomp.cli.face import Face, command
+from thermocomp.cli.face import CommandFace, command
 from thermocomp.cli.reading import read_one
 from thermocomp.cli.terminal import console, print_table, words
 from thermocomp.volumetric.report import volumetric_tables as told
@@ -16,7 +16,7 @@ from thermocomp.volumetric.verbs import VolumetricErrors
     forms={"machine": Path, "recording": Path | None, "time": list[float] | None},
     reads={"recording": read_one},
 )
-def volumetric(found: VolumetricErrors, face: Face) -> int:
+def volumetric(found: VolumetricErrors, face: CommandFace) -> int:
     """Show it.
 
     Parameters
