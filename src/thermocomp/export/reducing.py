@@ -23,7 +23,7 @@ _Model = TypeVar("_Model", bound=ErrorModel | PositionModel)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Order:
+class ExportOrder:
     """What is to be written.
 
     Parameters
@@ -55,7 +55,7 @@ class Outcome(NamedTuple):
 
 
 def export_reduced(
-    order: Order,
+    order: ExportOrder,
     models: Sequence[ErrorModel],
     recordings: "Sequence[Recording]",
     starts: "Starts",
@@ -66,7 +66,7 @@ def export_reduced(
 
     Parameters
     ----------
-    order : Order
+    order : ExportOrder
     models : sequence of ErrorModel
     recordings : sequence of Recording
         That they are reduced on.

@@ -19,7 +19,7 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.position import PositionModel
 from thermocomp.export.facts import Facts
-from thermocomp.export.reducing import Order, Outcome, along_axes, export_reduced
+from thermocomp.export.reducing import ExportOrder, Outcome, along_axes, export_reduced
 from thermocomp.export.reduction.options import ReductionOptions
 from thermocomp.export.st.ststatements import Dialect
 from thermocomp.export.target import Target, find_target
@@ -36,7 +36,7 @@ Models = Sequence[ErrorModel | PositionModel]
 
 
 @dataclass(frozen=True, eq=False)
-class Exported:
+class ExportedCode:
     """Code for a controller.
 
     Parameters
@@ -90,7 +90,7 @@ def export(
     date: str | None = None,
     progress: Callable[..., None] = silent,
     **settings: Any,
-) -> Exported:
+) -> ExportedCode:
     """Write the models of a file as code for another controller, with test vectors and how to use it.
 
     The code does what ``thermocomp serve`` does: it averages the zero, turns away what is not plausible, replaces a
@@ -132,7 +132,7 @@ def export(
 
     Returns
     -------
-    Exported
+    ExportedCode
 
     Raises
     ------
@@ -161,8 +161,8 @@ def export(
         elsewhere = {m.target: f"it predicts {m.unit}, and a correction is in um" for m in models if m.unit != "um"}
     left = [m for m in models if m.target not in refused and m.target not in elsewhere]
     if not left:
-        return Exported({}, refused, elsewhere)
-    order = Order(
+        return ExportedCode({}, refused, elsewhere)
+    order = ExportOrder(
         to=to,
         target=target,
         limits=limits,
@@ -174,7 +174,7 @@ def export(
         found = _export_whole(order, left, dialect)
     else:
         found = export_reduced(order, _constant(left, to), tests, starts, accept_unproven, listener)
-    return Exported(found.files, refused | found.refused, elsewhere | found.elsewhere)
+    return ExportedCode(found.files, refused | found.refused, elsewhere | found.elsewhere)
 
 
 def _read(
@@ -208,7 +208,7 @@ def _facts(model: Path, date: str | None, left_out: Mapping[str, str]) -> Facts:
     )
 
 
-def _export_whole(order: Order, models: Models, dialect: Dialect | None) -> Outcome:
+def _export_whole(order: ExportOrder, models: Models, dialect: Dialect | None) -> Outcome:
     """Make the files of an export to a target that holds all of a model."""
     target, options, elsewhere = order.target, order.options, dict[str, str]()
     writer = _writer(target, models, dialect, options.named())

@@ -14,7 +14,7 @@ from thermocomp.cli.terminal import console, words
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.export.reduction.options import ReductionOptions
-from thermocomp.export.verbs import Exported
+from thermocomp.export.verbs import ExportedCode
 
 
 @Parameter(name="*")
@@ -63,7 +63,7 @@ def no_file(output: Path, _: Mapping[str, Any]) -> list[Path]:
     },
     words=("model", "recordings"),
 )
-def export(found: Exported, face: CommandFace) -> int:
+def export(found: ExportedCode, face: CommandFace) -> int:
     """Show it.
 
     Parameters
@@ -82,7 +82,7 @@ def export(found: Exported, face: CommandFace) -> int:
     return 1 if found.refused else 0
 
 
-def _show(found: Exported, files: list[str]) -> None:
+def _show(found: ExportedCode, files: list[str]) -> None:
     for target, why in found.refused.items():
         console.print(f"[red]refused[/] {words(f'{target} is left out: {why}')}", soft_wrap=True)
     for target, why in found.elsewhere.items():
