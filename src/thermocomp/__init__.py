@@ -4,8 +4,10 @@ From temperature recordings to a validated model at the controller. Public names
 running wing never pays for the training wing.
 """
 
+import sys
 from importlib import import_module
 from importlib.metadata import version
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -20,6 +22,8 @@ if TYPE_CHECKING:
     from thermocomp.core.model import ErrorModel
     from thermocomp.core.polynomial import Polynomial
     from thermocomp.core.reading import Reading
+    from thermocomp.export.verbs import export
+    from thermocomp.iso230.verbs import iso230
     from thermocomp.models.ace import ACE
     from thermocomp.models.ace_monotone import MonotoneACE
     from thermocomp.models.arx import ARX
@@ -45,6 +49,7 @@ if TYPE_CHECKING:
     from thermocomp.recordings.recording import Recording
     from thermocomp.recordings.starts import Start
     from thermocomp.virtual.verbs import simulate
+    from thermocomp.volumetric.verbs import position, volumetric
 
 __version__ = version("thermocomp")
 
@@ -61,6 +66,10 @@ _PUBLIC = {
     "plan": "thermocomp.api.plan",
     "may_stop": "thermocomp.api.plan",
     "explain": "thermocomp.api.explain",
+    "export": "thermocomp.export.verbs",
+    "iso230": "thermocomp.iso230.verbs",
+    "position": "thermocomp.volumetric.verbs",
+    "volumetric": "thermocomp.volumetric.verbs",
     "freeze": "thermocomp.models.pipelines",
     "training_table": "thermocomp.api.inputs",
     "Recording": "thermocomp.recordings.recording",
@@ -137,16 +146,31 @@ __all__ = [
     "check",
     "compare",
     "explain",
+    "export",
     "fit",
     "freeze",
+    "iso230",
     "may_stop",
     "plan",
+    "position",
     "read",
     "revise",
     "select",
     "simulate",
     "training_table",
+    "volumetric",
 ]
+
+
+class _FrontDoor(ModuleType):
+    """Keeps a verb in front of the room of its name: importing the room would put the room there."""
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if not (name in _PUBLIC and isinstance(value, ModuleType)):
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _FrontDoor
 
 
 def __getattr__(name: str) -> Any:

@@ -59,7 +59,7 @@ def test_a_running_test_may_end_or_not(drift: str, capsys: pytest.CaptureFixture
         (("-o", "test.png"), "name the NC program, such as test.ngc"),
         (("-o", "nowhere/test.ngc"), "there is no folder"),
         (("-o", "drift.ngc", "--overwrite"), "drift.csv: is also an input"),
-        (("--running", "-o", "test.ngc"), "--running judges a test, and writes none"),
+        (("--running", "-o", "test.ngc"), "--running writes no file"),
         (("--top-speed", "-5"), "top speed -5 1/min"),
         (("--probe-every", "45", "-o", "test.ngc"), "a measurement every 45 min: want 1 to 30"),
     ],

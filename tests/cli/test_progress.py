@@ -51,7 +51,8 @@ def test_short_or_still_work_tells_nothing(
 ) -> None:
     if hidden:
         monkeypatch.setattr(progress, "OFTEN", 0.0)
-    with progress.show_steps(3, hidden=hidden) as step, progress.show_share("proving", hidden=hidden) as tell:
+    with progress.show_progress(hidden=hidden) as step, progress.show_share("proving", hidden=hidden) as tell:
+        step.begin(3)
         for k in range(3):
             step("fitting")
             tell(k / 2)
@@ -60,7 +61,8 @@ def test_short_or_still_work_tells_nothing(
 
 def test_steps_are_counted(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr(progress, "OFTEN", 0.0)
-    with progress.show_steps(5, hidden=False) as step:
+    with progress.show_progress(hidden=False) as step:
+        step.begin(5)
         step("fitting\x1b[31m")
         step("judging", 3)
     assert capsys.readouterr().err == "fitting?[31m: 1 of 5 after 0 s\njudging: 4 of 5 after 0 s\n"

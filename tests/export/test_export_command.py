@@ -12,6 +12,7 @@ import pytest
 from driftmodels import ACCEPTED, growing
 from watchedmachine import watched_model
 
+import thermocomp as tc
 from thermocomp.cli.app import run
 from thermocomp.core.inputs import Input
 from thermocomp.core.model import ErrorModel
@@ -288,10 +289,30 @@ def test_without_onnx_it_says_what_to_install(
     assert run(["export", str(model), "--to", "c99", "-o", str(tmp_path / "out")]) == 0
 
 
+def test_a_setting_that_there_is_not_is_named(tmp_path: Path) -> None:
+    model = written(tmp_path, watched_model("z_um"))
+    with pytest.raises(
+        tc.ThermocompError, match="unexpected keyword argument 'loss'; the settings are most_loss, axes"
+    ):
+        tc.export(model, "klipper", loss=3.0)
+
+
 def test_onnx_is_loaded_by_nothing_that_does_without() -> None:
     code = "import sys, thermocomp.export.commands.export, thermocomp.export.onnx.package; print('onnx' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
+
+
+def test_a_whole_model_wants_nothing_of_the_training_side(tmp_path: Path) -> None:
+    model = written(tmp_path, watched_model("z_um"))
+    code = (
+        "import sys\n"
+        "for name in ('pandas', 'sklearn', 'scipy', 'matplotlib', 'joblib', 'numba'): sys.modules[name] = None\n"
+        "from thermocomp.cli.app import run\n"
+        f"sys.exit(run(['export', {str(model)!r}, '--to', 'c99', '-o', {str(tmp_path / 'out')!r}]))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize(("to", "most"), [("linuxcnc", "2e+07"), ("beckhoff", "2e+08")])

@@ -40,16 +40,14 @@ WRITING = {
     "live/adapters/linuxcnc/halsetup.py",
     "nc/linuxcnc/expansion/expand.py",
     "nc/revision/job.py",
-    "export/commands/export.py",
+    "export/verbs.py",
     "cli/map.py",
     "live/commands/serve.py",  # the configuration of its demo: a text, never over another
     "files/jsonfile.py",
     "recordings/readers/recordings.py",
     "api/testprogram.py",
     "api/results.py",
-    "iso230/report/iso230.py",
     "papers/report/papers.py",
-    "volumetric/report/volumetric.py",
 }
 _WRITES = {"write_text", "write_bytes", "touch", "symlink_to", "hardlink_to", "open_to_write", "replace_lines"}
 _WRITES |= {"to_csv", "to_parquet", "to_excel", "to_json", "to_pickle", "tofile", "savetxt", "savez", "write_table"}

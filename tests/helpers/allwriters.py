@@ -28,6 +28,7 @@ from thermocomp.core.position import PositionModel
 from thermocomp.core.profile import SplineProfile
 from thermocomp.files import modelfile, positionfile
 from thermocomp.iso230.report import iso230 as iso230pages
+from thermocomp.iso230.verbs import Evaluated
 from thermocomp.judging.planning.trial import Trial
 from thermocomp.live.adapters.linuxcnc import halsetup
 from thermocomp.live.adapters.linuxcnc.halsetup import COMPONENT_NAME, HAL_NAME, HalSettings
@@ -35,6 +36,7 @@ from thermocomp.papers.report import papers as paperpages
 from thermocomp.recordings.readers import recordings
 from thermocomp.report import assessed, checks, html
 from thermocomp.volumetric.report import volumetric as volumetricpages
+from thermocomp.volumetric.verbs import VolumetricErrors
 
 _FANUC = (
     "%\nO1234\nG21 G90 G17 G94\nT1 M6\nS4000 M3\nG0 G54 X0. Y0. Z50.\nG1 Z0. F30.\nM98 P100 L2\nX100.\n"
@@ -168,12 +170,12 @@ WRITERS: dict[str, Writer] = {
     "report": _page(html, "render", lambda p: Compared(None, ()).report(p, overwrite=True)),  # type: ignore[arg-type]
     "page of assess": _page(assessed, "render", lambda p: Assessed(None, ()).report(p, overwrite=True)),  # type: ignore[arg-type]
     "selection page": _page(html, "render_choices", lambda p: Selected(()).report(p, overwrite=True)),
-    "iso230 page": _page(iso230pages, "render", lambda p: iso230pages.write([], [], [], p, overwrite=True)),
+    "iso230 page": _page(iso230pages, "render", lambda p: Evaluated((), (), ()).report(p, overwrite=True)),
     "papers page": _page(paperpages, "render", lambda p: paperpages.write([], p, seed=0, overwrite=True)),
     "volumetric page": _page(
         volumetricpages,
         "render",
-        lambda p: volumetricpages.write(None, p, overwrite=True),  # type: ignore[arg-type]
+        lambda p: VolumetricErrors(None, point=True, volume=True).report(p, overwrite=True),  # type: ignore[arg-type]
     ),
     "program": _revise("linuxcnc"),
     "program written out": _revise("fanuc"),

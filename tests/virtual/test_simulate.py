@@ -62,6 +62,11 @@ def test_what_is_there_is_not_written_over(
     assert run(["simulate", str(protocol), "-o", str(output)]) == 2
     assert "exists already" in capsys.readouterr().err
     assert output.read_text(encoding="utf-8") == "precious"
+    # the file of the second test is there, the first one's is not
+    protocol.write_text(PROTOCOL + "copies = 2\n", encoding="utf-8")
+    (tmp_path / "rec-2.csv").touch()
+    assert run(["simulate", str(protocol), "-o", str(output)]) == 2
+    assert "rec-2.csv: exists already" in " ".join(capsys.readouterr().err.split())
 
 
 def test_a_wrong_protocol_is_told_to_the_key(

@@ -10,6 +10,7 @@ from smallmill import write_mill
 
 from thermocomp.core.machine import Axis, Machine
 from thermocomp.core.structure import Structure
+from thermocomp.files.draft import write_text
 from thermocomp.files.machines import read_machine
 from thermocomp.recordings.readers import recordings
 from thermocomp.recordings.recording import Recording
@@ -37,7 +38,7 @@ def texts(svg: str) -> list[str]:
 
 def test_the_page_says_all_of_it(found: Volumetric, tmp_path: Path) -> None:
     path = tmp_path / "page.html"
-    page.write(found, path)
+    write_text(page.render(found), path, overwrite=False)
     text = path.read_text(encoding="utf-8")
     assert volumetric_tables.headline(found) in text
     assert "X 0 to 600 mm, Y -200 to 200 mm, Z 0 to 500 mm" in text

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from thermocomp.api.inputs import Given, recordings_of
-from thermocomp.api.results import Result, write_page
+from thermocomp.api.results import Result
 from thermocomp.core.exceptions import InputError
+from thermocomp.files.draft import write_text
 from thermocomp.recordings.checks import quality
 from thermocomp.recordings.checks.findings import Finding
 from thermocomp.recordings.readers.mapping import Mapping
@@ -72,7 +73,7 @@ class CheckedRecordings(Result):
         """Write the page that ``thermocomp check -o`` writes; return its path."""
         from thermocomp.report import checks
 
-        return write_page(checks.render(self.recordings, self.findings), path, overwrite)
+        return write_text(checks.render(self.recordings, self.findings), path, overwrite=overwrite)
 
     def __str__(self) -> str:
         worst = (

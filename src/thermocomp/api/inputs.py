@@ -1,6 +1,6 @@
 """What is handed in: recordings, files, tables; and what is made of them before any work."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from thermocomp.api.keywords import SILENT, Listener
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.zero import Zeroing
 from thermocomp.judging import splits
@@ -133,30 +134,6 @@ def starts_of(starts: Starts, recordings: Sequence[Recording]) -> tuple[Start, .
         if r.fingerprint in (e.fingerprint for e in start.earlier):
             raise InputError(f"starts: {r.name} cannot go on from itself: name the file before it in earlier=")
     return each
-
-
-class Listener:
-    """What hears how far the work is: a verb's ``progress``, whatever of this it has.
-
-    Parameters
-    ----------
-    progress : callable
-        Called with a line of text after each piece of work; may have ``begin``, called with the number of pieces, and
-        ``warn``, called with lines of trouble before the work.
-    """
-
-    def __init__(self, progress: Callable[..., object]) -> None:
-        self._progress = progress
-        self.warn: Callable[[list[str]], object] = getattr(progress, "warn", lambda _: None)
-
-    def begin(self, pieces: Callable[[], int]) -> None:
-        """Say how many pieces of work there are; they are counted only for who wants to know."""
-        if (begin := getattr(self._progress, "begin", None)) is not None:
-            begin(pieces())
-
-
-#: hears nothing
-SILENT = Listener(lambda *_: None)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,17 +8,8 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from thermocomp.api import testprogram
-from thermocomp.api.inputs import (
-    Given,
-    LeaveOne,
-    Listener,
-    Prepared,
-    Starts,
-    judging_of,
-    prepare,
-    recordings_of,
-    trouble_of,
-)
+from thermocomp.api.inputs import Given, LeaveOne, Prepared, Starts, judging_of, prepare, recordings_of, trouble_of
+from thermocomp.api.keywords import Listener, silent
 from thermocomp.api.results import Result
 from thermocomp.api.testprogram import Dialect
 from thermocomp.core.exceptions import InputError
@@ -36,10 +27,6 @@ if TYPE_CHECKING:
 
 #: time between two measurements with a touch probe [min]
 EVERY = 30.0
-
-
-def _silent(_: str, steps: int = 1) -> None:
-    """Say nothing."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -179,7 +166,7 @@ def plan(
     mapping: str | Path | Mapping | None = None,
     curve: bool = True,
     jobs: int = -1,
-    progress: Callable[..., Any] = _silent,
+    progress: Callable[..., Any] = silent,
 ) -> Planned:
     """Say how much test is enough, and write the test that would teach most next as an NC program.
 
@@ -257,7 +244,7 @@ def may_stop(
     targets: str | Sequence[str] | None = None,
     *,
     mapping: str | Path | Mapping | None = None,
-    progress: Callable[..., Any] = _silent,
+    progress: Callable[..., Any] = silent,
 ) -> Running:
     """Judge whether the running part of a test may end: its steady state is known.
 

@@ -56,12 +56,6 @@ class Result(ABC):
         return f"<p>{escape(str(self))}</p>{self.to_frame().to_html(index=False, float_format='{:.2f}'.format)}"
 
 
-def write_page(text: str, path: str | Path, overwrite: bool) -> Path:
-    """Write a page, whole or not at all; return its path."""
-    write_text(text, Path(path), overwrite=overwrite)
-    return Path(path)
-
-
 def starts_content(begins: Sequence[tuple[str, Start]]) -> list[dict[str, object]]:
     """Return how recordings begin, for a program."""
     return [start.content(name) for name, start in begins]
@@ -193,7 +187,7 @@ class Compared(Result):
         """Write the page that ``thermocomp compare -o`` writes; return its path."""
         from thermocomp.report import html
 
-        return write_page(html.render(self.comparison, self.recordings, self.samples), path, overwrite)
+        return write_text(html.render(self.comparison, self.recordings, self.samples), path, overwrite=overwrite)
 
     def __str__(self) -> str:
         from thermocomp.report.summary import verdict
@@ -360,7 +354,7 @@ class Assessed(Result):
         """Write the page that ``thermocomp assess -o`` writes; return its path."""
         from thermocomp.report import assessed
 
-        return write_page(assessed.render(self.judged, self.recordings), path, overwrite)
+        return write_text(assessed.render(self.judged, self.recordings), path, overwrite=overwrite)
 
     def __str__(self) -> str:
         return " ".join([*(_judged(a) for a in self.judged.overall()), *told_trouble(self.trouble)])

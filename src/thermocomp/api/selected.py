@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from thermocomp.api.results import Result, told_trouble, write_page
+from thermocomp.api.results import Result, told_trouble
 from thermocomp.core.exceptions import InputError
+from thermocomp.files.draft import write_text
 from thermocomp.judging.choice import Choice
 from thermocomp.recordings.recording import Recording
 
@@ -51,7 +52,7 @@ class Selected(Result):
         """Write the page that ``thermocomp select -o`` writes; return its path."""
         from thermocomp.report import html
 
-        return write_page(html.render_choices(self.choices, self.recordings), path, overwrite)
+        return write_text(html.render_choices(self.choices, self.recordings), path, overwrite=overwrite)
 
     @property
     def sensors(self) -> dict[str, tuple[str, ...]]:

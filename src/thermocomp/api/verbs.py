@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 from thermocomp.api.explain import models_of
-from thermocomp.api.inputs import Given, LeaveOne, Listener, Starts, prepare, recordings_of, starts_of, trouble_of
+from thermocomp.api.inputs import Given, LeaveOne, Starts, prepare, recordings_of, starts_of, trouble_of
+from thermocomp.api.keywords import Listener, settings_of, silent
 from thermocomp.api.results import Assessed, Compared, FittedModels
 from thermocomp.api.selected import Selected
 from thermocomp.core.correction import Limits
@@ -26,10 +27,6 @@ from thermocomp.recordings.readers.mapping import Mapping
 DEFAULT_MODELS = ("ols", "partial-f", "mra", "dynamic", "averaged")
 SelectionMethod = Literal["pareto", "subsets", "grouping", "partial-f", "stepwise", "ace"]
 Policy = Literal["clip", "hold", "fade"]
-
-
-def _silent(_: str, steps: int = 1) -> None:
-    """Say nothing."""
 
 
 def compare(
@@ -52,7 +49,7 @@ def compare(
     limits: Limits | None = Limits(),
     jobs: int = -1,
     scheduler: str | None = None,
-    progress: Callable[[str], None] = _silent,
+    progress: Callable[[str], None] = silent,
 ) -> Compared:
     """Compare methods on thermal cycles they have not seen, beside no compensation.
 
@@ -105,7 +102,7 @@ def compare(
         Dask scheduler whose workers do the work in place of these processes, such as ``tcp://192.168.1.20:8786``: see
         :doc:`/many_recordings`.
     progress : callable
-        Called with a line of text after each piece of work; see `thermocomp.api.inputs.Listener`.
+        Called with a line of text after each piece of work; see `thermocomp.api.keywords.Listener`.
 
     Returns
     -------
@@ -190,7 +187,7 @@ def fit(
     accept_unproven: str | None = None,
     jobs: int = -1,
     scheduler: str | None = None,
-    progress: Callable[[str], None] = _silent,
+    progress: Callable[[str], None] = silent,
 ) -> FittedModels:
     """Fit a model, judge it on thermal cycles it has not seen, and write it with its honest error.
 
@@ -277,7 +274,7 @@ def assess(
     harm_margin: float | None = None,
     limits: Limits = Limits(),
     probing: str | Probings | None = None,
-    progress: Callable[[str], None] = _silent,
+    progress: Callable[[str], None] = silent,
 ) -> Assessed:
     """Judge a model file on recordings: per cycle, with noise, with each sensor lost, outside its range.
 
@@ -350,7 +347,7 @@ def select(
     mapping: str | Path | Mapping | None = None,
     jobs: int = -1,
     scheduler: str | None = None,
-    progress: Callable[..., None] = _silent,
+    progress: Callable[..., None] = silent,
     **settings: Any,
 ) -> Selected:
     """Choose the few temperature sensors that a model needs.
@@ -389,11 +386,7 @@ def select(
     """
     if method not in ("pareto", "subsets", "grouping", "partial-f", "stepwise", "ace"):
         raise InputError(f"method {method!r}: want pareto, subsets, grouping, partial-f, stepwise or ace")
-    try:
-        chosen = Settings(**settings)
-    except TypeError as e:
-        known = ", ".join(Settings.__dataclass_fields__)
-        raise InputError(f"select: {str(e).partition(') ')[2]}; the settings are {known}") from e
+    chosen = settings_of(Settings, settings, "select")
     chosen.check(method)
     listener = Listener(progress)
     ready = prepare(

@@ -48,8 +48,6 @@ class Beginning:
         InputError
             The options do not go together, or a file or a channel is not there.
         """
-        from thermocomp.recordings.starts import Start
-
         if self.gap is not None and not self.continues:
             raise InputError("--gap is the time between two files: name the earlier one with --continues")
         if self.zero is not None and self.start not in (None, "known"):
@@ -67,6 +65,8 @@ class Beginning:
         for e in earlier:
             if e.fingerprint == tests[0].fingerprint:
                 raise InputError(f"--continues {e.source}: is the recording itself")
+        from thermocomp.recordings.starts import Start
+
         return Start(
             word=word,
             why="stated",

@@ -17,7 +17,7 @@ from thermocomp.cli.beginning import Beginning
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import CompensatorOptions, LeaveOneOut, Selector
 from thermocomp.cli.progress import Steps, show_progress
-from thermocomp.cli.reading import print_trouble, read_recordings
+from thermocomp.cli.reading import RecordingReader, print_trouble, read_recordings
 from thermocomp.cli.terminal import console, print_items, words
 from thermocomp.core.exceptions import InputError
 from thermocomp.files.draft import refuse_existing
@@ -27,7 +27,6 @@ from thermocomp.report.layout import Item
 #: `value`, which makes of them what the verb takes
 ON_A_LINE: dict[str, Any] = {
     "recordings": list[Path],
-    "recording": Path,
     "models": list[str],
     "model": str,
     "targets": Annotated[list[str] | None, Parameter(name="--target")],
@@ -42,6 +41,8 @@ ON_A_LINE: dict[str, Any] = {
 }
 #: parameters that a command line has no option for: the command itself shows what they say
 SHOWN = ("progress",)
+#: files that come of an output, by the options that were given
+Writes = Callable[[Path, Mapping[str, Any]], list[Path]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,10 +73,11 @@ class CommandFace:
         """Say on stderr what is wrong with recordings, before the work."""
         self.trouble.extend(print_trouble(lines))
 
-    def refuse_existing(self, writes: str | Callable[[Path], list[Path]], inputs: Sequence[Path]) -> None:
+    def refuse_existing(self, writes: str | Writes, given: Mapping[str, Any]) -> None:
         """Make sure, before any work, that the output can be written."""
         if self.output is not None:
-            files = [self.output] if isinstance(writes, str) else writes(self.output)
+            files = [self.output] if isinstance(writes, str) else writes(self.output, given)
+            inputs = [v for v in _flat(given.values()) if isinstance(v, Path)]
             refuse_existing(files, self.overwrite, inputs, writes if isinstance(writes, str) else "")
 
     def write(self, writer: Callable[..., object]) -> None:
@@ -109,12 +111,18 @@ class Verb:
     ----------
     place : str
         Where it stands, such as ``thermocomp.api.verbs:compare``.
+    forms, words, reads
+        As for `command`.
     """
 
-    def __init__(self, place: str, forms: Mapping[str, Any]) -> None:
+    def __init__(
+        self, place: str, forms: Mapping[str, Any], words: Sequence[str] = (), reads: Mapping[str, RecordingReader] = {}
+    ) -> None:
         self.forms = ON_A_LINE | dict(forms)
+        self.reads = reads
         module, _, name = place.partition(":")
         self.function: Callable[..., Any] = getattr(import_module(module), name)
+        self.words = words or [n for n, p in self.parameters.items() if p.default is p.empty]
 
     @cached_property
     def parameters(self) -> dict[str, inspect.Parameter]:
@@ -151,15 +159,16 @@ class Verb:
         """
         made = {name: value for name, value in given.items() if name in self.parameters}
         mapping = made.get("mapping")
-        if "recordings" in self.parameters:
-            made["recordings"] = read_recordings(made["recordings"], mapping, tell=tell_changes)
-            made.pop("mapping", None)
+        for name, read in self.reads.items():
+            if name in made and (made[name] or self.parameters[name].default is inspect.Parameter.empty):
+                made[name] = read(made[name], mapping, tell=tell_changes)
+                made.pop("mapping", None)
         for name, value in list(made.items()):
             if isinstance(value, Beginning):
-                made[name] = value.of(made["recordings"], mapping)
+                made[name] = value.of(made["recordings"] or [], mapping)
             elif self.parameters[name].kind is inspect.Parameter.VAR_KEYWORD:
                 made |= vars(made.pop(name))
-            elif is_group(type(value)):
+            elif is_group(self.forms.get(name)):
                 made[name] = value.value()
         if "progress" in inspect.signature(self.function).parameters:
             made["progress"] = progress
@@ -176,18 +185,19 @@ class Verb:
                 default = list(p.default) if isinstance(p.default, tuple) else p.default
                 more: dict[str, Any] = {"negative": f"--no-{name.replace('_', '-')}"} if default is True else {}
                 form = Annotated[form, Parameter(help=self.help_of(name), **more)]
-            required = default is inspect.Parameter.empty
-            kind = inspect.Parameter.POSITIONAL_ONLY if required else inspect.Parameter.KEYWORD_ONLY
+            kind = inspect.Parameter.POSITIONAL_ONLY if name in self.words else inspect.Parameter.KEYWORD_ONLY
             found.append(inspect.Parameter(name, kind, default=default, annotation=form))
-        return found
+        return sorted(found, key=lambda p: p.kind)
 
 
 def command(
     place: str,
     *,
-    writes: str | Callable[[Path], list[Path]] = "",
+    writes: str | Writes = "",
     needs_output: bool = False,
     forms: Mapping[str, Any] = {},
+    words: Sequence[str] = (),
+    reads: Mapping[str, RecordingReader] = {"recordings": read_recordings},
     instead: Mapping[str, str] = {},
     tell_changes: bool = True,
 ) -> Callable[[Callable[..., int]], Callable[..., int]]:
@@ -201,50 +211,55 @@ def command(
     place : str
         Where the verb stands, such as ``thermocomp.api.verbs:compare``.
     writes : str or callable
-        Ending of the file that ``--output`` names, or what returns all files that come of it; there is no such option
-        without it.
+        Ending of the file that ``--output`` names, or what returns all files that come of it and of the options that
+        are given; there is no such option without it.
     needs_output : bool
         There is nothing to do without ``--output``.
     forms : mapping
         How parameters of this verb are written on a command line, beside `ON_A_LINE`.
+    words : sequence of str
+        Parameters that stand on the line without an option's name; those that have no default if none is named.
+    reads : mapping
+        What reads the files that a parameter names, where Python takes recordings; they get the verb's ``mapping``.
     instead : mapping
-        Verbs that do the work instead, by the option that asks for them; they judge, and write nothing.
+        Verbs that do the work instead, by the option that asks for them; they write nothing.
     tell_changes : bool
         Say on stderr what a mapping changes in the values; False: the result says it.
     """
 
     def made_of(show: Callable[..., int]) -> Callable[..., int]:
-        verb = Verb(place, forms)
+        verb = Verb(place, forms, words, reads)
+        options = verb.options()
+        defaults = {p.name: p.default for p in options if p.default is not p.empty}
         own = [p for n, p in inspect.signature(show).parameters.items() if n not in ("found", "face")]
         described = _described(show)
 
         def run(*positional: Any, **named: Any) -> int:
-            given = dict(zip(verb.parameters, positional, strict=False)) | named
+            given = defaults | dict(zip(verb.words, positional, strict=False)) | named
             extra = {p.name: given.pop(p.name, p.default) for p in own}
             face = CommandFace(**{f: given.pop(f) for f in ("output", "overwrite", "json", "quiet") if f in given})
             asked = next((option for option in instead if extra[option]), "")
             if asked and face.output is not None:
-                raise InputError(f"{face.output}: --{asked} judges a test, and writes none; leave -o out")
-            face.refuse_existing(writes, [v for v in _flat(given.values()) if isinstance(v, Path)])
-            chosen = Verb(instead[asked], forms) if asked else verb
+                raise InputError(f"{face.output}: --{asked.strip('_')} writes no file; leave -o out")
+            if needs_output and not asked and face.output is None:
+                ways = ", or ".join(f"--{option.strip('_')}" for option in instead)
+                raise InputError(f"there is no file to write: name one with -o, or give {ways}")
+            face.refuse_existing(writes, given)
+            chosen = Verb(instead[asked], forms, reads=reads) if asked else verb
             with show_progress(hidden=face.json or face.quiet, warn=face.warn) as progress:
                 found = chosen.call(given, progress, tell_changes)
             return show(found, face, **extra)
 
-        output: Any = Path if needs_output else Path | None
+        required = needs_output and not instead
+        output: Any = Path if required else Path | None
+        none: Any = inspect.Parameter.empty if required else None
         alone = [
-            _option(
-                "output",
-                output,
-                inspect.Parameter.empty if needs_output else None,
-                described.get("output", ""),
-                ["--output", "-o"],
-            ),
+            _option("output", output, none, described.get("output", ""), ["--output", "-o"]),
             _option("overwrite", bool, False, "Write over an existing file."),
         ]
         mine = [_option(p.name, p.annotation, p.default, described[p.name]) for p in own]
         json = _option("json", bool, False, "Print results for a program instead of tables.")
-        parameters = [*verb.options(), *mine, *(alone if writes else []), json]
+        parameters = [*options, *mine, *(alone if writes else []), json]
         run.__name__ = run.__qualname__ = show.__name__
         run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
         run.__annotations__ = {p.name: p.annotation for p in parameters}

@@ -20,7 +20,11 @@ def files_of(program: Path) -> list[Path]:
     return [program, sheet_of(program), picture_of(program)]
 
 
-@command("thermocomp.api.plan:plan", writes=files_of, instead={"running": "thermocomp.api.plan:may_stop"})
+@command(
+    "thermocomp.api.plan:plan",
+    writes=lambda program, _: files_of(program),
+    instead={"running": "thermocomp.api.plan:may_stop"},
+)
 def plan(
     found: Planned | Running,
     face: CommandFace,

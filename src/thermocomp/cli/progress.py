@@ -73,14 +73,6 @@ def show_progress(*, hidden: bool, warn: Callable[[list[str]], object] = lambda 
 
 
 @contextmanager
-def show_steps(total: int, *, hidden: bool) -> Iterator[Steps]:
-    """Show how many of so many steps are done; nothing if `hidden`, or if the command line wants it quiet."""
-    with show_progress(hidden=hidden) as steps:
-        steps.begin(total)
-        yield steps
-
-
-@contextmanager
 def show_share(name: str, *, hidden: bool) -> Iterator[Share]:
     """Show the percentage that is done; nothing if `hidden`, or if the command line wants it quiet."""
     hidden = hidden or loudness.quiet

@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Protocol
 
 from thermocomp.cli import loudness
 from thermocomp.cli.exits import STDIN
@@ -15,6 +15,12 @@ if TYPE_CHECKING:
     from thermocomp.recordings.recording import Recording
 
 _stderr = make_console(stderr=True)
+
+
+class RecordingReader(Protocol):
+    """Reads what a parameter of a verb takes from the files that a command line names."""
+
+    def __call__(self, paths: Any, mapping: Path | None, /, *, tell: bool = True) -> Any: ...  # noqa: D102
 
 
 def read_recordings(paths: list[Path], mapping: Path | None, *, tell: bool = True) -> "list[Recording]":
@@ -33,6 +39,12 @@ def read_recordings(paths: list[Path], mapping: Path | None, *, tell: bool = Tru
     for r in found if tell and not loudness.quiet else ():
         for change in r.changed:
             _stderr.print(f"[dim]note[/] {words(f'{r.name}: {change}')}", soft_wrap=True)
+    return found
+
+
+def read_one(path: Path, mapping: Path | None, *, tell: bool = True) -> "Recording":
+    """Read the one recording that an option names."""
+    (found,) = read_recordings([path], mapping, tell=tell)
     return found
 
 

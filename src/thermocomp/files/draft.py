@@ -203,8 +203,8 @@ def draft(target: Path, *, overwrite: bool) -> Iterator[Path]:
         started.publish()
 
 
-def write_text(text: str, target: Path, *, overwrite: bool) -> None:
-    """Write a text, in UTF-8.
+def write_text(text: str, target: str | Path, *, overwrite: bool) -> Path:
+    """Write a text, in UTF-8; return its path.
 
     Parameters
     ----------
@@ -217,8 +217,9 @@ def write_text(text: str, target: Path, *, overwrite: bool) -> None:
     InputError
         See `drafts`.
     """
-    with draft(target, overwrite=overwrite) as path:
+    with draft(Path(target), overwrite=overwrite) as path:
         path.write_text(text, encoding="utf-8", newline="\n")
+    return Path(target)
 
 
 def refuse_existing(paths: Sequence[Path], overwrite: bool, inputs: Sequence[Path] = (), ending: str = "") -> None:

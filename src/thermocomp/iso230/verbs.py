@@ -1,21 +1,28 @@
 """Thermal tests after ISO 230-3, positioning after ISO 230-2 and time constants, in Python."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
+from thermocomp.api.explain import models_of
+from thermocomp.api.inputs import Given, Starts, recordings_of, starts_of, trouble_of
+from thermocomp.api.keywords import Listener, silent
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError, UnitError
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.units import read_with_unit
+from thermocomp.files.draft import write_text
 from thermocomp.iso230 import part2, part3, tables
 from thermocomp.iso230.part2 import PositioningResult
 from thermocomp.iso230.thermaltest import Pair, ThermalTest
 from thermocomp.judging.settling.settling import Phase, Settling, find_phases, time_constants
+from thermocomp.recordings.readers.mapping import Mapping
 from thermocomp.recordings.recording import Recording
-from thermocomp.recordings.starts import Start
 from thermocomp.volumetric.files import positioning as positioning_files
+
+if TYPE_CHECKING:
+    from thermocomp.api.results import FittedModels
 
 Test = Literal["etve", "spindle", "axis"]
 
@@ -30,15 +37,19 @@ class Evaluated:
     settlings : tuple of (Recording, tuple of Settling)
         Recordings with the time constants of their channels.
     positioned : tuple of PositioningResult
+    trouble : tuple of str
+        What is wrong with the recordings.
     """
 
     thermal: tuple[ThermalTest, ...]
     settlings: tuple[tuple[Recording, tuple[Settling, ...]], ...]
     positioned: tuple[PositioningResult, ...]
+    trouble: tuple[str, ...] = ()
 
-    def content(self) -> dict[str, Any]:
-        """Return all of it as plain numbers and words."""
+    def to_dict(self) -> dict[str, Any]:
+        """Return all of it for a program: what ``--json`` prints."""
         return {
+            "trouble": self.trouble,
             "thermal": [tables.thermal_content(t) for t in self.thermal],
             "time_constants": [
                 {"recording": r.name, "channels": [tables.settling_content(s) for s in mine]}
@@ -51,44 +62,52 @@ class Evaluated:
         """Write the page that ``thermocomp iso230 -o`` writes; return its path."""
         from thermocomp.iso230.report import iso230 as pages
 
-        pages.write(self.thermal, self.settlings, self.positioned, Path(path), overwrite=overwrite)
-        return Path(path)
+        return write_text(pages.render(self.thermal, self.settlings, self.positioned), path, overwrite=overwrite)
 
 
-def evaluate(
-    recordings: Sequence[Recording] = (),
+def iso230(
+    recordings: Given | None = None,
     *,
     test: Test | None = None,
     distance: str | None = None,
     pairs: Sequence[str] | None = None,
     ambient: str | None = None,
-    models: Sequence[ErrorModel] = (),
-    start: Start | None = None,
-    limits: Limits | None = None,
+    model: "ErrorModel | FittedModels | str | Path | Sequence[ErrorModel] | None" = None,
+    limits: Limits = Limits(),
+    starts: Starts = None,
     positioning: Sequence[str | Path] = (),
+    mapping: str | Path | Mapping | None = None,
+    progress: Callable[..., None] = silent,
 ) -> Evaluated:
-    """Evaluate thermal tests and positioning tests; the words are those of the command.
+    """Evaluate thermal tests after ISO 230-3 and positioning tests after ISO 230-2, and the time constants of channels.
 
     Parameters
     ----------
-    recordings : sequence of Recording
-        Of thermal tests.
+    recordings : Recording, path, DataFrame, or sequence of them, optional
+        CSV, XLSX or Parquet files of thermal tests.
     test : {'etve', 'spindle', 'axis'}, optional
-        What they are; found out if not given.
+        What they are: etve (machine at rest), spindle, or axis. Found out if not given: the spindle turns, else an
+        axis moves, else neither.
     distance : str, optional
-        Between the probes x1 and x2, and y1 and y2, such as ``100 mm``.
+        Between the probes x1 and x2, and y1 and y2, such as "100 mm"; without it no tilt is told.
     pairs : sequence of str, optional
-        Probes of other names, such as ``x_front:x_rear:100mm``.
+        Probes of other names: the one at the tip of the test bar, the one nearer to the spindle, and their distance,
+        such as x_front:x_rear:100mm.
     ambient : str, optional
-        Temperature of the surroundings.
-    models : sequence of ErrorModel
-        What they leave of each displacement is told beside it.
-    start : Start, optional
-        How the recordings begin.
-    limits : Limits, optional
-        Of the compensator; its own if not given.
+        Temperature of the surroundings; the first whose name says air, ambient or room if not given.
+    model : ErrorModel, FittedModels, path of a model file, or sequence of ErrorModel, optional
+        Model file from thermocomp fit: what it leaves of each displacement is told beside it.
+    limits : Limits
+        Of the compensator: what it would leave is told, not what the model alone would.
+    starts : Start or sequence of Start, optional
+        How the recordings begin, as for `compare`; it matters to a model.
     positioning : sequence of str or Path
-        CSV tables of positioning tests.
+        CSV tables of positioning tests, with the columns position_mm, deviation_um, direction (+ or -), run, and if
+        there are several, state and axis.
+    mapping : str, Path or Mapping, optional
+        TOML file that says what the columns of the recordings are.
+    progress : callable
+        Called with a line of text per recording.
 
     Returns
     -------
@@ -97,20 +116,44 @@ def evaluate(
     Raises
     ------
     InputError
-        A channel is not there, or a distance has no unit.
+        Nothing is given, a file or a channel cannot be used, or a distance has no unit.
+
+    Examples
+    --------
+    >>> import thermocomp as tc
+    >>> found = tc.iso230(tc.simulate("iso230-spindle"), distance="100 mm")
+    >>> [t.name for t in found.thermal]
+    ['iso230-spindle-constant', 'iso230-spindle-spectrum']
+    >>> first = found.to_dict()["thermal"][0]["curves"][0]
+    >>> first["name"], round(first["range_60"], 1)  # um within the first hour
+    ('x1_um', 3.4)
     """
+    if recordings is None and not positioning:
+        raise InputError("nothing given: name a recording of a thermal test, or a table by --positioning")
+    if recordings is None:
+        asked = {"--test": test, "--distance": distance, "--pairs": pairs, "--ambient": ambient, "--model": model}
+        for option in (o for o, value in asked.items() if value is not None):
+            raise InputError(f"{option} is for recordings of thermal tests: name one")
+    if distance is not None and pairs:
+        raise InputError("--distance is for probes named x1, x2, y1, y2; those of --pairs carry their own")
+    models = models_of(model) if model is not None else ()
+    tests = recordings_of(recordings, mapping) if recordings is not None else []
+    begun, trouble = starts_of(starts, tests) or (None,) * len(tests), trouble_of(tests)
+    listener = Listener(progress)
+    listener.warn(trouble)
+    listener.begin(lambda: len(tests))
     thermal: list[ThermalTest] = []
     settlings = []
-    given = {} if limits is None else {"limits": limits}
-    for recording in recordings:
+    for recording, start in zip(tests, begun, strict=True):
         paired = _pairs(recording, distance, pairs)
-        mine = part3.assess(recording, test, pairs=paired, ambient=ambient, models=models, start=start, **given)
+        mine = part3.assess(recording, test, pairs=paired, ambient=ambient, models=models, start=start, limits=limits)
         # where nothing was recorded of the drives, a test is told to be a warm-up
         phases = find_phases(recording) or tuple(Phase("warm-up", 1, t.start, t.stop) for t in mine if t.kind != "etve")
         thermal += mine
         settlings.append((recording, time_constants(recording, phases, part3.find_stations(recording))))
+        progress(recording.name)
     positioned = tuple(part2.assess(p) for path in positioning for p in positioning_files.read(Path(path)))
-    return Evaluated(tuple(thermal), tuple(settlings), positioned)
+    return Evaluated(tuple(thermal), tuple(settlings), positioned, tuple(trouble))
 
 
 def length(text: str, what: str) -> float:

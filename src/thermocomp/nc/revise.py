@@ -14,7 +14,8 @@ from thermocomp.nc.revision.job import revise as revise_program
 from thermocomp.nc.revision.options import Controller, Drifting, Starting, Timing, Way
 from thermocomp.nc.revision.prepare import prepare_job
 
-_GROUPS = (Drifting, Starting, Way, Controller, Timing)
+#: groups of options of the command; their fields are the keywords here
+GROUPS = (Drifting, Starting, Way, Controller, Timing)
 #: words of the command that name files
 _PATHS = ("model", "forecast", "carried", "machine", "subroutines")
 
@@ -107,12 +108,12 @@ def revise(
     for name in given.keys() & set(_PATHS):
         value = given[name]
         given[name] = [Path(v) for v in value] if isinstance(value, list | tuple) else value and Path(value)
-    known = {f.name for group in _GROUPS for f in fields(group)}
+    known = {f.name for group in GROUPS for f in fields(group)}
     for name in given.keys() - known:
         near = get_close_matches(name, known, n=3, cutoff=0.5)
         raise InputError(f"revise: there is no option {name!r}; the nearest are {', '.join(near) or ', '.join(known)}")
     groups: list[Any] = []
-    for group in _GROUPS:
+    for group in GROUPS:
         mine = {f.name: given[f.name] for f in fields(group) if f.name in given}
         missing = [
             f.name

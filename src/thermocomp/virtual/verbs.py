@@ -1,10 +1,12 @@
 """Recordings of the virtual machine, in Python."""
 
+from collections.abc import Callable
 from pathlib import Path
 
+from thermocomp.api.keywords import Listener, silent
 from thermocomp.recordings.recording import Recording
 from thermocomp.virtual import datasets
-from thermocomp.virtual.protocol import Physics
+from thermocomp.virtual.protocol import Experiment, Physics
 
 
 def simulate(
@@ -13,19 +15,26 @@ def simulate(
     physics: Physics | None = None,
     seed: int = 0,
     noise: float | None = None,
+    progress: Callable[..., None] = silent,
 ) -> list[Recording]:
     """Record an experiment on a virtual machine.
 
     Parameters
     ----------
     experiment : str or Path
-        One that comes with the package, such as ``demo``, or a protocol of one's own (.toml).
+        A protocol of your own, as a path that ends in .toml, or one of: chen1996, chen1996-law, chen1996-new,
+        chen1996-slope, demo, etve, hwang, iso230-axis, iso230-spindle, precompensation, precompensation-cut, probing,
+        random, stepwise2017, stepwise2017-online, volumetric, volumetric-new, wessel-fem, wessel-milling, wessel-sets,
+        wessel-tool.
     physics : {'linear', 'nonlinear'}, optional
-        Of the machine; what the experiment says without it.
+        Of the machine: joints, bearings and films by constant conductances, or as they depend on temperature and speed.
+        What the experiment says if not given.
     seed : int
-        Of weather and noise.
+        Of weather, noise, and what is drawn by lot.
     noise : float, optional
-        Standard deviation of the temperature noise [degC]; the sensor's own without it.
+        Standard deviation of the temperature noise [degC]; the sensor's own if not given.
+    progress : callable
+        Called with the name of each test that is done.
 
     Returns
     -------
@@ -44,4 +53,11 @@ def simulate(
     >>> recording
     <Recording hwang: 37 rows, 6.0 h, 14 temperatures, 1 displacements, 4 thermal cycle(s)>
     """
-    return datasets.record(experiment, physics=physics, seed=seed, sensor_noise=noise)
+    found = datasets.find_experiment(experiment)
+    Listener(progress).begin(lambda: len(found.names))
+    return datasets.record(found, physics=physics, seed=seed, sensor_noise=noise, progress=progress)
+
+
+def experiments() -> list[Experiment]:
+    """Return the experiments that come with the package."""
+    return [datasets.find_experiment(name) for name in datasets.EXPERIMENTS]

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from thermocomp.files.draft import write_text
 from thermocomp.iso230 import tables
 from thermocomp.iso230.part2 import PositioningResult
 from thermocomp.iso230.report import iso230figures as figures
@@ -51,24 +50,3 @@ def render(thermal: Sequence[ThermalTest], settlings: Settlings, positioned: Seq
         positioned=[(r, figures.positioning(r)) for r in positioned],
         positioning_tables=tables.positioning_tables(positioned),
     )
-
-
-def write(
-    thermal: Sequence[ThermalTest],
-    settlings: Settlings,
-    positioned: Sequence[PositioningResult],
-    path: Path,
-    *,
-    overwrite: bool = False,
-) -> None:
-    """Write the page.
-
-    Parameters
-    ----------
-    thermal : sequence of ThermalTest
-    settlings : sequence of (Recording, sequence of Settling)
-    positioned : sequence of PositioningResult
-    path, overwrite
-        See `thermocomp.files.draft.drafts`.
-    """
-    write_text(render(thermal, settlings, positioned), path, overwrite=overwrite)

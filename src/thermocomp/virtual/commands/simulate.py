@@ -1,79 +1,83 @@
 """`thermocomp simulate`: an experiment on a virtual machine."""
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
 
-from cyclopts import Parameter
+from thermocomp.cli.face import CommandFace, command
+from thermocomp.cli.terminal import console, print_table, words
+from thermocomp.recordings.recording import Recording
+from thermocomp.report import records
+from thermocomp.report.layout import Column, Layout
+from thermocomp.virtual.datasets import find_experiment
+from thermocomp.virtual.protocol import Experiment
 
-from thermocomp.cli.options import OptionalOutput, Quiet
-from thermocomp.cli.progress import show_steps
-from thermocomp.cli.terminal import console
-from thermocomp.core.exceptions import InputError
-from thermocomp.files.draft import refuse_existing
+
+def files_of(output: Path, given: Mapping[str, Any]) -> list[Path]:
+    """Return the file of each test of an experiment."""
+    return _number(output, len(find_experiment(given["experiment"]).names))
 
 
-def simulate(
-    experiment: str | None = None,
-    *,
-    output: OptionalOutput = None,
-    list_: Annotated[bool, Parameter(name="--list")] = False,
-    physics: Literal["linear", "nonlinear"] | None = None,
-    seed: int = 0,
-    noise: float | None = None,
-    overwrite: bool = False,
-    json: bool = False,
-    quiet: Quiet = False,
-) -> int:
-    """Record an experiment on a virtual machine.
+def _number(output: Path, tests: int) -> list[Path]:
+    if tests == 1:
+        return [output]
+    return [output.with_name(f"{output.stem}-{k}{output.suffix}") for k in range(1, tests + 1)]
+
+
+@command(
+    "thermocomp.virtual.verbs:simulate",
+    writes=files_of,
+    needs_output=True,
+    forms={"experiment": str},
+    words=("experiment",),
+    instead={"list_": "thermocomp.virtual.verbs:experiments"},
+)
+def simulate(found: list[Recording] | list[Experiment], face: CommandFace, *, list_: bool = False) -> int:  # noqa: ARG001 - asks for the other verb
+    """Show it.
 
     Parameters
     ----------
-    experiment : str
-        A protocol of your own, as a path that ends in .toml, or one of: chen1996, chen1996-law, chen1996-new,
-        chen1996-slope, demo, etve, hwang, iso230-axis, iso230-spindle, precompensation, precompensation-cut, probing,
-        random, stepwise2017, stepwise2017-online, volumetric, volumetric-new, wessel-fem, wessel-milling, wessel-sets,
-        wessel-tool.
     output : Path
         File to write (.parquet or .csv); an experiment of several tests gets one file per test.
     list_ : bool
         List the experiments and what they are.
-    physics : {'linear', 'nonlinear'}
-        Of the machine: joints, bearings and films by constant conductances, or as they depend on temperature and speed.
-        What the experiment says if not given.
-    seed : int
-        Of weather, noise, and what is drawn by lot.
-    noise : float
-        Standard deviation of the temperature noise [degC]; the sensor's own if not given.
-    overwrite : bool
-        Write over existing files.
-    json : bool
-        Print results for a machine instead of a table.
 
     Returns
     -------
     int
         0 done.
     """
-    from thermocomp.recordings.readers import recordings
-    from thermocomp.virtual import datasets as virtual
-    from thermocomp.virtual.commands import output as out
-
-    if list_:
-        out.show_experiments([virtual.find_experiment(name) for name in virtual.EXPERIMENTS], console, as_json=json)
+    experiments = [e for e in found if isinstance(e, Experiment)]
+    tests = [r for r in found if isinstance(r, Recording)]
+    if face.output is None:
+        content = [{"name": e.name, "description": e.description, "tests": len(e.tests)} for e in experiments]
+        face.show(lambda: {"experiments": content}, lambda: _show_experiments(experiments))
         return 0
-    if experiment is None or output is None:
-        raise InputError("name an experiment and a file: thermocomp simulate demo -o drift.parquet; see --list")
-    found = virtual.find_experiment(experiment)
-    n_tests = len(found.names)
-    paths = (
-        [output]
-        if n_tests == 1
-        else [output.with_name(f"{output.stem}-{k}{output.suffix}") for k in range(1, n_tests + 1)]
+    from thermocomp.recordings.readers import recordings
+
+    files = dict(zip(_number(face.output, len(tests)), tests, strict=True))
+    for path, test in files.items():
+        recordings.write(test, path, overwrite=face.overwrite)
+    face.show(
+        lambda: {"recordings": [{"file": str(p), **records.recording(r, ())} for p, r in files.items()]},
+        lambda: _show(files),
     )
-    refuse_existing(paths, overwrite)
-    with show_steps(n_tests, hidden=json or quiet) as progress:
-        tests = virtual.record(found, physics=physics, seed=seed, sensor_noise=noise, progress=progress)
-    for test, path in zip(tests, paths, strict=True):
-        recordings.write(test, path, overwrite=overwrite)
-    if not quiet:
-        out.show_simulated(tests, paths, console, as_json=json)
     return 0
+
+
+def _show(files: Mapping[Path, Recording]) -> None:
+    for path, r in files.items():
+        hours = (r.time[-1] - r.time[0]) / 3600
+        console.print(
+            f"{words(path)}: {len(r)} rows, {hours:.1f} h, {len(r.temperatures)} temperatures, "
+            f"{len(r.displacements)} displacements, {len(r.cycles)} thermal cycle(s)"
+        )
+
+
+def _show_experiments(experiments: list[Experiment]) -> None:
+    columns = (
+        Column("experiment", lambda e: e.name),
+        Column("tests", lambda e: len(e.tests), ">"),
+        Column("what it is", lambda e: e.description),
+    )
+    print_table(Layout(columns, experiments), console, box=None)

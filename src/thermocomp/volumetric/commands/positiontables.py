@@ -12,8 +12,8 @@ from thermocomp.recordings.readers.profiles import NOT_TAKEN
 from thermocomp.report.layout import Column, Layout, Toned, verdict
 from thermocomp.volumetric.judging.position import PositionStudy
 from thermocomp.volumetric.models.positionoptions import Setting
-from thermocomp.volumetric.position import Positioned
 from thermocomp.volumetric.report import records
+from thermocomp.volumetric.verbs import Positioned
 
 #: cycles that are told one by one; of more, the `WORST`
 FEW, WORST = 12, 5

@@ -66,8 +66,9 @@ def read(path: str | Path) -> tuple[Positioning, ...]:
     if source.suffix.lower() not in ENDINGS:
         raise RecordingError(f"{source}: a positioning test is read from one of {', '.join(ENDINGS)}")
     try:
-        check_file(source, FileLimits())
-        table = open_csv(source, ReadOptions())
+        limits = FileLimits()
+        check_file(source, limits)
+        table = open_csv(source, ReadOptions(), limits)
     except FileNotFoundError as e:
         raise RecordingError(f"{source}: no such file") from e
     except OSError as e:

@@ -175,8 +175,8 @@ class Volumetric:
         return max(self.moments, key=lambda m: m.straight.before.largest)
 
 
-#: tells how far the work is, as a share of it
-Progress = Callable[[float], None]
+#: hears what is done, and how many rows of it
+Progress = Callable[[str, int], object]
 
 
 def study(
@@ -231,7 +231,7 @@ def study(
     for k, field in enumerate(states):
         values[k] = field.components(point)
         if progress is not None and k % 100 == 0:
-            progress(k / len(time))
+            progress("replaying", 100)
     levers = Kinematics(machine)
     error, tilt = levers.synthesize(values, np.asarray(point), tip)
     course = PointCourse(

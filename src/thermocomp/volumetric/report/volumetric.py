@@ -1,9 +1,6 @@
 """The volumetric error of a machine on one offline page."""
 
-from pathlib import Path
-
 from thermocomp.core.components import COMPONENTS
-from thermocomp.files.draft import write_text
 from thermocomp.report.html import page
 from thermocomp.volumetric.judging.volumetric import Volumetric
 from thermocomp.volumetric.report import volumetric_figures as figures
@@ -51,15 +48,3 @@ def render(study: Volumetric) -> str:
         if over_time and any(c.is_scalar and c.code in known for c in COMPONENTS)
         else "",
     )
-
-
-def write(study: Volumetric, path: Path, *, overwrite: bool = False) -> None:
-    """Write the page.
-
-    Parameters
-    ----------
-    study : Volumetric
-    path, overwrite
-        See `thermocomp.files.draft.drafts`.
-    """
-    write_text(render(study), path, overwrite=overwrite)

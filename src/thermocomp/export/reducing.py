@@ -1,113 +1,80 @@
-"""What `thermocomp export` writes for controllers that hold less than a model."""
+"""An export to a controller that holds less than a model: which models, along which axes, and what is lost."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
-from cyclopts import Parameter
-
-from thermocomp.cli.beginning import Beginning
-from thermocomp.cli.progress import show_steps
-from thermocomp.cli.reading import read_recordings, tell_trouble
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.position import PositionModel
 from thermocomp.export.facts import Facts
+from thermocomp.export.reduction.options import ReductionOptions
 from thermocomp.export.reduction.reduced import Reduced, Shape, as_it_is, find_axis, fits, mark
 from thermocomp.export.target import Target
 
 if TYPE_CHECKING:
+    from thermocomp.api.inputs import Starts
+    from thermocomp.api.keywords import Listener
     from thermocomp.export.reduction.judging import Reduction
+    from thermocomp.recordings.recording import Recording
 
 _Model = TypeVar("_Model", bound=ErrorModel | PositionModel)
 
 
-@Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
-class ReductionOptions:
-    """How a model is reduced to what klipper, heidenhain and fanuc hold.
-
-    Parameters
-    ----------
-    most_loss : float
-        Largest loss that is let pass: RMS on unseen cycles over that of the full model.
-    axes : list of str
-        Which targets are written and along which axes they go, such as ch5_um=Z; by their names if not given: z_um is
-        Z.
-    sensors : list of str
-        Temperatures that the controller has, to choose from; all of the recordings if not given.
-    mapping : Path
-        TOML file that says what the columns of the recordings are.
-    harm_margin : float
-        Tolerated degradation in a single cycle [um]; as in ``thermocomp fit`` if not given.
-    jobs : int
-        Processes to share the work among; -1 takes all cores.
-    """
-
-    most_loss: float = 2.0
-    axes: list[str] | None = None
-    sensors: list[str] | None = None
-    mapping: Path | None = None
-    harm_margin: float | None = None
-    jobs: int = -1
-
-    def named(self) -> dict[str, str]:
-        """Return the axes by target."""
-        found = {}
-        for text in self.axes or ():
-            target, _, axis = text.rpartition("=")
-            if not target or axis.upper() not in ("X", "Y", "Z"):
-                raise InputError(f"--axes {text}: want a target and X, Y or Z, such as z_um=Z")
-            found[target] = axis.upper()
-        return found
-
-
-class Outcome(NamedTuple):
-    """What comes of an export."""
-
-    texts: dict[str, bytes]  #: files by their names
-    refused: dict[str, str]  #: targets that may not be written, and why
-    elsewhere: dict[str, str]  #: targets that the controller does not correct, and why
-
-
-def export_reduced(
-    to: str,
-    target: Target,
-    models: Sequence[ErrorModel],
-    recordings: list[Path],
-    options: ReductionOptions,
-    beginning: Beginning,
-    limits: Limits,
-    name: str,
-    facts: Facts,
-    accept_unproven: str | None,
-    *,
-    hidden: bool,
-) -> Outcome:
-    """Make the files of an export.
+class ExportOrder:
+    """What is to be written.
 
     Parameters
     ----------
     to : str
         Name of the target.
     target : Target
-        With a shape.
-    models : sequence of ErrorModel
-    recordings : list of Path
-        That they are reduced on.
-    options : ReductionOptions
-    beginning : Beginning
-        How the recordings begin.
     limits : Limits
     name : str
         Of the files.
     facts : Facts
+    options : ReductionOptions
+    """
+
+    to: str
+    target: Target
+    limits: Limits
+    name: str
+    facts: Facts
+    options: ReductionOptions
+
+
+class Outcome(NamedTuple):
+    """What comes of an export."""
+
+    files: dict[str, bytes]  #: by their names
+    refused: dict[str, str]  #: targets that may not be written, and why
+    elsewhere: dict[str, str]  #: targets that the controller does not correct, and why
+
+
+def export_reduced(
+    order: ExportOrder,
+    models: Sequence[ErrorModel],
+    recordings: "Sequence[Recording]",
+    starts: "Starts",
+    accept_unproven: str | None,
+    listener: "Listener",
+) -> Outcome:
+    """Make the files of an export to a target with a shape.
+
+    Parameters
+    ----------
+    order : ExportOrder
+    models : sequence of ErrorModel
+    recordings : sequence of Recording
+        That they are reduced on.
+    starts : Start or sequence of Start, optional
+        How the recordings begin.
     accept_unproven : str or None
         Who takes an unproven model, and why.
-    hidden : bool
-        Show no progress.
+    listener : Listener
 
     Raises
     ------
@@ -115,17 +82,17 @@ def export_reduced(
         None goes along an axis that the controller corrects, or two along one; a model has to be reduced, and there is
         no recording; or the correction would run into its limit.
     """
-    assert target.shape is not None
-    shape = target.shape
+    to, shape, options = order.to, order.target.shape, order.options
+    assert shape is not None
     wanted, axes, elsewhere = along_axes(models, options, to, shape.axes)
     more = [m for m in wanted if not fits(m, shape) or not _has(options, m)]
     if more and not recordings:
         held = f"{to} holds {_told(shape.sensors)}{', of --sensors' if options.sensors else ''}"
         raise InputError(
             f"{held}, and the model of {', '.join(m.target for m in more)} is more than that: name recordings to "
-            f"reduce it on, such as: thermocomp export {facts.source} drift.csv --to {to}"
+            f"reduce it on, such as: thermocomp export {order.facts.source} drift.csv --to {to}"
         )
-    reductions = _reduce(more, axes, recordings, options, beginning, shape, hidden=hidden) if more else {}
+    reductions = _reduce(more, axes, recordings, options, starts, shape, listener) if more else {}
     refused, found = dict[str, str](), list[Reduced]()
     for m in wanted:
         r = reductions[m.target].reduced if m.target in reductions else as_it_is(m, axes[m.target])
@@ -134,14 +101,14 @@ def export_reduced(
             refused[m.target] = why
         else:
             found.append(r)
-            if target.limited:
-                _check_limit(r, limits, to)
+            if order.target.limited:
+                _check_limit(r, order.limits, to)
     if not found:
         return Outcome({}, refused, elsewhere)
-    name = f"tc_{mark(name)}"
+    name = f"tc_{mark(order.name)}"
     drawn = [reductions[r.model.target] for r in found if r.model.target in reductions]
     figure = f"{name}_reduced.svg" if drawn else ""
-    texts = target.write(found, limits, name, facts, figure=figure)
+    texts = order.target.write(found, order.limits, name, order.facts, figure=figure)
     return Outcome((_figure(figure, drawn) if drawn else {}) | texts, refused, elsewhere)
 
 
@@ -218,27 +185,23 @@ def _find_axes(models: Sequence[ErrorModel | PositionModel], options: ReductionO
 def _reduce(
     models: Sequence[ErrorModel],
     axes: dict[str, str],
-    paths: list[Path],
+    tests: "Sequence[Recording]",
     options: ReductionOptions,
-    beginning: Beginning,
+    starts: "Starts",
     shape: Shape,
-    *,
-    hidden: bool,
+    listener: "Listener",
 ) -> "dict[str, Reduction]":
-    tests = read_recordings(paths, options.mapping)
-    tell_trouble(tests)
     from thermocomp.export.reduction.judging import reduce_model
     from thermocomp.judging.results import Rules
 
-    starts = beginning.of(tests, options.mapping)
+    listener.begin(lambda: len(models))
     found = {}
-    with show_steps(len(models), hidden=hidden) as progress:
-        for m in models:
-            found[m.target] = reduce_model(
-                m, axes[m.target], tests, shape,
-                sensors=options.sensors, starts=starts, rules=Rules(options.harm_margin), jobs=options.jobs,
-            )  # fmt: skip
-            progress(f"{m.target} reduced")
+    for m in models:
+        found[m.target] = reduce_model(
+            m, axes[m.target], tests, shape,
+            sensors=options.sensors, starts=starts, rules=Rules(options.harm_margin), jobs=options.jobs,
+        )  # fmt: skip
+        listener.tell(f"{m.target} reduced")
     return found
 
 

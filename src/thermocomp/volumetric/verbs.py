@@ -1,0 +1,310 @@
+"""Errors along the axes and anywhere in the work volume, in Python."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from thermocomp.api.inputs import judging_of, recordings_of, trouble_of
+from thermocomp.api.keywords import Listener, settings_of, silent
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.machine import Machine
+from thermocomp.core.position import PositionModel
+from thermocomp.files import positionfile
+from thermocomp.files.draft import write_text
+from thermocomp.files.machines import read_machine
+from thermocomp.models.methods import find_method
+from thermocomp.recordings.profiles import Profiles
+from thermocomp.recordings.readers import mapping as mappings
+from thermocomp.recordings.readers import profiles as tables
+from thermocomp.recordings.readers.mapping import Mapping
+from thermocomp.recordings.recording import Recording
+from thermocomp.volumetric.judging import position as assessing
+from thermocomp.volumetric.judging.position import PositionStudy
+from thermocomp.volumetric.judging.volumetric import Volumetric, study
+from thermocomp.volumetric.models.position import PositionOptions
+from thermocomp.volumetric.models.positionoptions import Setting
+from thermocomp.volumetric.positionsettings import PositionSettings
+from thermocomp.volumetric.report import records, volumetric_tables
+
+#: stands for every component that has columns of its own
+ALL = "all"
+#: points along each axis, if nothing is said
+GRID = 5
+
+
+@dataclass(frozen=True, eq=False)
+class Positioned:
+    """Components of a machine, fitted and judged.
+
+    Parameters
+    ----------
+    found : sequence of PositionStudy
+    tests : list of tuple of Profiles
+        Of each component.
+    left_open : tuple of str
+        Settings that were found out from the profiles.
+    several : bool
+        Several components were asked for, or all that there are.
+    trouble : tuple of str
+        What is wrong with the recordings.
+    accept_unproven : str, optional
+        Who takes unproven models all the same, and why.
+    """
+
+    found: Sequence[PositionStudy]
+    tests: list[tuple[Profiles, ...]]
+    left_open: tuple[Setting, ...]
+    several: bool
+    trouble: tuple[str, ...] = ()
+    accept_unproven: str | None = None
+
+    @property
+    def models(self) -> tuple[PositionModel, ...]:
+        """The models, one per component."""
+        return tuple(f.fit.model.taken(self.accept_unproven) for f in self.found)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all of it for a program: what ``--json`` prints; several components stand in a list."""
+        entries = [records.position(f, self.left_open) for f in self.found]
+        return {
+            "trouble": self.trouble,
+            "judging": self.found[0].assessment.protocol,
+            **({"components": entries} if self.several else entries[0]),
+        }
+
+    def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
+        """Write the models to a file; return its path."""
+        positionfile.write(self.models, Path(path), overwrite=overwrite)
+        return Path(path)
+
+
+def position(
+    recordings: str | Path | Sequence[str | Path],
+    component: str | Sequence[str],
+    *,
+    accept_unproven: str | None = None,
+    progress: Callable[..., None] = silent,
+    **settings: Any,
+) -> Positioned:
+    """Fit position-dependent errors: cold profiles and thermal slopes, judged on what they have not seen.
+
+    Settings that are not given are found out from the profiles, and anew wherever a part is left out: how many slopes
+    are worth it, whether the profile shifts as a whole, and about which position it turns.
+
+    Parameters
+    ----------
+    recordings : path, or sequence of them
+        CSV, XLSX or Parquet files with profiles in several thermal states; each is one test.
+    component : str or sequence of str
+        Codes of the errors, such as EYY, EXX or EAZ, or all that have columns of their own: a code says along which
+        axis and in which unit. One file holds the models of all.
+    accept_unproven : str, optional
+        As for `fit`.
+    progress : callable
+        Called with a line of text after each piece of work.
+    **settings
+        Of the fit, see `thermocomp.volumetric.positionsettings.PositionSettings`: ``model="ols"``, ``slopes=1``.
+
+    Returns
+    -------
+    Positioned
+
+    Raises
+    ------
+    InputError
+        A file, component or setting cannot be used, the method cannot be frozen, or settings do not go together.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import pandas as pd
+    >>> import thermocomp as tc
+    >>> heat = np.tile([0.0, 2.0, 4.0, 6.0], 4)  # four days, each from the cold machine
+    >>> table = pd.DataFrame({"time_s": 3600.0 * np.arange(16), "cycle": np.arange(16) // 4, "t1_C": 20 + heat})
+    >>> for place in range(0, 600, 100):  # a ball screw that grows by 12 um/m per degC
+    ...     table[f"EXX_{place}_um"] = 12e-3 * heat * place
+    >>> table.to_csv("laser.csv", index=False)
+    >>> found = tc.position("laser.csv", "EXX", model="ols", inputs=["t1_C"], jobs=1)
+    >>> (slope,) = found.models[0].slopes
+    >>> slope.formula()  # um/m
+    '12 t1_C'
+    >>> found.save("screw.json").name
+    'screw.json'
+    """
+    s = settings_of(PositionSettings, settings, "position")
+    files = [Path(p) for p in ([recordings] if isinstance(recordings, str | Path) else recordings)]
+    if not files:
+        raise InputError("no recording given: name at least one CSV, XLSX or Parquet file")
+    if s.jobs == 0:
+        raise InputError("--jobs 0: name a number of processes, or -1 for all cores")
+    if not find_method(s.model).kind.freezable:
+        raise InputError(f"{s.model} cannot be frozen to plain numbers: choose another method")
+    components = [component] if isinstance(component, str) else list(component)
+    tests = _read(files, components, s)
+    options = PositionOptions(
+        method=s.model,
+        inputs=s.inputs,
+        slopes=1 if s.slopes is None else s.slopes,
+        offset=bool(s.offset),
+        profile=s.profile,
+        order="auto" if s.order is None else s.order,
+        reference=s.reference or 0,
+        reference_position=s.reference_position,
+        rezero=not s.absolute,
+    )
+    given: dict[Setting, object] = {
+        "slopes": s.slopes,
+        "offset": s.offset,
+        "reference_position": s.reference_position,
+    }
+    left_open = tuple(name for name, value in given.items() if value is None)
+    judging = partial(judging_of, split=s.split, leave_one=s.left_out(len(files)))
+    states = [test.states for test in tests[0]]
+    for r in states:
+        progress(f"read {r.source or r.name}: {len(r)} rows, {len(r.table.columns)} columns", 0)
+    listener, trouble = Listener(progress), trouble_of(states)
+    listener.warn(trouble)
+    listener.begin(lambda: assessing.n_pieces(tests, options, judging))
+    found = assessing.study_all(tests, options, left_open=left_open, judging=judging, jobs=s.jobs, progress=progress)
+    return Positioned(
+        found=found,
+        tests=tests,
+        left_open=left_open,
+        several=_several(components),
+        trouble=tuple(trouble),
+        accept_unproven=accept_unproven,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class VolumetricErrors:
+    """A machine's errors in its work volume.
+
+    Parameters
+    ----------
+    study : Volumetric
+    point, volume : bool
+        The point, the volume was asked for.
+    trouble : tuple of str
+        What is wrong with the recording.
+    """
+
+    study: Volumetric
+    point: bool
+    volume: bool
+    trouble: tuple[str, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all of it for a program: what ``--json`` prints."""
+        return {"trouble": self.trouble, **volumetric_tables.content(self.study)}
+
+    def report(self, path: str | Path, *, overwrite: bool = False) -> Path:
+        """Write the page that ``thermocomp volumetric -o`` writes; return its path."""
+        from thermocomp.volumetric.report import volumetric as pages
+
+        return write_text(pages.render(self.study), path, overwrite=overwrite)
+
+
+def volumetric(
+    machine: Machine | str | Path,
+    *,
+    recording: Recording | str | Path | pd.DataFrame | None = None,
+    mapping: str | Path | Mapping | None = None,
+    at: tuple[float, float, float] | None = None,
+    grid: int | None = None,
+    tool_length: float | None = None,
+    time: Sequence[float] | None = None,
+    progress: Callable[..., None] = silent,
+) -> VolumetricErrors:
+    r"""Tell the error of the tool's tip at a point and all over the work volume, and what corrections leave of it.
+
+    With neither a point nor a grid both are told, in the middle of the travels and on 5 points along each axis.
+
+    Parameters
+    ----------
+    machine : Machine, str or Path
+        Machine file (.toml): axes, and what is known of the 32 error components.
+    recording : Recording, path or DataFrame, optional
+        CSV, XLSX or Parquet file to replay through the machine's models; without it the machine is taken in its
+        reference state, with its constants and profiles alone.
+    mapping : str, Path or Mapping, optional
+        TOML file that says what the recording's columns are.
+    at : tuple of float, optional
+        Positions X Y Z of the axes [mm]: error, tilt and contributions there. The straight lines go through it.
+    grid : int, optional
+        Points along each axis: the volume before and after correction.
+    tool_length : float, optional
+        From the gauge point to the tip, along -Z [mm]; the machine file's tool if not given.
+    time : sequence of float, optional
+        Times to look at [h]; start, largest error and end of the recording if not given.
+    progress : callable
+        Called with a line of text, and the number of rows that were replayed.
+
+    Returns
+    -------
+    VolumetricErrors
+
+    Raises
+    ------
+    InputError
+        A file, a point or a time cannot be used.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import thermocomp as tc
+    >>> lines = ['name = "Mill"', 'structure = "w X\' b Z Y t"', "[components]", 'C0Y = "10 urad"']
+    >>> for axis, travel in (("X", 600), ("Y", 400), ("Z", 500)):
+    ...     lines.insert(2, f'[axes.{axis}]\ntravel = ["0 mm", "{travel} mm"]\nreference_position = "0 mm"')
+    >>> _ = Path("mill.toml").write_text("\n".join(lines))
+    >>> found = tc.volumetric("mill.toml", at=(0, 100, 0))
+    >>> found.to_dict()["states"][0]["error_um"]  # 10 urad over 100 mm
+    [-1.0, 0.0, 0.0]
+    """
+    if tool_length is not None and not tool_length >= 0:
+        raise InputError(f"--tool-length {tool_length:g}: must not be negative")
+    if recording is None and mapping is not None:
+        raise InputError("--mapping is for a recording: name one by --recording")
+    if not isinstance(machine, Machine):
+        source, machine = machine, read_machine(machine)
+        progress(f"read {source}: {len(machine.axes)} axes, {len(machine.components)} components", 0)
+    tests = recordings_of(recording, mapping) if recording is not None else []
+    listener, trouble = Listener(progress), trouble_of(tests)
+    listener.warn(trouble)
+    listener.begin(lambda: len(tests[0]) if tests else 1)
+    found = study(
+        machine,
+        tests[0] if tests else None,
+        at=at,
+        grid=GRID if grid is None else grid,
+        tool=None if tool_length is None else (0.0, 0.0, -tool_length),
+        hours=time or (),
+        progress=progress,
+    )
+    return VolumetricErrors(
+        found, point=at is not None or grid is None, volume=grid is not None or at is None, trouble=tuple(trouble)
+    )
+
+
+def _several(component: Sequence[str]) -> bool:
+    return len(component) > 1 or ALL in component
+
+
+def _read(paths: Sequence[Path], components: Sequence[str], s: PositionSettings) -> list[tuple[Profiles, ...]]:
+    """Read one component, however its columns are called, or several by columns that are called after them."""
+    given = mappings.read_mapping(s.mapping) if s.mapping is not None else None
+    if _several(components):
+        if s.columns or s.positions is not None or s.layout == "long":
+            raise InputError(
+                "--columns, --positions and long tables are for one component: name a single one, or call the columns "
+                "after their components, such as EXX_250_um"
+            )
+        wanted = [] if ALL in components else list(dict.fromkeys(components))
+        return list(tables.read_components(paths, wanted, given).values())
+    places = tables.read_places(s.positions) if s.positions is not None else None
+    options = tables.ProfileOptions(target=components[0], columns=s.columns, places=places)
+    return [tuple(tables.read(path, options, given, layout=s.layout) for path in paths)]
