@@ -27,6 +27,8 @@ from thermocomp.recordings.readers.mapping import Mapping
 DEFAULT_MODELS = ("ols", "partial-f", "mra", "dynamic", "averaged")
 SelectionMethod = Literal["pareto", "subsets", "grouping", "partial-f", "stepwise", "ace"]
 Policy = Literal["clip", "hold", "fade"]
+#: what `select` takes beside the recordings
+SelectionSettings = Settings
 
 
 def compare(

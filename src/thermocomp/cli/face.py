@@ -15,7 +15,7 @@ from docstring_parser import DocstringStyle, parse
 import thermocomp
 from thermocomp.cli.beginning import Beginning
 from thermocomp.cli.jsonoutput import print_json
-from thermocomp.cli.options import CompensatorOptions, LeaveOneOut, Selector
+from thermocomp.cli.options import CompensatorOptions, LeaveOneOut
 from thermocomp.cli.progress import Steps, show_progress
 from thermocomp.cli.reading import RecordingReader, print_trouble, read_recordings
 from thermocomp.cli.terminal import console, print_items, words
@@ -37,7 +37,6 @@ ON_A_LINE: dict[str, Any] = {
     "leave_one": LeaveOneOut,
     "starts": Beginning,
     "limits": CompensatorOptions,
-    "settings": Selector,
 }
 #: parameters that a command line has no option for: the command itself shows what they say
 SHOWN = ("progress",)

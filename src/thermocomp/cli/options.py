@@ -1,6 +1,6 @@
 """Groups of options that several commands share, and what they stand for."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -8,7 +8,6 @@ from cyclopts import Parameter
 
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
-from thermocomp.judging.choice import Settings
 
 if TYPE_CHECKING:
     from thermocomp.api.inputs import LeaveOne
@@ -79,13 +78,3 @@ class CompensatorOptions:
     def value(self) -> Limits:
         """Return them as the compensator takes them."""
         return Limits(self.magnitude, self.rate, self.dead_band)
-
-
-@Parameter(name="*")
-@dataclass(frozen=True, kw_only=True)
-class Selector(Settings):  # noqa: D101 - that of Settings, which the help is made from
-    __doc__ = Settings.__doc__
-
-    unsigned: bool = False
-    models: list[str] = field(default_factory=lambda: ["ols", "averaged"])
-    holm: bool = False

@@ -2,12 +2,11 @@
 
 from pathlib import Path
 
-from thermocomp.api.plan import EVERY, Planned
+from thermocomp.api.plan import EVERY, Planned, RunningTest
 from thermocomp.api.testprogram import Dialect, picture_of, sheet_of
 from thermocomp.cli.face import CommandFace, command
 from thermocomp.cli.terminal import console, print_table, words
 from thermocomp.core.exceptions import InputError
-from thermocomp.judging.settling.stopping import Running
 from thermocomp.report.layout import Column, Layout
 
 
@@ -26,7 +25,7 @@ def files_of(program: Path) -> list[Path]:
     instead={"running": "thermocomp.api.plan:may_stop"},
 )
 def plan(
-    found: Planned | Running,
+    found: Planned | RunningTest,
     face: CommandFace,
     *,
     dialect: Dialect = "linuxcnc",
@@ -53,7 +52,7 @@ def plan(
         0 done, with --running: it may end; 1 with --running: go on; 2 unusable input.
     """
     content = {"trouble": face.trouble, "expected_um": None, "candidates": [], "curve": None, "running": None}
-    if isinstance(found, Running):
+    if isinstance(found, RunningTest):
         face.show(lambda: {**content, "running": found.to_dict(), "files": []}, lambda: _show_running(found))
         return 0 if found.may_stop else 1
     files = [] if face.output is None else files_of(face.output)
@@ -63,7 +62,7 @@ def plan(
     return 0
 
 
-def _show_running(found: Running) -> None:
+def _show_running(found: RunningTest) -> None:
     columns = (
         Column("target", lambda s: s[0]),
         Column("now", lambda s: s[1].change, ".1f", "um"),

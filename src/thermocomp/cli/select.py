@@ -1,11 +1,26 @@
 """`thermocomp select`: the few sensors that a model needs."""
 
+from dataclasses import dataclass, field
+
+from cyclopts import Parameter
+
 from thermocomp.api.selected import Selected
+from thermocomp.api.verbs import SelectionSettings
 from thermocomp.cli.face import CommandFace, command
 from thermocomp.report import printed
 
 
-@command("thermocomp.api.verbs:select", writes=".html")
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Selector(SelectionSettings):  # noqa: D101 - that of SelectionSettings, which the help is made from
+    __doc__ = SelectionSettings.__doc__
+
+    unsigned: bool = False
+    models: list[str] = field(default_factory=lambda: ["ols", "averaged"])
+    holm: bool = False
+
+
+@command("thermocomp.api.verbs:select", writes=".html", forms={"settings": Selector})
 def select(found: Selected, face: CommandFace) -> int:
     """Show it.
 
