@@ -1,6 +1,8 @@
 """README and docs show what the commands really print."""
 
 import re
+import shlex
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -54,6 +56,19 @@ def test_python_prints_what_the_readme_shows(
     exec(compile(program, "README.md", "exec"), {})
     assert_printed(blocks()[1], capsys.readouterr().out)
     assert sorted(p.name for p in Path().iterdir()) == ["model.json", "report.html"]
+
+
+@pytest.mark.long
+def test_the_readme_revises_a_program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = README.read_text("utf-8")
+    for begin in ("thermocomp simulate demo -o", "thermocomp fit .*speed.json", "printf", "thermocomp revise"):
+        (line,) = re.findall(rf"^    ({begin}.*)$", text, re.MULTILINE)
+        if line.startswith("printf"):
+            subprocess.run(["/bin/sh", "-c", line], check=True)
+        else:
+            assert run(shlex.split(line, comments=True)[1:]) == 0, line
+    assert "Y19.99" in Path("revised.ngc").read_text("ascii")
 
 
 @pytest.mark.long

@@ -264,6 +264,7 @@ def test_fanuc_refusals_that_expand_helps_with(text: str) -> None:
     [
         ("G4 X2000", "G4 X2000 has no decimal point"),
         ("G4 P600.", "P600. for a dwell: with a decimal point it counts seconds for a Haas"),
+        ("G4 P600.", "write G4 X600. for seconds, or P without a point for milliseconds"),
         ("G0 Z5.\nG82 X1. Z-1. R1. P2. F100.", "P2. for a dwell"),
     ],
 )

@@ -150,10 +150,10 @@ def check_dwell(words: BlockWords) -> None:
     """Refuse a dwell in P with a decimal point: it counts seconds for a Haas, and a Fanuc does not take it."""
     word = words.words.get("P")
     if word is not None and word.number is not None and "." in word.value:
-        seconds = f"G4 X{word.value.strip()}" if words.groups.get("once") == "G4" else "a G4 X of its own"
+        seconds = f"G4 X{word.value.strip()} for seconds, or " if words.groups.get("once") == "G4" else ""
         raise words.error(
             f"P{word.value.strip()} for a dwell: with a decimal point it counts seconds for a Haas, and a Fanuc does "
-            f"not take it; write {seconds} for seconds, or P without a point for milliseconds"
+            f"not take it; write {seconds}P without a point for milliseconds"
         )
 
 

@@ -63,8 +63,7 @@ _G10 = (
     "force) than in a Fanuc (L10 to L13: tool offsets; L20: G54.1; P0: the external offset): write G10 L2 P1 to P6, in "
     "G90 and without R"
 )
-#: LinuxCNC's, and of a Fanuc's machine what its maker has made of them
-#: (M48 and M49 also where thermocomp takes them for a Fanuc's)
+#: LinuxCNC's, and of a Fanuc's machine what its maker has made of them: M48 and M49, too, which most make the same of
 _MAKERS_M: Final = {
     n: code.does for n, code in M_CODES["linuxcnc"].items() if n not in M_CODES["fanuc"] or n in (48.0, 49.0)
 }
