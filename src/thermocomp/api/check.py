@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from thermocomp.api.inputs import Given, recordings_of
-from thermocomp.api.results import Result
+from thermocomp.api.results import Paged, Result
 from thermocomp.core.exceptions import InputError
-from thermocomp.files.draft import write_text
 from thermocomp.recordings.checks import quality
 from thermocomp.recordings.checks.findings import Finding
 from thermocomp.recordings.readers.mapping import Mapping
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CheckedRecordings(Result):
+class CheckedRecordings(Result, Paged):
     """Recordings and what was found in them.
 
     Parameters
@@ -69,11 +68,11 @@ class CheckedRecordings(Result):
             raise InputError(f"recording {recording}: there are {len(self.recordings)}, counted from 0")
         return checks.figure(self.recordings[recording], self.findings[recording])
 
-    def report(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write the page that ``thermocomp check -o`` writes; return its path."""
+    def page(self) -> str:
+        """Return the page that ``thermocomp check -o`` writes."""
         from thermocomp.report import checks
 
-        return write_text(checks.render(self.recordings, self.findings), path, overwrite=overwrite)
+        return checks.render(self.recordings, self.findings)
 
     def __str__(self) -> str:
         worst = (

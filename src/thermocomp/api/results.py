@@ -56,6 +56,18 @@ class Result(ABC):
         return f"<p>{escape(str(self))}</p>{self.to_frame().to_html(index=False, float_format='{:.2f}'.format)}"
 
 
+class Paged(ABC):
+    """A result that has a page."""
+
+    @abstractmethod
+    def page(self) -> str:
+        """Return the page as one HTML text that needs no network."""
+
+    def report(self, path: str | Path, *, overwrite: bool = False) -> Path:
+        """Write the page; return its path."""
+        return write_text(self.page(), path, overwrite=overwrite)
+
+
 def starts_content(begins: Sequence[tuple[str, Start]]) -> list[dict[str, object]]:
     """Return how recordings begin, for a program."""
     return [start.content(name) for name, start in begins]
@@ -94,7 +106,7 @@ def frame_of(assessments: Sequence[Assessment]) -> pd.DataFrame:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Compared(Result):
+class Compared(Result, Paged):
     """Methods judged on what they had not seen.
 
     Parameters
@@ -183,11 +195,11 @@ class Compared(Result):
             return figures.overview(self.comparison).figure
         return _run(self.comparison.assessments, self.recordings, target, model)
 
-    def report(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write the page that ``thermocomp compare -o`` writes; return its path."""
+    def page(self) -> str:
+        """Return the page that ``thermocomp compare -o`` writes."""
         from thermocomp.report import html
 
-        return write_text(html.render(self.comparison, self.recordings, self.samples), path, overwrite=overwrite)
+        return html.render(self.comparison, self.recordings, self.samples)
 
     def __str__(self) -> str:
         from thermocomp.report.summary import verdict
@@ -300,7 +312,7 @@ class FittedModels(Result):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Assessed(Result):
+class Assessed(Result, Paged):
     """Frozen models judged on recordings.
 
     Parameters
@@ -350,11 +362,11 @@ class Assessed(Result):
         """Return how the model ran through the recordings, for the first target or another."""
         return _run(self.judged.assessments, self.recordings, target or self.judged.models[0].target, None)
 
-    def report(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write the page that ``thermocomp assess -o`` writes; return its path."""
+    def page(self) -> str:
+        """Return the page that ``thermocomp assess -o`` writes."""
         from thermocomp.report import assessed
 
-        return write_text(assessed.render(self.judged, self.recordings), path, overwrite=overwrite)
+        return assessed.render(self.judged, self.recordings)
 
     def __str__(self) -> str:
         return " ".join([*(_judged(a) for a in self.judged.overall()), *told_trouble(self.trouble)])

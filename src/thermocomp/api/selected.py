@@ -1,14 +1,12 @@
 """Sensors that were chosen, for a notebook, a page and a program."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from thermocomp.api.results import Result, told_trouble
+from thermocomp.api.results import Paged, Result, told_trouble
 from thermocomp.core.exceptions import InputError
-from thermocomp.files.draft import write_text
 from thermocomp.judging.choice import Choice
 from thermocomp.recordings.recording import Recording
 
@@ -17,7 +15,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Selected(Result):
+class Selected(Result, Paged):
     """Sensors that were chosen.
 
     Parameters
@@ -48,11 +46,11 @@ class Selected(Result):
             ],
         }
 
-    def report(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write the page that ``thermocomp select -o`` writes; return its path."""
+    def page(self) -> str:
+        """Return the page that ``thermocomp select -o`` writes."""
         from thermocomp.report import html
 
-        return write_text(html.render_choices(self.choices, self.recordings), path, overwrite=overwrite)
+        return html.render_choices(self.choices, self.recordings)
 
     @property
     def sensors(self) -> dict[str, tuple[str, ...]]:

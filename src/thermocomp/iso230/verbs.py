@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, Literal
 from thermocomp.api.explain import models_of
 from thermocomp.api.inputs import Given, Starts, recordings_of, starts_of, trouble_of
 from thermocomp.api.keywords import Listener, silent
+from thermocomp.api.results import Paged
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError, UnitError
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.units import read_with_unit
-from thermocomp.files.draft import write_text
 from thermocomp.iso230 import part2, part3, tables
 from thermocomp.iso230.part2 import PositioningResult
 from thermocomp.iso230.thermaltest import Pair, ThermalTest
@@ -28,7 +28,7 @@ Test = Literal["etve", "spindle", "axis"]
 
 
 @dataclass(frozen=True, eq=False)
-class Evaluated:
+class Evaluated(Paged):
     """Tests, evaluated.
 
     Parameters
@@ -58,11 +58,11 @@ class Evaluated:
             "positioning": [tables.positioning_content(r) for r in self.positioned],
         }
 
-    def report(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write the page that ``thermocomp iso230 -o`` writes; return its path."""
+    def page(self) -> str:
+        """Return the page that ``thermocomp iso230 -o`` writes."""
         from thermocomp.iso230.report import iso230 as pages
 
-        return write_text(pages.render(self.thermal, self.settlings, self.positioned), path, overwrite=overwrite)
+        return pages.render(self.thermal, self.settlings, self.positioned)
 
 
 def iso230(

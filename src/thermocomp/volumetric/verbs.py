@@ -10,11 +10,11 @@ import pandas as pd
 
 from thermocomp.api.inputs import judging_of, recordings_of, trouble_of
 from thermocomp.api.keywords import Listener, settings_of, silent
+from thermocomp.api.results import Paged
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Machine
 from thermocomp.core.position import PositionModel
 from thermocomp.files import positionfile
-from thermocomp.files.draft import write_text
 from thermocomp.files.machines import read_machine
 from thermocomp.models.methods import find_method
 from thermocomp.recordings.profiles import Profiles
@@ -181,7 +181,7 @@ def position(
 
 
 @dataclass(frozen=True, eq=False)
-class VolumetricErrors:
+class VolumetricErrors(Paged):
     """A machine's errors in its work volume.
 
     Parameters
@@ -202,11 +202,11 @@ class VolumetricErrors:
         """Return all of it for a program: what ``--json`` prints."""
         return {"trouble": self.trouble, **volumetric_tables.content(self.study)}
 
-    def report(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write the page that ``thermocomp volumetric -o`` writes; return its path."""
+    def page(self) -> str:
+        """Return the page that ``thermocomp volumetric -o`` writes."""
         from thermocomp.volumetric.report import volumetric as pages
 
-        return write_text(pages.render(self.study), path, overwrite=overwrite)
+        return pages.render(self.study)
 
 
 def volumetric(
