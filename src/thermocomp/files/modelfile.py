@@ -17,7 +17,6 @@ from thermocomp.core.paceddynamic import PacedDynamic
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.watch import Watch
 from thermocomp.files import jsonfile
-from thermocomp.files.draft import write_text
 
 #: as it stands in the file
 FORMAT = jsonfile.MODELS.name
@@ -79,7 +78,7 @@ def write(models: Sequence[ErrorModel], path: str | Path, *, overwrite: bool = F
     InputError
         The file exists and `overwrite` is False.
     """
-    write_text(dumps(models), Path(path), overwrite=overwrite)
+    jsonfile.write(dumps(models), path, overwrite=overwrite)
 
 
 def read(path: str | Path) -> tuple[ErrorModel, ...]:

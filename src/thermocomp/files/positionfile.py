@@ -11,7 +11,6 @@ from thermocomp.core.position import PositionModel
 from thermocomp.core.profile import Profile
 from thermocomp.core.provenance import Provenance
 from thermocomp.files import jsonfile, modelfile
-from thermocomp.files.draft import write_text
 
 #: as it stands in the file
 FORMAT = jsonfile.POSITION_MODELS.name
@@ -70,7 +69,7 @@ def write(models: Sequence[PositionModel], path: str | Path, *, overwrite: bool 
     InputError
         The file exists and `overwrite` is False.
     """
-    write_text(dumps(models), Path(path), overwrite=overwrite)
+    jsonfile.write(dumps(models), path, overwrite=overwrite)
 
 
 def read(path: str | Path) -> tuple[PositionModel, ...]:
