@@ -23,6 +23,6 @@ def assess(found: Assessed, face: CommandFace) -> int:
         on, 2 unusable input.
     """
     face.write(found.report)
-    face.print(found.to_dict, printed.assess(found.judged, found.recordings), "Report")
+    face.show_items(found.to_dict, printed.assess(found.judged, found.recordings), "Report")
     before = {m.honest_error.word for m in found.judged.models if m.honest_error is not None}
     return 1 if "refused" in before | {a.word for a in found.judged.overall()} else 0

@@ -22,7 +22,7 @@ def compare(found: Compared, face: CommandFace) -> int:
         (what was judged until then is shown).
     """
     face.write(found.report)
-    face.print(found.to_dict, printed.comparison(found.comparison), "Report")
+    face.show_items(found.to_dict, printed.comparison(found.comparison), "Report")
     if found.comparison.left:
         return STOPPED
     return 0 if all(best is not None for best in found.best.values()) else 1

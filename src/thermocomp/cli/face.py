@@ -93,7 +93,7 @@ class CommandFace:
         else:
             printer()
 
-    def print(self, content: Callable[[], dict[str, Any]], items: Iterable[Item], file: str) -> None:
+    def show_items(self, content: Callable[[], dict[str, Any]], items: Iterable[Item], file: str) -> None:
         """Print a result for a program or for people, and where the file is that was written."""
         if self.quiet or self.json:
             self.show(content, lambda: None)

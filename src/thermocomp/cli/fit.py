@@ -20,5 +20,5 @@ def fit(found: FittedModels, face: CommandFace) -> int:
         0 done, 1 a component was refused, 2 unusable input.
     """
     face.write(found.save)
-    face.print(lambda: {"file": str(face.output), **found.to_dict()}, printed.fit(found.fitted), "Model file")
+    face.show_items(lambda: {"file": str(face.output), **found.to_dict()}, printed.fit(found.fitted), "Model file")
     return 1 if any(a.word == "refused" for a in found.fitted.comparison.overall()) else 0

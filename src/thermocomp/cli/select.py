@@ -36,5 +36,5 @@ def select(found: Selected, face: CommandFace) -> int:
         2 unusable input.
     """
     face.write(found.report)
-    face.print(found.to_dict, printed.choices(found.choices), "Page")
+    face.show_items(found.to_dict, printed.choices(found.choices), "Page")
     return 1 if any(c.failure for c in found.choices) else 0

@@ -10,7 +10,7 @@ from thermocomp.live.recorder import CONFIRM_WITHIN
 from thermocomp.runtime.state import CompensatorState, Status
 
 
-class InForce:
+class ConfirmedCorrections:
     """Corrections that controllers have confirmed, and their alarms.
 
     Parameters

@@ -13,7 +13,7 @@ from thermocomp.core.reading import Measurement, Reading
 from thermocomp.live.clock import ServiceClock
 from thermocomp.live.curves import Curves
 from thermocomp.live.events import Events
-from thermocomp.live.inforce import InForce, suspensions
+from thermocomp.live.inforce import ConfirmedCorrections, suspensions
 from thermocomp.live.keeper import CONFIGURED, StateKeeper
 from thermocomp.live.latest import Latest
 from thermocomp.live.ledger import ProbingLedger
@@ -57,7 +57,7 @@ class Service:
     def __post_init__(self) -> None:
         models = self.compensator.models
         self.latest = Latest(i.name for m in models for i in (*m.inputs, *(m.watch.inputs if m.watch else ())))
-        self.curves, self.in_force = Curves(self.compensator), InForce(self.sinks, self.clock)
+        self.curves, self.in_force = Curves(self.compensator), ConfirmedCorrections(self.sinks, self.clock)
         self.probings = ProbingLedger(self.compensator, self.clock, partial(self.say, "probing"))
         self.keeper = StateKeeper(self.state_path, self.compensator, self.clock, partial(self.say, "service"))
         self.outlets = [Outlet(sink, self._hear if self.in_force.listens_to(sink) else None) for sink in self.sinks]

@@ -121,7 +121,7 @@ def in_um(value: float | None) -> str:
 
 
 @dataclass(frozen=True)
-class Line:
+class PrintedLine:
     """A line of text.
 
     Parameters
@@ -138,4 +138,4 @@ class Line:
     whole: bool = False
 
 
-Item = Line | Layout
+Item = PrintedLine | Layout

@@ -14,7 +14,7 @@ from thermocomp.recordings.starts import Start
 from thermocomp.report import records
 from thermocomp.report.bands import describe_bands
 from thermocomp.report.faults import describe_faults, describe_held
-from thermocomp.report.layout import Column, Item, Layout, Line, Toned, laid_out, verdict
+from thermocomp.report.layout import Column, Item, Layout, PrintedLine, Toned, laid_out, verdict
 from thermocomp.report.losses import describe_losses
 from thermocomp.report.probings import describe_probings
 from thermocomp.report.running import describe_running
@@ -26,27 +26,27 @@ BUT, NOTE = Toned("but", "doubtful"), Toned("note", "soft")
 def comparison(found: Comparison) -> Iterator[Item]:
     """Yield a comparison of methods on unseen blocks."""
     yield from _starts(found.starts)
-    yield Line(f"Judged on: {found.judging.name}")
+    yield PrintedLine(f"Judged on: {found.judging.name}")
     yield _assessment_table(found.assessments)
     yield _cycle_table(found.assessments)
     for a in found.overall():
         if not a.accepted:
-            yield Line(f" {a.model} for {a.target}: {a.reason}", verdict(a.word), whole=True)
+            yield PrintedLine(f" {a.model} for {a.target}: {a.reason}", verdict(a.word), whole=True)
     for target in dict.fromkeys(a.target for a in found.assessments):
         best = found.best(target)
         if best is None:
-            yield Line("", Toned(f"{target}: no model may run yet", "grave"))
+            yield PrintedLine("", Toned(f"{target}: no model may run yet", "grave"))
         else:
-            yield Line(
+            yield PrintedLine(
                 f", {best.metric('rms'):.2f} um RMS instead of {best.none_metric('rms'):.2f} um "
                 f"({best.metric('reduction'):.0f} % less): {best.reason}",
                 Toned(f"{target}: {best.model}", "chosen"),
                 whole=True,
             )
-    yield from (Line(f" {caution}", BUT) for caution in cautions(found))
-    yield from map(Line, describe_running(found.overall()))
+    yield from (PrintedLine(f" {caution}", BUT) for caution in cautions(found))
+    yield from map(PrintedLine, describe_running(found.overall()))
     if found.left:
-        yield Line(f" {found.left} pairs of method and target were not judged", Toned("stopped:", "grave"))
+        yield PrintedLine(f" {found.left} pairs of method and target were not judged", Toned("stopped:", "grave"))
 
 
 def choices(found: Sequence[Choice]) -> Iterator[Item]:
@@ -54,9 +54,9 @@ def choices(found: Sequence[Choice]) -> Iterator[Item]:
     for c in found:
         for t in c.tables:
             yield from _titled(f"{c.target}: {t.title}", t)
-        yield from (Line(f" {note}", NOTE) for note in c.notes)
+        yield from (PrintedLine(f" {note}", NOTE) for note in c.notes)
         chosen = f"{c.target}: {', '.join(c.sensors) or 'no sensor'}"
-        yield Line(f": {c.reason}", Toned(chosen, "bad" if c.failure else "chosen"))
+        yield PrintedLine(f": {c.reason}", Toned(chosen, "bad" if c.failure else "chosen"))
 
 
 def fit(fitted: Fitted) -> Iterator[Item]:
@@ -64,7 +64,7 @@ def fit(fitted: Fitted) -> Iterator[Item]:
     overall = fitted.comparison.overall()
     models = [records.model(m, r2, a) for m, r2, a in zip(fitted.models, fitted.r_squared, overall, strict=True)]
     yield from _starts(fitted.comparison.starts)
-    yield Line(f"Judged on: {fitted.comparison.judging.name}")
+    yield PrintedLine(f"Judged on: {fitted.comparison.judging.name}")
     columns = (
         Column("target", "target"),
         Column("sensors", lambda m: len(m["sensors"]), ">"),
@@ -76,9 +76,9 @@ def fit(fitted: Fitted) -> Iterator[Item]:
     yield Layout(columns, models)
     for m in fitted.models:
         if m.honest_error is not None:
-            yield Line(f" {m.target}: {m.honest_error.why}", verdict(m.honest_error.word), whole=True)
+            yield PrintedLine(f" {m.target}: {m.honest_error.why}", verdict(m.honest_error.word), whole=True)
     bands = describe_bands(fitted.models, overall)
-    yield from map(Line, [*describe_running(overall), *bands, *describe_losses(fitted.models)])
+    yield from map(PrintedLine, [*describe_running(overall), *bands, *describe_losses(fitted.models)])
 
 
 def assess(judged: Judged, recordings: Sequence[Recording]) -> Iterator[Item]:
@@ -86,17 +86,17 @@ def assess(judged: Judged, recordings: Sequence[Recording]) -> Iterator[Item]:
     logs = find_faults(judged, recordings)
     yield from _starts(judged.starts)
     for line in describe_faults(logs, recordings):
-        yield Line(f" {line}", Toned("sensor failed", "doubtful"), whole=True)
-    yield from (Line(f" {line}", BUT, whole=True) for line in describe_held(judged, logs))
+        yield PrintedLine(f" {line}", Toned("sensor failed", "doubtful"), whole=True)
+    yield from (PrintedLine(f" {line}", BUT, whole=True) for line in describe_held(judged, logs))
     yield _assessment_table(judged.assessments)
     yield _cycle_table(judged.assessments)
     yield _robustness(judged.overall())
     for a in judged.overall():
-        yield Line(f" {a.target}: {a.reason}", verdict(a.word), whole=True)
+        yield PrintedLine(f" {a.target}: {a.reason}", verdict(a.word), whole=True)
         if a.robustness is not None:
             yield from _disturbed(a.target, a.robustness)
     bands = describe_bands(judged.models, judged.overall())
-    yield from map(Line, [*describe_running(judged.overall()), *bands, *describe_probings(judged.overall())])
+    yield from map(PrintedLine, [*describe_running(judged.overall()), *bands, *describe_probings(judged.overall())])
     fitted = {"when fitted": judged.models[0].validity, "these recordings": judged.validity}
     if known := {name: v for name, v in fitted.items() if v is not None}:
         covered = coverage.table(known)
@@ -104,26 +104,28 @@ def assess(judged: Judged, recordings: Sequence[Recording]) -> Iterator[Item]:
     for m in judged.models:
         if m.honest_error is not None and not m.accepted:
             word = verdict(f"{m.honest_error.word} when it was fitted")
-            yield Line(f" {m.target}: {m.honest_error.why}", word, whole=True)
+            yield PrintedLine(f" {m.target}: {m.honest_error.why}", word, whole=True)
 
 
-def _disturbed(target: str, found: Robustness) -> Iterator[Line]:
+def _disturbed(target: str, found: Robustness) -> Iterator[PrintedLine]:
     if found.harm:
-        yield Line(f" {target}: {found.harm}", Toned("harmful when disturbed", "bad"))
+        yield PrintedLine(f" {target}: {found.harm}", Toned("harmful when disturbed", "bad"))
     if found.outside > 0.1:
-        yield Line(f" {100 * found.outside:.0f} % of the rows are outside the range {target} was trained in", BUT)
+        yield PrintedLine(
+            f" {100 * found.outside:.0f} % of the rows are outside the range {target} was trained in", BUT
+        )
     if found.unlike > 0.1:
-        yield Line(f" {target}: {describe_unlike(found)}", BUT)
+        yield PrintedLine(f" {target}: {describe_unlike(found)}", BUT)
 
 
 def _titled(title: str, t: Table) -> Iterator[Item]:
-    yield Line("")
-    yield Line("", Toned(title, "strong"))
+    yield PrintedLine("")
+    yield PrintedLine("", Toned(title, "strong"))
     yield laid_out(t)
 
 
-def _starts(begins: Sequence[tuple[str, Start]]) -> Iterator[Line]:
-    return (Line(f"Start of {start.told(name)}") for name, start in begins)
+def _starts(begins: Sequence[tuple[str, Start]]) -> Iterator[PrintedLine]:
+    return (PrintedLine(f"Start of {start.told(name)}") for name, start in begins)
 
 
 def _robustness(assessments: Sequence[Assessment]) -> Layout:
