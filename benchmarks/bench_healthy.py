@@ -1,7 +1,7 @@
 """The watch over machines on which nothing fails: what it accuses all the same.
 
 Run with ``python benchmarks/bench_healthy.py [tests]`` (9 tests of 12 h of the virtual machine with each physics). The
-watch is fitted to the demo; the tests have other speeds, drawn anew every 45 min, and other weathers (18 to 26 degC, no
+watch is fitted to the demo; the tests have other speeds, drawn every 45 min, and other weathers (18 to 26 degC, no
 rougher than the demo's), with the axes still as in the demo. And where the measured data are there, recordings of
 printers without a spindle: a watch learned from the first half of 2021-06-13, which goes through the whole of it, and
 through 06-12, of another printer, whose chamber sensor is absent and reads -180 degC.

@@ -153,7 +153,7 @@ def revise(program: Path, proof: str) -> dict[str, float]:
 
 
 def revisions() -> bool:
-    """Revise programs of growing length and say whether their memory is bounded."""
+    """Revise programs of growing length and state whether their memory is bounded."""
     from thermocomp.nc.linuxcnc.rs274 import find_obstacle
 
     jobs = [(size, "unproved") for size in SIZES] + ([(PROVED, "proved")] if find_obstacle() is None else [])
@@ -190,7 +190,7 @@ def revisions() -> bool:
 
 
 def tokenizer(paths: list[Path]) -> bool:
-    """Read programs and say whether that was fast enough."""
+    """Read programs and state whether that was fast enough."""
     programs = {path.name: list(split_lines(path.read_text("latin-1"))) for path in paths}
     if not paths:
         programs["a finishing program, made"] = made()

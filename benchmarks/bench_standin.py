@@ -4,7 +4,7 @@ Run with ``python benchmarks/bench_standin.py [instants]`` (5 per cycle: 20 in a
 sensors and six) each thermal cycle is left out in turn; `averaged` and the watch know nothing of it. Every temperature
 fails in every way at random instants of it, two hours before its end at the latest. From the report on, if an hour is
 left of the cycle, the RMS error of what the compensator leaves is divided by that with all sensors well. Which models
-may go on without a sensor is judged on the other cycles, each of them left out in turn too.
+may continue without a sensor is judged on the other cycles, each of them left out in turn too.
 """
 
 import os
@@ -51,7 +51,7 @@ class Cost:
     target: str
     sensor: str
     kind: str
-    stood: bool  #: the model may go on
+    stood: bool  #: the model may continue
     ratio: float  #: RMS error to that with all sensors well
     harm: float  #: RMS error minus that without compensation [um]
 

@@ -99,7 +99,7 @@ def compare(
     goal: float,
     repeats: tuple[int, int],
 ) -> bool:
-    """Time both sides in turn, print medians and ratio, and say whether the goal is reached."""
+    """Time both sides in turn, print medians and ratio, and state whether the goal is reached."""
     ours()  # warm
     our_times, their_times = [], []
     per_turn = repeats[0] // repeats[1]

@@ -3,7 +3,7 @@
 Run with ``OMP_NUM_THREADS=1 python benchmarks/bench_subsets.py [--quick]``; ``--quick`` leaves out what takes leaps
 most of a minute. Leaps is timed inside R, without its start. Both sides must find the same set of every size, with the
 same sum of squares to six digits: leaps is seen to lose half of its own. Ours is timed twice: the search (factorisation
-of the data included), and with the certificate, for which each set is fitted anew.
+of the data included), and with the certificate, for which each set is fitted again.
 """
 
 import shutil

@@ -157,7 +157,7 @@ def cases() -> Iterator[Case]:
         for n in (3, 5, 10):
             yield Case(f"{kind}, {n} files", independent(kind, n, 2), splits.leave_one_file_out, FIVE, high=0.07)
         for n in (4, 8):
-            name = f"{kind}, {n} files that go on"
+            name = f"{kind}, {n} files that continue"
             yield Case(name, continued(kind, n), splits.leave_one_file_out, FIVE, high=0.07)
         yield Case(f"{kind}, split", independent(kind, 1, 6), lambda s: splits.by_rows(s, 0.75, 0.25), FIVE, high=0.07)
     yield Case("harmful in one of six", real(0.5, 6, harm=5.0), splits.leave_one_cycle_out, FIVE, high=0.05)

@@ -86,7 +86,7 @@ def take_back(before: dict[Path, str]) -> None:
 
 
 def write(path: Path, text: str) -> None:
-    """Write a source file; its compiled form is not told from one of the same second and size."""
+    """Write a source file; its compiled form is not given from one of the same second and size."""
     path.write_text(text, encoding="utf-8")
     for compiled in (path.parent / "__pycache__").glob(f"{path.stem}.*.pyc"):
         compiled.unlink()

@@ -3,7 +3,7 @@
 Run with ``python benchmarks/nc_sweep.py --programs 2000 --seed 1``. Each seed gives one program, which is revised by
 both methods, for Z alone or for X, Y and Z. The judge (`tests/helpers/state_judge.py`) knows nothing of what
 the revision wanted. Printed are the counts, and why programs were refused. The folder of ``--found`` gets what was
-found, and what is wrong with both programs; a sweep that was interrupted goes on with what is there.
+found, and what is wrong with both programs; a sweep that was interrupted continues with what is there.
 """
 
 import argparse

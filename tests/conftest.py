@@ -17,7 +17,7 @@ from thermocomp.recordings.stacking import stack
 
 ROOT = Path(__file__).resolve().parent.parent
 
-#: of a property that does not say how many examples it wants: few at the desk, many in CI (HYPOTHESIS_PROFILE=ci)
+#: of a property that does not state how many examples it wants: few at the desk, many in CI (HYPOTHESIS_PROFILE=ci)
 settings.register_profile("quick", max_examples=25, deadline=None)
 settings.register_profile("thorough", max_examples=200, deadline=None)
 # the same examples each time: a commit passes or it does not; new ones are looked for by `make test-long`

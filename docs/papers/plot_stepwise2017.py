@@ -3,7 +3,7 @@ Stepwise regression 2017: from 24 temperatures to a few
 =======================================================
 
 *The Open Mechanical Engineering Journal* 11, 2017. 24 temperatures of a machine are more than a model needs. Stepwise
-regression takes in the one with the largest partial F, tests those inside again, and goes on until nothing enters and
+regression takes in the one with the largest partial F, tests those inside again, and continues until nothing enters and
 nothing leaves; five remain. On-line, the five predict the drift of X better than least squares on all 24 and than
 projection pursuit, with less than 5 um left.
 

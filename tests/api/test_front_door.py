@@ -179,8 +179,8 @@ def test_how_a_recording_begins(recording: Recording) -> None:
     assert tc.select(warm, "z_um", "partial-f", starts=rezeroed).sensors["z_um"]
     for wrong, message in (
         ([rezeroed], r"starts: 1 for 2 recording\(s\): give one each, or one for all"),
-        (went_on, "starts: 2 recordings cannot all go on from the same files"),
-        ([tc.Start(), tc.Start("continued", earlier=(after,))], "small cannot go on from itself"),
+        (went_on, "starts: 2 recordings cannot all continue from the same files"),
+        ([tc.Start(), tc.Start("continued", earlier=(after,))], "small cannot continue from itself"),
     ):
         with pytest.raises(InputError, match=message):
             tc.compare([before, after], "z_um", "ols", starts=wrong)
@@ -248,7 +248,7 @@ def test_recordings_come_as_anything(recording: Recording, tmp_path: Path) -> No
     assert len(tc.compare(files, "z_um", ["ols"], leave_one="file").to_frame(blocks=True)) == 3
     with pytest.raises(InputError, match="no recording given"):
         tc.compare([])
-    with pytest.raises(InputError, match="int is no recording: give a Recording, a path or a DataFrame"):
+    with pytest.raises(InputError, match="int is not a recording: give a Recording, a path or a DataFrame"):
         tc.compare([3])  # type: ignore[list-item]
     with pytest.raises(InputError, match="split and leave_one exclude each other"):
         tc.compare(recording, split="0.5/0.5", leave_one="cycle")

@@ -36,9 +36,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for ending, stamps in (("", ("", "")), ("-stamped", ("2026-03-01T08:00:00", "2026-03-01T13:00:30"))):
         recordings.write(part(whole, "a", slice(0, ROW), stamps[0]), there / f"a{ending}.csv")
         recordings.write(part(whole, "b", slice(ROW, None), stamps[1]), there / f"b{ending}.csv")
-    anew = part(whole, "anew", slice(ROW, None), "2026-03-01T13:00:30")
+    anew = part(whole, "again", slice(ROW, None), "2026-03-01T13:00:30")
     table = anew.table.assign(z_um=anew.table["z_um"] - anew.table["z_um"].iloc[0])
-    recordings.write(replace(anew, table=table), there / "anew-stamped.csv")
+    recordings.write(replace(anew, table=table), there / "again-stamped.csv")
     recordings.write(whole, there / "whole.csv")
     samples = stack([small_machine()], ["z_um"])
     model = train("dynamic", samples, 0, np.ones(len(samples), np.bool_)).model
@@ -75,7 +75,7 @@ def test_a_warm_start_is_not_taken_for_a_cold_one(folder: Path, capsys: pytest.C
     assert not (folder / "new.json").exists()
     start, cold = assessed(folder, capsys, b, "--start", "cold")
     assert (start["start"], start["how_known"]) == ("cold", "stated")
-    assert cold["rms_um"] > 5.0  # 0.6 um if it is known what it goes on from
+    assert cold["rms_um"] > 5.0  # 0.6 um if it is known what it continues from
 
 
 def test_continued_is_the_whole(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -101,7 +101,7 @@ def test_continued_is_the_whole(folder: Path, capsys: pytest.CaptureFixture[str]
 
 
 def test_found_out_by_time_stamps(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    a, b, anew = (str(folder / f"{n}-stamped.csv") for n in ("a", "b", "anew"))
+    a, b, anew = (str(folder / f"{n}-stamped.csv") for n in ("a", "b", "again"))
     start, found = assessed(folder, capsys, a, b)
     assert (start["start"], start["earlier"]) == ("continued", [a])
     assert "by time stamps and displacements; b-stamped begins 90 s after the end of a-stamped" in start["how_known"]
@@ -159,7 +159,7 @@ def test_cold_is_said(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
         (["--zero", "t9_C=20"], "no channel is named 't9_C'"),
         (["--continues", "b.csv"], "is the recording itself"),
         (["--continues", "a.csv", "--gap", "-5"], "a gap of -5 s between two files"),
-        (["a.csv", "--continues", "a.csv"], "2 recordings are given; name the one that goes on"),
+        (["a.csv", "--continues", "a.csv"], "2 recordings are given; name the one that continues"),
         (["--magnitude", "0"], "limit magnitude = 0.0: must be positive"),
     ],
 )
@@ -192,7 +192,7 @@ def test_fit_and_compare_go_on(folder: Path, capsys: pytest.CaptureFixture[str])
     assert content["starts"][0]["start"] == "continued"
     assert content["results"][0]["n_rows"] == round(0.4 * (400 - ROW))
     assert run(["compare", b, *study, "--models", "ols", "--start", "rezeroed"]) == 1
-    assert "was re-zeroed on a machine that went on from a" in capsys.readouterr().out
+    assert "was re-zeroed on a machine that continued from a" in capsys.readouterr().out
     subsets = ["--target", "z_um", "--method", "subsets", "--jobs", "1"]
     assert run(["select", b, *subsets]) == 2
     assert "Say how it begins: --continues EARLIER" in told(capsys)

@@ -87,7 +87,7 @@ def test_compare_as_json(drift: Path, capsys: pytest.CaptureFixture[str]) -> Non
         assert set(r) >= RESULT_KEYS
         assert r["block"] == "rows 600-799"
         assert r["verdict"] == "unproven"
-        assert r["reason"].startswith("judged on one stretch that goes on from what was learned; ")
+        assert r["reason"].startswith("judged on one stretch that continues from what was learned; ")
         assert r["n_sensors"] == len(r["sensors"])
         assert not {"z_um", "x_um"} & set(r["sensors"])
         assert r["mae_um"] <= r["rms_um"] <= r["max_um"]

@@ -30,7 +30,7 @@ _OURS = {
     "map.py": {"k", "more", "best"},
     "iso230.py": {"TITLES[t.kind]"},
     "face.py": {"file"},
-    "positiontables.py": {"unit", "anew", "states", "fit.enough", "sum((len(t) for t in tests))"},
+    "positiontables.py": {"unit", "again", "states", "fit.enough", "sum((len(t) for t in tests))"},
     "revise.py": {"mark", "revision.changed", "outcome.duration(revision.seconds)", "_spindle(job)", "took"},
     "terminal.py": {"table"},
     "volumetric.py": {

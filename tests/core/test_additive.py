@@ -137,7 +137,7 @@ def test_numbers_that_do_not_fit_are_refused(change: dict[str, Any], message: st
     [
         ("a", ((0, float("inf")),), "variable a: weights must be finite"),
         ("none", (), "variable none: is of no input"),
-        ("two\nlines", ((0, 1.0),), r"variable: 'two\\nlines' is no name"),
+        ("two\nlines", ((0, 1.0),), r"variable: 'two\\nlines' is not a name"),
     ],
 )
 def test_what_is_no_variable_is_refused(name: str, weights: Any, message: str) -> None:

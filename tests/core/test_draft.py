@@ -33,7 +33,7 @@ with draft(target, overwrite=True) as path:
 
 @contextmanager
 def writer(target: Path) -> Iterator[subprocess.Popen[str]]:
-    """A process that has written half of a file, and goes on when it gets a line."""
+    """A process that has written half of a file, and continues when it gets a line."""
     command = [sys.executable, "-c", WRITER, str(target)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout
@@ -61,7 +61,7 @@ def test_a_killed_run_is_cleared_away_and_a_living_one_is_not(tmp_path: Path) ->
             assert mine in hidden(tmp_path)
             assert len(hidden(tmp_path)) == 2  # that of the living one, and this
         assert hidden(tmp_path) == {mine}
-        living.communicate("go on\n")
+        living.communicate("continue\n")
         assert living.returncode == 0
     assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {"a.txt": "whole", "c.txt": "c"}
 

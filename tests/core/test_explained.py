@@ -63,7 +63,7 @@ def test_a_dozen_lines_say_it(model: ErrorModel) -> None:
     assert len(lines) == 14
     text = "\n".join(lines)
     assert "z_um: averaged predicts it [um] from 3 temperatures and spindle_rpm: these and their past." in lines
-    assert "temperatures from their mean over the first 5 min after a start while the spindle stands" in text
+    assert "temperatures from their mean over the first 5 min after a start while the spindle is stopped" in text
     assert "Honest error: 1.25 um RMS, largest 2.00, on unseen cycles; without compensation 5.00 RMS." in lines
     assert "Verdict: accepted, worse than none on cycle 3." in lines
     assert f"Band: {band.tell('um')}." in lines

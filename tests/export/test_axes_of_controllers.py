@@ -122,7 +122,7 @@ def test_the_files_say_what_goes_where_and_what_nobody_confirmed(of: Any) -> Non
 def test_axes_are_told_by_name_or_said() -> None:
     targets = ("z_um", "x1_um", "x2_um")
     tables = gather(Compensator.of([replace(growing(t, 2.0), honest_error=ACCEPTED) for t in targets], FREE))
-    with pytest.raises(InputError, match="x1_um and x2_um are both X: say which one"):
+    with pytest.raises(InputError, match="x1_um and x2_um are both X: state which one"):
         find_drives(tables, {})
     assert [d[:2] for d in find_drives(tables, {"x2_um": "Z", "z_um": "Y"})] == [("Y", 0), ("Z", 2)]
     with pytest.raises(InputError, match="--axes a: no such target"):

@@ -118,9 +118,7 @@ def test_each_target_has_its_own_verdict_and_what_is_left_out_is_said_in_the_fil
     assert run(["export", str(model), "--to", "c99", "-o", str(tmp_path / "out"), *taken]) == 1
     for name in ("tc_thermal.h", "tc_thermal.md"):
         text = (tmp_path / "out" / name).read_text()
-        assert text.split("\n")[0].strip("/* ") == (
-            "z_um: accepted on unseen cycles; y_um: UNPROVEN, taken all the same"
-        )
+        assert text.split("\n")[0].strip("/* ") == ("z_um: accepted on unseen cycles; y_um: UNPROVEN, taken anyway")
         assert "Left out: x_um: worse than nothing" in text
         assert "Left out: B0C: it predicts urad, and a correction is in um" in text
 
@@ -211,7 +209,7 @@ def test_only_what_may_run_moves_anything(tmp_path: Path, capsys: pytest.Capture
     assert (tmp_path / "shadow" / "tc_thermal.md").read_text().startswith("SHADOW ONLY, y_um: not proven")
     line = ["export", str(alone), "--to", "c99", "-o", str(tmp_path / "taken"), "--accept-unproven", "M. Weber, trial"]
     assert run(line) == 0
-    assert (tmp_path / "taken" / "tc_thermal.md").read_text().startswith("y_um: UNPROVEN, taken all the same")
+    assert (tmp_path / "taken" / "tc_thermal.md").read_text().startswith("y_um: UNPROVEN, taken anyway")
 
     (tmp_path / "no").mkdir()
     capsys.readouterr()
@@ -373,7 +371,7 @@ def test_a_name_in_any_script_stands_as_it_is(tmp_path: Path, to: str) -> None:
         ),
         (b"", "it is empty"),
         (b"G0 X1\n", "it begins with 'G0 X1'"),
-        (b"PK\x03\x04\xff\xfe", "it is no text, as an XLSX or a Parquet file is none"),
+        (b"PK\x03\x04\xff\xfe", "it is not text, as an XLSX or a Parquet file is none"),
         (b'{"format": "other"}', 'it has no "format": "thermocomp-model", found \'other\'; name the file that'),
         (b"[1, 2]", 'it has no "format": "thermocomp-model", found none; name the file that'),
     ],

@@ -81,7 +81,7 @@ def test_what_is_unproven_wants_somebody_who_takes_it(tmp_path: Path, capsys: py
     line = ["export", str(tmp_path / "model.json"), str(tmp_path / "drift.csv"), "--to", "klipper", *DATE]
     assert run([*line, "-o", str(tmp_path / "out"), "--accept-unproven", "M. Weber, trial"]) == 0
     lines = (tmp_path / "out" / "tc_thermal.cfg").read_text().splitlines()
-    assert lines[0] == "# z_um: UNPROVEN, taken all the same; reduced to what the controller holds"
+    assert lines[0] == "# z_um: UNPROVEN, taken anyway; reduced to what the controller holds"
     assert lines[1] == "# z_um: unproven, taken by M. Weber, trial"
 
 

@@ -43,7 +43,7 @@ def call(text: str, numbers: dict[int, float]) -> None:
         left_side, word, right_side = re.fullmatch(r"(.+?)(EQ|NE|LT|GT)(.+)", words).groups()  # type: ignore[union-attr]
         if right_side == "#0":  # vacant
             return (int(left_side[1:]) not in numbers) == (word == "EQ")
-        if left_side.startswith("#") and int(left_side[1:]) not in numbers:  # vacant is no number
+        if left_side.startswith("#") and int(left_side[1:]) not in numbers:  # vacant is not a number
             return word == "NE"
         a, b = real(left_side), real(right_side)
         return {"EQ": a == b, "NE": a != b, "LT": a < b, "GT": a > b}[word]

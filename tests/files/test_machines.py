@@ -281,7 +281,7 @@ def test_model_files_that_do_not_fit(tmp_path: Path) -> None:
         ('EYY = {model = "altered_position.json"}', "altered_position.json: its numbers do not match its checksum"),
         ('Y0C = {model = "."}', "cannot be read as a model file"),
         ('Y0C = {model = "two.json"}', "components.Y0C: "),
-        ('Y0C = {model = "two.json"}', "two.json holds models of a, b: say which by target"),
+        ('Y0C = {model = "two.json"}', "two.json holds models of a, b: state which by target"),
         ('Y0C = {model = "two.json", target = "c"}', "components.Y0C.target: there is no model in "),
         (
             'C0Y = {model = "two.json", target = "a"}',

@@ -113,16 +113,16 @@ def test_a_model_without_an_honest_error_is_read_and_does_not_run() -> None:
 def test_a_verdict_by_other_rules_does_not_run_even_if_taken(rules: int, word: str, verdict: str) -> None:
     (read,) = modelfile.loads(signed(put(rules, "honest_error", "rules"), put(verdict, "honest_error", "verdict")))
     for model in (read, read.taken("M. Weber, trial on machine 7")):
-        with pytest.raises(InputError, match=f"runs in shadow only: judged by {word} rules: .*; fit it anew"):
+        with pytest.raises(InputError, match=f"runs in shadow only: judged by {word} rules: .*; fit it again"):
             model.check_may_run()
 
 
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ('"unit": "um",', '"unit": "um", "unit": "um",', "not a model file: the key 'unit' stands twice in one table"),
-        ('"intercept": 0.0', '"intercept": NaN', "not a model file: NaN is no number"),
-        ('"intercept": 0.0', '"intercept": -Infinity', "not a model file: -Infinity is no number"),
+        ('"unit": "um",', '"unit": "um", "unit": "um",', "not a model file: the key 'unit' appears twice in one table"),
+        ('"intercept": 0.0', '"intercept": NaN', "not a model file: NaN is not a number"),
+        ('"intercept": 0.0', '"intercept": -Infinity', "not a model file: -Infinity is not a number"),
         ('"intercept": 0.0', '"intercept": 1e999', "holds what no model file can: 'Out of range float"),
         ('"target": "z_um"', '"target": "\\ud800"', "holds what no model file can: \"'utf-8' codec"),
         ('"intercept": 0.0', f'"intercept": {"9" * 4301}', "an integer of 4,301 digits"),
@@ -192,9 +192,9 @@ def test_of_a_long_list_the_first_error_is_enough() -> None:
 @pytest.mark.parametrize("name", ["", " ", "z\num", "z\x1b[2J", "z\u202e", "z\u2028", "x" * 201, "z\x00"])
 def test_names_are_names(name: str) -> None:
     for change in (put(name, "target"), put(name, "inputs", 1, "name")):
-        with pytest.raises(ModelFileError, match=r"is no name|a name has 1 to 200 characters"):
+        with pytest.raises(ModelFileError, match=r"is not a name|a name has 1 to 200 characters"):
             modelfile.loads(signed(change))
-    with pytest.raises(InputError, match=r"is no name|a name has 1 to 200 characters"):
+    with pytest.raises(InputError, match=r"is not a name|a name has 1 to 200 characters"):
         Input(name, "temperature", "degC", 20.0, True, -1.0, 1.0)
 
 
@@ -230,7 +230,7 @@ def test_what_is_no_plain_file_is_refused_and_nothing_waits(tmp_path: Path) -> N
         for read in (modelfile.read, read_machine, read_mapping):
             with pytest.raises(InputError, match=r"it is a folder, a pipe or a device"):
                 read(tmp_path / name)
-    with pytest.raises(ModelFileError, match=r"is no name of a model file: embedded null"):
+    with pytest.raises(ModelFileError, match=r"is not a name of a model file: embedded null"):
         modelfile.read(f"{tmp_path}/a\0b")
 
 
@@ -246,7 +246,7 @@ def test_files_have_a_size(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("sign", ["[],", "{},", '"",', "1,"])
 def test_so_has_what_stands_in_them(sign: str) -> None:
-    with pytest.raises(ModelFileError, match="stands in it more than"):
+    with pytest.raises(ModelFileError, match="appears in it more than"):
         modelfile.loads(signed().replace('"models": [', f'"models": [{sign * 6_000_000}'))
 
 
@@ -315,7 +315,7 @@ def test_lines_of_dots_are_comments(tmp_path: Path) -> None:
     assert read_mapping(path).columns["z"].missing == (1.5,) * 60
 
 
-# -- no model says what is no number ----------------------------------------------------------------------------------
+# -- no model says what is not a number --------------------------------------------------------------------------------
 
 
 def test_readings_of_any_size_give_numbers() -> None:

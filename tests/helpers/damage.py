@@ -1,5 +1,5 @@
 """Damaged files of models, machines, jobs and mappings, drawn by lot: as an accident leaves them, and as somebody who
-can sign them anew would make them.
+can sign them again would make them.
 """
 
 import json

@@ -4,7 +4,7 @@ from machine_writer import Writer
 
 
 def wake(w: Writer) -> None:
-    """Go on after the operator or the tool changer may have moved the axes: some name one axis at first."""
+    """Continue after the operator or the tool changer may have moved the axes: some name one axis at first."""
     x, y = w.spot()
     way = w.draw.randint(0, 4)
     if way == 0:
@@ -91,7 +91,7 @@ def tool(w: Writer, first: bool = False) -> None:
 
 
 def systems(w: Writer) -> None:
-    """Go on in another work coordinate system, some of which the program has set."""
+    """Continue in another work coordinate system, some of which the program has set."""
     draw = w.draw
     w.rapid(Z=w.clear) if w.maybe(0.7) else w.put("G53 G0 Z0")
     system = draw.choice((1, 2, 2, 3, 4, 6, 7, 9))

@@ -178,7 +178,7 @@ class Writer:
         self.put(" ".join(words) + extra)
 
     def by(self, code: str, f: float | None = None, **steps: float | None) -> None:
-        """Go on by these ways, in G91."""
+        """Continue by these ways, in G91."""
         words = [code]
         for letter, step in steps.items():
             if step is None:

@@ -220,7 +220,7 @@ def compare(blocks: Iterable[Block], ran: Ran) -> Comparison:  # noqa: PLR0911, 
                 else:
                     at = values[:3]
         beside = block.modal.cutter or (beside and not (block.known[0] and block.known[1]))
-        # after M6 the module goes on where the last straight move was, and takes no notice of G43 on that line
+        # after M6 the module continues where the last straight move was, and takes no notice of G43 on that line
         if block.tool_change is not None and (arced or "G43" in block.codes):
             unsure = {"X", "Y", "Z"}
         arced = block.kind == "arc" if block.moves else arced

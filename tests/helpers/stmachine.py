@@ -316,7 +316,7 @@ def finite(value: float) -> float:
 
 
 def run(machine: Machine, readings: Readings, targets: int, sensors: int) -> Answers:
-    """Call a block with readings; what is no number is not good."""
+    """Call a block with readings; what is not a number is not good."""
     said, told, found, passed = [], [], [], []
     for values, age, dt in zip(*readings, strict=True):
         good = [bool(np.isfinite(v)) for v in values]

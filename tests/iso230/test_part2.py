@@ -186,10 +186,10 @@ def test_what_is_wanted_changes_at_2_m() -> None:
 
 def test_the_uncertainty_is_said_not_to_be_told() -> None:
     r = assess(Positioning("Y", "cold", "um", TARGETS, UP, DOWN))
-    assert "uncertainty is not told" in positioning_tables([r])[0].caption
+    assert "uncertainty is not given" in positioning_tables([r])[0].caption
     content = positioning_content(r)
     assert content["uncertainty"] is None
-    assert "uncertainty is not told" in content["notes"][-1]
+    assert "uncertainty is not given" in content["notes"][-1]
 
 
 @pytest.mark.parametrize(

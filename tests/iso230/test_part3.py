@@ -105,7 +105,7 @@ def test_tilt_has_the_sign_of_the_house() -> None:
     assert Pair("x1_um", "x2_um", 100.0).angle(np.array([1.0]), np.array([3.0])).tolist() == [20.0]
     assert Pair("y1_um", "y2_um", 100.0).angle(np.array([1.0]), np.array([3.0])).tolist() == [-20.0]
     assert (
-        "no tilt is told: the distance between the probes y1_um and y2_um was not given" in assess(recording)[0].notes
+        "no tilt is given: the distance between the probes y1_um and y2_um was not given" in assess(recording)[0].notes
     )
 
 

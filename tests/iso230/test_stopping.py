@@ -79,7 +79,7 @@ def test_the_last_phase_is_judged() -> None:
     cold = judge_running(cooling, ["z_um"])
     assert cold.phase.kind == "cool-down"
     assert not cold.may_stop
-    assert "go on; not known yet: z_um" in cold.words
+    assert "continue; not known yet: z_um" in cold.words
     assert "the test may end" in judge_running(running(150, 150), ["z_um"]).words
 
 

@@ -69,7 +69,7 @@ def test_plus_a_day_only_the_day_is_judged(recording: Recording, models: tuple[E
     assert overall.learned == 800
     assert overall.row.tolist() == list(range(800, 1600))
     assert overall.word == "unproven"  # its level is that of the rows that were learned
-    assert overall.reason.startswith("judged on one stretch that goes on from what was learned")
+    assert overall.reason.startswith("judged on one stretch that continues from what was learned")
     assert overall.reason.endswith("; 800 of 1,600 rows were learned from: left out")
     # a piece of it in the middle of two days, in a file of its own beside a whole one
     both = [after(day, of(recording.table.iloc[100:500], recording)), small_machine(DAY, seed=6)]

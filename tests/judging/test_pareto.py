@@ -154,7 +154,7 @@ def test_what_the_next_sensor_gains_and_whether_it_is_worth_it() -> None:
 
 
 def test_two_sensors_that_are_worth_it_together_are_named() -> None:
-    """One alone brings nothing, so the look ahead goes on; what they bring has to be worth both of them."""
+    """One alone brings nothing, so the look ahead continues; what they bring has to be worth both of them."""
     one = by_hand([[4.0, 9.0], [3.9, 8.9], [2.5, 7.5], [2.5, 7.4]], [20.0, 30.0])
     margins = one.margin()
     assert margins is not None

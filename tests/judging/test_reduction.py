@@ -104,7 +104,7 @@ def test_the_full_model_is_fitted_anew_or_its_own_error_told() -> None:
     model, samples = full(recording, "dynamic"), stack([recording], ["z_um"])
     assert method_of(model, samples) == "dynamic"
     found = reduce_model(model, "Z", [recording], SHAPES["klipper"])
-    assert "dynamic, fitted anew" in found.reduced.beside
+    assert "dynamic, fitted again" in found.reduced.beside
     assert [a.block for a in found.full] == [a.block for a in found.blocks]
     assert model.provenance is not None
     for known in (None, replace(model.provenance, method="theirs"), replace(model.provenance, parameters={"a": "1"})):

@@ -113,7 +113,7 @@ def test_rezeroed_is_counted_from_there(method: str, known: bool) -> None:
     start = Start("rezeroed", "stated", (first,), gap) if known else Start("rezeroed")
     samples = stack([second], [TARGET], starts=start)
     own = samples.cycle >= 0
-    window = [0]  # a row every minute: the zero is one row, the spindle stands or not
+    window = [0]  # a row every minute: the zero is one row, the spindle is stopped or not
     if samples.resting is not None and samples.resting[own][0]:
         window = list(range(6))
     raw = second.table[TARGET].to_numpy()
@@ -184,7 +184,7 @@ def test_a_thermal_test_that_goes_on() -> None:
 def test_a_rezeroed_test_of_known_past_teaches_nothing() -> None:
     first, second, gap = cut(resting(), 150)
     samples = stack([second], [TARGET], starts=Start("rezeroed", "stated", (first,), gap))
-    with pytest.raises(FitError, match="b was re-zeroed on a machine that went on from a"):
+    with pytest.raises(FitError, match="b was re-zeroed on a machine that continued from a"):
         train("ols", samples, 0, np.ones(len(samples), np.bool_))
 
 

@@ -80,7 +80,7 @@ def test_the_operator_is_served_beside_a_crowd() -> None:
     ):
         for _ in range(3):
             ask(port)
-        fed(service, 25.0)  # and the service goes on
+        fed(service, 25.0)  # and the service continues
     assert service.counts["readings"] == 3
 
 
@@ -129,7 +129,7 @@ def test_who_does_not_read_is_dropped_and_blocks_nobody(monkeypatch: pytest.Monk
         base = f"http://127.0.0.1:{port}"
         with httpx.stream("GET", f"{base}/api/events", timeout=20.0) as listening:
             lines, deadline = listening.iter_lines(), time.monotonic() + 5.0
-            while time.monotonic() < deadline:  # who reads goes on
+            while time.monotonic() < deadline:  # who reads continues
                 assert next(lines) is not None
             ask(port)
             for k, one in enumerate(deaf):

@@ -1,4 +1,4 @@
-"""Hostile text and names without end, through a real broker: refused at the door, and the page goes on telling."""
+"""Hostile text and names without end, through a real broker: refused at the door, and the page continues telling."""
 
 import asyncio
 import json
@@ -217,7 +217,7 @@ def test_events_are_not_drowned(tmp_path: Path) -> None:
             shop.publish(many + [("p", json.dumps(one).encode()) for one in found])
             time.sleep(1.1)
         texts = [e["text"] for e in shop.state()["events"]]
-        assert "z_um counts anew: a new part" in texts
+        assert "z_um is re-zeroed: a new part" in texts
         assert sum("refused: no target" in t for t in texts) <= 30
         assert sum("messages refused" in t for t in texts) == 1
 

@@ -64,7 +64,7 @@ def test_show(live: Journal, capsys: pytest.CaptureFixture[str]) -> None:
     stamp = "2026-09-22T03:32:20+00:00  "
     assert [line.removeprefix(stamp) for line in lines[3:]] == [
         "state  z_um holding: no reading for [bold]3 s",
-        "reference  z_um counts anew: homing",
+        "reference  z_um is re-zeroed: homing",
         "measurement  z_um probing +2.00 um under a correction of -10.00 um, not in its frame; deviation +12.00 um",
         "measurement  z_um work_offset +12.00 um under a correction of -10.00 um, in its frame; deviation +12.00 um; "
         "the correction is in it, and counts twice while it stays in force",

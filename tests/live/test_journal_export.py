@@ -324,7 +324,7 @@ def test_a_clock_that_is_set_back_mixes_no_times(again: bool, tmp_path: Path) ->
     path, start = tmp_path / "live.db", StartRow(BEGIN, (TargetRow("z_um"),), (HEAT, Z), "off", 30.0)
     journal = Journal.open(path, JournalLimits(), start)
     for part, (begin, size) in enumerate(((0.0, 1.0), (1800.0, 2.0))):
-        if part and again:  # the service was started anew, by the other clock
+        if part and again:  # the service was started again, by the other clock
             journal.close()
             journal = Journal.open(path, JournalLimits(), start._replace(time=BEGIN + begin))
         for k in range(360):

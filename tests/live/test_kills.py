@@ -97,4 +97,4 @@ def test_no_step_above_the_rate(kills: int, tmp_path: Path) -> None:
     assert worst <= 1e-9
     assert max(abs(v) for _, v in seen) > 3.0
     moving = [v for _, v in seen]
-    assert abs(moving[-1]) >= 0.5 * max(map(abs, moving))  # it did not begin anew
+    assert abs(moving[-1]) >= 0.5 * max(map(abs, moving))  # it did not begin again

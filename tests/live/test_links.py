@@ -1,4 +1,4 @@
-"""Whatever a source or a sink raises is the trouble of its own link; the others and the service go on."""
+"""Whatever a source or a sink raises is the trouble of its own link; the others and the service continue."""
 
 import asyncio
 import json

@@ -143,12 +143,12 @@ def test_without_a_component_it_stays_and_a_new_one_begins_there() -> None:
         await until(lambda: sink.reports()["Z"].in_force < -11.9)
         machine.do("trace", "trace")
         keeper = [p for p in machine.pids("thermocomp_hal.py") if p != machine.component()]
-        for pid in (*keeper, machine.component()):  # so that nobody starts it anew
+        for pid in (*keeper, machine.component()):  # so that nobody starts it again
             os.kill(pid, signal.SIGKILL)
         await lost(sink)
         assert await sink.confirmed() is None
         await asyncio.sleep(0.5)
-        assert machine.get("axis.z.eoffset") == pytest.approx(-0.012, abs=1e-4)  # HAL goes on
+        assert machine.get("axis.z.eoffset") == pytest.approx(-0.012, abs=1e-4)  # HAL continues
         machine.do("off")
         machine.do("on")  # nobody looks after it: it begins at zero, and comes back within the rate
         await asyncio.sleep(1.5)

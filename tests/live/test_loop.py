@@ -147,7 +147,7 @@ def test_a_restart_goes_on_where_it_was(tmp_path: Path) -> None:
     again, other = Service(slow, [source], [], state_path=path), Given()
     again.sources = [other]
     assert again.state.corrections["z_um"].offset == -4.0
-    assert "goes on" in again.events[0].text
+    assert "continues" in again.events[0].text
 
     async def on() -> None:
         say(other, 22.0)
@@ -260,7 +260,7 @@ def test_what_is_ordered_is_in_the_events() -> None:
     service.rezero("z_um", "homing")
     assert [e.text for e in service.events][-2:] == [
         "z_um holding: by M. Weber, as ordered",
-        "z_um counts anew: homing",
+        "z_um is re-zeroed: homing",
     ]
 
 

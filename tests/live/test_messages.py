@@ -1,4 +1,4 @@
-"""Readings as messages: bounded, and what is no number is missing."""
+"""Readings as messages: bounded, and what is not a number is missing."""
 
 import json
 import math

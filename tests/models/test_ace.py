@@ -292,7 +292,7 @@ def test_unseen_tests_of_the_virtual_machine() -> None:
         return float(np.sqrt(np.mean((m.fit(T, y).predict(unseen) - truth) ** 2)))
 
     assert ACE().fit(T, y).psi_ > 0.99
-    # the test goes beyond what was learned: the monotone curves go on, the paper's are cropped (W-07)
+    # the test goes beyond what was learned: the monotone curves continue, the paper's are cropped (W-07)
     assert rms(MonotoneACE()) < 0.6 * rms(ACE())
     assert rms(MonotoneACE()) < 0.03 * np.ptp(truth)
     assert rms(ACE()) < 0.3 * np.sqrt(np.mean(truth**2))

@@ -171,5 +171,5 @@ def test_bad_input_is_refused() -> None:
     with pytest.raises(InputError, match="half_window >= 1"):
         maximal_correlations([t], half_window=0)
     T[7, 2] = np.nan
-    with pytest.raises(FitError, match="hole: row 7 holds a value that is no number"):
+    with pytest.raises(FitError, match="hole: row 7 holds a value that is not a number"):
         maximal_correlations([DataSet("hole", T, S)])

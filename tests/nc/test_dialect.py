@@ -70,7 +70,7 @@ def test_what_both_read_alike_is_not_asked_for(text: str) -> None:
     [
         (
             "G04P500",
-            "G4 P500 is 500 s for LinuxCNC, and 0.5 s for a Fanuc: say --controller, or for a Fanuc write G4 X, which",
+            "G4 P500 is 500 s for LinuxCNC, and 0.5 s for a Fanuc: give --controller, or for a Fanuc write G4 X, which",
         ),
         ("G4 P500.", "G4 P500. is 500 s for LinuxCNC and a Haas, and a Fanuc takes P in milliseconds without a point"),
         ("G98 G82 X1. Z-1. R1. P2.", "G82 P2. is 2 s for LinuxCNC and a Haas"),
@@ -152,7 +152,7 @@ def test_what_both_read_alike_is_not_asked_for(text: str) -> None:
             "G98 G19 G81 X1. Y2. Z-1. R1.",
             "G81 in G18 or G19 drills across that plane in LinuxCNC, and along Z in a Fanuc",
         ),
-        ("G98 G81 X1. Y2. Z-1. R1.\nG91 X3.", "G81 in G91 goes on with R and depth of lines before"),
+        ("G98 G81 X1. Y2. Z-1. R1.\nG91 X3.", "G81 in G91 continues with R and depth of lines before"),
         (
             "M48",
             "M48 is for LinuxCNC: overrides on; on a Fanuc or Haas it does what the machine's maker has made of it",
@@ -176,7 +176,7 @@ def test_a_word_with_two_readings_is_asked_for(text: str, asked: str) -> None:
     assert asked in found
     line = 5 + text.count("\n") - (text.endswith("\nG90"))
     assert found.startswith(f"line {line}: ")
-    assert found.endswith("write it so that both read the same, or say --controller linuxcnc or --controller fanuc")
+    assert found.endswith("write it so that both read the same, or give --controller linuxcnc or --controller fanuc")
     # LinuxCNC's own word anywhere decides it
     assert question(f"o100 sub\no100 endsub\n{program}") == ""
 
@@ -273,7 +273,7 @@ def test_what_only_linuxcnc_takes_decides(text: str) -> None:
 def test_what_only_a_fanuc_takes_is_named(text: str) -> None:
     found = question(f"{BEGIN}{text}\n{END}")
     assert found.startswith(f"line 5: {text!r} is ")
-    assert "say --controller fanuc (dwells, cycles and lengths are others there), or --controller linuxcnc" in found
+    assert "give --controller fanuc (dwells, cycles and lengths are others there), or --controller linuxcnc" in found
 
 
 @pytest.mark.parametrize(
@@ -292,7 +292,7 @@ def test_what_only_a_fanuc_takes_is_named(text: str) -> None:
 )
 def test_a_program_number_behind_words_is_a_fanucs(text: str) -> None:
     found = question(f"{text}\n{BEGIN}{END}")
-    assert f"line 1: {text!r} is how a Fanuc's or Haas's programs begin: say --controller fanuc" in found
+    assert f"line 1: {text!r} is how a Fanuc's or Haas's programs begin: give --controller fanuc" in found
 
 
 def test_habits_answer_for_lengths_only() -> None:

@@ -255,7 +255,7 @@ def test_values_are_those_of_the_interpreter(seed: int) -> None:
         if value is not None and truth is not None:
             assert value == pytest.approx(truth[0], rel=1e-9, abs=1e-9), text
         elif value is not None or not any(part in text for part in (" MOD ", "**", "tan[")):
-            # the interpreter may go on with 1 MOD 0 or 0 ** -1 (not a number, infinity) and lose it in a comparison;
+            # the interpreter may continue with 1 MOD 0 or 0 ** -1 (not a number, infinity) and lose it in a comparison;
             # its tan[90] is 1.6e16
             assert value is None, f"{text}: {value}, but the interpreter refuses it"
             assert truth is None, f"{text}: refused, but the interpreter has {truth}"

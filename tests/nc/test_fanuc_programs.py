@@ -53,7 +53,7 @@ def revise(path: Path, folder: Path, way: str) -> Trial:
         ledger.take(row)
         rows.append(row)
     if not run.changed:
-        raise ProgramError(1, "nothing was taken off")
+        raise ProgramError(1, "nothing was corrected")
     original, revised = folder / "original.nc", folder / "revised.nc"
     original.write_text("".join(lines), "ascii")
     revised.write_text("".join(t for row in rows for t in row.texts), "ascii")

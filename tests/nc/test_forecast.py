@@ -50,7 +50,7 @@ def test_decimal_commas(tmp_path: Path, delimiter: str) -> None:
         ("timestamp,t3_C\n2026-01-01,2\n", "since the start of the program"),
         ("time_s,t3_C\n1,2\n1,3\n", r"line 3, column 'time_s': '1': the time must be there and rise"),
         ("time_s,t3_C\n1,2\n,3\n", "must be there"),
-        ("time_s,t3_C\n1,warm\n", "line 2, column 't3_C': 'warm' is no number"),
+        ("time_s,t3_C\n1,warm\n", "line 2, column 't3_C': 'warm' is not a number"),
         ("time_s,t3_C\n1,nan\n", "no finite number"),
         ("time_s,t3_C\n1,2,3\n", "line 2 has 3 cells where the headings are 2"),
         ("time_s,t3_C,t3 [degC]\n1,2,3\n", "another one of t3_C"),

@@ -50,7 +50,7 @@ WRONG = [
     ("G81 X1 Z-1 R1 L0", "whole number"),
     ("G81 X1 Z-1 R1 A1", "rotary"),
     ("G81 X1 Z-1 R1\nR2", "no code that uses it"),
-    ("G84 X1 Z-1 R1", "spindle stands"),
+    ("G84 X1 Z-1 R1", "spindle is stopped"),
     ("M4\nG84 X1 Z-1 R1", "the other way"),
     ("G93 G1 X1 F1\nX2", "needs F"),
     ("G93 F1 G81 X1 Z-1 R1", "G93"),
@@ -58,7 +58,7 @@ WRONG = [
     ("G1 X1 F0", "no F is in force"),
     ("G33 Z-1", "needs K"),
     ("M3\nG33 Z-1 K1 F1", "remove F"),
-    ("G33 Z-1 K1", "spindle stands"),
+    ("G33 Z-1 K1", "spindle is stopped"),
     ("G38.2 X0", "starts where it ends"),
     ("G5 X1", "needs P and Q"),
     ("G10 L2 X1", "G10 L2"),
@@ -198,7 +198,7 @@ def test_a_speed_that_was_never_told() -> None:
         ("G64 G54 P1", "write G54.1 P1"),
         (
             "G17 G54 G64 P0.01",
-            "G64 with P is LinuxCNC's, and a Fanuc's G64 has none: remove P, or say --controller linuxcnc",
+            "G64 with P is LinuxCNC's, and a Fanuc's G64 has none: remove P, or give --controller linuxcnc",
         ),
         ("G2 X1. Y0. I0.5 P2", "G2 with P is LinuxCNC's"),
         ("M19 R90.", "M19 with R90. turns the spindle to an angle, in the way that the machine's maker has chosen"),
@@ -249,7 +249,7 @@ def test_fanuc_refusals(text: str, reason: str) -> None:
 
 @pytest.mark.parametrize("text", ["G30 P2 Z0.", "G91 G30 Z0. P2", "G54 P3", "G49 H0", "G0 X1. E2."])
 def test_a_letter_that_linuxcnc_has_no_use_for_may_be_a_fanucs(text: str) -> None:
-    with pytest.raises(ProgramError, match=r"no code that uses it in LinuxCNC.*say --controller fanuc if"):
+    with pytest.raises(ProgramError, match=r"no code that uses it in LinuxCNC.*give --controller fanuc if"):
         run(START + text + "\n")
 
 

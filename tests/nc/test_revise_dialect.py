@@ -38,7 +38,7 @@ def test_a_program_number_counts_wherever_it_is(
     line = next(n for n, text in enumerate(head.splitlines(), 1) if "1000" in text or "<" in text)
     message = said(capsys)
     assert f"part.nc: line {line}: " in message
-    assert "how a Fanuc's or Haas's programs begin: say --controller fanuc" in message
+    assert "how a Fanuc's or Haas's programs begin: give --controller fanuc" in message
     assert set(job_folder.iterdir()) == before
 
 
@@ -59,7 +59,7 @@ def test_what_makers_and_fanuc_have_made_of_a_code_is_asked_and_may_be_stated(
         assert revise(program="part.nc", dialect=False) == 2
         message = said(capsys)
         assert f"part.nc: line 6: {shown}" in message
-        assert "or say --controller linuxcnc or --controller fanuc" in message
+        assert "or give --controller linuxcnc or --controller fanuc" in message
         assert revise(program="part.nc", out=f"{word.replace(' ', '')}.nc") == 0, capsys.readouterr().err
 
 

@@ -25,7 +25,7 @@ def test_without_a_drift_there_is_no_file(
     assert revise("--model", "zero.json", *method) == 1
     assert set(job_folder.iterdir()) == before
     text = out(capsys)
-    assert "nothing written: nothing was taken off: the drift in the cuts is 0.0 um at most" in text
+    assert "nothing written: nothing was corrected: the drift in the cuts is 0.0 um at most" in text
     assert "run the original, or give a smaller --tolerance" in text
     assert "Written" not in text
 

@@ -16,7 +16,7 @@ from thermocomp.core.model import ErrorModel
     ("program", "message"),
     [
         ("G90\nG0 X1\nM2\n", "part.ngc: line 2: X1 before G20 or G21: inches or millimetres?"),
-        ("G90\nG0 X1\nM2\n", "say which unit the control starts with (--units)"),
+        ("G90\nG0 X1\nM2\n", "state which unit the control starts with (--units)"),
         ("G21\nM3\nG0 X1\nM2\n", "part.ngc: line 2: M3 and no spindle speed was stated"),
         (
             "G21\nG0 X1\nG1 X2 F100\nM2\n",
@@ -82,7 +82,7 @@ def test_whose_a_program_with_a_number_is_has_to_be_said(
     program = f"%\n{number}\nG21 G90 G17 G94\nT1 M6\nS4000 M3\nG0 G54 X0. Y0. Z5.\nG4 P3000\nG1 Z-1. F300.\nM30\n%\n"
     Path("part.nc").write_text(program, encoding="ascii")
     assert revise(program="part.nc", out="out.nc", dialect=False) == 2
-    assert f"line 2: '{number}' is how a Fanuc's or Haas's programs begin: say --controller fanuc" in said(capsys)
+    assert f"line 2: '{number}' is how a Fanuc's or Haas's programs begin: give --controller fanuc" in said(capsys)
     assert revise("--controller", "fanuc", program="part.nc", out="out.nc") in (0, 1)
 
 
@@ -91,7 +91,7 @@ def test_a_cut_with_a_standing_spindle_is_told(job_folder: Path, capsys: pytest.
     assert revise(program="bad.ngc") == 0
     Path("bad.ngc").write_text(PLATE.replace("G1 Z-1", "M5\nG1 Z-1"), encoding="ascii")
     assert revise("--overwrite", program="bad.ngc") in (0, 1)
-    assert "the spindle stands at line 9, and the tool moves in feed: is that right?" in " ".join(
+    assert "the spindle is stopped at line 9, and the tool moves in feed: is that right?" in " ".join(
         capsys.readouterr().out.split()
     )
 
@@ -110,10 +110,10 @@ def test_a_refusal_leaves_an_earlier_run_as_it_was(job_folder: Path) -> None:
     [
         (replace(lags("z_um"), honest_error=replace(HONEST, verdict="refused", reason="harm")), [], "was refused"),
         (judged(lags("z_um", room=True)), [], "wants t3_C, a temperature: it is not driven by the speed alone"),
-        (judged(lags("height_um")), [], "does not say which axis it is; say --axis height_um=Z, or --axis"),
-        (judged(lags("y1_um")), [], 'say --axis y1_um=Y, or --axis "y1_um=Y at Z 200 mm"'),
-        (judged(lags("X_probe")), [], "say --axis X_probe=X, or --axis"),
-        (judged(lags("yaw")), [], "say --axis yaw=Z, or --axis"),
+        (judged(lags("height_um")), [], "does not state which axis it is; give --axis height_um=Z, or --axis"),
+        (judged(lags("y1_um")), [], 'give --axis y1_um=Y, or --axis "y1_um=Y at Z 200 mm"'),
+        (judged(lags("X_probe")), [], "give --axis X_probe=X, or --axis"),
+        (judged(lags("yaw")), [], "give --axis yaw=Z, or --axis"),
         (judged(lags("z_um")), ["--axis", "zz=Z"], "there is no model of 'zz'"),
         (judged(lags("z_um")), ["--constant", "t3=20degC"], "driven by the spindle speed alone"),
         (judged(lags("z_um")), ["--origin", "G60=1 mm, 2 mm, 3 mm"], "want a work coordinate system"),
@@ -134,7 +134,7 @@ def test_a_refusal_leaves_an_earlier_run_as_it_was(job_folder: Path) -> None:
         (
             judged(lags("z_um")),
             ["--method", "offset"],
-            "make sure that none is, and say --no-g92; or take --method coord",
+            "make sure that none is, and give --no-g92; or take --method coord",
         ),
         (judged(lags("z_um")), ["--rotation", "G54=12"], "--rotation 'G54=12': write an angle in degrees, such as"),
         (judged(lags("z_um")), ["--rotation", "none", "G54=1 deg"], "--rotation 'none': want a work coordinate system"),

@@ -52,7 +52,7 @@ def test_a_model_that_is_worse_than_the_drift_is_told(job_folder: Path, capsys: 
     said = f"may be wrong by 9.6 um, and the drift in the cuts is {axis['without_um']:.1f} um: revising may not help"
     assert any(said in w for w in warnings)
     _, warnings = bound([], capsys)
-    assert not any("may not help" in w or "nothing was taken off" in w for w in warnings)
+    assert not any("may not help" in w or "nothing was corrected" in w for w in warnings)
 
 
 def test_one_measurement_for_several_places(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -247,7 +247,7 @@ def test_what_the_interpreter_does_not_run_is_told(job_folder: Path, capsys: pyt
     assert revise(proved=True) == 2
     message = said(capsys)
     assert "part.ngc: it cannot be proved: LinuxCNC's interpreter does not run the original: line 14: " in message
-    assert message.endswith("; --unproved writes it all the same, and its header says so")
+    assert message.endswith("; --unproved writes it anyway, and its header says so")
     assert set(job_folder.iterdir()) == before
 
 

@@ -123,7 +123,7 @@ def test_a_measured_start_says_what_was_measured(make: Callable[[], ErrorModel],
     assert drift.deviation(ORIGIN)[2] == pytest.approx(deviation, abs=1e-6)
     drift.advance(5.0, 0.0)
     fastest = 5.0 if make is net else 0.04 * deviation + 1e-6
-    assert drift.deviation(ORIGIN)[2] == pytest.approx(deviation, abs=fastest)  # it goes on from there
+    assert drift.deviation(ORIGIN)[2] == pytest.approx(deviation, abs=fastest)  # it continues from there
 
 
 def test_a_measured_lag_bank_has_settled_at_one_speed() -> None:

@@ -50,7 +50,7 @@ def test_the_user_says_it() -> None:
 @pytest.mark.parametrize(
     ("targets", "texts", "says"),
     [
-        (("ch3", "z"), [], r"'ch3' does not say which axis.*ch3=Z.*targets are ch3, z"),
+        (("ch3", "z"), [], r"'ch3' does not state which axis.*ch3=Z.*targets are ch3, z"),
         (("x_at_200", "x_at_0"), [], "'x_at_200' does not say"),
         (("ch3", "z"), ["ch4=Z"], "no model of 'ch4'.*ch3"),
         (("ch3",), ["ch3=Z", "ch3=X"], "ch3 was given before"),

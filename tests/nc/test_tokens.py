@@ -166,7 +166,7 @@ def test_demarcation(text: str) -> None:
         ("G1 X- Y2", "column 7: found 'Y'"),
         ("X.", "column 2: found '.'"),
         ("X5.5.5", "column 5: found '.'"),
-        ("G1 X1 X2", "column 7: X stands on the line twice, first in column 4"),
+        ("G1 X1 X2", "column 7: X appears twice on the line, first in column 4"),
         ("G1 X[1+[2]", "column 5: the bracket '[' is not closed"),
         ("G1 X[1]]", "column 8: found ']'"),
         ("G1 X[1 (c) +2]", "column 8: a comment stands inside brackets"),

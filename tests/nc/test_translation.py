@@ -245,7 +245,7 @@ def test_what_stands_at_the_other_control() -> None:
         ("G10 L2 P0 X1.", "external offset"),
         ("G30 P3 Z0.", "two reference points"),
         ("G49\nG43", "G43 without H"),
-        ("M5\nG0 Z5.\nG86 X1. Z-1. R1. F100", "while the spindle stands"),
+        ("M5\nG0 Z5.\nG86 X1. Z-1. R1. F100", "while the spindle is stopped"),
     ],
 )
 def test_what_is_not_the_same_is_not_translated(text: str, reason: str) -> None:

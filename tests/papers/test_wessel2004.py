@@ -73,7 +73,7 @@ def heated_rod(name: str, heat: FloatArray, *, room: float = 20.0, n_t: int = 9,
 
 
 def schedule(name: str, rows: int, pieces: int) -> FloatArray:
-    """Return heat at both ends, drawn anew for every piece of a test."""
+    """Return heat at both ends, drawn again for every piece of a test."""
     drawn = np.random.default_rng([*name.encode()]).choice([0.0, 0.5, 1.0, 2.0], (pieces, 2))
     return drawn[np.arange(rows) * pieces // rows]
 

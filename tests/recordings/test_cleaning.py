@@ -97,7 +97,9 @@ def test_a_probe_that_was_knocked_goes_on() -> None:
 def test_a_probe_is_zeroed_at_an_instant() -> None:
     mended = clean(rows(), [Rezero(("z_um",), at=0.0, to=5.0)])
     assert mended.table["z_um"].tolist() == [5.0 + 2.0 * k for k in range(12)]
-    with pytest.raises(InputError, match="z_um has no value before the instant, from which it could go on; give `to`"):
+    with pytest.raises(
+        InputError, match="z_um has no value before the instant, from which it could continue; give `to`"
+    ):
         clean(rows(), [Rezero(("z_um",), at=0.0)])
 
 

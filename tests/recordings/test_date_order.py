@@ -1,4 +1,4 @@
-"""The order of day and month is that in which a recording goes on; where several do, it is asked for, never guessed."""
+"""The order of day and month is that in which a recording continues; where several do, it is asked for."""
 
 from contextlib import suppress
 from datetime import datetime, timedelta
@@ -156,7 +156,7 @@ def test_what_changes_no_duration_is_taken_without_a_question(
 ) -> None:
     day = series(datetime(2024, 3, 5, 8), timedelta(minutes=10), 48)
     path = written(tmp_path / "day.csv", day, "%d/%m/%Y %H:%M")
-    with pytest.raises(InputError, match="day/month/year or month/day/year, and no row tells which; say how"):
+    with pytest.raises(InputError, match="day/month/year or month/day/year, and no row tells which; state how"):
         read(path)
     assert run(["map", str(path), "--yes"]) == 0
     assert "%d/%m/%Y" in capsys.readouterr().out

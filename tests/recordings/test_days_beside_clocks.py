@@ -209,7 +209,7 @@ def test_a_format_that_passes_over_the_day_loses_no_date(tmp_path: Path) -> None
 )
 def test_the_format_that_is_offered_fits(days: tuple[str, str], form: str, tmp_path: Path) -> None:
     path = write(tmp_path / "d.csv", "Date,Time", two(f"{days[0]},#", f"{days[1]},#"))
-    with pytest.raises(RecordingError, match="say how it is written") as caught:
+    with pytest.raises(RecordingError, match="state how it is written") as caught:
         read_or_offer(path)
     assert caught.value.remedies[0]["time"]["format"] == f"{form} %H:%M:%S"
     mended = read(path, check_content(dict(caught.value.remedies[0]), "mapping"))

@@ -119,7 +119,7 @@ def test_columns_of_one_name_are_told_apart_by_number(tmp_path: Path) -> None:
 def test_dates_that_can_be_read_in_two_ways_are_asked_for(tmp_path: Path) -> None:
     path = tmp_path / "american.csv"
     path.write_text("Day;Clock;n_rpm;T1_C;T2_C;z_um\n" + stamped("%m/%d/%Y;%H:%M:%S"), encoding="utf-8")
-    with pytest.raises(RecordingError, match="say how it is written in a mapping"):
+    with pytest.raises(RecordingError, match="state how it is written in a mapping"):
         read(path)
     same(read(path, Mapping(TimeColumn("Clock", format="%m/%d/%Y %H:%M:%S", date="Day"))))
 

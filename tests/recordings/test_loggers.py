@@ -154,7 +154,7 @@ ASKED: dict[str, tuple[str, str, str, str]] = {
         "2024-04-03T08:00:00",
         "line 2, column 'Date': '03/04/2024 08:00:00' can be read as day/month/year or month/day/year, and no row "
         "tells "
-        'which; say how it is written in a mapping: [time] column = "Time", date = "Date" and format = '
+        'which; state how it is written in a mapping: [time] column = "Time", date = "Date" and format = '
         '"%d/%m/%Y %H:%M:%S" or format = "%m/%d/%Y %H:%M:%S"',
         '[time]\ncolumn = "Time"\ndate = "Date"\nformat = "%d/%m/%Y %H:%M:%S"\n',
     ),
@@ -180,7 +180,7 @@ ASKED: dict[str, tuple[str, str, str, str]] = {
     "three_digits.csv": (
         "three",
         "",
-        "'21,500' can be read as 21500 or as 21.500, and no other number tells which; say what the decimal sign is "
+        "'21,500' can be read as 21500 or as 21.500, and no other number tells which; state the decimal sign "
         "in a "
         'mapping: [read] decimal = "," or decimal = "."',
         '[read]\ndecimal = ","\n',
@@ -188,8 +188,8 @@ ASKED: dict[str, tuple[str, str, str, str]] = {
     "two_sheets.xlsx": (
         "nine",
         "",
-        "the sheets 'before service', 'after service' all hold a table; say which in a mapping, such as [read] sheet = "
-        '"before service"',
+        "the sheets 'before service', 'after service' all hold a table; state which in a mapping, such as [read] "
+        'sheet = "before service"',
         '[read]\nsheet = "before service"\n',
     ),
 }

@@ -355,7 +355,7 @@ def test_several_tests_are_kept_and_known_one_by_one() -> None:
     for run in prints.runs:
         rows = unpack_marks(run.rows).astype(np.int64)
         assert len(rows) > 100
-        assert ((rows % 800) + LENGTH * run.stride < 800).all()  # no run goes on in another test
+        assert ((rows % 800) + LENGTH * run.stride < 800).all()  # no run continues in another test
     for k, test in enumerate(tests):
         found = overlap(prints, stack([test], ["z_um"]), 0)
         assert np.abs(found - np.arange(800 * k, 800 * (k + 1))).max() <= 2 * LENGTH

@@ -127,11 +127,11 @@ def test_columns_by_pattern_by_places_and_by_name(tmp_path: Path) -> None:
     table = wide(found)
     table = table.assign(**{c.replace("y_laser", "z_laser"): 0.0 for c in map(str, table) if c.startswith("y_laser")})
     table.to_csv(tmp_path / "both.csv", index=False)
-    with pytest.raises(RecordingError, match=r"profiles called y_laser_\*, z_laser_\*; say which .*'y_laser_"):
+    with pytest.raises(RecordingError, match=r"profiles called y_laser_\*, z_laser_\*; state which .*'y_laser_"):
         read(tmp_path / "both.csv", "EYY")
     for pattern in ("y_laser_*", "y_laser_*_um"):
         same(read(tmp_path / "both.csv", ProfileOptions(target="EYY", columns=pattern)), _with_zeros(found))
-    with pytest.raises(RecordingError, match=r"no column is called 'x_\*'; say which .* There are y_laser_0_um"):
+    with pytest.raises(RecordingError, match=r"no column is called 'x_\*'; state which .* There are y_laser_0_um"):
         read(tmp_path / "both.csv", ProfileOptions(target="EYY", columns="x_*"))
     with pytest.raises(InputError, match="put \\* where the position stands"):
         read(tmp_path / "both.csv", ProfileOptions(target="EYY", columns="y_laser"))
@@ -155,7 +155,7 @@ def _with_zeros(found: Profiles) -> Profiles:
 
 def test_columns_that_nobody_named_must_suit_the_component(tmp_path: Path) -> None:
     wide(made()).to_csv(tmp_path / "wide.csv", index=False)
-    with pytest.raises(RecordingError, match="columns like 'y_laser_0_um' seem to be of Y, not of EXX; say which"):
+    with pytest.raises(RecordingError, match="columns like 'y_laser_0_um' seem to be of Y, not of EXX; state which"):
         read(tmp_path / "wide.csv", "EXX")
     assert read(tmp_path / "wide.csv", ProfileOptions(target="EXX", columns="y_laser_*")).axis == "X"
     assert read(tmp_path / "wide.csv", "EXY").target == "EXY"
@@ -167,7 +167,7 @@ def test_columns_that_nobody_named_must_suit_the_component(tmp_path: Path) -> No
         read(tmp_path / "wide.csv", "laser")
     own = ProfileOptions(target="laser", axis="Y", unit="um")
     assert read(tmp_path / "wide.csv", own).target == "laser"
-    with pytest.raises(InputError, match="say whether it is in um or urad"):
+    with pytest.raises(InputError, match="state whether it is in um or urad"):
         read(tmp_path / "wide.csv", ProfileOptions(target="laser", axis="Y"))
 
 
@@ -250,7 +250,7 @@ def test_columns_of_a_long_table(tmp_path: Path) -> None:
     table = long(found)
     path = tmp_path / "long.csv"
     table.assign(other_um=1.0).to_csv(path, index=False)
-    with pytest.raises(RecordingError, match="one column of displacements; there are error_um, other_um: say which"):
+    with pytest.raises(RecordingError, match="one column of displacements; there are error_um, other_um: state which"):
         read(path, "EYY")
     assert "other_um" in [c.name for c in read(path, ProfileOptions(target="EYY", columns="error_um")).states.channels]
     with pytest.raises(InputError, match="no column is called 'errors'; there are t1_C"):

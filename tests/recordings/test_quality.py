@@ -290,7 +290,7 @@ def test_one_cycle_is_told_with_its_reason() -> None:
     assert check(turning) == ()
     once = np.where(TIME < 7500, 3000.0, 0.0)
     still = replace(turning, table=turning.table.assign(n=once)).with_cycles(make_single_cycle(N))
-    assert "does not start anew" in check(still)[0].text
+    assert "does not start again" in check(still)[0].text
     assert "starts has a stop and a run of 300 s" in check(turning.with_cycles(make_single_cycle(N)))[0].text
 
 

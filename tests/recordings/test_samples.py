@@ -276,7 +276,7 @@ def test_files_that_follow_each_other(stamp: str, level: float, word: str) -> No
 
 
 def test_three_files_of_one_test() -> None:
-    """What the last one goes on from is both others, in the order of time."""
+    """What the last one continues from is both others, in the order of time."""
     first = _drift(stamp="2026-03-01T08:00:00")
     second = replace(_drift(50.7, stamp="2026-03-01T08:49:55"), name="second")
     second.table["z_um"] = 50.7

@@ -80,7 +80,7 @@ def test_what_only_one_reading_fits_is_read(
         ("Date", ["03-04-2024 08:00", "04-04-2024 08:00"], "day/month/year or month/day/year"),
         ("Date", ["03/04/2024 8:00:00 PM", "03/04/2024 8:00:10 PM"], "%d/%m/%Y %I:%M:%S %p"),
         ("Zeit", ["00:10", "00:20"], "hours and minutes or as minutes and seconds.*%H:%M.*%M:%S"),
-        ("Zeit", ["2024-05-27 08:00:00 EST", "2024-05-27 08:00:10 EST"], "say how it is written"),
+        ("Zeit", ["2024-05-27 08:00:00 EST", "2024-05-27 08:00:10 EST"], "state how it is written"),
         ("Time", ["45439.3333333333", "45439.3334490741"], "holds numbers from 45439.333333333 .* says no unit"),
         ("Time [m]", ["0", "1"], "'m' stands for metres; minutes are min"),
         ("T", ["0", "1"], "no time column"),
@@ -414,7 +414,7 @@ def test_a_clock_that_is_set_needs_its_zone(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="02:00:00 is before 2024-10-27 02:59:00"):
         read(autumn, utc)
     missing = stamps(tmp_path / "missing.csv", "2024-03-31 01:58:00", "2024-03-31 02:30:00")
-    with pytest.raises(RecordingError, match=r"these are no times in Europe/Berlin: .*02:30:00"):
+    with pytest.raises(RecordingError, match=r"these are not times in Europe/Berlin: .*02:30:00"):
         read(missing, berlin)
     with pytest.raises(InputError, match=r"\[time\]: zone = 'Europe/Berln' is not known"):
         Mapping(TimeColumn(zone="Europe/Berln"))

@@ -129,7 +129,7 @@ def test_without_a_failure_there_is_a_sentence() -> None:
     assert "fades" not in words(page)
     bare = replace(judged, models=(replace(watched_model(), watch=None),))
     (why,) = faults.section(bare, [day]).parts
-    assert why == "No watch over the temperatures was asked: the model file holds none; fit it anew."
+    assert why == "No watch over the temperatures was asked: the model file holds none; fit it again."
 
 
 def test_the_verdict_stands_out_by_what_it_is(judged: Judged, recording: Recording) -> None:

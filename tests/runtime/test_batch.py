@@ -145,7 +145,7 @@ def test_a_correction_that_nothing_drives_is_held_and_then_fades() -> None:
         # the row in which the hold ends fades as a whole
         left = before * math.exp(-(since[-1] - limits.hold) / limits.fade)
         assert found.compensated[-1] == pytest.approx(left)
-        assert found.deviation[-1] == pytest.approx(14.5)  # the model alone goes on
+        assert found.deviation[-1] == pytest.approx(14.5)  # the model alone continues
 
 
 def test_a_slow_limit_is_seen_in_what_runs_and_not_in_the_model() -> None:

@@ -1,4 +1,4 @@
-"""A compensator that stops and goes on: no jump, nothing forgotten that counts, one target beside the other."""
+"""A compensator that stops and continues: no jump, nothing forgotten that counts, one target beside the other."""
 
 import math
 from dataclasses import replace

@@ -148,7 +148,7 @@ BODY = HEAD + 'segments = [{duration = "1 min"}]\n'
         (HEAD + 'duration = "inf h"', "key 'duration' = 'inf h': write a time with its unit"),
         (HEAD + 'duration = "3 parsec"', "key 'duration' = '3 parsec': unknown unit 'parsec'"),
         (HEAD + 'duration = "3 mm"', "unit 'mm' measures displacement or position, not time"),
-        (HEAD + "speed = 100", "key 'duration': is missing: say how long it lasts"),
+        (HEAD + "speed = 100", "key 'duration': is missing: state how long it lasts"),
         (HEAD + "segments = 3", "key 'segments' = 3: must be a list"),
         (HEAD + "segments = [3]", "[[segments]] 1: must be a table"),
         (HEAD + 'duration = "1 min"\nspeed = inf', "key 'speed' = inf: Input should be a finite number"),

@@ -35,7 +35,7 @@ class Joint:
             self.pivot[k] += axis.measured_at[k]
         straight = np.eye(3)[k]
         guide = Rotation.from_rotvec(1e-6 * np.array(lean[name])).apply(straight)
-        # the carriage goes on the axis itself to the reference position, and along the guide from there
+        # the carriage continues the axis itself to the reference position, and along the guide from there
         self.move = axis.reference_position * straight + (point[k] - axis.reference_position) * guide
         self.move = self.move + 1e-3 * np.array([of[f"E{a}{name}"] for a in "XYZ"])
         self.way = point[k] * straight

@@ -188,7 +188,7 @@ def test_a_correction_that_does_not_settle_is_refused() -> None:
 
 
 def test_beyond_the_travel_the_correction_at_its_end_is_held() -> None:
-    """A live compensator a hundredth of a millimetre beyond must not stop, and nothing goes on without limit."""
+    """A live compensator a hundredth of a millimetre beyond must not stop, and nothing continues without limit."""
     field = VolumetricModel(machine := rich("XFZY")).field(np.full(len(VolumetricModel(machine).stack.models), 9.0))
     ends = np.array([[0.0, 600.0, 600.0], [600.0, 0.0, 300.0]])
     at_ends = field.correction(ends)

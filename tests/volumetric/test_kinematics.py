@@ -26,7 +26,7 @@ LEVERS = {
     "YXFZ": {"Y": (95.0, 0.0, 170.0), "X": (5.0, 0.0, 170.0), "Z": (5.0, 0.0, -100.0)},
     # the table moves in X; on the column the head goes up and down and the ram in and out
     "w X' b Z Y (C1) t": {"X": (5.0, 180.0, 170.0), "Z": (5.0, 180.0, -100.0), "Y": (5.0, 0.0, -100.0)},
-    # the spindle stands still: between Z and the tool nothing moves
+    # the spindle is stopped: between Z and the tool nothing moves
     "XYZF": {"X": (5.0, 180.0, 170.0), "Y": (5.0, 0.0, 170.0), "Z": (5.0, 0.0, -100.0)},
     "XZY": {"X": (5.0, 180.0, 170.0), "Z": (5.0, 180.0, -100.0), "Y": (5.0, 0.0, -100.0)},
 }

@@ -33,7 +33,7 @@ def place(body: Pose, at: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Slide:
-    """How a slide goes on its guide: turns and shifts that change with the position, about a bearing of its own."""
+    """How a slide continues its guide: turns and shifts that change with the position, about a bearing of its own."""
 
     axis: int
     sense: float  # +1: it carries the tool, to plus; -1: it carries the workpiece, to minus

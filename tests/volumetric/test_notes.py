@@ -71,7 +71,7 @@ def test_a_turn_that_counts_from_there_is_told_once() -> None:
     (found,) = note_counted_twice(mill({"ECX": shifted}))
     assert "ECX is 15 urad at X 300 mm" in found
     assert "by 7.5 um along X" in found
-    # models of time begin at zero; what nobody sees is not told; nothing else turns
+    # models of time begin at zero; what nobody sees is not given; nothing else turns
     quiet: dict[str, Source] = {"ECX": line("ECX", "urad", {"t": 9.0}), "EAX": 0.05, "EXX": 9.0, "C0Y": 9.0, "A0C": 9.0}
     assert note_counted_twice(mill(quiet)) == ()
 

@@ -99,7 +99,7 @@ def recordings_of(given: Given, mapping: str | Path | mappings.Mapping | None = 
         elif isinstance(one, pd.DataFrame):
             found.append(Recording.from_dataframe(one, name=f"table {k}" if len(several) > 1 else "table"))
         else:
-            raise InputError(f"{type(one).__name__} is no recording: give a Recording, a path or a DataFrame")
+            raise InputError(f"{type(one).__name__} is not a recording: give a Recording, a path or a DataFrame")
     return found
 
 
@@ -119,7 +119,7 @@ def starts_of(starts: Starts, recordings: Sequence[Recording]) -> tuple[Start, .
     Raises
     ------
     InputError
-        They are not as many as the recordings, or one goes on from itself or is told to several.
+        They are not as many as the recordings, or one continues from itself or is told to several.
     """
     if starts is None:
         return None
@@ -128,11 +128,11 @@ def starts_of(starts: Starts, recordings: Sequence[Recording]) -> tuple[Start, .
         raise InputError(f"starts: {len(each)} for {len(recordings)} recording(s): give one each, or one for all")
     if isinstance(starts, Start) and starts.earlier and len(recordings) > 1:
         raise InputError(
-            f"starts: {len(recordings)} recordings cannot all go on from the same files: give one start each"
+            f"starts: {len(recordings)} recordings cannot all continue from the same files: give one start each"
         )
     for start, r in zip(each, recordings, strict=True):
         if r.fingerprint in (e.fingerprint for e in start.earlier):
-            raise InputError(f"starts: {r.name} cannot go on from itself: name the file before it in earlier=")
+            raise InputError(f"starts: {r.name} cannot continue from itself: name the file before it in earlier=")
     return each
 
 
@@ -184,7 +184,7 @@ def prepare(
     starts : Start or sequence of Start, optional
         How the recordings begin, see `starts_of`.
     zero_over : float
-        Average the start over so long, while the spindle stands [s].
+        Average the start over this time, while the spindle is stopped [s].
     tilt : sequence of str, optional
         Tilts to predict too, see `thermocomp.recordings.tilts.with_tilts`.
     split, leave_one : str, optional

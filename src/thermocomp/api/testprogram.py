@@ -55,7 +55,7 @@ def stretches(trial: Trial, every: float = 0.0) -> Iterator[ProgramStretch]:
 def write_program(trial: Trial, dialect: Dialect, every: float = 0.0) -> str:
     """Return a test as an NC program.
 
-    It turns the spindle, stops it and waits; it moves no axis. Where it is to be measured the spindle stands, and a
+    It turns the spindle, stops it and waits; it moves no axis. Where it is to be measured the spindle is stopped, and a
     routine is called that does nothing until it is filled in.
 
     Parameters
@@ -82,7 +82,7 @@ def write_program(trial: Trial, dialect: Dialect, every: float = 0.0) -> str:
     running = 0.0
     for part in stretches(trial, every):
         if part.first:
-            what = f"{part.speed:.0f} 1/min" if part.speed else "the spindle stands"
+            what = f"{part.speed:.0f} 1/min" if part.speed else "the spindle is stopped"
             lines.append(_comment(f"{clock(part.start)} {what} for {_length(trial, part)}", dialect))
         if every:
             lines += ["M5"] * (running > 0) + _measure(dialect)

@@ -80,7 +80,7 @@ def compare(
         How all recordings begin, or each of them, such as ``Start("continued", earlier=(monday,))``; found out if not
         given. See `thermocomp.recordings.starts.Start`.
     zero_over : float
-        Average the start of each test over so long, while the spindle stands [s]; 0: it is the first row.
+        Average the start of each test over this time, while the spindle is stopped [s]; 0: it is the first row.
     mapping : str, Path or Mapping, optional
         TOML file that says what the columns of files are.
     support : {'clip', 'hold', 'fade'}
@@ -92,7 +92,7 @@ def compare(
         is quicker, none is accepted.
     primary : str, optional
         Method that is named beforehand: it is judged as if it were the only one, the others are corrected for the
-        number tried. Without it that goes for the recommended one, which is chosen anew without each cycle.
+        number tried. Without it that goes for the recommended one, which is chosen again without each cycle.
     harm_margin : float, optional
         Tolerated degradation in a single cycle, day or file, stated before judging [um]. If not given: three times the
         probe's noise or 5 % of the largest drift, at most 2 um.

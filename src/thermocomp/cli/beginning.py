@@ -23,7 +23,7 @@ class Beginning:
     Parameters
     ----------
     start : str
-        cold: zeroed at rest at its start; continued: goes on from the files of --continues; rezeroed: counts from its
+        cold: zeroed at rest at its start; continued: continues from the files of --continues; rezeroed: counts from its
         start, on a machine that may be warm; known: counts from the temperatures of --zero.
     continues : list of Path
         Files of the same test before the recording, in the order of time. With --start rezeroed the state of the
@@ -55,7 +55,7 @@ class Beginning:
         if self.continues and self.start not in (None, "continued", "rezeroed"):
             raise InputError(f"--continues goes with --start continued or rezeroed, not with {self.start}")
         if self.continues and len(tests) != 1:
-            raise InputError(f"--continues: {len(tests)} recordings are given; name the one that goes on")
+            raise InputError(f"--continues: {len(tests)} recordings are given; name the one that continues")
         word = self.start or ("continued" if self.continues else "known" if self.zero is not None else None)
         if word is None:
             return None

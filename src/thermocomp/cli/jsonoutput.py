@@ -17,7 +17,7 @@ def print_json(content: dict[str, Any]) -> None:
     content = {"thermocomp": __version__, "arguments": called_with, **content}
     # JSON has no nan and no infinity: what is not known is null
     text = json.dumps(_nulled(content), indent=2, ensure_ascii=False)
-    # what no terminal should get, and bytes of a name that is no text, stand there as JSON escapes them
+    # what no terminal should get, and bytes of a name that is not text, stand there as JSON escapes them
     sys.stdout.write("".join(c if c.isprintable() or c == "\n" else json.dumps(c)[1:-1] for c in text) + "\n")
 
 

@@ -49,7 +49,7 @@ def plan(
     Returns
     -------
     int
-        0 done, with --running: it may end; 1 with --running: go on; 2 unusable input.
+        0 done, with --running: it may end; 1 with --running: continue; 2 unusable input.
     """
     content = {"trouble": face.trouble, "expected_um": None, "candidates": [], "curve": None, "running": None}
     if isinstance(found, RunningTest):
@@ -77,7 +77,7 @@ def _show_running(found: RunningTest) -> None:
 def _show(found: Planned, files: list[Path]) -> None:
     columns = (
         Column("next test", lambda c: c.trial.words),
-        Column("would take off", lambda c: c.gain, ".2f", "um"),
+        Column("would gain", lambda c: c.gain, ".2f", "um"),
         Column("expected error in it", lambda c: c.doubt, ".2f", "um"),
         Column("what is new in it", lambda c: c.news),
     )

@@ -49,7 +49,7 @@ class Curve:
         if any(not a < b for a, b in pairwise(self.x)):
             raise SettingError(f"{self.kind} curve: x must rise strictly")
         if not np.isfinite(self._pieces[2]).all():
-            raise SettingError(f"{self.kind} curve: two x are so close that the slope between them is no number")
+            raise SettingError(f"{self.kind} curve: two x are so close that the slope between them is not a number")
 
     @cached_property
     def _pieces(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:

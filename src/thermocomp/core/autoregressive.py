@@ -8,7 +8,7 @@ The model's clock ticks every `interval`; readings may come at any time:
 - Ticks are made when they are due, several at once after a gap. The work is bounded: once the inputs in the memory are
   all the same, the rest of a gap is one matrix power (or, for a net, ends where the net has come to rest).
 - Between two ticks the deviation goes in a straight line from the last one towards the one that would come if the
-  inputs went on as they were since. It is continuous in time, so a reading at 14.9 s or 15.1 s makes no difference
+  inputs continued as they were since. It is continuous in time, so a reading at 14.9 s or 15.1 s makes no difference
   worth mentioning, and at the tick it is exact.
 
 The past of the deviation is the model's own, never a measured one (P-05, E-P3). `ErrorModel.init` starts cold: no

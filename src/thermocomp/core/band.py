@@ -39,7 +39,7 @@ class Band:
     running, stopped : float
         Factor while the spindle turns, and while it stands [-].
     speeds : tuple of int
-        Inputs that say whether the spindle turns; none: the larger factor holds always.
+        Inputs that state whether the spindle turns; none: the larger factor holds always.
 
     Raises
     ------
@@ -63,7 +63,7 @@ class Band:
         if min(self.speeds, default=0) < 0:
             raise SettingError("band: there is no input before the first")
         if len(set(self.speeds)) < len(self.speeds):
-            raise SettingError("band: a speed stands twice in it")
+            raise SettingError("band: a speed appears twice in it")
 
     @property
     def words(self) -> str:

@@ -193,7 +193,7 @@ def check_count(owner: str, most: int, **entries: Sequence[object]) -> None:
 
 
 def check_name(what: str, name: str, most: int = NAME) -> None:
-    """Refuse what is no name: empty, too long, or with characters that break a line or a terminal.
+    """Refuse what is not a name: empty, too long, or with characters that break a line or a terminal.
 
     Parameters
     ----------
@@ -213,4 +213,4 @@ def check_name(what: str, name: str, most: int = NAME) -> None:
     for c in name:
         kind = unicodedata.category(c)
         if kind[0] == "C" or kind in ("Zl", "Zp"):
-            raise SettingError(f"{what}: {name[:40]!a} is no name: it holds the character {c!a}")
+            raise SettingError(f"{what}: {name[:40]!a} is not a name: it holds the character {c!a}")

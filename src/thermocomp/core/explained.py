@@ -49,7 +49,7 @@ class SensorExplanation:
     lost : float or None
         RMS error on unseen cycles without it [unit of the model]; None: never judged.
     runs_on : bool
-        The correction goes on with the prediction in its place; otherwise it is held, then fades.
+        The correction continues with the prediction in its place; otherwise it is held, then fades.
     spare : str
         Why a spare sensor beside it is recommended; empty if none is.
     """
@@ -267,7 +267,7 @@ def _zero(model: ErrorModel) -> str:
         return "the first reading after a start"
     what = "temperatures" if all(i.quantity == "temperature" for i in own) else ", ".join(i.name for i in own)
     turning = f" ({_span(zeroing.otherwise)} if it turns)" if zeroing.speed else ""
-    rest = " while the spindle stands" if zeroing.speed else ""
+    rest = " while the spindle is stopped" if zeroing.speed else ""
     return f"{what} from their mean over the first {_span(zeroing.at_rest)} after a start{rest}{turning}"
 
 

@@ -160,9 +160,9 @@ class Mean:
 
 @dataclass(frozen=True)
 class Recurrence:
-    """A value that is made anew at every tick of a clock of its own; see `thermocomp.core.autoregressive`.
+    """A value that is made again at every tick of a clock of its own; see `thermocomp.core.autoregressive`.
 
-    Between ticks it goes in a straight line towards what the next would be if the inputs went on as since the last.
+    Between ticks it goes in a straight line towards what the next would be if the inputs continued as since the last.
 
     Parameters
     ----------

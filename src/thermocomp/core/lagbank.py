@@ -57,7 +57,7 @@ def run(
     ----------
     signals : ndarray of shape (n_rows, n_lags)
     dt : ndarray of shape (n_rows,)
-        Time since the previous row [s]. A value of ``inf`` starts anew, at rest: the first row of each test.
+        Time since the previous row [s]. A value of ``inf`` starts again, at rest: the first row of each test.
     time_constants : ndarray of shape (n_lags,) or (n_rows, n_lags)
         [s]; of each row where they change.
     memory : ndarray of shape (n_lags,), optional

@@ -334,7 +334,7 @@ class ErrorModel(ABC):
         time : str or array-like of shape (n_rows,), optional
             Time: numbers [s], or datetimes with or without a time zone; or the name of its column; without it the
             column ``time_s``. A row that is not later than the one before starts a new test, from rest and from a zero
-            of its own: the mean over its start, see `Zeroing`; whether the spindle stands there is read from its
+            of its own: the mean over its start, see `Zeroing`; whether the spindle is stopped there is read from its
             column, if there is one. A model without memory does without; then the first row is the zero.
         reference : array-like of shape (n_inputs,), optional
             What counts as zero, as in `init`.
@@ -505,10 +505,10 @@ class ErrorModel(ABC):
         if found.word == "refused":
             raise InputError(f"model of {self.target} was refused and will not run: {found.reason}")
         if not found.current:
-            raise InputError(f"model of {self.target} is unproven and runs in shadow only: {found.why}; fit it anew")
+            raise InputError(f"model of {self.target} is unproven and runs in shadow only: {found.why}; fit it again")
         if not found.taken:
             raise InputError(
-                f"model of {self.target} is unproven and runs in shadow only: {found.why}. To take it all the same: "
+                f"model of {self.target} is unproven and runs in shadow only: {found.why}. To take it anyway: "
                 '--accept-unproven "NAME, REASON", in Python taken("NAME, REASON") of the model'
             )
 

@@ -27,9 +27,7 @@ def find_plugins(group: Group, report: Callable[[str], object] = lambda _: None)
         if (first := found.setdefault(entry.name, entry)).value != entry.value:
             report(f"{describe_plugin(entry)} is skipped: {entry.name} is there already, {first.value}")
     if not any(entry.value.startswith("thermocomp.") for entry in found.values()):
-        report(
-            f"no {group} of thermocomp itself are installed: its installation is older than its code; install it anew"
-        )
+        report(f"no {group} of thermocomp itself are installed: its installation is older than its code; reinstall it")
     return found
 
 

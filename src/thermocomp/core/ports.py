@@ -1,6 +1,6 @@
 """The two sides of a compensator that the shop floor fills: where readings come from, where corrections go.
 
-Both are asynchronous and can be lost at any time: who uses them connects, looks at the status, and connects anew.
+Both are asynchronous and can be lost at any time: who uses them connects, looks at the status, and connects again.
 """
 
 from collections.abc import AsyncIterator, Mapping

@@ -125,7 +125,7 @@ def _axes(text: str, code: str, *, primed: bool) -> tuple[str, ...]:
             raise SettingError(f"{word} in {code!r}: a spindle on the workpiece's side is not supported")
         match = _AXIS.fullmatch(word)
         if not match:
-            raise SettingError(f"{word!r} in {code!r} is no axis: want X, Y, Z, A, B or C")
+            raise SettingError(f"{word!r} in {code!r} is not an axis: want X, Y, Z, A, B or C")
         if primed and not match[2]:
             raise SettingError(f"{word!r} in {code!r} stands on the {side}'s side and needs a prime: {word}'")
         if match[2] and not primed:

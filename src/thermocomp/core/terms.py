@@ -34,7 +34,7 @@ class Variable:
     Raises
     ------
     SettingError
-        What is no name, no input, or a factor that is no finite number.
+        What is not a name, no input, or a factor that is no finite number.
     """
 
     name: str

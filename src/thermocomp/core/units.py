@@ -229,7 +229,7 @@ def read_with_unit(text: object, quantity: str) -> float | None:
     Returns
     -------
     float or None
-        In the house unit; None: it is no text of a number and a unit.
+        In the house unit; None: it is not text of a number and a unit.
 
     Raises
     ------

@@ -32,12 +32,12 @@ class Zeroing:
     Parameters
     ----------
     at_rest : float
-        From the first reading on, while the spindle is known to stand [s].
+        From the first reading on, while the spindle is known to be stopped [s].
     otherwise : float
         The same where it turns from the first reading on, or nothing is known of it [s]: short, for what warms up must
         not get into the zero. Of a test recorded once a minute it is the first row.
     speed : str
-        Channel that tells whether the spindle stands [1/min]; empty if there is none.
+        Channel that tells whether the spindle is stopped [1/min]; empty if there is none.
 
     Raises
     ------
@@ -55,7 +55,7 @@ class Zeroing:
             check_name("zero", self.speed)
 
     def stands(self, speed: object) -> bool:
-        """Return whether a reading of `speed` says that the spindle stands; anything but a number does not."""
+        """Return whether a reading of `speed` says that the spindle is stopped; anything but a number does not."""
         return isinstance(speed, float | int) and type(speed) is not bool and abs(speed) <= STANDS
 
 
@@ -68,7 +68,7 @@ class Gathered(NamedTuple):
 
     times: tuple[float, ...] = ()  #: [s]
     values: tuple[FloatArray, ...] = ()  #: (n_inputs,) each
-    resting: bool = False  #: the spindle stood in the first of them
+    resting: bool = False  #: the spindle was stopped in the first of them
 
     def belongs(self, zeroing: Zeroing, time: float, resting: bool) -> bool:
         """Return whether a reading is one more of them."""
@@ -99,7 +99,7 @@ def first_rows(zeroing: Zeroing, time: FloatArray, resting: BoolArray) -> tuple[
     time : ndarray of shape (n_readings,)
         Of the usable readings, rising [s].
     resting : ndarray of bool of shape (n_readings,)
-        The spindle is known to stand.
+        The spindle is known to be stopped.
 
     Returns
     -------
@@ -151,7 +151,7 @@ def find_zero(
         [s]
     values : ndarray of shape (n_rows, n_inputs)
     resting, usable : ndarray of bool of shape (n_rows,)
-        The spindle is known to stand; every input is a number.
+        The spindle is known to be stopped; every input is a number.
 
     Returns
     -------

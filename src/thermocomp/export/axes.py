@@ -42,7 +42,7 @@ def find_drives(tables: Tables, named: Mapping[str, str]) -> list[Drive]:
         if letter in found:
             other = tables.targets[found[letter].target]
             raise InputError(
-                f"{other} and {target} are both {letter}: say which one drives it, such as --axes {target}={letter}"
+                f"{other} and {target} are both {letter}: state which one drives it, such as --axes {target}={letter}"
             )
         if letter:
             values = tables.values
@@ -50,7 +50,7 @@ def find_drives(tables: Tables, named: Mapping[str, str]) -> list[Drive]:
             found[letter] = Drive(letter, k, values["position"][k], travel)
     if not found:
         raise InputError(
-            f"no axis is known of {', '.join(tables.targets)}: say it, such as --axes {tables.targets[0]}=Z"
+            f"no axis is known of {', '.join(tables.targets)}: give it, such as --axes {tables.targets[0]}=Z"
         )
     return list(found.values())
 

@@ -34,7 +34,7 @@ class Facts:
         """Return where it comes from."""
         return [
             f"Model: {self.source}, SHA-256 {self.sha256}",
-            f"Written by thermocomp {self.version} on {self.date}; change nothing here, export anew",
+            f"Written by thermocomp {self.version} on {self.date}; change nothing here, export again",
             *(f"Left out: {target}: {why}" for target, why in self.left_out.items()),
         ]
 
@@ -64,10 +64,10 @@ def _verdict(compensator: Compensator) -> str:
     shadow, lines = compensator.shadow, compensator.lines
     if len(shadow) == len(lines):
         return f"SHADOW ONLY, {', '.join(lines)}: not proven on unseen cycles; all corrections stay zero"
-    said = {"accepted on unseen cycles": list[str](), "UNPROVEN, taken all the same": list[str]()}
+    said = {"accepted on unseen cycles": list[str](), "UNPROVEN, taken anyway": list[str]()}
     for target, line in lines.items():
         if target not in shadow:
             taken = any(m.honest_error and m.honest_error.taken for m in compensator.models[line.models])
-            said["UNPROVEN, taken all the same" if taken else "accepted on unseen cycles"].append(target)
+            said["UNPROVEN, taken anyway" if taken else "accepted on unseen cycles"].append(target)
     words = [f"{', '.join(targets)}: {word}" for word, targets in said.items() if targets]
     return "; ".join([*words, *([f"SHADOW ONLY, {', '.join(shadow)}: corrections stay zero"] if shadow else [])])

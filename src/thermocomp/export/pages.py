@@ -34,7 +34,7 @@ def describe(compensator: Compensator, tables: Tables, of: str = "") -> dict[str
             for k, (t, p) in enumerate(positions)
         ),
         "zero": f"Temperatures count from the mean over the first {zeroing.otherwise:g} s, or over "
-        f"{zeroing.at_rest:g} s while the spindle stands; until then the correction stays where it is."
+        f"{zeroing.at_rest:g} s while the spindle is stopped; until then the correction stays where it is."
         if tables.sizes["has_zero"]
         else "Nothing counts from the start.",
         "geometry": "Only what temperature changes along an axis is corrected: its profile stays a table of the "

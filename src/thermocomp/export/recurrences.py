@@ -6,7 +6,7 @@ from thermocomp.core import expression as e
 
 
 class Clock:
-    """A value that is made anew at every tick.
+    """A value that is made again at every tick.
 
     Parameters
     ----------

@@ -124,7 +124,7 @@ def unpack(kind: Format, entry: Any, text: str, source: str, **shared: Any) -> A
         raise ModelFileError(f"{source}: not a {kind.words}: holds what no {kind.words} can: {_short(str(e))}") from e
     if content.get("sha256") != found_digest:
         raise ModelFileError(
-            f"{source}: its numbers do not match its checksum: the file was altered or damaged; write it anew with "
+            f"{source}: its numbers do not match its checksum: the file was altered or damaged; write it again with "
             f"'{kind.command}'"
         )
     try:
@@ -196,7 +196,7 @@ def digest(body: list[Any], shared: dict[str, Any] | None = None) -> str:
 def _parse(text: str, no: str, source: str, command: str) -> Any:
     for sign, most in _COUNTS.items():
         if text.count(sign) > most:
-            raise ModelFileError(f"{no}: {sign} stands in it more than {most:,} times")
+            raise ModelFileError(f"{no}: {sign} appears in it more than {most:,} times")
     try:
         return json.loads(text, object_pairs_hook=_table, parse_constant=_refuse, parse_int=_whole)
     except RecursionError as e:
@@ -229,12 +229,12 @@ def _table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     if len(found) != len(pairs):
         keys = [k for k, _ in pairs]
         twice = next(k for k in found if keys.count(k) > 1)
-        raise ValueError(f"the key {_short(twice)} stands twice in one table")
+        raise ValueError(f"the key {_short(twice)} appears twice in one table")
     return found
 
 
 def _refuse(constant: str) -> NoReturn:
-    raise ValueError(f"{constant} is no number")
+    raise ValueError(f"{constant} is not a number")
 
 
 def _whole(digits: str) -> int:
@@ -257,7 +257,7 @@ def _check_kind(kind: Format, content: Any, source: str) -> None:
         )
     version = content.get("version")
     if type(version) is not int or version < 1:
-        raise ModelFileError(f"{source}: {kind.words} without a version; write it anew with '{kind.command}'")
+        raise ModelFileError(f"{source}: {kind.words} without a version; write it again with '{kind.command}'")
     if version > kind.version:
         raise ModelFileError(
             f"{source}: written by a newer thermocomp, version {version} of a {kind.words}; this one reads version "

@@ -36,7 +36,7 @@ class ManyError(SettingError):
 
 @contextmanager
 def kept(errors: list[SettingError]) -> Iterator[None]:
-    """Go on behind an error, and keep it."""
+    """Continue behind an error, and keep it."""
     try:
         yield
     except SettingError as e:

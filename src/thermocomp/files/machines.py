@@ -253,7 +253,7 @@ class _Sources:
             raise explain_unknown(f"model in {path} of", target, models, (*where, "target"))
         wanted = target or (component.code if component.code in models else None)
         if wanted is None and len(models) > 1:
-            raise SettingError(f"{path} holds models of {', '.join(models)}: say which by target", where)
+            raise SettingError(f"{path} holds models of {', '.join(models)}: state which by target", where)
         model = models[wanted] if wanted is not None else next(iter(models.values()))
         if target is None and model.target in BY_CODE and model.target != component.code:
             raise SettingError(f"{path} holds a model of {model.target}, not of {component.code}", here)

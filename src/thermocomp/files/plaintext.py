@@ -48,12 +48,12 @@ def read_text(path: str | Path, what: str, most: int, failure: type[InputError] 
     except FileNotFoundError as e:
         raise failure(f"{source}: no such {what}") from e
     except UnicodeDecodeError as e:
-        found = f"it is no text, as an XLSX or a Parquet file is none ({e})"
+        found = f"it is not text, as an XLSX or a Parquet file is none ({e})"
         raise failure(f"{source}: cannot be read as a {what}: {found}; name a {what}") from e
     except OSError as e:
         raise failure(f"{source}: cannot be read as a {what}: {e}") from e
     except ValueError as e:  # a null character
-        raise failure(f"{str(source)!a}: is no name of a {what}: {e}") from e
+        raise failure(f"{str(source)!a}: is not a name of a {what}: {e}") from e
 
 
 def list_errors(source: str | Path, errors: Sequence[str]) -> str:

@@ -13,7 +13,7 @@ makers quote them. With x[i, j] the deviation at target i in run j of one direct
 
 An axis over 2 m is approached once in each direction, every 250 mm on average: E, M and B come of that; s, R and A take
 at least two runs and are left out. The uncertainty of the measurement, which the 2014 edition wants to be told with the
-results, is not known from the deviations and not told here.
+results, is not known from the deviations and not reported here.
 """
 
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ TARGETS, TARGETS_PER_METRE, RUNS = 5, 5.0, 5
 #: an axis is long from here on; it wants one run in each direction, targets so far apart on average [mm]
 LONG, LONG_INTERVAL = 2000.0, 250.0
 #: what every report of these values has to say
-UNCERTAINTY = "The measurement uncertainty is not told: ISO 230-2:2014 wants it stated with these values."
+UNCERTAINTY = "The measurement uncertainty is not given: ISO 230-2:2014 wants it stated with these values."
 
 
 @dataclass(frozen=True, eq=False)

@@ -92,8 +92,8 @@ def assess(
 ) -> tuple[ThermalTest, ...]:
     """Evaluate the thermal tests that a recording holds.
 
-    A test begins where the drives start (the row before, which is the state it begins in) and goes on until they start
-    anew; an ETVE test is the whole recording. Stops shorter than 20 min, as in a spectrum of speeds, do not end it.
+    A test begins where the drives start (the row before, the state it begins in) and continues until they start
+    again; an ETVE test is the whole recording. Stops shorter than 20 min, as in a spectrum of speeds, do not end it.
 
     Parameters
     ----------
@@ -295,7 +295,7 @@ def _about(recording: Recording, kind: Kind, pairs: Sequence[Pair], air: Channel
     named, used = paired_names(recording), {n for p in pairs for n in (p.tip, p.spindle)}
     untold = [f"{named[a, 1]} and {named[a, 2]}" for a in "xy" if {(a, 1), (a, 2)} <= named.keys()]
     if untold and not used:
-        notes.append(f"no tilt is told: the distance between the probes {', '.join(untold)} was not given")
+        notes.append(f"no tilt is given: the distance between the probes {', '.join(untold)} was not given")
     if stations := find_stations(recording):
         notes.append(_stations_words(stations))
     if air is None:
@@ -317,7 +317,7 @@ def _stations_words(stations: dict[str, str]) -> str:
     codes = list(dict.fromkeys(stations.values()))
     shown = ", ".join(codes[:3]) + (" ..." if len(codes) > 3 else "")
     return (
-        f"{len(stations)} channels are stations of error profiles ({shown}): they are not told here; thermocomp "
+        f"{len(stations)} channels are stations of error profiles ({shown}): they are not reported here; thermocomp "
         "position and thermocomp volumetric are for them"
     )
 
@@ -348,7 +348,7 @@ def _about_rows(recording: Recording, kind: Kind, rows: tuple[int, int, int], nu
     notes = []
     running = recording.time[stop] - recording.time[start]
     if running < HOUR:
-        notes.append(f"it ran for {running / 60:.0f} min only: nothing is told of the first 60 min")
+        notes.append(f"it ran for {running / 60:.0f} min only: nothing is stated about the first 60 min")
     if kind == "etve":
         if (on := find_driven_rows(recording)) is not None and on.any():
             notes.append("the spindle or an axis moves: that is no test of the environment alone")

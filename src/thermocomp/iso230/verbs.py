@@ -89,7 +89,7 @@ def iso230(
         What they are: etve (machine at rest), spindle, or axis. Found out if not given: the spindle turns, else an
         axis moves, else neither.
     distance : str, optional
-        Between the probes x1 and x2, and y1 and y2, such as "100 mm"; without it no tilt is told.
+        Between the probes x1 and x2, and y1 and y2, such as "100 mm"; without it no tilt is given.
     pairs : sequence of str, optional
         Probes of other names: the one at the tip of the test bar, the one nearer to the spindle, and their distance,
         such as x_front:x_rear:100mm.
@@ -162,7 +162,7 @@ def length(text: str, what: str) -> float:
     Raises
     ------
     InputError
-        It is no number with a unit of length.
+        It is not a number with a unit of length.
     """
     try:
         found = read_with_unit(text, "position")

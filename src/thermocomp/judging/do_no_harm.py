@@ -290,7 +290,7 @@ def measure(
     margin : float, optional
         Harm that is let pass [um], stated before judging; see `margin_of`.
     stretch : bool
-        It goes on from what was learned: compare also with both re-zeroed where it begins.
+        It continues from what was learned: compare also with both re-zeroed where it begins.
 
     Returns
     -------

@@ -157,7 +157,7 @@ def _log(watch: Watch, samples: Samples, test: int, recording: Recording) -> Fau
             read[:, j] = samples.values[(samples.test == test) & (samples.row >= 0), names.index(name)]
     fault, stood_in = np.zeros(read.shape, np.int8), np.full(read.shape, np.nan)
     for row, state, let in look_through(watch, samples, test):
-        if (own := int(samples.row[row])) >= 0:  # not of a file that it goes on from
+        if (own := int(samples.row[row])) >= 0:  # not of a file that it continues from
             fault[own] = state.fault
             stood_in[own] = np.where(state.fault != GOOD, let[heat], np.nan)
     found = [

@@ -203,7 +203,7 @@ def _caps(
     others = {c.name for k, c in enumerate(samples.targets) if k != target} | set(watched)
     found = [text for channel, text in samples.trouble if channel not in others]
     if split.stretch:
-        found.append("judged on one stretch that goes on from what was learned")
+        found.append("judged on one stretch that continues from what was learned")
     if learned is None:
         found.append("the model does not say what it learned, so that it cannot be held against that")
     return tuple(found)

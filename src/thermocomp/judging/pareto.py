@@ -241,7 +241,7 @@ def _frequency(found: Budget, place: int) -> Table:
             if found.frequency[place, j] > 0
         ),
         marked=None,
-        caption="Chosen anew without each block: a sensor far below 100 % was a matter of luck.",
+        caption="Chosen again without each block: a sensor far below 100 % was a matter of luck.",
     )
 
 

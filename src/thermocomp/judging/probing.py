@@ -137,7 +137,7 @@ class Probed:
         return replace(self, at=self.at[rows], shift=self.shift[rows], without=self.without[rows])
 
     def held(self, measured: FloatArray, test: NDArray[np.intp]) -> FloatArray:
-        """Return what probings alone would take off: the last one, held; zero before the first of a test [um]."""
+        """Return what probings alone would gain: the last one, held; zero before the first of a test [um]."""
         rows = np.arange(len(measured))
         last = np.maximum.accumulate(np.where(self.at, rows, -1))
         before = np.concatenate([[-1], last[:-1]])[: len(rows)]  # it counts from the next row on

@@ -1,7 +1,7 @@
 """Which method to take: chosen inside the training part of every left-out unit, so that the choosing is judged too.
 
 The error of a choice among methods is not the error of the method that comes out best: the best of twenty is partly
-luck. So the choice is made anew for every left-out unit, by the error on units left out of the rest (nested
+luck. So the choice is made again for every left-out unit, by the error on units left out of the rest (nested
 cross-validation, Varma and Simon 2006), and what was chosen then is judged on the left-out unit.
 """
 
@@ -203,6 +203,6 @@ def correct_verdicts(
         mine = after[found.method]
         better = min(found.verdict.p_value, mine.p_value)
         after[found.method] = replace(
-            mine, p=better, about="chosen anew without each unit, and judged with the choosing"
+            mine, p=better, about="chosen again without each unit, and judged with the choosing"
         )
     return after

@@ -275,9 +275,9 @@ def replay(model: ErrorModel, samples: Samples, rows: BoolArray) -> tuple[FloatA
 def walk(model: ErrorModel, samples: Samples, rows: BoolArray, disturb: Disturb | None = None) -> Iterator[State]:
     """Step a model through the tests that hold `rows`; yield its state at each wanted row, in their order.
 
-    The model runs without a break from the start of a test, or of the files that it goes on from, as it would on the
+    The model runs without a break from the start of a test, or of the files that it continues from, as it would on the
     machine; its only inputs are those of `samples`, never a displacement. A row with a missing input is what the gate
-    turns away live: the last deviation is held. A test that counts anew is told minus what the model says there.
+    turns away live: the last deviation is held. A test that is re-zeroed is told minus what the model says there.
 
     Parameters
     ----------

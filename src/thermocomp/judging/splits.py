@@ -30,7 +30,7 @@ class Split:
     whole : bool
         The gate judges the block as one; without it, each thermal cycle in it.
     stretch : bool
-        It goes on from what was learned: its cycles are not independent of that.
+        It continues from what was learned: its cycles are not independent of that.
     """
 
     block: str
@@ -76,7 +76,7 @@ def by_rows(samples: Samples, train: float, test: float) -> Judging:
     """
     if not (0 < train < 1 and 0 < test < 1 and train + test <= 1 + 1e-9):
         raise InputError(f"split {train:g}/{test:g}: want two shares between 0 and 1 whose sum is at most 1")
-    own = np.flatnonzero(samples.cycle >= 0)  # not those of earlier files, which tests go on from
+    own = np.flatnonzero(samples.cycle >= 0)  # not those of earlier files, which tests continue from
     n = len(own)
     ends = [*own.tolist(), len(samples)]
     first, stop = ends[round(n * train)], ends[min(n, round(n * (train + test)))]
@@ -96,7 +96,7 @@ def by_time(samples: Samples, train_s: float, test_s: float) -> Judging:
         [s]
     """
     steps = samples.dt()
-    earlier = samples.cycle < 0  # a file that the test goes on from, and the break after it
+    earlier = samples.cycle < 0  # a file that the test continues from, and the break after it
     steps[np.isinf(steps) | earlier | np.roll(earlier, 1)] = 0.0
     elapsed = np.cumsum(steps)
     first, stop = (int(np.searchsorted(elapsed, t)) for t in (train_s, train_s + test_s))
@@ -204,7 +204,7 @@ def leave_one_day_out(samples: Samples) -> Judging:
             f"leaving one day out: {name} has no time stamps, so nobody knows its days; write date and time into its "
             "time column, or leave out cycles or files"
         )
-    own = samples.cycle >= 0  # not those of earlier files, which tests go on from
+    own = samples.cycle >= 0  # not those of earlier files, which tests continue from
     for k in np.unique(samples.cycle[own]):
         rows = np.flatnonzero(samples.cycle == k)
         if samples.time[rows[-1]] - samples.time[rows[0]] <= DAY:

@@ -419,7 +419,7 @@ def _guard(model: ErrorModel, samples: Samples, watched: Samples | None, known: 
 
 
 def _goes_on(model: ErrorModel, samples: Samples, known: BoolArray) -> bool:
-    """Return whether what is judged goes on from what was learned: its level is that of the learned part."""
+    """Return whether what is judged continues from what was learned: its level is that of the learned part."""
     judged = np.unique(samples.test[~known & np.isfinite(samples.deviations[:, 0])])
     earlier = {r.fingerprint for k in judged for r in (samples.starts[k].earlier if samples.starts else ())}
     return bool(np.isin(samples.test[known], judged).any() or not earlier.isdisjoint(_hashes(model)))

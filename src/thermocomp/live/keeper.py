@@ -54,7 +54,7 @@ class StateKeeper:
             saved = statefile.read(self._path, self._compensator)
         except ThermocompError as e:
             if not statefile.is_ours(self._path):
-                raise InputError(f"{self._path}: is no state file, and would be written over; name another") from e
+                raise InputError(f"{self._path}: is not a state file, and would be written over; name another") from e
             self._say(f"cold start: {e}")
             self._refused = self._path
             return cold
@@ -63,7 +63,7 @@ class StateKeeper:
         # what the controller or the configuration ordered is theirs to say again
         own = {t: o for t, o in state.orders.items() if o.word != "suspended" and o.reason != CONFIGURED}
         state = state._replace(orders=cold.orders | own)
-        how = "goes on" if state.references else "begins anew, with the corrections that are in force"
+        how = "continues" if state.references else "begins again, with the corrections that are in force"
         self._say(f"start after {age:.0f} s: {how}")
         return state
 

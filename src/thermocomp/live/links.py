@@ -1,6 +1,6 @@
-"""Links of the service: each source and each sink in a task of its own, connected anew when it is lost.
+"""Links of the service: each source and each sink in a task of its own, reconnected when it is lost.
 
-Whatever a source or a sink raises, it is this link's trouble alone: the others and the service go on.
+Whatever a source or a sink raises, it is this link's trouble alone: the others and the service continue.
 """
 
 import asyncio
@@ -58,7 +58,7 @@ class Link:
                 if task is None or task.cancelling():
                     raise
                 self.trouble = "cancelled by itself"
-            except Exception as e:  # noqa: BLE001 - whatever it is, the others go on
+            except Exception as e:  # noqa: BLE001 - whatever it is, the others continue
                 self.trouble = explain(e)
             if self.trouble != self._told:
                 self._losses.append(self.trouble)

@@ -1,4 +1,4 @@
-"""The service: readings come in, the compensator takes each, corrections go out; whatever fails, the rest goes on."""
+"""The service: readings come in, the compensator takes each, corrections go out; whatever fails, the rest continues."""
 
 import asyncio
 import time
@@ -131,7 +131,7 @@ class Service:
         """Reset the reference of a target; see `thermocomp.runtime.orders.rezero`."""
         self.state = rezero(self.compensator, self.state, target, self.clock.now(), why, in_force)
         self.probings.forget(target)
-        self.say("reference", f"{target} counts anew: {why}")
+        self.say("reference", f"{target} is re-zeroed: {why}")
         self._dirty = True
 
     def measure(self, found: Measurement) -> None:

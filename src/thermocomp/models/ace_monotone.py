@@ -26,7 +26,7 @@ class MonotoneACE(TransformRegressor):
       back-fitting takes thousands of sweeps, cost nothing.
     - theta is made rising in every sweep (isotonic regression of its knots), so its inverse is unique. Where theta is
       flat, the inverse has a single point: the mean of y there.
-    - The curves go on straight beyond the trained range for a share of it, and are constant from there on.
+    - The curves continue straight beyond the trained range for a share of it, and are constant from there on.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class MonotoneACE(TransformRegressor):
     shrinkage : float
         Weight of the mean square of the curves' knots: decides between inputs that say the same.
     extend : float
-        Share of the trained span by which curves go on beyond it. It is the margin at which `Support` clips the inputs
+        Share of the trained span by which curves continue beyond it: the margin at which `Support` clips the inputs
         unless told otherwise; 0 crops peaks like the paper (W-07).
     tolerance : float
         Sweeps end when theta moves by less (root mean square; it has norm 1).

@@ -46,7 +46,7 @@ def find_band(
     turning : ndarray of bool of shape (n_rows,)
         The spindle turns.
     speeds : sequence of int
-        Inputs that will say whether it turns.
+        Inputs that will state whether it turns.
     level : float
 
     Returns

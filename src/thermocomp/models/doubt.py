@@ -60,7 +60,7 @@ class Doubt:
         dt : float
             Between two rows [s].
         room : ndarray of shape (n_rows, n_temperatures), optional
-            What the room does to each temperature [degC]. The rest is foretold from the speed.
+            What the room does to each temperature [degC]. The rest is predicted from the speed.
         """
         step = np.full(len(speed), dt)
         step[0] = np.inf

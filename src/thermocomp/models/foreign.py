@@ -54,7 +54,7 @@ class ForeignRegressor(UnfrozenRegressor):
         return pd.DataFrame(change, columns=self._names()) if hasattr(self, "feature_names_in_") else change
 
     def _bulk(self) -> str:
-        return "it is no method of thermocomp and has no 'freeze'"
+        return "it is not a method of thermocomp and has no 'freeze'"
 
 
 @contextmanager

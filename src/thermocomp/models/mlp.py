@@ -51,7 +51,7 @@ class SigmoidNet(NetRegressor):
     saturates where others extrapolate.
 
     Initial weights are uniform in -0.3 .. 0.3 (C-29). Chen starts with a learning rate of 0.5 and decreases it
-    continuously, he does not say how: here it falls to `final_learning_rate` by `schedule`. Nor does he say in which
+    continuously, he does not state how: here it falls to `final_learning_rate` by `schedule`. Nor does he say in which
     order the patterns come, or how many epochs he ran.
 
     Parameters
@@ -170,7 +170,7 @@ class SigmoidNet(NetRegressor):
             Without it five stretches of equal length take the place of the cycles.
         progress : callable, optional
             Is told what a sweep has found so far. A sweep that is interrupted (KeyboardInterrupt) after its first
-            count goes on with what it has, and says so in `chosen_by_`.
+            count continues with what it has, and says so in `chosen_by_`.
 
         Returns
         -------

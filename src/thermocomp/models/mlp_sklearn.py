@@ -17,7 +17,7 @@ _NAMES: dict[str, Activation] = {"logistic": "sigmoid", "tanh": "tanh"}
 class SklearnNet(StaticRegressor, NetRegressor):
     """`sklearn.neural_network.MLPRegressor` with one hidden layer, inputs and targets standardised.
 
-    Its output is linear: beyond the trained range it goes on where Chen's net saturates. A channel that does not
+    Its output is linear: beyond the trained range it continues where Chen's net saturates. A channel that does not
     change is cut off.
 
     Parameters

@@ -75,7 +75,7 @@ class PacedFeatures:
             Of `thermocomp.models.averaged.AveragedDynamic`.
         """
         usual = usual_step(step)
-        # where the spindle stood in the rows learned from, it may have turned before
+        # where the spindle was stopped in the rows learned from, it may have turned before
         turned = np.abs(rows[:, list(speeds)]).max(axis=1, initial=0.0)
         return cls(
             tuple(i for i in range(rows.shape[1]) if i not in speeds),

@@ -170,7 +170,7 @@ class BestSubset(TermRegressor):
         InputError
             A setting makes no sense, or there are too many columns that depend on each other (see `max_size`).
         KeyboardInterrupt
-            While the cycles are left out. Interrupted before, it goes on with what was found so far.
+            While the cycles are left out. Interrupted before, it continues with what was found so far.
         """
         criterion = self.criterion or ("bic" if cycle is None else "cycles")
         if criterion not in {"mse", "adjr2", "cp", "bic", "cycles"} or (self.size is not None and self.size < 1):

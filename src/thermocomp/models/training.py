@@ -234,7 +234,7 @@ def _refuse_unknown_counts(samples: Samples, seen: BoolArray) -> None:
         start = samples.starts[test]
         if start.word == "rezeroed" and start.earlier:
             raise FitError(
-                f"{samples.test_names[test]} was re-zeroed on a machine that went on from {start.earlier[-1].name}: "
+                f"{samples.test_names[test]} was re-zeroed on a machine that continued from {start.earlier[-1].name}: "
                 "its displacements miss what had come until then. Such a test can judge (assess), not teach"
             )
 

@@ -100,7 +100,7 @@ def find_watch(samples: Samples, learn: BoolArray) -> Watch | None:
 def _weights(
     of: PacedFeatures, change: FloatArray, step: FloatArray, heat: Sequence[int], parts: IntArray, folds: IntArray
 ) -> FloatArray:
-    """Return what foretells each temperature, by all cycles and without each, (1 + n_cycles, n_features, n_heat)."""
+    """Return what predicts each temperature, by all cycles and without each, (1 + n_cycles, n_features, n_heat)."""
     moments = of.moments(change, change[:, list(heat)], step, parts, NOISE)
     every = np.unique(parts[parts >= 0])
     learned = (every, *(np.setdiff1d(every, parts[folds == k]) for k in range(int(folds.max()) + 1)))

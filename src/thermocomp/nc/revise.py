@@ -22,14 +22,14 @@ _PATHS = ("model", "forecast", "carried", "machine", "subroutines")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RevisedProgram:
-    """An NC program that was revised, or was not because nothing was taken off.
+    """An NC program that was revised, or was not because nothing was corrected.
 
     Parameters
     ----------
     path : Path
         The program that was written.
     written : bool
-        False: nothing was taken off, so there are no files.
+        False: nothing was corrected, so there are no files.
     files : tuple of Path
         All that was written.
     summary : dict
@@ -42,7 +42,7 @@ class RevisedProgram:
     summary: dict[str, Any]
 
     def __repr__(self) -> str:
-        return f"<RevisedProgram: {self.path if self.written else 'nothing was taken off, nothing was written'}>"
+        return f"<RevisedProgram: {self.path if self.written else 'nothing was corrected, nothing was written'}>"
 
 
 def revise(

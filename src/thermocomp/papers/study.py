@@ -131,7 +131,7 @@ class Claims(Generic[_Found]):
         return register
 
     def include(self, others: "Claims[Any]", part: Callable[[_Found], Any]) -> None:
-        """Go on with all claims about a part of what was found."""
+        """Continue with all claims about a part of what was found."""
         self._judges.append(lambda found: others(part(found)))
 
     def __call__(self, found: _Found) -> tuple[Claim, ...]:

@@ -1,4 +1,4 @@
-"""Cleaning: stretches that are cut, clocks that are shifted, probes that are zeroed anew, rows that are resampled.
+"""Cleaning: stretches that are cut, clocks that are shifted, probes that are zeroed again, rows that are resampled.
 
 Nothing is changed but by a step that somebody has written down, and each step says what it did.
 """
@@ -158,7 +158,7 @@ class Rezero(Step):
     at : float or str
         Time of the first row that is moved.
     to : float, optional
-        What the value there becomes, in the house unit; without it the channel goes on as it went before.
+        What the value there becomes, in the house unit; without it the channel continues as it went before.
     until : float or str, optional
         Time of the first row that is not moved any more; without it the rest of the test is moved.
     """
@@ -287,7 +287,7 @@ def _step(x: FloatArray, first: int, name: str, owner: str) -> float:
     before = np.flatnonzero(np.isfinite(x[:first]))[-_BESIDE:]
     after = first + np.flatnonzero(np.isfinite(x[first:]))[:_BESIDE]
     if not before.size or not after.size:
-        raise InputError(f"{owner}: {name} has no value before the instant, from which it could go on; give `to`")
+        raise InputError(f"{owner}: {name} has no value before the instant, from which it could continue; give `to`")
     y = x[np.concatenate([before, after])]
     moves = np.concatenate([np.diff(x[before]), np.diff(x[after])])
     slope = float(np.median(moves)) if moves.size else 0.0

@@ -53,7 +53,7 @@ def find_cycles(
     Returns
     -------
     tuple of Cycle
-        One cycle that covers everything if the spindle does not start anew.
+        One cycle that covers everything if the spindle does not start again.
     """
     known = np.isfinite(speed)
     if not known.any():

@@ -25,7 +25,7 @@ LONG = (60, 12, 6, 4, 2)
 INPUTS = 4
 #: of fingerprints in a model file [byte]; as text they are a third more
 BYTES = 14_000
-#: a run whose half goes on in more ways than these says too little
+#: a run whose half continues in more ways than these says too little
 WAYS = 4
 #: a run that comes again within so many of its lengths is something periodic
 PERIOD = 5
@@ -192,7 +192,7 @@ def _windows(x: FloatArray, scale: _Scale, stride: int, rows: TargetRows) -> _Wi
 
 
 def _seldom(mark: Marks, halves: Marks, stride: int) -> BoolArray:
-    """Return the runs of which neither half goes on in many ways, and which do not come again soon.
+    """Return the runs of which neither half continues in many ways, and which do not come again soon.
 
     However often all of a run comes, it counts: so do the copies of a recording.
     """

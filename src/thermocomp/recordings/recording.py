@@ -129,7 +129,7 @@ class Recording:
         Raises
         ------
         RecordingError
-            There is no time, or it does not rise; no column is a channel; a cell is no number.
+            There is no time, or it does not rise; no column is a channel; a cell is not a number.
         UnitError
             A unit is unknown.
         InputError

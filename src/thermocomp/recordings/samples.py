@@ -36,7 +36,7 @@ class Samples:
         Seconds since the start of the row's test [s].
     test, cycle, row : ndarray of int of shape (n_rows,)
         Index into `test_names`, index into `cycle_names`, row in the file's table. The last two are -1 in rows of an
-        earlier file, which a test goes on from: they are gone through, and neither learned from nor judged.
+        earlier file, which a test continues from: they are gone through, and neither learned from nor judged.
     test_names, cycle_names : tuple of str
     hashes : tuple of str
         Fingerprint of each test: SHA-256 of its times and values.
@@ -48,11 +48,11 @@ class Samples:
     zeroing : Zeroing
         Over how long the start is averaged.
     resting : ndarray of bool of shape (n_rows,), optional
-        The spindle is known to stand; None: it is known nowhere.
+        The spindle is known to be stopped; None: it is known nowhere.
     starts : tuple of Start
         How each test begins; empty: cold.
     stamps : tuple of str
-        ISO timestamp of each test's first row, that of an earlier file it goes on from; empty: not known.
+        ISO timestamp of each test's first row, that of an earlier file it continues from; empty: not known.
     trouble : tuple of (str, str)
         Channel (empty: all) and what is wrong with it as a whole; see `thermocomp.recordings.checks.sound`.
     """
@@ -109,11 +109,11 @@ class Samples:
 
     @property
     def stands(self) -> BoolArray:
-        """Rows in which the spindle is known to stand."""
+        """Rows in which the spindle is known to be stopped."""
         return np.zeros(len(self), dtype=np.bool_) if self.resting is None else self.resting
 
     def anew(self, test: int) -> int | None:
-        """Return the row from which a test counts anew, what went before being known or not; None: it does not."""
+        """Return the row from which a test is re-zeroed, what went before being known or not; None: it does not."""
         if not self.starts or self.starts[test].word != "rezeroed":
             return None
         return int(np.flatnonzero((self.test == test) & (self.cycle >= 0))[0])
@@ -167,7 +167,7 @@ class Samples:
         rows : ndarray of bool of shape (n_rows,)
             Learned from; those without a number are passed over.
         before : int, optional
-            The last value is that of the last row before this one in its test, or in the files that it goes on from, 0
+            The last value is that of the last row before this one in its test, or in the files it continues from, 0
             without any; without it, that of the last row of all.
         """
         y = self.deviations[:, target]
@@ -179,7 +179,7 @@ class Samples:
         if before is not None:
             test = int(self.test[before])
             mine = candidates[(candidates < before) & (self.test[candidates] == test)]
-            for r in reversed(self.starts[test].earlier if self.starts else ()):  # what it goes on from
+            for r in reversed(self.starts[test].earlier if self.starts else ()):  # what it continues from
                 if not mine.size:
                     others = [k for k, own in enumerate(self.hashes) if own == r.fingerprint]
                     mine = candidates[np.isin(self.test[candidates], others)]

@@ -132,7 +132,7 @@ def _chosen_channels(
 
 
 class _Part(NamedTuple):
-    """The rows of one test, after those of the files that it goes on from."""
+    """The rows of one test, after those of the files that it continues from."""
 
     start: Start
     values: FloatArray

@@ -18,7 +18,7 @@ Word = Literal["cold", "continued", "rezeroed", "known"]
 #: what the words mean, for tables and errors
 WORDS: dict[Word, str] = {
     "cold": "zeroed at rest at its start",
-    "continued": "goes on from an earlier file, and counts from the zero of that",
+    "continued": "continues from an earlier file, and counts from the zero of that",
     "rezeroed": "displacements and temperatures count from its start, on a machine that may be warm",
     "known": "counts from a zero that is known",
 }
@@ -60,7 +60,7 @@ class Start:
     >>> from thermocomp import Start, simulate
     >>> (monday,) = simulate("hwang")
     >>> print(Start("continued", earlier=(monday,), gap=600.0).told("tuesday"))  # starts=... of compare, fit, assess
-    tuesday: continued from hwang (goes on from an earlier file, and counts from the zero of that); stated
+    tuesday: continued from hwang (continues from an earlier file, and counts from the zero of that); stated
     >>> Start("known", zero={"t_bed_front_C": 20.0}).content("tuesday")["zero_degC"]
     {'t_bed_front_C': 20.0}
     """
@@ -94,7 +94,7 @@ class Start:
         }
 
     def told(self, name: str) -> str:
-        """Return it in words, such as ``b: continued from a (goes on from an earlier file ...); stated``."""
+        """Return it in words, such as ``b: continued from a (continues from an earlier file ...); stated``."""
         names = ", ".join(r.name for r in self.earlier)
         before = f" from {names}" if self.word == "continued" else ""
         after = f"; what went before: {names}" if self.earlier and not before else ""
@@ -112,7 +112,7 @@ def bridge_files(start: Start, recording: Recording) -> tuple[Start, FloatArray]
     ----------
     start : Start
     recording : Recording
-        That goes on from the earlier files of `start`.
+        That continues from the earlier files of `start`.
 
     Returns
     -------
@@ -154,7 +154,7 @@ def find_starts(
 ) -> tuple[Start, ...]:
     """Find out how tests begin.
 
-    A displacement that begins near zero was zeroed there. One that does not, and goes on from where the file before it
+    A displacement that begins near zero was zeroed there. One that does not, and continues where the file before it
     (by time stamps) ended, continues that. All else cannot be told.
 
     Parameters
@@ -186,7 +186,7 @@ def find_starts(
 
 
 def find_resting_rows(recording: Recording, zeroing: Zeroing) -> BoolArray:
-    """Return the rows in which the spindle is known to stand.
+    """Return the rows in which the spindle is known to be stopped.
 
     Parameters
     ----------

@@ -45,7 +45,7 @@ def section(judged: Judged, recordings: Sequence[Recording]) -> Section:
     logs = find_faults(judged, recordings)
     if not logs:
         known = any(m.watch is not None for m in judged.models)
-        why = "the recordings have not got what it needs" if known else "the model file holds none; fit it anew"
+        why = "the recordings have not got what it needs" if known else "the model file holds none; fit it again"
         return Section(TITLE, [f"No watch over the temperatures was asked: {why}."])
     if not any(log.faults for log in logs):
         watched = list(dict.fromkeys(name for log in logs for name in log.watch.names))

@@ -44,7 +44,7 @@ class Column:
         Name or place of the value in the row, or what makes it of the row.
     form : str
         Format of numbers, as in Python, or ``um``: hundredths, and nothing finer on a page than makes sense. Without
-        one the column holds words, on the left; ``>`` sets what is no number to the right.
+        one the column holds words, on the left; ``>`` sets what is not a number to the right.
     unit : str
     whole : bool
         Its cells are never broken over two lines.

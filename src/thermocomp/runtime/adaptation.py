@@ -189,7 +189,7 @@ def take(
     if abs(error) > before.most + IMPLAUSIBLE * repeatability:
         return before, (
             f"{error:+.1f} um from the model, which can be wrong by {before.most:.1f} um at most: check the probe, the "
-            "tool and the unit; if the tool point did move so far, set the zero anew"
+            "tool and the unit; if the tool point did move so far, set the zero again"
         )
     (mean, covariance), spread = before.at(time), before.spread
     weights, own = _beside(directions, 1.0), (UNEXPLAINED * before.size) ** 2 + repeatability**2

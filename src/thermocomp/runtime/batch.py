@@ -30,7 +30,7 @@ class ModelRun(NamedTuple):
     outside: BoolArray  #: (n_rows,), an input of the model alone was outside the trained range
     rejected: BoolArray  #: (n_rows,), complete readings that the gate turned away
     why: str  #: the first of them; empty if there is none
-    half_width: FloatArray  #: (n_rows,), of the band about `deviation`; nan without one, and where that counts anew
+    half_width: FloatArray  #: (n_rows,), of the band about `deviation`; nan without one, and where that is re-zeroed
     shift: FloatArray  #: (n_rows,), what was learned from probings, and is in `compensated`
     without: FloatArray  #: (n_rows,), `compensated` without any
     refused: tuple[str, ...]  #: why probings were not used
@@ -64,9 +64,9 @@ def run(
     reference : array-like of shape (n_inputs,), optional
         What counts as zero; see `ErrorModel.init`.
     resting : ndarray of bool of shape (n_rows,), optional
-        The spindle is known to stand; nowhere if not given.
-    anew : int, optional
-        Row from which deviations count anew: from there it is the model minus what it says there, on average over the
+        The spindle is known to be stopped; nowhere if not given.
+    again : int, optional
+        Row from which deviations count again: from there it is the model minus what it says there, on average over the
         rows that a zero is taken of, and the correction begins at zero again.
     undriven : ndarray of bool of shape (n_rows,), optional
         The correction is not driven: sensors failed that the model must not lose. It is held, then fades.
@@ -210,7 +210,7 @@ def _gated(model: ErrorModel, time: FloatArray, values: FloatArray, stands: Bool
 def _counted(
     deviation: FloatArray, model: ErrorModel, time: FloatArray, used: BoolArray, stands: BoolArray, anew: int
 ) -> tuple[FloatArray, int]:
-    """Return deviations minus those where they count anew, and the row from which the correction moves again."""
+    """Return deviations minus those where they count again, and the row from which the correction moves again."""
     own = anew + np.flatnonzero(used[anew:])
     count, known = first_rows(model.zeroing, time[own], stands[own])
     shift = float(deviation[own[:count]].mean()) if count else 0.0

@@ -1,7 +1,7 @@
 """When a reading was taken, where clocks cannot be trusted.
 
 A reading carries a stamp of its source's clock, which may be set while the machine runs; the process has a monotone
-clock beside it. Stamps say how far two readings are apart as long as the monotone clock agrees. Corrections move by the
+clock beside it. Stamps state how far two readings are apart if the monotone clock agrees. Corrections move by the
 monotone clock alone.
 """
 

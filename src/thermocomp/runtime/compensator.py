@@ -5,7 +5,7 @@ Processing chain of a reading: in time? -> watch (which temperatures are believe
 sign -> limits -> `Correction`. Rejected readings leave the state unchanged: every correction stays where it was, for
 `Limits.hold`, and fades after that; so does one whose model was never judged without the sensors that failed. The first
 readings after a start are averaged: they are what temperatures count from, and the corrections stay zero until it is
-known, as long as the spindle stands (`ErrorModel.zeroing`). A probing comes with a reading and counts from the next one
+known, while the spindle is stopped (`ErrorModel.zeroing`). A probing comes with a reading and counts from the next one
 on: it says what the models are wrong by (`thermocomp.runtime.adaptation`).
 """
 
@@ -382,7 +382,7 @@ class Compensator:
             return limit_line(Correction(0.0), before, line.travel, travel, replace(self.limits, dead_band=0.0)), order
         after = limit_line(wanted, before, line.travel, travel, self.limits)
         if state.away is not None and _apart(wanted, after, line.travel) > max(ARRIVED, self.limits.dead_band):
-            return after, Status("restarting", f"nothing ran for {state.away:.0f} s; probe, or set the zero anew")
+            return after, Status("restarting", f"nothing ran for {state.away:.0f} s; probe, or set the zero again")
         return after, ACTIVE
 
     def _believe(self, state: CompensatorState, reading: Reading, time: float) -> tuple[CompensatorState, Reading]:
@@ -409,7 +409,7 @@ class Compensator:
         held: dict[str, str],
         driven: Collection[str] = (),
     ) -> "_Idle":
-        """Let corrections that nothing drives fade once they were held for long; say how they are."""
+        """Let corrections that nothing drives fade once they were held for long; state how they are."""
         # one reading counts for no more than its age may be: a clock that leaps makes nothing fade
         travel = self._travel(state, tick)
         clock = state.clock if not is_number(tick) else tick if state.clock is None else max(state.clock, tick)

@@ -1,4 +1,4 @@
-"""What somebody, or the controller, has a compensator do: take a target out, count anew, let all corrections go."""
+"""What somebody, or the controller, has a compensator do: take a target out, count again, let all corrections go."""
 
 from dataclasses import replace
 
@@ -72,7 +72,7 @@ def rezero(
     why: str,
     in_force: Correction | None = None,
 ) -> CompensatorState:
-    """Let a target or axis count anew from where it is: its correction stays, and moves on from there.
+    """Let a target or axis count again from where it is: its correction stays, and moves on from there.
 
     Parameters
     ----------

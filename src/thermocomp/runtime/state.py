@@ -13,7 +13,7 @@ from thermocomp.runtime.watch import WatchState
 
 Word = Literal["active", "holding", "fading", "suspended", "shadow", "restarting"]
 
-#: a state that is older is of another day: the machine starts anew, but for the corrections in force [s]
+#: a state that is older is of another day: the machine starts again, but for the corrections in force [s]
 FORGOTTEN = 24 * 3600.0
 
 
@@ -28,7 +28,7 @@ class Reference(NamedTuple):
     """From which instant a target or axis counts, and why.
 
     `shift` is what the models said there, together with the correction that was in force: nothing jumps where a zero is
-    set anew.
+    set again.
     """
 
     time: float  #: on the stamps of the readings [s]
@@ -96,10 +96,10 @@ def resume(
     in_force: Mapping[str, Correction] | None = None,
     tick: float | None = None,
 ) -> CompensatorState:
-    """Return the state to go on with after a restart.
+    """Return the state to continue with after a restart.
 
-    Up to `FORGOTTEN` the models go on from what they remember, as after an outage: what they read then counts as having
-    been there all the time. After that, or of unknown age, the machine starts anew. The correction that is in force
+    Up to `FORGOTTEN` the models continue from what they remember, as after an outage: what they read then counts as
+    having been there all the time. After that, or of unknown age, the machine starts again. The correction that is in force
     stays in either case, and moves from there within the limits.
 
     Parameters

@@ -128,7 +128,7 @@ def look(
         In the order of the watch's inputs; nan where a value is missing. Without its speeds nothing is predicted: it
         is passed on as it is.
     resting : bool
-        The spindle is known to stand.
+        The spindle is known to be stopped.
 
     Returns
     -------

@@ -189,7 +189,7 @@ class Touch:
         time : ndarray of shape (n_rows,)
             [s]
         still : ndarray of shape (n_rows,)
-            The spindle stands.
+            The spindle is stopped.
         """
         run = np.zeros(len(time), dtype=np.bool_)
         due = 0.0

@@ -269,7 +269,7 @@ def add_path(*path: str | int) -> Iterator[None]:
 def _check_duration(durations: tuple[float, ...], path: Path, sampling: float | None = None) -> None:
     """Refuse durations that are not there, not positive, or no whole number of samplings."""
     if not durations:
-        raise SettingError('is missing: say how long it lasts, such as duration = "30 min"', path)
+        raise SettingError('is missing: state how long it lasts, such as duration = "30 min"', path)
     for duration in durations:
         if not 0 < duration < math.inf:
             raise SettingError(f"{duration:g} s: must be positive", path)

@@ -92,7 +92,7 @@ def position(
 ) -> Positioned:
     """Fit position-dependent errors: cold profiles and thermal slopes, judged on what they have not seen.
 
-    Settings that are not given are found out from the profiles, and anew wherever a part is left out: how many slopes
+    Settings that are not given are found out from the profiles, and again wherever a part is left out: how many slopes
     are worth it, whether the profile shifts as a whole, and about which position it turns.
 
     Parameters

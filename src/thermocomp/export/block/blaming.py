@@ -12,7 +12,7 @@ def blame(s: Names, w: Names, t: Names, elapsed: float) -> None:
     Parameters
     ----------
     s, w, t : Names
-        Variables that are kept, worked out anew, and known.
+        Variables that are kept, worked out again, and known.
     elapsed : float
         Since the last look [s].
     """
@@ -108,7 +108,7 @@ def weigh_swaps(s: Names, w: Names, t: Names, counts: float) -> None:
     Parameters
     ----------
     s, w, t : Names
-        Variables that are kept, worked out anew, and known.
+        Variables that are kept, worked out again, and known.
     counts : float
         Time that counts as evidence [s].
     """

@@ -10,12 +10,12 @@ MOST_TICKS = 2e9
 
 
 def run_clock(s: Names, w: Names, t: Names, c: int, begun: bool) -> None:
-    """Let a value go on to now; between two ticks it goes straight to what the next would be.
+    """Let a value continue to now; between two ticks it goes straight to what the next would be.
 
     Parameters
     ----------
     s, w, t : Names
-        Variables that are kept, worked out anew, and known.
+        Variables that are kept, worked out again, and known.
     c : int
         Of the clock.
     begun : bool

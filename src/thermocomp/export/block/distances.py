@@ -12,7 +12,7 @@ def find_distances(s: Names, w: Names, t: Names, k: int) -> None:
     Parameters
     ----------
     s, w, t : Names
-        Variables that are kept, worked out anew, and known.
+        Variables that are kept, worked out again, and known.
     k : int
         Of the supports.
     """
@@ -43,7 +43,7 @@ def find_nearest(s: Names, w: Names, t: Names, k: int, columns: int) -> None:
     Parameters
     ----------
     s, w, t : Names
-        Variables that are kept, worked out anew, and known.
+        Variables that are kept, worked out again, and known.
     k : int
         Of the supports.
     columns : int

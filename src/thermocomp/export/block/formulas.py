@@ -17,7 +17,7 @@ def tick(s: Names, w: Names, t: Names, c: int) -> None:
     Parameters
     ----------
     s, w, t : Names
-        Variables that are kept, worked out anew, and known.
+        Variables that are kept, worked out again, and known.
     c : int
         Of the clock.
     """

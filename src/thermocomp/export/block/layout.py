@@ -39,7 +39,7 @@ STATE = {
     "begun_absolute": Var("bool", "models that count from nothing have begun"),
     "begun_rezeroed": Var("bool", "models that count from the start have begun"),
     "gathered": Var("int", "readings of the zero"),
-    "resting": Var("bool", "the spindle stood in the first of them"),
+    "resting": Var("bool", "the spindle was stopped in the first of them"),
     "gathered_at": Var("time", "when they were taken [s]", ("MOST",)),
     "gathered_value": Var("real", "what they say", ("MOST", "CHANNELS")),
     "deviation": Var("real", "of each model, within its range", ("MODELS",)),
@@ -63,7 +63,7 @@ WATCH = {
     "look": Var("time", "of the last look [s]"),
     "watch_zero": Var("real", "what its inputs count from", ("WATCHED",)),
     "watch_gathered": Var("int", "readings of its zero"),
-    "watch_resting": Var("bool", "the spindle stood in the first of them"),
+    "watch_resting": Var("bool", "the spindle was stopped in the first of them"),
     "watch_gathered_at": Var("time", "when they were taken [s]", ("MOST",)),
     "watch_gathered_value": Var("real", "what they say", ("MOST", "WATCHED")),
     "memory": Var("real", "lags of the temperatures, lag by lag, and states of the speed", ("MEMORY",)),
@@ -91,7 +91,7 @@ WATCH = {
     "fast": Var("time", "when it last did [s]"),
 }
 
-#: what is worked out anew in every call
+#: what is worked out again in every call
 WORK = {
     "age": Var("time", "of the values [s]"),
     "dt": Var("time", "since the call before [s]"),
@@ -102,7 +102,7 @@ WORK = {
     "passes": Var("bool", "the reading may be used"),
     "travel": Var("time", "time that counts for moves [s]"),
     "step": Var("time", "between this reading and the one before [s]"),
-    "stands": Var("bool", "the spindle stands"),
+    "stands": Var("bool", "the spindle is stopped"),
     "column": Var("real", "readings, sorted", ("COLUMN",)),
     "rows": Var("int", "so many"),
     "middle": Var("real", "their median, or their mean without outliers"),
@@ -122,7 +122,7 @@ WORK = {
 
 #: the same, of the watch
 WATCH_WORK = {
-    "made": Var("bool", "what is read goes on as it is"),
+    "made": Var("bool", "what is read continues as it is"),
     "x": Var("real", "readings, less the zero [degC]", ("SENSORS",)),
     "there": Var("bool", "it reads something that a machine can have", ("SENSORS",)),
     "before": Var("real", "what it should be near [degC]", ("SENSORS",)),
@@ -156,9 +156,9 @@ TABLES = {
     "reading_age": Var("time", "older values are not used [s]"),
     "hold": Var("time", "so long a correction stays that nothing drives [s]"),
     "fade": Var("time", "time constant with which it goes to zero after that [s]"),
-    "at_rest": Var("time", "the zero is averaged so long while the spindle stands [s]"),
+    "at_rest": Var("time", "the zero is averaged so long while the spindle is stopped [s]"),
     "otherwise": Var("time", "so long otherwise [s]"),
-    "speed_channel": Var("int", "tells whether the spindle stands"),
+    "speed_channel": Var("int", "tells whether the spindle is stopped"),
     "channel": Var("int", "of each trained range", ("RANGES",)),
     "temperature": Var("bool", "it is one", ("RANGES",)),
     "rezero": Var("bool", "it counts from the start", ("RANGES",)),

@@ -86,7 +86,7 @@ def find_linear(s: Names, w: Names, t: Names, at: float, first: int, end: int) -
     Parameters
     ----------
     s, w, t : Names
-        Variables that are kept, worked out anew, and known.
+        Variables that are kept, worked out again, and known.
     at : float
         Where.
     first, end : int
@@ -109,7 +109,7 @@ def find_step(s: Names, w: Names, t: Names, at: float, first: int, end: int) -> 
     Parameters
     ----------
     s, w, t : Names
-        Variables that are kept, worked out anew, and known.
+        Variables that are kept, worked out again, and known.
     at : float
         Where.
     first, end : int
@@ -125,7 +125,7 @@ def find_place(s: Names, w: Names, t: Names, at: float, first: int, end: int) ->
     Parameters
     ----------
     s, w, t : Names
-        Variables that are kept, worked out anew, and known.
+        Variables that are kept, worked out again, and known.
     at : float
         The value.
     first, end : int

@@ -24,7 +24,7 @@ def step(s: Names, w: Names, t: Names) -> None:
     """Take values in that were measured a while ago, and move the corrections."""
     tell_time(s, w, t)
     for c in range(t.CHANNELS):
-        w.given[c] = w.value[c] >= -1e30 and w.value[c] <= 1e30  # what is no number is not
+        w.given[c] = w.value[c] >= -1e30 and w.value[c] <= 1e30  # what is not a number is not
     w.stands = False
     if t.has_speed:
         w.stands = w.given[t.speed_channel] and abs(w.value[t.speed_channel]) <= STANDS
@@ -98,7 +98,7 @@ def check_start(s: Names, w: Names, t: Names, g: int) -> None:
     Parameters
     ----------
     s, w, t : Names
-        Variables that are kept, worked out anew, and known.
+        Variables that are kept, worked out again, and known.
     g : int
         Of the sets of ranges.
     """
@@ -199,7 +199,7 @@ def drive(s: Names, w: Names, t: Names, k: int) -> None:
     Parameters
     ----------
     s, w, t : Names
-        Variables that are kept, worked out anew, and known.
+        Variables that are kept, worked out again, and known.
     k : int
         Of the target.
     """
@@ -234,7 +234,7 @@ def idle(s: Names, w: Names, t: Names, k: int) -> None:
     Parameters
     ----------
     s, w, t : Names
-        Variables that are kept, worked out anew, and known.
+        Variables that are kept, worked out again, and known.
     k : int
         Of the target.
     """

@@ -165,7 +165,7 @@ def find_jumps(s: Names, w: Names, t: Names, elapsed: float) -> None:
     Parameters
     ----------
     s, w, t : Names
-        Variables that are kept, worked out anew, and known.
+        Variables that are kept, worked out again, and known.
     elapsed : float
         Since the last look [s].
     """
@@ -192,7 +192,7 @@ def advance(s: Names, w: Names, t: Names, elapsed: float) -> None:
     Parameters
     ----------
     s, w, t : Names
-        Variables that are kept, worked out anew, and known.
+        Variables that are kept, worked out again, and known.
     elapsed : float
         Since the last look [s].
     """
@@ -272,7 +272,7 @@ def judge(s: Names, w: Names, t: Names, k: int) -> None:
     Parameters
     ----------
     s, w, t : Names
-        Variables that are kept, worked out anew, and known.
+        Variables that are kept, worked out again, and known.
     k : int
         Of the target.
     """

@@ -86,7 +86,7 @@ _SOURCE = """{facts}#include "{name}.h"
 #include <math.h>
 
 #ifdef __FAST_MATH__
-#error "a value that is no number would not be noticed: compile without -ffast-math"
+#error "a value that is not a number would not be noticed: compile without -ffast-math"
 #endif
 
 #define TC(x) ((tc_real)(x))
@@ -99,7 +99,7 @@ _SOURCE = """{facts}#include "{name}.h"
 #define TC_ROUNDED(x, single) TC(x)
 #endif
 
-/* what is worked out anew in every call */
+/* what is worked out again in every call */
 typedef struct {{
 {work}}} {name}_work;
 

@@ -69,7 +69,7 @@ one call in which the zero becomes known has more to sort: 300 s / cycle reading
 ## Switch it off
 
 Do not set the correction to zero at once: the axis would jump. Call `{name}_step` with an age of 1e9: it stays where
-it is for {hold:g} s and then goes to zero, slowly. To begin anew: `{name}_start`, once the correction is zero. The
+it is for {hold:g} s and then goes to zero, slowly. To begin again: `{name}_start`, once the correction is zero. The
 controller must not compensate for temperature itself at the same time.
 """
 

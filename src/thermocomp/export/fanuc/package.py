@@ -55,7 +55,7 @@ All of this is **UNCONFIRMED** on a control: have the machine builder look at it
    never more often for the rate to hold.
 5. Try the sign in two minutes with #500 = 0: add 0.1 mm to the external offset of an axis by hand, and go to the
    same position again: the tool has to stand 0.1 mm further in its plus direction. Take it away again.
-6. `#500 = 1` switches it on. Set the datums anew once it has arrived.
+6. `#500 = 1` switches it on. Set the datums again once it has arrived.
 
 """
 
@@ -68,7 +68,7 @@ agree. On the control: put a row's temperatures into the variables by MDI, #500 
 moves, and read the external offset. Then back to the true ones."""
 
 _OFF = """\
-`#500 = 0`, and go on calling the macro: it takes its correction back by at most {step:g} um a call. When {forces}
+`#500 = 0`, and continue calling the macro: it takes its correction back by at most {step:g} um a call. When {forces}
 are 0 it has gone, and the calls may go, too. Never clear the external offset by hand while the macro is called."""
 
 

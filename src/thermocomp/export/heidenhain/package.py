@@ -44,7 +44,7 @@ _INSTALL = """\
    dimension alone and have the axis go to the same position again. If the tool stands 0.1 mm further in the
    **minus** direction of the axis, the formula is right as it is; if in the plus direction, turn every sign behind
    `<L>`.
-4. Set the datums anew.
+4. Set the datums again.
 
 TNC 360: the PLC works out `word` of `{name}.txt`, rounds it to whole um, keeps it within +-{most:g} um, and writes
 it every few seconds. Try the sign with +100 um: the axis has to go 0.1 mm in its plus direction."""
@@ -57,7 +57,7 @@ have the PLC write the temperatures of a row into the words, and read the dimens
 
 _OFF = """\
 Move the axes clear, put the old dimension back in place of the formula (TNC 360: let the PLC write 0, which the
-axis follows at 1 um/s), and set the datums anew: a dimension that changes moves the tool at once."""
+axis follows at 1 um/s), and set the datums again: a dimension that changes moves the tool at once."""
 
 
 def write_heidenhain(
@@ -127,7 +127,7 @@ def find_marks(reductions: Sequence[Reduced]) -> dict[str, str]:
 
 
 def formula(r: Reduced, marks: dict[str, str], *, word: bool = False) -> str:
-    """Return a formula as it goes on behind a dimension; the correction in um for a `word`."""
+    """Return a formula as it continues behind a dimension; the correction in um for a `word`."""
     sign, number = (-1, in_um) if word else (1, in_mm)
     text = _signed(number(sign * r.model.intercept)) if r.model.intercept else ""
     for (i, factor), zero in zip(r.terms, r.zeros, strict=True):

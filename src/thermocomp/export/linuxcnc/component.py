@@ -278,7 +278,7 @@ def has_slopes(tables: Tables) -> bool:
 
 
 def remark(text: str) -> str:
-    """Return a text as remarks in HAL, whose lines have an end and go on behind a backslash."""
+    """Return a text as remarks in HAL, whose lines have an end and continue behind a backslash."""
     lines = textwrap.wrap(comment(text).replace("\\", "/"), 110, break_on_hyphens=False)
     return "".join(f"# {line}\n" for line in lines or [""])
 

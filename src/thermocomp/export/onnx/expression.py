@@ -89,7 +89,7 @@ class Walk:
         return after
 
     def _clock(self, tick: e.Node, interval: float) -> str:
-        """Return a value that is made anew at every tick: `thermocomp.core.autoregressive` says how."""
+        """Return a value that is made again at every tick: `thermocomp.core.autoregressive` says how."""
         g, clock = self._graph, Clock(tick, interval)
         now = g.join([self.value(leaf) for leaf in clock.leaves])
         n, means = len(clock.leaves), clock.means

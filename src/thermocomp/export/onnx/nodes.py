@@ -151,7 +151,7 @@ class Graph:
         carried : sequence of str
             Their first values.
         body : Graph
-            Of the number of the trip, whether to go on, and the values; of whether to go on, and the values.
+            Of the number of the trip, whether to continue, and the values; of whether to continue, and the values.
         """
         left = tuple(self.name() for _ in carried)
         self.nodes.append(Node("Loop", (trips, "", *carried), left, {"body": body}))

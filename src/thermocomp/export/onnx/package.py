@@ -30,7 +30,7 @@ _README = """{facts}
     python {name}_test.py
 
 It prints how many calls are wrong (none) and the largest difference; its exit code is 0 if all is well. Run the same
-vectors in the runtime of the controller: texts such as "nan" stand there for what is no number.
+vectors in the runtime of the controller: texts such as "nan" stand there for what is not a number.
 
 ## Run it
 
@@ -66,7 +66,7 @@ Call it in a cycle, every second or ten, with the time since the call before:
 `status` per target: 1 active, 2 holding, 3 fading, 4 shadow. Give `correction` [um] to the controller{line}.
 
 A value that is missing, no number or not plausible stops all corrections: they stay for {hold:g} s and then go to
-zero, slowly; the models go on with the next values that are all good, over the time between. A `dt` that is negative,
+zero, slowly; the models continue with the next values that are all good, over that time. A `dt` that is negative,
 no number or above 1e10 moves nothing, and so does one of 0. A state that is damaged counts as that of a start.
 
 ## What is not inside
@@ -80,8 +80,8 @@ no number or above 1e10 moves nothing, and so does one of 0. A state that is dam
 
 ## Switch it off
 
-Do not set the correction to zero at once: the axis would jump. Go on to call it with a `value` of NaN: it stays where
-it is for {hold:g} s and then goes to zero. To begin anew: a `state` of zeros, once the correction is zero. The
+Do not set the correction to zero at once: the axis would jump. Call it with a `value` of NaN from then on: it stays where
+it is for {hold:g} s and then goes to zero. To begin again: a `state` of zeros, once the correction is zero. The
 controller must not compensate for temperature itself at the same time.
 """
 
@@ -151,7 +151,7 @@ def _readme(compensator: Compensator, tables: Tables, name: str, said: list[str]
     counted = sorted({r.name for r in tables.ranges if r.rezero})
     zero = (
         f"Where `zero` is `mean`, it is the mean of that value over the first {zeroing.otherwise:g} s, or over "
-        f"{zeroing.at_rest:g} s while the spindle stands, without outliers, and stays the same until the power is off. "
+        f"{zeroing.at_rest:g} s while the spindle is stopped, without outliers, and stays until the power is off. "
         f"Until it is known, give NaN: nothing moves. Take none where the temperatures together are more than {DAY:g} "
         "degC from the numbers in brackets, those of the training, or one of them is far off the others: that is no "
         "machine at its start."

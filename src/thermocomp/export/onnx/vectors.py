@@ -107,7 +107,7 @@ def answer(compensator: Compensator, tables: Tables, readings: Readings, zero: F
 def write_vectors(
     tables: Tables, readings: Readings, answers: Answers, zero: FloatArray, facts: Sequence[str], sha256: str, size: int
 ) -> str:
-    """Return test vectors as JSON; what is no number is a text that `float` of Python takes.
+    """Return test vectors as JSON; what is not a number is a text that `float` of Python takes.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ from thermocomp.recordings.starts import Start
 FloatArray = NDArray[np.float64]
 
 NAME = "reduced"
-#: a controller's formula knows no trained range: it goes on as it is
+#: a controller's formula knows no trained range: it continues as it is
 UNBOUNDED = Support("clip", margin=1e3)
 #: what of a single cycle is learned from, and what judged: no proof, but a figure
 _SHARES = (0.6, 0.4)
@@ -45,7 +45,7 @@ class Reduction:
     blocks : tuple of Assessment
         On each unseen block.
     full : tuple of Assessment
-        The full model on the same ones; empty if it could not be fitted anew.
+        The full model on the same ones; empty if it could not be fitted again.
     time : tuple of ndarray
         Times of each recording's rows [s].
     """
@@ -70,9 +70,9 @@ def reduce_model(
 ) -> Reduction:
     """Fit the best model of a shape to recordings, and judge it beside the full one.
 
-    Sensors are chosen anew without each unseen cycle, by cycles left out of the others. What is judged says its
+    Sensors are chosen again without each unseen cycle, by cycles left out of the others. What is judged says its
     numbers in the digits that are printed, and knows no range: neither does the controller. The full model is fitted
-    anew without each cycle, too, if its method is known; else its error is that in its file.
+    again without each cycle, too, if its method is known; else its error is that in its file.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def _left_outs(blocks: Sequence[Assessment], full: Sequence[Assessment]) -> list
 
 def _beside(model: ErrorModel, method: str, judging: Judging) -> str:
     if method:
-        return f"{method}, fitted anew for this; both are judged alike: {judging.name}"
+        return f"{method}, fitted again for this; both are judged alike: {judging.name}"
     if model.honest_error is None:
         return "the model's method is not known here, and it was never judged on cycles it has not seen"
     return (

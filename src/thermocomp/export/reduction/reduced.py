@@ -132,7 +132,7 @@ class Reduced:
         if self.loss > most_loss:
             return f"loses too much: {self.loss_in_words}, at most {most_loss:g} are let pass (--most-loss)"
         if found.word == "unproven" and not found.taken:
-            return f'unproven: {found.why} (--accept-unproven "NAME, REASON" takes it all the same)'
+            return f'unproven: {found.why} (--accept-unproven "NAME, REASON" takes it anyway)'
         return ""
 
     @property
@@ -272,7 +272,7 @@ def head(reductions: Sequence[Reduced], facts: Facts, sign: str, units: str) -> 
     for r in reductions:
         found = r.model.honest_error
         taken = found.taken if found is not None else ""
-        words.append(f"{r.model.target}: {'UNPROVEN, taken all the same' if taken else 'accepted on unseen cycles'}")
+        words.append(f"{r.model.target}: {'UNPROVEN, taken anyway' if taken else 'accepted on unseen cycles'}")
         more += [f"{r.model.target}: unproven, taken by {taken}"] if taken else []
         more += [f"{r.model.target}: {r.loss_in_words}; {r.none.rms:.2f} um without compensation"]
     kind = "reduced to what the controller holds" if any(r.cycles for r in reductions) else "the model as it is"

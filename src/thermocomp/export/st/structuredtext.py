@@ -107,7 +107,7 @@ def translate(tables: Tables, name: str, dialect: Dialect) -> list[SourceUnit]:
 
 
 def _start(tables: Tables, name: str, used: str, scl: bool) -> SourceUnit:
-    """Return the function that begins anew; the corrections in force stay, and move from there."""
+    """Return the function that begins again; the corrections in force stay, and move from there."""
     mark = "#" if scl else ""
     lines = []
     for n, var in used_in("s", used).items():
@@ -121,7 +121,7 @@ def _start(tables: Tables, name: str, used: str, scl: bool) -> SourceUnit:
             lines.append(f"{mark}s.{safe(n)} := {zero};")
     own = quoted(f"{name}_start", scl)
     parts = [f"FUNCTION {own} : {'Void' if scl else 'BOOL'}", *(SCL if scl else [])]
-    parts += ["(* Begin anew: temperatures count from now on; corrections stay, and move from where they are. *)"]
+    parts += ["(* Begin again: temperatures count from now on; corrections stay, and move from where they are. *)"]
     parts += [section("VAR_IN_OUT", {"s": quoted(f"{name}_state", scl)})]
     parts += [section("VAR_TEMP" if scl else "VAR", {"k": "DINT"})]
     return SourceUnit(f"{name}_start", "\n".join(parts), "\n".join(lines), "END_FUNCTION")

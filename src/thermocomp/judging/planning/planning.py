@@ -24,7 +24,7 @@ KINDS: tuple[Kind, ...] = ("repeated", "stop", "run")
 REST, SHORT = 900.0, 1800.0
 #: of what the room does to a part of the machine [s]
 LAG = 7200.0
-#: rows of a test that is foretold [s]
+#: rows of a test that is predicted [s]
 _STEP = 60.0
 #: of them those that are counted
 _EVERY = 5
@@ -174,7 +174,7 @@ def plan(samples: Samples, top_speed: float | None = None, *, hours: float = 12.
 
     What is expected to be wrong follows from the covariance of the weights of `averaged` (`thermocomp.models.doubt`),
     over all tests of the grid, the room changing in each of them. A test takes from the covariance what regression on
-    its rows would: its spindle speed is known exactly, its temperatures are foretold from the speed, and the room
+    its rows would: its spindle speed is known exactly, its temperatures are predicted from the speed, and the room
     reaches the machine with a lag of 2 h.
 
     Parameters

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 #: repeated: runs and stops of half an hour in turn; stop: a run, then a stop as long; run: one run without a stop;
-#: room: the spindle stands while the room changes
+#: room: the spindle is stopped while the room changes
 Kind = Literal["repeated", "stop", "run", "room"]
 
 
@@ -16,7 +16,7 @@ class Trial:
     ----------
     kind : {'repeated', 'stop', 'run', 'room'}
         repeated: short runs and stops in turn; stop: a run, then a stop as long; run: a run without a stop; room: the
-        spindle stands while the temperature of the room changes.
+        spindle is stopped while the temperature of the room changes.
     speed : float
         Of the spindle [1/min].
     steps : tuple of (float, float)
@@ -37,6 +37,6 @@ class Trial:
         """What is done, in words."""
         _, (_, longest), *_ = self.steps
         if self.kind == "room":
-            return f"spindle stands {longest / 3600:g} h, the room changes"
+            return f"spindle is stopped {longest / 3600:g} h, the room changes"
         run = f"{self.speed:,.0f} 1/min for {longest / 3600:g} h"
         return {"run": run, "stop": f"{run}, then a stop as long"}.get(self.kind, f"{run}, stop as long, repeated")

@@ -293,7 +293,7 @@ def average_test(
 
 
 def average_curve(time: FloatArray, values: FloatArray, noise: Noise) -> tuple[FloatArray, FloatArray]:
-    """Average a curve that begins in its first row and goes on smoothly to its last one.
+    """Average a curve that begins in its first row and continues smoothly to its last one.
 
     A row is the mean over the window around it. Towards the first row, in which the drives start or stop, the window
     narrows, so that what came before is not mixed in; towards the last one it stays where it is, and a straight line

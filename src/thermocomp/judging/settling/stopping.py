@@ -1,4 +1,4 @@
-"""When a running test may stop: the steady state is foretold, with its uncertainty.
+"""When a running test may stop: the steady state is predicted, with its uncertainty.
 
 The best exponentials through a curve that has not settled say a final value, and by their standard errors seem sure of
 it; others fit nearly as well and end elsewhere. So all pairs of time constants are tried, and each counts by how well
@@ -104,15 +104,17 @@ class Running:
         what = f"{self.phase.kind} {self.phase.number}, {self.seconds / 3600:.1f} h"
         if self.may_stop:
             then = (
-                "stop the spindle" if self.phase.kind == "warm-up" else "the test may end, or go on to the next speed"
+                "stop the spindle"
+                if self.phase.kind == "warm-up"
+                else "the test may end, or continue to the next speed"
             )
             return f"{what}: the steady state is known; {then}"
         open_ = ", ".join(f"{n} (+-{s.uncertainty:.1f}, want {s.limit:.1f})" for n, s in self.states if not s.known)
-        return f"{what}: go on; not known yet: {open_}"
+        return f"{what}: continue; not known yet: {open_}"
 
 
 def foretell(time: FloatArray, values: FloatArray) -> SteadyState:
-    """Foretell the steady state of a curve.
+    """Predict the steady state of a curve.
 
     Parameters
     ----------

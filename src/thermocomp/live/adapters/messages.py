@@ -30,7 +30,7 @@ def read_message(payload: bytes | str, arrived: float, names: Mapping[str, str])
     ----------
     payload : bytes or str
         JSON: values by channel, such as ``{"t1_C": 21.3, "spindle_rpm": 4000}``; with ``time`` (s since 1970) when
-        it was taken. What is no number is missing.
+        it was taken. What is not a number is missing.
     arrived : float
         The clock, now [s]: its time if it does not say.
     names : mapping of str to str
@@ -39,7 +39,7 @@ def read_message(payload: bytes | str, arrived: float, names: Mapping[str, str])
     Raises
     ------
     ReadingError
-        It is too large, no JSON, no table, or has text that is no text: invalid UTF-8, half a surrogate pair, control
+        It is too large, no JSON, no table, or has text that is not text: invalid UTF-8, half a surrogate pair, control
         characters, names that are too long.
     """
     content = _table(payload, '{"t1_C": 21.3}')
@@ -114,7 +114,7 @@ def _table(payload: bytes | str, example: str) -> dict[str, Any]:
     except ValueError as e:
         raise ReadingError(f"a message that is no JSON: {escape(e, 80)}") from e
     if not isinstance(content, dict):
-        raise ReadingError(f"a message that is no table of values: {escape(content, 40)}; want {example}")
+        raise ReadingError(f"a message that is not a table of values: {escape(content, 40)}; want {example}")
     for name, value in content.items():
         if why := explain_unfit(name) or (isinstance(value, str) and not _is_text(value) and explain_unfit(value)):
             raise ReadingError(f"a message with text that cannot be used: {why}")

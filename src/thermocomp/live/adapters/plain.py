@@ -45,9 +45,9 @@ class Played:
         raise NotImplementedError
 
     async def connect(self, timeout: float) -> None:  # noqa: ARG002 - of the port
-        """Begin with the first row, or go on after the last that was played."""
+        """Begin with the first row, or continue after the last that was played."""
         self._connection.to("connecting")
-        if self._broken is not None:  # what cannot be read once cannot be read later, and it is not played anew
+        if self._broken is not None:  # what cannot be read once cannot be read later, and it is not played again
             self._connection.to("failed", str(self._broken))
             raise self._broken
         if self._rows is None:
@@ -196,7 +196,7 @@ def read_rows(path: Path) -> Generator[tuple[float, dict[str, float]], None, Non
     Raises
     ------
     InputError
-        It cannot be read, has no times, or names that are none; while rows are read: a line is no text.
+        It cannot be read, has no times, or names that are none; while rows are read: a line is not text.
     """
     try:
         file = path.open("rb")

@@ -142,7 +142,7 @@ def told(stored: "StoredRun", reader: "JournalReader") -> tuple[str, str]:
     if isinstance(row, StateRow):
         return kind, f"{row.target} {row.word}" + (f": {row.reason}" if row.reason else "")
     if isinstance(row, ReferenceRow):
-        return kind, f"{row.target} counts anew: {row.why}"
+        return kind, f"{row.target} is re-zeroed: {row.why}"
     if isinstance(row, UpdateRow):
         change = f"refused: {row.refused}" if row.refused else f"{row.before:+.2f} to {row.after:+.2f} um"
         return kind, f"{row.target} measured {row.measured:+.2f} um, {change}"

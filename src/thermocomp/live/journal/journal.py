@@ -90,7 +90,7 @@ class Journal:
 
     @classmethod
     def open(cls, path: str | Path, limits: JournalLimits, start: StartRow) -> Self:
-        """Open a journal, to go on with it or to begin it; a disk that does not let us is told by `status`.
+        """Open a journal, to continue with it or to begin it; a disk that does not let us is told by `status`.
 
         A file that is damaged or no journal is kept as ``.refused``; one of a newer version stays as it is.
 
@@ -115,7 +115,7 @@ class Journal:
         """Let a row wait for the next `flush`; one that holds no values is counted, and nothing is raised."""
         try:
             kind, text, time = kind_of(row), dumps(row, self._described), float(row.time)
-        except Exception as e:  # noqa: BLE001 - whatever is handed in, the service goes on
+        except Exception as e:  # noqa: BLE001 - whatever is handed in, the service continues
             self._refused += 1
             self._odd = f"{type(row).__name__} refused: {e}"
             return
@@ -200,7 +200,7 @@ class Journal:
         connection.execute("COMMIT")
 
     def _connect(self) -> sqlite3.Connection:
-        """Go on with the newest file, or begin one."""
+        """Continue with the newest file, or begin one."""
         files = numbered(self.path)
         newest = files[max(files)] if files else None
         if newest is not None:
@@ -213,7 +213,7 @@ class Journal:
         return found
 
     def _attach(self, path: Path) -> sqlite3.Connection | None:
-        """Return a file to go on with; None: it is of a newer version, or was set aside."""
+        """Return a file to continue with; None: it is of a newer version, or was set aside."""
         connection = sqlite3.connect(path, timeout=0.2, isolation_level=None, check_same_thread=False)
         try:
             version = find_version(connection)

@@ -66,7 +66,7 @@ class JournalReader:
     Raises
     ------
     InputError
-        There is none, or a file is no journal, damaged, or of a newer version.
+        There is none, or a file is not a journal, damaged, or of a newer version.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -235,7 +235,7 @@ def telling(path: Path) -> Iterator[None]:
     except sqlite3.Error as e:
         code = getattr(e, "sqlite_errorcode", 0) & 0xFF
         if code == sqlite3.SQLITE_NOTADB:
-            raise InputError(f"{path}: is no journal of thermocomp, nor any database") from e
+            raise InputError(f"{path}: is not a journal of thermocomp, nor any database") from e
         if code == sqlite3.SQLITE_CANTOPEN:
             hint = "may it be read? Else copy it, and what is named like it, into a folder where files may be made"
             raise InputError(f"{path}: cannot be opened; {hint}") from e
@@ -253,7 +253,7 @@ def reading(path: Path) -> Iterator[sqlite3.Connection | None]:
     Raises
     ------
     InputError
-        It is no journal, or of a newer version.
+        It is not a journal, or of a newer version.
     """
     # without leave to make files beside it, SQLite reads one that nobody writes into only if it is told so
     how = "mode=ro" if path.with_name(f"{path.name}-wal").exists() else "mode=ro&immutable=1"
@@ -263,7 +263,7 @@ def reading(path: Path) -> Iterator[sqlite3.Connection | None]:
     with telling(path), closing(sqlite3.connect(f"{path.resolve().as_uri()}?{how}", uri=True)) as connection:
         version = find_version(connection)
         if version is None:
-            raise InputError(f"{path}: is no journal of thermocomp but another database")
+            raise InputError(f"{path}: is not a journal of thermocomp but another database")
         if version > VERSION:
             raise InputError(
                 f"{path}: a journal of version {version}, and this thermocomp knows {VERSION}: read it with a newer one"

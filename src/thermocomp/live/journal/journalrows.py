@@ -77,7 +77,7 @@ class StateRow(NamedTuple):
 
 
 class ReferenceRow(NamedTuple):
-    """A target counts anew from now on."""
+    """A target is re-zeroed from now on."""
 
     time: float
     target: str

@@ -121,7 +121,7 @@ def converge(
     """Sweep, with `triangle` for the boxcar, until a sweep moves the functions by `tolerance` at most.
 
     The move is the root of the mean square over the rows, summed over all phi; theta has norm 1. Sweeps are
-    accelerated by momentum (Nesterov), which starts anew whenever the move grows.
+    accelerated by momentum (Nesterov), which starts again whenever the move grows.
 
     Returns
     -------

@@ -52,7 +52,7 @@ def _lane_level(bounds: RankArray, groups: Any, out: FloatArray) -> None:
 
 @compiled
 def _lane_margins(sums: FloatArray, half: int) -> None:
-    """Go on with running sums, which have `half` rows to spare on either side, as if their numbers were mirrored."""
+    """Continue with running sums, which have `half` rows to spare on either side, as if their numbers were mirrored."""
     top = len(sums) - 1 - half
     zero = splat(0.0)
     whole = add(load(sums, top), load(sums, top))

@@ -70,7 +70,7 @@ def left_by(
 def add(  # noqa: PLR0912, PLR0915 - in one piece it is four times as fast
     columns: FloatArray, least: FloatArray, state: State, lists: Lists, inside: ByteArray, size: int, budget: int
 ) -> int:
-    """Go on with the enumeration of all sets up to `size` until it is over or `budget` sets were looked at.
+    """Continue with the enumeration of all sets up to `size` until it is over or `budget` sets were looked at.
 
     Level d has d columns inside; ``numbers[1, d]`` is the next to enter there and ``numbers[2, d]`` the last; it is
     over when level 0 has no more. ``sums[:, d]``: residual sum of squares; the one when the products were computed; the

@@ -3,7 +3,7 @@
 Let the rows of W be those of the inverse of the triangle of a set S, restricted to the columns that may still leave
 ("free"); M = W W' and b = W z. Column j leaves at the cost b[j]^2 / M[j, j], and with it M and b lose one rank. The row
 of M that a column needs to leave is built from the vectors of those that left before, so a node costs a few passes over
-one row. Where that would lose more digits than `GUARD` allows, W is computed anew by Householder's QR.
+one row. Where that would lose more digits than `GUARD` allows, W is computed again by Householder's QR.
 
 The state is a tuple. ``work[:, d, :]`` holds at level d: 0 the vector of the column that left, 1 the diagonal of M,
 2 b, 3 the costs, 4 the costs in the order of the free columns, 5 the least diagonal that is good enough. ``moments[d]``
@@ -29,7 +29,7 @@ from thermocomp.models.kernels.subsets import (
 
 State = tuple[FloatArray, FloatArray, FloatArray, IntArray, IntArray, FloatArray]
 
-#: least share of M[j, j] that may be left before W is computed anew: five digits are lost at most
+#: least share of M[j, j] that may be left before W is computed again: five digits are lost at most
 GUARD = 1e-5
 
 
@@ -140,7 +140,7 @@ def begin(triangle: FloatArray, state: State, lists: Lists, inside: ByteArray, r
 def drop(  # noqa: PLR0912, PLR0915 - in one piece it is a tenth faster
     state: State, lists: Lists, inside: ByteArray, budget: int
 ) -> int:
-    """Go on with the search until it is over or `budget` nodes were visited; return their number.
+    """Continue with the search until it is over or `budget` nodes were visited; return their number.
 
     The search is over when ``state`` says that level 0 has no children left, ``numbers[2, 0] == 0``, at level 0.
     """

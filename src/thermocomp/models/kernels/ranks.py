@@ -35,7 +35,7 @@ def _argsort(x: FloatArray, index: RankArray, keys: RankArray, bins: RankArray) 
     bins[:] = 0
     for i in range(n):
         place = (x[i] - low) * scale
-        keys[i] = np.uint32(place) if place < size - 1 else np.uint32(size - 1)  # also where it is no number
+        keys[i] = np.uint32(place) if place < size - 1 else np.uint32(size - 1)  # also where it is not a number
         bins[keys[i] + 1] += 1
     for k in range(size):
         bins[k + 1] += bins[k]

@@ -166,7 +166,7 @@ def interpolate_at_rows(
     run : TickedRun
     ticked : ndarray of shape (n_ticks + 1,)
     ahead : callable
-        Gives the tick after some ticks, if the inputs went on as given: ``ahead(ticks, inputs)``.
+        Gives the tick after some ticks, if the inputs continued as given: ``ahead(ticks, inputs)``.
 
     Returns
     -------

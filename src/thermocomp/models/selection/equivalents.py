@@ -129,7 +129,9 @@ def equivalents(
             raise InputError(f"psi of displacement {d}: want {len(sets)} sets by data sets, found {values.shape}")
         if not np.isfinite(values).all():
             k, test = np.argwhere(~np.isfinite(values))[0]
-            raise InputError(f"psi of displacement {d}, set {sets[k]}, data set {test}: {values[k, test]} is no number")
+            raise InputError(
+                f"psi of displacement {d}, set {sets[k]}, data set {test}: {values[k, test]} is not a number"
+            )
         summed[d] = values.sum(axis=1)
         top = int(np.argmax(np.round(summed[d], _DECIMALS)))
         best.append(top)

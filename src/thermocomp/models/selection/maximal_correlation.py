@@ -116,7 +116,7 @@ def maximal_correlations(
     Raises
     ------
     FitError
-        A test has fewer rows than the boxcar, or a value that is no number.
+        A test has fewer rows than the boxcar, or a value that is not a number.
     InputError
         Tests differ in their channels, or a setting is out of its range.
     """
@@ -168,7 +168,9 @@ def _checked(test: DataSet, half_window: int) -> tuple[FloatArray, FloatArray]:
         )
     bad = ~(np.isfinite(T).all(axis=1) & np.isfinite(S).all(axis=1))
     if bad.any():
-        raise FitError(f"{test.name}: row {int(np.argmax(bad))} holds a value that is no number; leave such rows out")
+        raise FitError(
+            f"{test.name}: row {int(np.argmax(bad))} holds a value that is not a number; leave such rows out"
+        )
     return T, S
 
 

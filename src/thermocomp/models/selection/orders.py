@@ -76,7 +76,7 @@ def compute_orders(
 ) -> tuple[Order, ...]:
     """Compute all orders from the triangle of the greatest one, on the same rows, so that they can be compared.
 
-    For each m the small triangle is made anew with the inputs first; its last column then holds the SSE of every k.
+    For each m the small triangle is made again with the inputs first; its last column then holds the SSE of every k.
 
     Parameters
     ----------

@@ -83,7 +83,7 @@ def revise(
     Returns
     -------
     int
-        0 done, 1 nothing was taken off and nothing written, 2 the program or something else cannot be used.
+        0 done, 1 nothing was corrected and nothing written, 2 the program or something else cannot be used.
     """
     job, notes = prepare_job(program, drifting, output, starting, way, controller, timing, date, overwrite=overwrite)
     loudness.tell(f"read {job.program}")
@@ -159,5 +159,5 @@ def _many(n: int, what: str) -> str:
 def _spindle(job: Job) -> str:
     slowest, fastest = job.revision.slowest, job.revision.fastest
     if not fastest:
-        return "the spindle stands still"
+        return "the spindle is stopped"
     return f"spindle {slowest:g} 1/min" if slowest == fastest else f"spindle {slowest:g} to {fastest:g} 1/min"

@@ -57,7 +57,7 @@ class Program:
             raise ProgramError(line, f"{who}: there is no N{number} in this program")
         if len(places) > 1:
             lines = " and ".join(str(i + 1) for i in places[:2])
-            raise ProgramError(line, f"{who}: N{number} stands in lines {lines}: number the lines anew")
+            raise ProgramError(line, f"{who}: N{number} appears in lines {lines}: number the lines again")
         return places[0]
 
     def closing(self, begin: int, loop: int) -> int:
@@ -115,7 +115,7 @@ class File:
             return found[0]
         if found:
             lines = " and ".join(str(p.start + 1) for p in found[:2])
-            raise ProgramError(line, f"{who}: O{number} stands in lines {lines}; delete the duplicate")
+            raise ProgramError(line, f"{who}: O{number} appears in lines {lines}; delete the duplicate")
         raise ProgramError(
             line,
             f"{who}: O{number:04d} is not in this file; put it behind the program, with its O number and M99, or have "

@@ -108,7 +108,7 @@ class _Unroller:
                 yield text, i + 1
 
     def _run(self, frame: _Frame) -> Lines:
-        """Run a program from its place on; return the line number to go on with, 0 for none, or that all has ended."""
+        """Run a program from its place on; return the line number to continue with, 0 for none, or that all ended."""
         began = False
         program, texts = frame.program, self._texts
         while frame.place < program.stop:
@@ -146,7 +146,7 @@ class _Unroller:
         return self._read_lines[index]
 
     def _line(self, frame: _Frame, line: Line) -> Generator[tuple[str, int], None, int | None]:
-        """Run one line; return None if the program goes on behind it."""
+        """Run one line; return None if the program continues behind it."""
         if line.flow or line.assignments:
             self._refuse_optional(line)
             self._acted = True
@@ -289,7 +289,7 @@ class _Unroller:
             self._go_back(frame)
 
     def _go_back(self, frame: _Frame) -> None:
-        """Take in that the program goes on at a line before; refuse a pass that is the same as the one before."""
+        """Take in that the program continues at a line before; refuse a pass that is the same as the one before."""
         place, state = frame.place, (frame.variables.changes, list(frame.loops))
         self._passes[place] = self._passes.get(place, (0, 0))[0] + 1, self._steps
         if frame.seen.get(place) == state:

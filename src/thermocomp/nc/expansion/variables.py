@@ -167,7 +167,7 @@ def arguments(
                 raise ProgramError(
                     line.number,
                     f"{letter}{word.value} has no decimal point: whether it counts units or least increments depends "
-                    "on the control; say which with --integers",
+                    "on the control; state which with --integers",
                 )
             value *= least if integers == "least" else 1.0
         found[ARGUMENTS[letter]] = value

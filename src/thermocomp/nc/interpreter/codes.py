@@ -13,7 +13,7 @@ CYCLES: Final = frozenset({"G73", "G74", "G81", "G82", "G83", "G84", "G85", "G86
 #: codes outside the motion group that take the axis words of their line for themselves
 TAKES_AXES: Final = frozenset({"G10", "G28", "G30", "G52", "G92"})
 AXES: Final = ("X", "Y", "Z")
-#: the operator decides when the program goes on
+#: the operator decides when the program continues
 STOPS: Final = frozenset({"M0", "M1", "M60"})
 ROTARY: Final = frozenset("ABC")
 #: words whose value is a length when they stand with a motion, an offset or a cycle

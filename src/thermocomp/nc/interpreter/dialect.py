@@ -63,7 +63,7 @@ _USUAL: Final = ("length", "feed", "g41", "g43", "exact", "radius", "state", "be
 _NAMED: Final = 5
 
 _BEGINS = "how a Fanuc's or Haas's programs begin"
-_EITHER = "or say --controller linuxcnc or --controller fanuc"
+_EITHER = "or give --controller linuxcnc or --controller fanuc"
 _BEHIND = "is a comment for LinuxCNC, and the next block for a Fanuc: take it away, or give it a line of its own"
 
 
@@ -130,7 +130,7 @@ def check_dialect(lines: Iterable[str], *, whole: bool = False, startup: str = "
     if other:
         raise ProgramError(
             other.line,
-            f"{other.text!r} is {other.what}: say --controller fanuc (dwells, cycles and lengths are others there), or "
+            f"{other.text!r} is {other.what}: give --controller fanuc (dwells, cycles, lengths are others there), or "
             "--controller linuxcnc",
         )
     if found.fault is not None and not mine:

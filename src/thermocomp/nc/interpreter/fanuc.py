@@ -171,7 +171,7 @@ def dwell_of_x(state: InterpreterState, words: BlockWords) -> float:
     if state.setup.integers == "refuse":
         raise words.error(
             f"G4 X{word.value.strip()} has no decimal point: whether it counts seconds or milliseconds depends on the "
-            "control; say which with --integers, or write the point"
+            "control; state which with --integers, or write the point"
         )
     return words.values["X"] / (1000.0 if state.setup.integers == "least" else 1.0)
 

@@ -242,7 +242,7 @@ class Follower:
         once = groups.get("once")
         turns = groups.get("rotation") == "G68"
         smoothed = "high speed" in groups and not _AXIS_LETTERS.isdisjoint(values)
-        if smoothed and (told or any(values.get(letter) for letter in _AXIS_LETTERS)):  # zeros say which are smoothed
+        if smoothed and (told or any(values.get(letter) for letter in _AXIS_LETTERS)):  # zeros state which are smoothed
             raise words.error("axis words beside a code that smooths the path; put it on a line of its own")
         if once is None and not smoothed and not turns and "tool length" not in groups:
             if told == "G80":

@@ -36,7 +36,7 @@ def lengths(state: InterpreterState, words: BlockWords) -> None:
         if setup.integers == "refuse":
             raise words.error(
                 f"{letter}{word.value} has no decimal point: whether it counts units or least increments depends on "
-                "the control; say which with --integers"
+                "the control; state which with --integers"
             )
         angle = letter == "R" and "rotation" in groups
         words.values[letter] = word.number * setup.least / (MM if inch and not angle else 1.0)
@@ -58,7 +58,7 @@ def _unit_needed(state: InterpreterState, words: BlockWords) -> None:
         if words.values.get(letter) and not inverse:
             raise words.error(
                 f"{letter}{words.words[letter].value.strip()} before G20 or G21: inches or millimetres? write G20 or "
-                "G21 on a line before it, or say which unit the control starts with (--units)"
+                "G21 on a line before it, or state which unit the control starts with (--units)"
             )
 
 
@@ -129,7 +129,7 @@ def _unit_of_feed(state: InterpreterState, words: BlockWords) -> None:
     if not (state.unit_told or state.fanuc or state.modal.feed_mode == 93) and words.values.get("F"):
         raise words.error(
             f"F on the line of {code}: LinuxCNC reads it in the unit in force before; put it on a line after {code}, "
-            "or say which unit the control starts with (--units)"
+            "or state which unit the control starts with (--units)"
         )
     state.unit_told = True
 

@@ -325,7 +325,7 @@ def _may_drill(state: InterpreterState, words: BlockWords) -> None:
     if code in ("G74", "G84", "G87") and modal.plane != 17:
         raise words.error(f"{code} in G{modal.plane}: LinuxCNC 2.9 confuses the axes there; write G17 before")
     if code in ("G74", "G84", "G86", "G87") and not turning:
-        raise words.error(f"{code} while the spindle stands; start it before")
+        raise words.error(f"{code} while the spindle is stopped; start it before")
     if (code == "G84" and turning < 0) or (code == "G74" and turning > 0):
         raise words.error(f"{code} while the spindle turns the other way; {'M3' if code == 'G84' else 'M4'} before it")
 

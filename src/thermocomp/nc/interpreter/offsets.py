@@ -98,7 +98,7 @@ class Offsets:
 
     @property
     def rotation_told(self) -> bool:
-        """Whether program or setup say how the system in force is turned."""
+        """Whether program or setup state how the system in force is turned."""
         alike = len({self.rotations.get(system, math.nan) for system in range(1, LAST + 1)}) == 1
         return self.system in self.rotations and (self.named or alike)
 

@@ -68,7 +68,7 @@ _MAKERS_M: Final = {
     n: code.does for n, code in M_CODES["linuxcnc"].items() if n not in M_CODES["fanuc"] or n in (48.0, 49.0)
 }
 _STATE: Final = (70.0, 71.0, 72.0, 73.0)
-_SAY: Final = "say --controller"
+_SAY: Final = "give --controller"
 _SAY_DWELL: Final = f"{_SAY}, or for a Fanuc write G4 X, which takes seconds with a point"
 _CALL = "is taken by LinuxCNC from files of its own, and by a Fanuc from its memory: write the moves out"
 
@@ -257,8 +257,8 @@ def _open_cycle(codes: set[float], values: dict[str, str], force: InForce) -> It
         yield OpenWord("across", code, what)
     if force.kept not in (None, force.absolute):
         what = (
-            "goes on with R and depth of lines before, which are places in G90 and ways in G91: LinuxCNC reads them "
-            "anew, and a Fanuc as it is made: write all words of the cycle, behind G80"
+            "continues with R and depth of lines before, which are places in G90 and ways in G91: LinuxCNC reads them "
+            "again, and a Fanuc as it is made: write all words of the cycle, behind G80"
         )
         yield OpenWord("kept", f"{code} in G{90 if force.absolute else 91}", what)
     if not force.retract:

@@ -171,7 +171,7 @@ class InterpreterState:
         Raises
         ------
         ProgramError
-            No feed; G93 without F on the line; G95 while the spindle stands.
+            No feed; G93 without F on the line; G95 while the spindle is stopped.
         """
         mode, feed = self.modal.feed_mode, self.feed
         if mode == 93:
@@ -204,7 +204,7 @@ class InterpreterState:
         """
         feed = pitch * abs(self.speed)
         if not feed:
-            raise words.error("a feed per turn while the spindle stands; start it with S and M3 before")
+            raise words.error("a feed per turn while the spindle is stopped; start it with S and M3 before")
         way = length(arc, start, end) if arc else math.dist(start, end)
         return Move(
             rapid=False, start=start, end=end, arc=arc, feed=feed, seconds=(way or rotary) / feed * 60.0, rotary=rotary

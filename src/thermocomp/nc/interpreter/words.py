@@ -91,7 +91,7 @@ class Reader:
                     groups[code.group] = code.name
                 codes += (code.name,)
             elif letter in values:
-                raise ProgramError(line.number, f"{letter} stands on the line twice; one has to go")
+                raise ProgramError(line.number, f"{letter} appears twice on the line; one has to go")
             else:
                 words[letter] = word
                 values[letter] = number

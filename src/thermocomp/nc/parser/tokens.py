@@ -93,7 +93,7 @@ def program_lines(stream: TextIO) -> Iterator[str]:
     while text := stream.readline(LONGEST):
         if len(text) == LONGEST:
             raise InputError(
-                f"a line has {LONGEST} characters or more: this is no NC program; "
+                f"a line has {LONGEST} characters or more: this is not a NC program; "
                 "give the program as text, with line ends"
             )
         yield text
@@ -330,7 +330,7 @@ def _read_words(text: str, place: int, columns: Sequence[int], controller: Contr
         elif letter in letters:
             place = _value(text, place + 1, letter, controller)
             if first.setdefault(letter, start) != start and letter not in "GM":
-                what = f"{letter} stands on the line twice, first in column {first[letter] + 1}"
+                what = f"{letter} appears twice on the line, first in column {first[letter] + 1}"
                 raise _NotUnderstoodError(begin, what)
             end = columns[place - 1] + 1
             value = line.text[start + 1 : end].lstrip(_BLANK)

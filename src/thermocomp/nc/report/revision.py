@@ -86,7 +86,7 @@ def _drift(ax: Axes, bound: Bound, time: FloatArray, run: Run) -> None:
     ax.axhline(0, color="#aaa", lw=0.8)
     ax.plot(*_within(time, drift), color=MEASURED, lw=1.6, label="drift")
     taken = -carried[:, ::-1]
-    ax.plot(*_within(time, taken), color=TAKEN_OFF, lw=1.0, label="taken off by the program (minus the correction)")
+    ax.plot(*_within(time, taken), color=TAKEN_OFF, lw=1.0, label="corrected by the program (minus the correction)")
     ax.plot(*_cuts(time, left), color=RESIDUAL, lw=1.4, label="left in the cuts")
     low, high = ax.get_ylim()
     ax.set_ylim(min(low, -_SMALL), max(high, _SMALL))
@@ -111,7 +111,7 @@ def _within(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArra
 def _cuts(time: FloatArray, left: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return a curve from one end of each cut to the other, with gaps where nothing is cut.
 
-    Which end is the higher one is told by the cut before: curves go on.
+    Which end is the higher one is told by the cut before: curves continue.
     """
     starts = np.concatenate([[0.0], time[:-1]])
     x = np.stack([starts, time, time], axis=1)

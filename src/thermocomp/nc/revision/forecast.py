@@ -143,7 +143,7 @@ def _number(cell: str, unit: Unit, delimiter: str, where: str) -> float | None:
     try:
         number = float(text if delimiter == "," else text.replace(",", "."))
     except ValueError as e:
-        raise InputError(f"{where}: {text!r} is no number") from e
+        raise InputError(f"{where}: {text!r} is not a number") from e
     if not math.isfinite(number):
         raise InputError(f"{where}: {text!r} is no finite number")
     return unit.scale * number + unit.shift

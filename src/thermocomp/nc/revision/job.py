@@ -25,7 +25,7 @@ from thermocomp.nc.rewrite.travel import Travel
 from thermocomp.nc.thermal.drift import Drift
 
 #: what a program that cannot be proved is refused with
-ALL_THE_SAME = "--unproved writes it all the same, and its header says so"
+ALL_THE_SAME = "--unproved writes it anyway, and its header says so"
 #: program and differences while their header says nothing yet
 PROGRAM, DIFF = "program", "diff"
 #: of longer programs it is found out first whether they are refused: revising them takes a while [bytes]
@@ -122,7 +122,7 @@ class Done(NamedTuple):
 
     run: Run
     bounds: tuple[Bound, ...]
-    written: bool  #: False: nothing was taken off, so there are no files
+    written: bool  #: False: nothing was corrected, so there are no files
     proof: Proof | None  #: None: the interpreter has not judged it
     seconds: float  #: for the revision
     proving: float  #: for the proof

@@ -140,7 +140,7 @@ class Starting:
     carried : Path
         It is as the last job has left it: the file OUT.job.json of that revision.
     pause : str
-        How long the spindle stood still since then, such as "30 min"; not at all if not given.
+        How long the spindle was stopped still since then, such as "30 min"; not at all if not given.
     measured : list of str
         How far the tool point has drifted from the cold machine, such as z=12um.
     zero : str
@@ -256,7 +256,7 @@ class Way:
         if not setup.no_shift:
             raise InputError(
                 "--method offset writes G52, which wipes a G92 or G52 that is in force when the program starts: make "
-                "sure that none is, and say --no-g92; or take --method coordinates"
+                "sure that none is, and give --no-g92; or take --method coordinates"
             )
         x, y, z = (name in axes for name in "XYZ")
         return Offset(digits, step, safe_z=safe, axes=(x, y, z))

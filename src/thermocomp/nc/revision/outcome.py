@@ -41,7 +41,7 @@ def warnings(job: Job, done: Done) -> list[str]:
     ]
     found += [] if job.travel is None else job.travel.warnings()
     if revision.standing:
-        found.append(f"the spindle stands at line {revision.standing}, and the tool moves in feed: is that right?")
+        found.append(f"the spindle is stopped at line {revision.standing}, and the tool moves in feed: is that right?")
     if revision.idle:
         found.append(f"{revision.idle} lines behind the end of the program are as they were: nobody runs them")
     if done.written and revision.method.leaves_mark:
@@ -75,9 +75,9 @@ def describe_place(job: Job, done: Done) -> list[str]:
 
 
 def explain_nothing(job: Job, done: Done) -> str:
-    """Return why nothing was taken off a program, and what to do."""
+    """Return why nothing was corrected a program, and what to do."""
     revision, most = job.revision, max((b.without for b in done.bounds), default=0.0)
-    said = f"nothing was taken off: the drift in the cuts is {most:.1f} um at most"
+    said = f"nothing was corrected: the drift in the cuts is {most:.1f} um at most"
     method, tolerance = revision.method, revision.demand.tolerance
     if most <= TELLING * tolerance:
         return f"{said}, and it is taken off from {tolerance:g} um on; run the original, or give a smaller --tolerance"

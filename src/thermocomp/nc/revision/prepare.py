@@ -140,7 +140,7 @@ def _refuse_optional(program: Path) -> None:
             if line.optional:
                 raise InputError(
                     f"{program}: line {line.number}: an optional line: --expand writes it out as a plain one, or "
-                    "leaves it out; say --block-delete off or on"
+                    "leaves it out; give --block-delete off or on"
                 )
 
 
@@ -162,7 +162,7 @@ def _moment(text: str | None) -> datetime:
     Raises
     ------
     InputError
-        It is no date.
+        It is not a date.
     """
     if text is None:
         return datetime.now().astimezone()

@@ -16,7 +16,7 @@ CLEAR = 0.5
 class Contact:
     """The tool is in contact from a feed move on until it is lifted, changed, or sent off in machine coordinates.
 
-    The program does not say which cut finishes, so each is treated as one that does. A rapid that stays at its depth is
+    The program does not state which cut finishes, so each is treated as one that does. A rapid that stays at depth is
     part of the cut: it may lead to the next pass over the same face.
 
     Parameters

@@ -175,7 +175,7 @@ class Coordinates(CorrectionMethod):
         return shift_words(block, shifts, added, frame.digits)
 
     def _refuse_mixed_levels(self, block: Block, axis: int) -> None:
-        """Raise `ProgramError` if levels that were shifted as places go on as distances in G91."""
+        """Raise `ProgramError` if levels that were shifted as places continue as distances in G91."""
         if block.modal.absolute:
             return
         if any(word not in block.words for word in (AXES[axis], "R")):

@@ -65,7 +65,7 @@ def refuse_revised(line: Line) -> None:
     if f"{MARK} REVISED" in line.comment:
         raise ProgramError(
             line.number,
-            "has been revised by thermocomp already: its drift would be taken off twice; revise the original",
+            "has been revised by thermocomp already: its drift would be corrected twice; revise the original",
         )
 
 

@@ -82,7 +82,7 @@ def _refuse_turned(block: Block, setup: Setup) -> None:
         what = (
             "it is in the head, so the spindle grows along the tool and not along Z: not supported"
             if side
-            else "does it turn the spindle or the workpiece? say so with --machine, whose structure names it: "
+            else "does it turn the spindle or the workpiece? state it with --machine, whose structure names it: "
             f'"w {letter}\' X\' b Y Z (C1) t" in the table, "w X\' b Y Z {letter} (C1) t" in the head'
         )
         raise ProgramError(block.line.number, f"{letter} {where}, and {what}")
@@ -97,6 +97,6 @@ def refuse_untold_rotation(block: Block, carried: Vector) -> None:
     raise ProgramError(
         block.line.number,
         f"X or Y is corrected, and a rotation of {name if told else 'the work coordinate system in force'} that is "
-        "stored in the controller (G10 L2 R) would turn that: say that there is none (--rotation none) or "
+        "stored in the controller (G10 L2 R) would turn that: state that there is none (--rotation none) or "
         + (f"which (--rotation '{name}=12 deg')" if told else which),
     )

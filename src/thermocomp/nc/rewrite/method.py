@@ -219,6 +219,6 @@ def refuse_probing(block: Block) -> None:
     if block.kind == "probe":
         raise ProgramError(
             block.line.number,
-            f"{block.modal.motion} probes: the program goes on with what it finds, which holds the drift already; "
+            f"{block.modal.motion} probes: the program continues with what it finds, which holds the drift already; "
             "revise the part of the program that cuts",
         )

@@ -36,7 +36,7 @@ FIRST = 200
 OFTEN = 20.0
 DENSE = 20.0
 MOST_PIECES = 1000
-#: the drift goes on within a line: so much more than the tolerance may be left before anything is said to hold it
+#: the drift continues within a line: so much more than the tolerance may be left before anything is said to hold it
 TELLING = 1.1
 _PLAIN = frozenset(("G0", "G1"))
 
@@ -97,7 +97,7 @@ class Revision:
     held : dict of str to (float, int)
         What kept a correction from following the drift in a cut, what was left there at most [um], and in which line.
     standing : int
-        First line that cuts while the spindle stands; 0: none does.
+        First line that cuts while the spindle is stopped; 0: none does.
     idle : int
         Lines behind the end of the program that have words: nothing is corrected there.
     """

@@ -26,11 +26,11 @@ _LONG = 2 * 86400.0
 
 
 class ThermalStart(NamedTuple):
-    """State of the models when the program starts, or so long before it as the spindle stands still."""
+    """State of the models when the program starts, or so long before it as the spindle is stopped."""
 
     states: tuple[State, ...]  #: per station
     known: bool  #: the state is no prediction: the machine is cold or measured
-    pause: float = 0.0  #: time the spindle stands still before the program [s]
+    pause: float = 0.0  #: time the spindle is stopped before the program [s]
     zeros: tuple[float, ...] | None = None  #: deviation that counted as zero in the last job, per station [um]
     zero_known: bool = False  #: that one was no prediction
     doubts: tuple[float, ...] | None = None  #: what the last job widened the bound by, per station [um]
@@ -59,7 +59,7 @@ def begin_cold(stations: Sequence[Station], others: Inputs) -> ThermalStart:
 
 
 def carry_over(stations: Sequence[Station], left: JobState, pause: float = 0.0) -> ThermalStart:
-    """Return the state that the last job has left, and a pause in which the spindle stood still.
+    """Return the state that the last job has left, and a pause in which the spindle was stopped still.
 
     Parameters
     ----------

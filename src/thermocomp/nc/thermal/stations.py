@@ -123,7 +123,7 @@ def check_stations(found: Sequence[Station]) -> list[Station]:
         if len(mine) == 1 and along != {None}:
             raise InputError(
                 f"{axis} has one model at a position ({names}): with one it cannot be told how the drift varies along "
-                f"{mine[0].along}; give another one, or say --axis {mine[0].model.target}={axis}"
+                f"{mine[0].along}; give another one, or give --axis {mine[0].model.target}={axis}"
             )
         if len(mine) > 1 and (len(along) > 1 or None in along):
             raise InputError(f"{axis} has several models, {names}: want one, or one per position along a single axis")
@@ -143,7 +143,7 @@ def _by_name(model: ErrorModel, targets: Sequence[str]) -> Station:
     begins = _BEGINS.match(model.target)
     meant = begins[0].upper() if begins else "Z"
     raise InputError(
-        f"the name of the target {model.target!r} does not say which axis it is; say --axis "
+        f"the name of the target {model.target!r} does not state which axis it is; give --axis "
         f'{model.target}={meant}, or --axis "{model.target}={meant} at Z 200 mm"; targets are {", ".join(targets)}'
     )
 

@@ -120,7 +120,7 @@ def tables(m: Milled) -> tuple[StudyTable, ...]:
 def figures(m: Milled) -> tuple[Figure, ...]:
     """Return the surfaces of one test, and the depth differences of all."""
     tests = np.arange(1.0, len(m.without(RIGHT).depth) + 1)
-    # goes on to the right, where the legend then hides nothing
+    # continues to the right, where the legend then hides nothing
     zero = PlotCurve("", np.array([1.0, 1.5 * len(tests)]), np.zeros(2), "dashed")
     ways: tuple[tuple[str, str, Style], ...] = (
         ("", "not revised", "line"),

@@ -159,7 +159,7 @@ def _depth(c: Computed) -> Ours:
 
 @claims.add(
     "E-P5",
-    "A job that begins on a warm machine: RMS in its first hour if the model begins cold, and if it goes on "
+    "A job that begins on a warm machine: RMS in its first hour if the model begins cold, and if it continues "
     "from the last job",
     "assumes a cold start",
 )

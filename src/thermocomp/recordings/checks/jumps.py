@@ -94,7 +94,7 @@ def jumps(signals: Sequence[Signal], time: FloatArray, moved: BoolArray) -> Iter
     at all other such changes. A step that comes back is told with both its ends, and its rows. A channel with over
     four jumps is taken for a thermostat. Steps across a gap in time are no steps.
 
-    Changed places: two channels of one quantity jump at the same row, and each goes on where the other was, to within
+    Changed places: two channels of one quantity jump at the same row, and each continues where the other was, to within
     a quarter of the jump, and no third channel jumps there. What two sensors say alike at that moment cannot be
     told apart.
 
@@ -191,7 +191,7 @@ def _exchanged(a: Edges, b: Edges, row: int, height: float, moved: BoolArray) ->
 
 def _swap(a: Signal, b: Signal, row: int, time: FloatArray) -> Finding:
     text = (
-        f"changes places with {b.channel.name} at {at_row(row, time)}: each goes on where the other was. Swap the two "
+        f"changes places with {b.channel.name} at {at_row(row, time)}: each continues where the other was. Swap these "
         "columns back from there on, or leave both out"
     )
     names = sorted([a.channel.name, b.channel.name])  # both tell the same step

@@ -232,11 +232,11 @@ def _no_cycle(recording: Recording) -> Iterator[Finding]:
     if recording.speed is not None:
         speed = np.abs(np.nan_to_num(recording.table[recording.speed.name].to_numpy(dtype=np.float64)))
         runs = int(np.count_nonzero(np.diff(speed > 0.02 * speed.max(initial=0.0), prepend=False)) + 1) // 2
-        why = "the spindle does not start anew"
+        why = "the spindle does not start again"
         if runs > 1:
             why = (
                 f"none of the spindle's {runs} starts has a stop and a run of {SPLITS:.0f} s about it (are the times "
-                "minutes or hours? Then say so in a mapping: [time] unit)"
+                "minutes or hours? Then state it in a mapping: [time] unit)"
             )
     text = (
         f"the whole test is one thermal cycle, as {why}; judging on unseen cycles needs several cycles or several tests"

@@ -94,7 +94,7 @@ def displacement_units(signals: Sequence[Signal], temperatures: Sequence[Signal]
         if width > FAR:
             text = (
                 f"moves by {width / 1000:.3g} mm in the whole test, more than any machine drifts. Are these um, or nm? "
-                'Then say so in a mapping: unit = "um"'
+                'Then state it in a mapping: unit = "um"'
             )
             yield Finding("trouble", name, "unit", text, remedy=column(name, unit="um"))
         if width >= 0.3 and not all_of_them:
@@ -102,7 +102,7 @@ def displacement_units(signals: Sequence[Signal], temperatures: Sequence[Signal]
         against = f" while a temperature moves by {warming:.3g} degC" if np.isfinite(warming) else ""
         text = (
             f"moves by {width:.2g} um in the whole test{against}, less than any probe at a machine. Are these "
-            'mm? Then say so in a mapping: unit = "mm"; else the probe does not touch'
+            'mm? Then state it in a mapping: unit = "mm"; else the probe does not touch'
         )
         severity: Severity = "trouble" if warming >= 1 else "warning"
         yield Finding(severity, name, "unit", text, remedy=column(name, unit="mm"))
@@ -139,7 +139,7 @@ def time_unit(time: FloatArray, temperatures: Sequence[Signal]) -> Iterator[Find
         return
     text = (
         f"the test would last {(time[-1] - time[0]) / 86400:.4g} days, and {told}: no warm-up is as slow. Are the "
-        'times ms? Then say so in a mapping: [time] unit = "ms"'
+        'times ms? Then state it in a mapping: [time] unit = "ms"'
     )
     yield Finding("trouble", "", "time unit", text, remedy={"time": {"unit": "ms"}})
 

@@ -52,7 +52,7 @@ class PlannedColumn:
         if self.unit.symbol == "K" and not self.rule.unit and valid.size and float(np.median(valid)) < _COLDEST:
             raise RecordingError(
                 f"{source}: column {heading!r}: values about {float(np.median(valid)):.3g} K are no temperatures but "
-                f'differences, or in degC; say which in a mapping, [columns.NAME] column = "{heading}" and unit = '
+                f'differences, or in degC; state which in a mapping, [columns.NAME] column = "{heading}" and unit = '
                 '"degC", or role = "ignore"',
                 [{"columns": {self.channel.name: {"column": heading, **said}}} for said in _DOUBTFUL],
             )
@@ -68,7 +68,7 @@ class PlannedColumn:
         if absent.any():
             found = ", ".join(f"{c:g}" for c in np.unique(raw[absent]))
             notes.append(f"{self.channel.name}: missing-value code {found} in {absent.sum()} of {len(raw)} cells")
-        # SCPI: 9.9E37 stands for infinity, 9.91E37 for what is no number
+        # SCPI: 9.9E37 stands for infinity, 9.91E37 for what is not a number
         infinite = (np.abs(raw) >= _SCPI_INFINITY) & ~absent
         if infinite.any():
             notes.append(f"{self.channel.name}: infinite, taken as missing, in {infinite.sum()} of {len(raw)} cells")

@@ -1,4 +1,4 @@
-"""In which order day, month and year stand: where dates alone do not tell, a recording that goes on does."""
+"""In which order day, month and year stand: where dates alone do not tell, a recording that continues does."""
 
 from collections.abc import Mapping
 from typing import Literal, NamedTuple
@@ -25,7 +25,7 @@ class DateChoice(NamedTuple):
 
 
 def find_order(readings: Mapping[str, IntArray]) -> DateChoice:
-    """Choose the order in which rows go on.
+    """Choose the order in which rows continue.
 
     Parameters
     ----------

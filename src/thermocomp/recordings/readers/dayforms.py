@@ -66,7 +66,7 @@ def find_day_columns(table: FileTable, columns: Sequence[int], *, beside_clock: 
     columns : sequence of int
         To look into.
     beside_clock : bool
-        The times of the rows are no numbers: what then changes below a heading of a date may be one in any form.
+        The times of the rows are not numbers: what then changes below a heading of a date may be one in any form.
     """
     found, typed = [], []
     for k in columns:
@@ -209,5 +209,5 @@ def _read_forms(texts: "pd.Series[str]", *forms: str) -> list[IntArray]:
 
 
 def _unwrap(days: IntArray, period: int) -> IntArray:
-    """Return days that count on where a week or a year begins anew."""
+    """Return days that count on where a week or a year begins again."""
     return np.concatenate([days[:1], days[0] + np.cumsum(np.diff(days) % period)])

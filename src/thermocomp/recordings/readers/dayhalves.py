@@ -37,7 +37,7 @@ def _plain(cell: object) -> str:
 
 
 def are_halves(cells: Sequence[str], heading: str) -> bool:
-    """Return whether cells say which half of a day it is.
+    """Return whether cells state which half of a day it is.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def join_halves(
     Raises
     ------
     RecordingError
-        A cell does not say which half; or it contradicts the time.
+        A cell does not state which half; or it contradicts the time.
     """
     time, half = names
     there = clocks.notna()

@@ -120,14 +120,14 @@ def _error_column(rows: Rows, wanted: str, unit: str, owner: str) -> str:
         return name
     names = [c.name for c in rows.channels if c.quantity == QUANTITY[unit]]
     if len(names) != 1:
-        said = f"there are {', '.join(names)}: say which" if names else f"there is none: name one like error_{unit}"
+        said = f"there are {', '.join(names)}: state which" if names else f"there is none: name one like error_{unit}"
         raise RecordingError(f"{owner}: want one column of {QUANTITY[unit]}s; {said}")
     _refuse_mixed(rows, names[0], unit, owner)
     return names[0]
 
 
 def _refuse_mixed(rows: Rows, column: str, unit: str, owner: str) -> None:
-    """Refuse a twin of the column in the other unit that goes on where the column itself has no value."""
+    """Refuse a twin of the column in the other unit that continues where the column itself has no value."""
     other = "urad" if unit == "um" else "um"
     twin = f"{column.removesuffix(f'_{unit}')}_{other}"
     if twin not in rows.table:
@@ -148,7 +148,7 @@ def _place_columns(rows: Rows, position: str, axis: str, owner: str) -> dict[str
     found = [name for name in wanted if name in there]
     if not found:
         raise RecordingError(
-            f"{owner}: no column of positions is called {' or '.join(wanted)}; name it so, or say which it is. There "
+            f"{owner}: no column of positions is called {' or '.join(wanted)}; name it so, or state which it is. There "
             f"are {', '.join(there) or 'none'}"
         )
     others = {a: n for a in "XYZ" if a != axis for n in (f"{a.lower()}_mm", f"{a}_mm") if n in there}

@@ -52,7 +52,7 @@ class TimeColumn:
         How timestamps are written, in the letters of `datetime.strptime`; empty: ISO 8601.
     start : str
         ISO timestamp of the first row, for files that hold only relative times: it tells the days, and which
-        file goes on from another.
+        file continues from another.
     date : str or int
         Column of the dates where `column` holds the time of day alone.
     zone : str

@@ -114,7 +114,7 @@ class ParquetTable:
                         parts[k].append(cells)
                 row = stop
         if row != self.n_rows:
-            raise RecordingError(f"{self.path}: says it has {self.n_rows} rows, and has {row}; write it anew")
+            raise RecordingError(f"{self.path}: says it has {self.n_rows} rows, and has {row}; write it again")
         columns = {k: pd.concat(p, ignore_index=True) for k, p in parts.items()}
         numbered, notes = convert_all(self, {k: columns[k] for k in written}, self.decimal)
         data = {**columns, **values, **numbered}
@@ -145,7 +145,7 @@ def _translated(path: Path) -> Iterator[None]:
         raise
     except Exception as e:
         raise RecordingError(
-            f"{path}: is not a Parquet file, or a damaged one ({type(e).__name__}: {e}); write it anew"
+            f"{path}: is not a Parquet file, or a damaged one ({type(e).__name__}: {e}); write it again"
         ) from e
 
 

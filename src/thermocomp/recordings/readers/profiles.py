@@ -85,7 +85,7 @@ class ProfileOptions:
             )
             raise InputError(f"{self.target}: {hint}; name a component such as EYY, or say the axis")
         if unit not in QUANTITY:
-            raise InputError(f"{self.target}: unit {unit!r}: say whether it is in um or urad")
+            raise InputError(f"{self.target}: unit {unit!r}: state whether it is in um or urad")
         return axis, cast(Literal["um", "urad"], unit)
 
 
@@ -214,7 +214,7 @@ def from_recording(recording: Recording, options: ProfileOptions | str) -> Profi
     if not found:
         what = f"called {wanted.columns!r}" if wanted.columns else f"like y_laser_250_{unit} (position in mm, unit)"
         raise RecordingError(
-            f"{owner}: no column is {what}; say which columns hold the profile, such as 'y_laser_*', or read a table "
+            f"{owner}: no column is {what}; state which columns hold the profile, such as 'y_laser_*', or read a table "
             "with a row per position as a long one. There are "
             + ", ".join(c.name for c in recording.channels if c.quantity in QUANTITY.values())
         )
@@ -299,14 +299,14 @@ def _matching(recording: Recording, pattern: str) -> list[tuple[Channel, float]]
 def _by_name(recording: Recording, quantity: str, owner: str) -> list[tuple[Channel, float]]:
     """Return the channels of a quantity that have a position in their name; all must be called alike.
 
-    With them come those of another quantity that are called like them and go on where they end: a wrong unit.
+    With them come those of another quantity that are called like them and continue where they end: a wrong unit.
     """
     placed = [(c, m) for c in recording.channels if (m := _PLACED.fullmatch(c.name))]
     found = [(c, m) for c, m in placed if c.quantity == quantity]
     bases = list(dict.fromkeys(m["base"] for _, m in found))
     if len(bases) > 1:
         raise RecordingError(
-            f"{owner}: there are profiles called {', '.join(f'{b}_*' for b in bases)}; say which columns to take, such "
+            f"{owner}: there are profiles {', '.join(f'{b}_*' for b in bases)}; state which columns to take, such "
             f"as '{bases[0]}_*'"
         )
     there = {m["position"] for _, m in found}
@@ -320,6 +320,6 @@ def _refuse_another_axis(target: str, axis: str, found: Sequence[tuple[Channel, 
         called = re.match(r"([xyz])(?:\d?_)", c.name)
         if called and target in BY_CODE and called[1].upper() not in (axis, target[1]):
             raise RecordingError(
-                f"{owner}: columns like {c.name!r} seem to be of {called[1].upper()}, not of {target}; say which "
+                f"{owner}: columns like {c.name!r} seem to be of {called[1].upper()}, not of {target}; state which "
                 "columns to take if they are meant"
             )

@@ -150,7 +150,7 @@ def _read_rows(source: Path, mapping: Mapping, *, rising: bool, extra: Sequence[
 def _load(
     source: Path, mapping: Mapping, table: FileTable, columns: ColumnPlan, extra: Sequence[int]
 ) -> tuple[FileCells, list[int], tuple[str, ...]]:
-    """Read the columns of a plan, and those that may hold dates; say which these are, and what was made of cells."""
+    """Read the columns of a plan, and those that may hold dates; state which these are, and what was made of cells."""
     times = columns.times
     is_stamp = columns.time_unit == "timestamp" or not (columns.time_unit or table.is_number(times.time))
     clocks = [times.time, *columns.beside]

@@ -102,7 +102,7 @@ def parse_stamps(text: "pd.Series[Any]", heading: str) -> Parsed | None:
     Raises
     ------
     AmbiguousDatesError
-        Day, month and year can be told apart neither by their numbers nor by how the rows go on
+        Day, month and year can be told apart neither by their numbers nor by how the rows continue
         (`thermocomp.recordings.readers.dateorder.find_order`).
     """
     first = text.iloc[0].strip()
@@ -148,7 +148,7 @@ def parse_stamps(text: "pd.Series[Any]", heading: str) -> Parsed | None:
 def _refuse_other_order(
     plain: "pd.Series[Any]", shape: re.Match[str], stated: str, found: "pd.Series[pd.Timestamp]"
 ) -> None:
-    """Refuse an order that the heading or the year states, where rows go on from one to the next only in another."""
+    """Refuse an order that the heading or the year states, where rows continue from one to the next only in another."""
     if not (shape["a"].isdigit() and shape["b"].isdigit()) or not found.notna().all():
         return
     if not find_longest_step(_instants(found)) >= _MONTH:

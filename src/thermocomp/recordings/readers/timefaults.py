@@ -106,13 +106,13 @@ def refuse_passed(time: FloatArray, start: str, file: FileCells) -> None:
             f"{file.source}: {file.table.place(int(rows[0]))}: {name!r} changes, and {heading!r}, which begins with "
             f"zero, runs on by {more[rows[0] - 1]:g} s: time that passed, or a pause of a whole day? If it is time "
             f'that passed, leave out {name!r} in a mapping: [time] column = "{heading}" and [columns."{name}"] role = '
-            '"ignore"; if not, say how both are written: [time] column, date and format',
+            '"ignore"; if not, state how both are written: [time] column, date and format',
             [{"time": {"column": heading}, "columns": {name: {"role": "ignore"}}}],
         )
 
 
 def refuse_set_forward(time: FloatArray, start: str, file: FileCells) -> None:
-    """Refuse a gap of an hour where clocks are set forward: the file does not say whether an hour passed.
+    """Refuse a gap of an hour where clocks are set forward: the file does not state whether an hour passed.
 
     Parameters
     ----------

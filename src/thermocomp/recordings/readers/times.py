@@ -116,7 +116,7 @@ def _read_stamps(cells: "pd.Series[Any]", file: FileCells) -> tuple[FloatArray, 
             differ = e.differ()
             raise (TwoReadingsError if differ else RecordingError)(
                 f"{file.source}: {file.table.place(0)}, column {titled!r}: {first!r} can be read as {e}, and no row "
-                f"tells which{f' ({e.tell()})' if differ else ''}; say how it is written in a mapping: [time] "
+                f"tells which{f' ({e.tell()})' if differ else ''}; state how it is written in a mapping: [time] "
                 f"{_told(keys)} and {ways}",
                 [{"time": {**keys, "format": form}} for form in e.readings],
             ) from e
@@ -153,8 +153,8 @@ def _refuse_form(text: "pd.Series[str]", file: FileCells) -> NoReturn:
     # minutes and seconds alone: the hours may be lost
     doubtful = len(forms) > 1 or not any(map(has_day, forms))
     raise (TwoReadingsError if doubtful and forms else RecordingError)(
-        f"{file.at(0)}: {text.iloc[0].strip()!r} {hint}; say how it is written in a mapping: [time] {_told(keys)} and "
-        f"{ways}",
+        f"{file.at(0)}: {text.iloc[0].strip()!r} {hint}; state how it is written in a mapping: [time] {_told(keys)} "
+        f"and {ways}",
         [{"time": {**keys, "format": form}} for form in forms],
     )
 
@@ -170,7 +170,7 @@ def _read_clock(text: "pd.Series[Any]", file: FileCells) -> tuple[FloatArray, st
     parts = text.str.strip().str.extract(CLOCK)
     if not halves and pd.isna(parts["seconds"].iloc[0]):
         raise TwoReadingsError(
-            f"{file.at(0)}: {first!r} can be read as hours and minutes or as minutes and seconds; say how it is "
+            f"{file.at(0)}: {first!r} can be read as hours and minutes or as minutes and seconds; state how it is "
             f'written in a mapping: [time] column = "{file.heading}" and format = "%H:%M" or format = "%M:%S"',
             [{"time": {"column": file.heading, "format": form}} for form in ("%H:%M", "%M:%S")],
         )
@@ -243,7 +243,7 @@ def find_likely_units(raw: FloatArray) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        The likeliest first; none where they are no times of a test.
+        The likeliest first; none where they are not times of a test.
     """
     if len(raw) < 2 or not (np.diff(raw) > 0).all():
         return ()
@@ -258,7 +258,7 @@ def _in_zone(time: FloatArray, start: str, zone: str, where: str) -> tuple[Float
     try:
         zoned = local.tz_localize(zone, ambiguous="infer")
     except ValueError as e:  # an hour that the zone does not have, or has twice without a way to tell
-        raise RecordingError(f"{where}: these are no times in {zone}: {e}; correct [time] zone in the mapping") from e
+        raise RecordingError(f"{where}: these are not times in {zone}: {e}; correct [time] zone in the mapping") from e
     return _seconds(pd.Series(zoned - zoned[0])), zoned[0].isoformat()
 
 

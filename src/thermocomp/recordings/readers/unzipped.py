@@ -79,9 +79,9 @@ class _Survey:
         elif self.elements - self.begun > self.limits.row_elements:
             self.limits.check("row_elements", self.elements - self.begun, self.where)
         if len(attributes.get("r", "")) > _PLACE:
-            raise RecordingError(f"{self.where}: a cell cannot stand in {attributes['r'][:40]!r}; save the file anew")
+            raise RecordingError(f"{self.where}: a cell cannot stand in {attributes['r'][:40]!r}; save the file again")
 
     def _doctype(self, *_: object) -> None:
         raise RecordingError(
-            f"{self.where}: defines entities or a document type, as no spreadsheet does; save the file anew"
+            f"{self.where}: defines entities or a document type, as no spreadsheet does; save the file again"
         )

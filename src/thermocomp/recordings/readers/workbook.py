@@ -78,7 +78,7 @@ def open_workbook(path: Path, options: ReadOptions, limits: FileLimits) -> Frame
         raise
     except Exception as e:  # whatever a damaged file makes of two parsers
         raise RecordingError(
-            f"{path}: is not a workbook, or a damaged one ({type(e).__name__}: {e}); save it anew"
+            f"{path}: is not a workbook, or a damaged one ({type(e).__name__}: {e}); save it again"
         ) from e
 
 
@@ -100,7 +100,7 @@ def _choose(path: Path, sheets: Sheets, options: ReadOptions) -> tuple[str, tupl
             likely += [name] if find_layout(_sample(rows)) is not None else []
     if len(likely) > 1:
         raise RecordingError(
-            f"{path}: the sheets {', '.join(map(repr, likely))} all hold a table; say which in a mapping, such as "
+            f"{path}: the sheets {', '.join(map(repr, likely))} all hold a table; state which in a mapping, such as "
             f'[read] sheet = "{likely[0]}"',
             [{"read": {"sheet": name}} for name in likely],
         )

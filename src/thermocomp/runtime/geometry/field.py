@@ -143,7 +143,7 @@ class ErrorField:
         -----
         Moved by c the machine errs by e(P + c), not by e(P): c = -e(P + c), by exact transforms, solved by inserting.
         Along an axis that is not there nothing moves: c is zero in each step, and what is left is e(P + c). Beyond the
-        travel the correction at its end is held: nothing was measured there, and levers and slopes must not go on.
+        travel the correction at its end is held: nothing was measured there, and levers and slopes must not continue.
         """
         machine = self.kinematics.machine
         places = np.clip(check_finite("positions", points), *self.kinematics.travel)

@@ -130,8 +130,8 @@ def _show_notes(tests: Sequence[Sequence[Profiles]], console: Console) -> None:
 
 
 def _show_judging(found: PositionStudy, left_open: Sequence[Setting], console: Console) -> None:
-    anew = "; settings are chosen anew in each" if left_open else ""
-    console.print(f"Judged on: {words(found.assessment.protocol)}{anew}")
+    again = "; settings are chosen again in each" if left_open else ""
+    console.print(f"Judged on: {words(found.assessment.protocol)}{again}")
 
 
 def _chosen(found: PositionStudy, left_open: Sequence[Setting]) -> str:

@@ -124,7 +124,7 @@ def study(
 ) -> PositionStudy:
     """Judge how a position-dependent error is modelled on unseen cycles, then fit it to everything.
 
-    In each split everything is learned anew: settings left open, cold profile, its order, slopes. The cold profile of a
+    In each split all is learned again: settings left open, cold profile, its order, slopes. The cold profile of a
     test of which only a part is left out is its zero: it is used, and not judged. A left-out test is judged by the cold
     profiles of the others.
 
@@ -342,7 +342,7 @@ def _together(one: _All, parts: Sequence[_Part], options: PositionOptions) -> Po
         ),
         unit=unit,
         names=BESIDE,
-        caps=("judged on one stretch that goes on from what was learned",) if one.judging.splits[0].stretch else (),
+        caps=("judged on one stretch that continues from what was learned",) if one.judging.splits[0].stretch else (),
     )
     measured, predicted = _factors(one, parts, options) if options.powers else (np.empty((len(rows), 0)),) * 2
     factors = []

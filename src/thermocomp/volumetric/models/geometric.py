@@ -258,7 +258,7 @@ def _left_out(points: FloatArray, place: NDArray[np.intp], axis: str) -> NDArray
 def _try(
     columns: FloatArray, values: FloatArray, place: NDArray[np.intp], points: FloatArray, axis: str, order: Order
 ) -> Tried:
-    """Leave out each point between the ends in turn; by the hat matrix, without fitting anew."""
+    """Leave out each point between the ends in turn; by the hat matrix, without fitting again."""
     n_terms = columns.shape[1]
     Q, R = np.linalg.qr(columns)
     sizes = np.abs(np.diag(R))

@@ -3,7 +3,7 @@
 
 ``thermocomp linuxcnc setup`` copies this file beside the machine's configuration. What a correction is at a position,
 its rate and its magnitude are kept by HAL in the servo thread; this process only says where each line shall go. So it
-may die at any time: HAL goes on with what it was told last, and a new process begins at what is in force.
+may die at any time: HAL continues with what it was told last, and a new process begins at what is in force.
 
 It listens on a Unix socket, says what is in force, and answers JSON lines:
 
@@ -36,7 +36,7 @@ TOLD = ("offset-rate", "slope-rate", "offset", "slope")
 HEARD = ("offset-now", "slope-now", "away", "demand", "force")
 #: between two looks at the controller [s]
 TICK = 0.01
-#: components that were killed, at most: then LinuxCNC has to be started anew
+#: components that were killed, at most: then LinuxCNC has to be started again
 MOST = 200
 #: bytes of a line; connections at a time, of which one is listened to
 LONGEST, WAITING = 4096, 4
@@ -160,7 +160,7 @@ class Server:
             alarm = ""
             if not why and axis.aside is not None and now - axis.aside > PATIENCE:
                 alarm = "clipped at a soft limit" if limited else "does not follow: is OFFSET_AV_RATIO in the INI?"
-            share = 0.0 if why else 1.0  # LinuxCNC goes on showing an offset that it has made part of the position
+            share = 0.0 if why else 1.0  # LinuxCNC continues showing an offset that it has made part of the position
             axes[letter] = {
                 "offset": share * self.get(axis, "offset-now") / micron,
                 "slope": share * self.get(axis, "slope-now") * 1e6,
@@ -317,7 +317,7 @@ def ending(child: "subprocess.Popen[bytes]") -> Callable[..., None]:
 
 
 def keep(arguments: list[str]) -> None:
-    """Run the component in a process of its own, and anew whenever it dies."""
+    """Run the component in a process of its own, and again whenever it dies."""
     here = Path(__file__).resolve()
     while here.exists():
         child = subprocess.Popen([sys.executable, str(here), *arguments, "--once"])
@@ -337,7 +337,7 @@ def main() -> None:
     parser.add_argument("--unit", choices=("mm", "inch"), default="mm")
     for name, unit in (("magnitude", "um"), ("rate", "um/s"), ("timeout", "s"), ("hold", "s"), ("fade", "um/s")):
         parser.add_argument(f"--{name}", type=float, required=True, help=unit)
-    parser.add_argument("--once", action="store_true", help="do not start it anew when it is killed")
+    parser.add_argument("--once", action="store_true", help="do not start it again when it is killed")
     options = parser.parse_args()
     if not options.once:
         keep(sys.argv[1:])
@@ -345,7 +345,7 @@ def main() -> None:
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))  # LinuxCNC ends
     try:
         server = Server(options)
-    except (hal.error, RuntimeError) as e:  # it would be started anew without end
+    except (hal.error, RuntimeError) as e:  # it would be started again without end
         print(f"thermocomp: {e}: LinuxCNC does not run with thermocomp.hal", file=sys.stderr)
         return
     server.run()

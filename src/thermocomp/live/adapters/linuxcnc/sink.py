@@ -57,7 +57,7 @@ class LinuxCncSink:
     axes: dict[str, str]
     magnitude: float | None = None
     rate: float | None = None
-    ticks: int = field(default=-1, init=False)  #: of the component: it goes on while that is alive
+    ticks: int = field(default=-1, init=False)  #: of the component: it continues while that is alive
     _connection: Connection = field(default_factory=Connection, init=False, repr=False)
     _streams: tuple[asyncio.StreamReader, asyncio.StreamWriter] | None = field(default=None, init=False, repr=False)
     _beating: asyncio.Task[None] | None = field(default=None, init=False, repr=False)

@@ -19,8 +19,8 @@ HALF = frozenset({"rotation", "G92"})
 #: what is drawn: how to state it
 REMEDIES: Final[Mapping[str, str]] = MappingProxyType(
     {
-        "rotation": "say --rotation none if none is stored, or state it, such as --rotation 'G54=0 deg'",
-        "G92": "say --no-g92 if no G92 or G52 is in force when the program starts",
+        "rotation": "give --rotation none if none is stored, or state it, such as --rotation 'G54=0 deg'",
+        "G92": "give --no-g92 if no G92 or G52 is in force when the program starts",
         "G98/G99": "write G98 or G99 before the first cycle, or state it: --startup G98",
         "system in force": "write G54 before the first move",
         "origins": "state them, such as --origin 'G54=0 mm, 0 mm, 0 mm'",
@@ -28,7 +28,7 @@ REMEDIES: Final[Mapping[str, str]] = MappingProxyType(
         "homes": "state it: --home '0 mm, 0 mm, 0 mm'; G30 cannot be stated",
         "start": "position all axes before",
         "unit": "write G20 or G21 at the top, or state it: --units",
-        "optional lines": "say whether they are run: --block-delete",
+        "optional lines": "state whether they are run: --block-delete",
         "tool diameters": "expand the program for its tools: --expand",
         "parameters": "give them a value in the program",
     }

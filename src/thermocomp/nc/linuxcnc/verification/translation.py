@@ -30,7 +30,7 @@ _SAME: Final = (
 )
 _OTHER: Final = {"G61": "G61.1"}
 _SAME_M: Final = frozenset({"M0", "M1", "M2", "M3", "M4", "M5", "M6", "M7", "M8", "M9", "M30", "M48", "M49"})
-#: they move nothing, and say how a Fanuc smooths, or take back what is not in force; G98 and G99 go with each cycle
+#: they move nothing, and state how a Fanuc smooths, or take back what is not in force; G98 and G99 go with each cycle
 _LEFT_OUT: Final = frozenset(
     {
         "G98",
@@ -321,7 +321,7 @@ class Translator:
         if wanted == turning:
             return [], []
         if code == "G86" or not self._follower.state.spindle:
-            raise _cannot(block, f"{code} while the spindle stands, which LinuxCNC refuses")
+            raise _cannot(block, f"{code} while the spindle is stopped, which LinuxCNC refuses")
         names = {1: "M3", -1: "M4", 0: "M5"}
         return [names[wanted]], [names[turning]]
 
