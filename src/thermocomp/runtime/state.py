@@ -99,7 +99,7 @@ def resume(
     """Return the state to continue with after a restart.
 
     Up to `FORGOTTEN` the models continue from what they remember, as after an outage: what they read then counts as
-    having been there all the time. After that, or of unknown age, the machine starts again. The correction that is in force
+    having been there all the time. After that, or of unknown age, the machine starts again. The correction in force
     stays in either case, and moves from there within the limits.
 
     Parameters

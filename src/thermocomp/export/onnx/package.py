@@ -80,7 +80,7 @@ no number or above 1e10 moves nothing, and so does one of 0. A state that is dam
 
 ## Switch it off
 
-Do not set the correction to zero at once: the axis would jump. Call it with a `value` of NaN from then on: it stays where
+Do not set the correction to zero at once: the axis would jump. Call it with a `value` of NaN instead: it stays where
 it is for {hold:g} s and then goes to zero. To begin again: a `state` of zeros, once the correction is zero. The
 controller must not compensate for temperature itself at the same time.
 """
