@@ -59,5 +59,16 @@ class FileCells:
         return f"{self.source}: {self.table.place(row)}, column {heading!r}"
 
     def refuse_row(self, row: int, text: str, column: int | None = None, *, skip: bool = True) -> RecordingError:
-        """Return the error of a cell; to pass over its row is a remedy unless `skip` is False."""
+        """Return the error of a cell.
+
+        Parameters
+        ----------
+        row : int
+        text : str
+            What is wrong, and what to do.
+        column : int, optional
+            The time without it.
+        skip : bool
+            To pass over the row is a remedy.
+        """
         return RecordingError(f"{self.at(row, column)}: {text}", [skip_row(self.table, row)] if skip else ())
