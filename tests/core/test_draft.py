@@ -13,7 +13,8 @@ from pathlib import Path
 import pytest
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.files.draft import draft, drafts, refuse_existing
+from thermocomp.core.outputs import refuse_existing
+from thermocomp.files.draft import draft, drafts
 from thermocomp.files.scratch import scratch
 
 pytestmark = pytest.mark.skipif(find_spec("fcntl") is None, reason="files are not locked here")

@@ -20,7 +20,7 @@ from thermocomp.cli.progress import Steps, show_progress
 from thermocomp.cli.reading import RecordingReader, print_trouble, read_recordings
 from thermocomp.cli.terminal import console, print_items, words
 from thermocomp.core.exceptions import InputError
-from thermocomp.files.draft import refuse_existing
+from thermocomp.core.outputs import refuse_existing
 from thermocomp.report.layout import Item
 
 #: how a parameter is written on a command line, where Python takes more than a line can hold; a group of options has

@@ -9,7 +9,7 @@ from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import OptionalOutput
 from thermocomp.cli.terminal import console, make_console, words
 from thermocomp.core.exceptions import InputError, Remedy
-from thermocomp.files.draft import refuse_existing, write_text
+from thermocomp.core.outputs import refuse_existing
 
 if TYPE_CHECKING:
     from thermocomp.recordings.readers.mending import Mended, Question
@@ -54,20 +54,13 @@ def map(
         refuse_existing(
             [output], overwrite, [p for p in (recording, mapping) if p is not None and p != output], ".toml"
         )
-    from thermocomp.files.plaintext import read_text
-    from thermocomp.files.tomlfile import MOST
     from thermocomp.recordings.checks.quality import check
-    from thermocomp.recordings.readers.mapping import read_mapping
-    from thermocomp.recordings.readers.mending import mend, take_best, to_toml
+    from thermocomp.recordings.readers.mending import mend, read_draft, take_best, to_toml
 
-    begun = ""
-    if mapping is not None:
-        read_mapping(mapping)  # says what is wrong with it
-        begun = read_text(mapping, "mapping file", MOST)
-    mended = mend(recording, begun, take_best if yes or json else _ask)
+    mended = mend(recording, read_draft(mapping), take_best if yes or json else _ask)
     left = [f for f in check(mended.recording) if f.severity == "trouble"]
     if output is not None:
-        write_text(mended.text, output, overwrite=overwrite)
+        mended.save(output, overwrite=overwrite)
     if json:
         print_json(_content(mended, output, [f"{f.channel} {f.text}".strip() for f in left]))
         return 1 if left else 0

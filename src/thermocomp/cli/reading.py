@@ -9,7 +9,6 @@ from thermocomp.cli import loudness
 from thermocomp.cli.exits import STDIN
 from thermocomp.cli.terminal import make_console, words
 from thermocomp.core.exceptions import InputError
-from thermocomp.files.scratch import scratch
 
 if TYPE_CHECKING:
     from thermocomp.recordings.recording import Recording
@@ -51,16 +50,11 @@ def read_one(path: Path, mapping: Path | None, *, tell: bool = True) -> "Recordi
 def _read_all(paths: list[Path], read: "Callable[[list[Path]], list[Recording]]") -> "list[Recording]":
     if STDIN not in paths:
         return read(paths)
-    from thermocomp.recordings.readers.limits import FileLimits
+    from thermocomp.recordings.readers.streams import spooled
 
     if paths.count(STDIN) > 1:
         raise InputError("-: there is one standard input")
-    with scratch() as folder:
-        typed = folder / "stdin.csv"
-        with typed.open("wb") as file:
-            while block := sys.stdin.buffer.read(1 << 20):
-                FileLimits().check("file_bytes", file.tell() + len(block), "standard input")
-                file.write(block)
+    with spooled(sys.stdin.buffer, "standard input") as typed:
         return read([typed if p == STDIN else p for p in paths])
 
 

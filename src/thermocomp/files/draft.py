@@ -19,13 +19,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.outputs import OTHERWISE, cannot_be_written, find_place
 from thermocomp.files.scratch import is_scratch, scratch
 
-_OTHERWISE = "choose another name or allow overwriting with --overwrite"
 #: a disk whose folders are not flushed says so
 _NO_FLUSH = {errno.EINVAL, errno.ENOSYS, errno.ENOTSUP}
-#: of a file beside the target, where the draft has to be
-_NOT_ALLOWED = {errno.EACCES, errno.EPERM, errno.EROFS}
 
 
 class Drafts(dict[Path, Path]):
@@ -168,7 +166,7 @@ def drafts(targets: Sequence[Path], *, overwrite: bool) -> Iterator[Drafts]:
         places = {target: find_place(target) for target in targets}
         for target, place in places.items():
             if not overwrite and _status(place) is not None:
-                raise InputError(f"{target}: exists already; {_OTHERWISE}")
+                raise InputError(f"{target}: exists already; {OTHERWISE}")
         if len(set(places.values())) < len(places):
             raise InputError(f"{', '.join(map(str, targets))}: two of them are one file; choose other names")
         with _telling(places):
@@ -222,68 +220,6 @@ def write_text(text: str, target: str | Path, *, overwrite: bool) -> Path:
     return Path(target)
 
 
-def refuse_existing(paths: Sequence[Path], overwrite: bool, inputs: Sequence[Path] = (), ending: str = "") -> None:
-    """Raise `InputError` if an output cannot be written, before any work is done.
-
-    Parameters
-    ----------
-    paths : sequence of Path
-        To be written.
-    overwrite : bool
-        Existing files may be replaced.
-    inputs : sequence of Path
-        What is read: never to be replaced.
-    ending : str
-        Of the names of such files, such as ``.html``.
-
-    Raises
-    ------
-    InputError
-        One is there already, is an input, cannot be there, or has another ending.
-    """
-    for path in paths:
-        place = find_place(path)
-        if any(place.exists() and other.exists() and place.samefile(other) for other in inputs):
-            raise InputError(f"{path}: is also an input; choose another name")
-        if place.exists() and not overwrite:
-            raise InputError(f"{path}: exists already; {_OTHERWISE}")
-        if ending and path.suffix.lower() != ending:
-            raise InputError(f"{path}: the file is written as {ending[1:]}; name it {path.with_suffix(ending)}")
-
-
-def find_place(target: Path) -> Path:
-    """Return where a file is really written: links are followed, the last one even if it leads to nothing.
-
-    Returns
-    -------
-    Path
-        Its folder is there, and at it is nothing or a file that may be written.
-
-    Raises
-    ------
-    InputError
-        It is none.
-    """
-    place = Path(os.path.realpath(target))
-    try:
-        target.stat()
-    except FileNotFoundError:
-        pass
-    except OSError as e:  # links in a circle, a name that is too long, a file where a folder should be
-        raise _cannot(target, e) from e
-    folder = place.parent if target.is_symlink() else target.parent
-    if not folder.is_dir():
-        raise InputError(f"{target}: there is no folder {folder}; make it first")
-    if place.is_dir():
-        raise InputError(f"{target}: is a folder; name a file")
-    if place.exists():
-        if not place.is_file():
-            raise InputError(f"{target}: is a pipe or a device and no file; choose another name")
-        if not os.access(place, os.W_OK):
-            raise InputError(f"{target}: is read-only; choose another name, or let it be written")
-    return place
-
-
 def _status(path: Path) -> os.stat_result | None:
     try:
         return path.lstat()
@@ -298,19 +234,13 @@ def _telling(places: dict[Path, Path]) -> Iterator[None]:
         yield
     except OSError as e:
         if not isinstance(e.filename, str | bytes):  # writing and flushing do not say what
-            raise _cannot(next(reversed(places)), e) from e
+            raise cannot_be_written(next(reversed(places)), e) from e
         where = Path(os.fsdecode(e.filename))
         for target, place in places.items():
             beside = where.parts[len(place.parent.parts) :] if where.is_relative_to(place.parent) else (".",)
             if not beside or where == place or is_scratch(beside[0]):
-                raise _cannot(target, e) from e
+                raise cannot_be_written(target, e) from e
         raise
-
-
-def _cannot(target: Path, error: OSError) -> InputError:
-    hint = f"; a file must be allowed beside it, in {target.parent}" if error.errno in _NOT_ALLOWED else ""
-    why = os.strerror(error.errno) if error.errno else error
-    return InputError(f"{target}: cannot be written: {why}{hint}; what was there is as it was")
 
 
 def _flush_folder(folder: Path) -> None:

@@ -15,6 +15,7 @@ from thermocomp.judging.guards import Guard, find_guard
 from thermocomp.judging.pieces import work_through
 from thermocomp.judging.results import Assessment
 from thermocomp.judging.robustness import stress, worse
+from thermocomp.models.methods import METHODS
 from thermocomp.models.training import train
 from thermocomp.recordings.samples import Samples
 
@@ -82,3 +83,13 @@ def _refit(samples: Samples, support: Support, guard: Guard | None, judged: Asse
 
 def _not_refitted(judged: Assessment, why: str) -> Assessment:
     return replace(judged, verdict=replace(judged.verdict, caps=(f"cannot be fitted to all rows: {why}",)))
+
+
+def fit_whole(method: str, samples: Samples, target: int) -> ErrorModel:
+    """Return a method fitted to all rows, for its formula."""
+    return train(method, samples, target, np.ones(len(samples), dtype=np.bool_)).model
+
+
+def describe_method(name: str) -> str:
+    """Return a sentence on a method."""
+    return METHODS[name].summary if name in METHODS else "an estimator that was handed in"

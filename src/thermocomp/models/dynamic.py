@@ -12,9 +12,10 @@ from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.terms import Term
 from thermocomp.models.base import FloatArray, IntArray
 from thermocomp.models.numerics import moments as ridge
-from thermocomp.models.pacedfeatures import SHORTEST_LAG, usual_step
+from thermocomp.models.pacedfeatures import SHORTEST_LAG
 from thermocomp.models.shrinkage import Rule, choose
 from thermocomp.models.timed import Time, TimedRegressor
+from thermocomp.recordings.samples import usual_step
 
 MINUTE = 60.0
 

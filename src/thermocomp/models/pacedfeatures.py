@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from thermocomp.core import lagbank
 from thermocomp.core.bounds import LEAST
 from thermocomp.models.numerics.structures import LagStructure, Moments
+from thermocomp.recordings.samples import usual_step
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
@@ -189,12 +190,6 @@ class PacedFeatures:
             each = [np.full(len(c), s * len(c)) for c, s in zip(columns, strengths, strict=True)]
             drawn.append(LagStructure(np.concatenate(columns), np.concatenate(each)))
         return drawn
-
-
-def usual_step(step: FloatArray) -> float:
-    """Return the median time between two rows [s]; inf where every row is a test of its own."""
-    between = step[np.isfinite(step) & (step > 0)]
-    return float(np.median(between)) if between.size else float("inf")
 
 
 def _pick(rng: np.random.Generator, count: int, fewest: int, most: int) -> IntArray:

@@ -13,8 +13,8 @@ from thermocomp.core.zero import STANDS
 from thermocomp.models.averaged import LAGS, POWERS, RUNNING, STOPPED
 from thermocomp.models.numerics.folds import halve, number_folds
 from thermocomp.models.numerics.structures import fit_each, share_out
-from thermocomp.models.pacedfeatures import PacedFeatures, usual_step
-from thermocomp.recordings.samples import Samples
+from thermocomp.models.pacedfeatures import PacedFeatures
+from thermocomp.recordings.samples import Samples, usual_step
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

@@ -226,3 +226,9 @@ class Samples:
     def frame(self) -> pd.DataFrame:
         """Return inputs minus reference as a table with the inputs' names."""
         return pd.DataFrame(self.change(), columns=[c.name for c in self.inputs])
+
+
+def usual_step(step: FloatArray) -> float:
+    """Return the median time between two rows [s]; inf where every row is a test of its own."""
+    between = step[np.isfinite(step) & (step > 0)]
+    return float(np.median(between)) if between.size else float("inf")

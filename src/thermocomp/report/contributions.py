@@ -8,8 +8,7 @@ from matplotlib.figure import Figure
 from thermocomp.core.contributions import contributions, gains
 from thermocomp.core.paceddynamic import PacedDynamic
 from thermocomp.core.shown import shorten
-from thermocomp.models.pacedfeatures import usual_step
-from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.samples import Samples, usual_step
 from thermocomp.report.drawing import Drawn, add_legend, drawing, svg
 from thermocomp.report.figures import COLOURS, LONGEST, MEASURED, NONE, FloatArray, thin_points
 from thermocomp.report.layout import Column, Layout

@@ -1,6 +1,6 @@
 """Figures of a sensor selection, as SVG text. Each answers one question; the question stands in its docstring."""
 
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -10,7 +10,6 @@ from matplotlib.ticker import MaxNLocator
 from thermocomp.core.shown import shorten
 from thermocomp.judging.budget import Budget
 from thermocomp.judging.choice import Choice, Table
-from thermocomp.models.grouping import CorrelationGrouping
 from thermocomp.report.drawing import Drawn, add_legend, drawing, log_ticks, name_ticks, svg
 from thermocomp.report.figures import COLOURS, LONGEST, NONE
 
@@ -34,7 +33,7 @@ def draw(choice: Choice) -> tuple[Drawn, str] | None:
             "How many sensors are needed? Lines: mean over the unseen blocks; dots: each block. Ring: enough, for what "
             "more sensors bring is within the margin of the rule. Condition: how far the sensors repeat each other."
         )
-    if isinstance(found, CorrelationGrouping):
+    if choice.method == "grouping" and found is not None:
         return grouping(found, choice.target), (
             "Left: correlation of every two temperatures, those of a group side by side and framed; names of "
             "representatives are bold. Right: the best subset of each number of representatives."
@@ -71,8 +70,14 @@ def rows(table: Table, value: int, target: str) -> Drawn:
         return svg(figure)
 
 
-def grouping(g: CorrelationGrouping, target: str) -> Drawn:
-    """Show which temperatures say the same, and how many are worth having: groups in the correlation matrix, MSE_p."""
+def grouping(g: Any, target: str) -> Drawn:
+    """Show which temperatures say the same, groups in the correlation matrix, and how many are worth having: MSE_p.
+
+    Parameters
+    ----------
+    g : CorrelationGrouping
+    target : str
+    """
     order = [i for members in g.groups_ for i in members]
     names = [str(n) for n in g.feature_names_in_[order]]
     places = [g.candidates_.index(i) for i in order]

@@ -4,16 +4,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from thermocomp.core.validity import Validity
 from thermocomp.judging import coverage, do_no_harm
 from thermocomp.judging.choice import Table
 from thermocomp.judging.metrics import METRICS
+from thermocomp.judging.refit import describe_method, fit_whole
 from thermocomp.judging.results import Assessment, Comparison
 from thermocomp.judging.robustness import Robustness
-from thermocomp.models.methods import METHODS
-from thermocomp.models.training import train
 from thermocomp.recordings.checks.quality import check
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
@@ -56,10 +53,7 @@ def summarise(
         "usable": [t for t in targets if comparison.best(t) is not None],
         "targets": [_target(comparison, t, samples) for t in targets],
         "recordings": [_recording(r) for r in recordings],
-        "models": [
-            {"name": m, "summary": METHODS[m].summary if m in METHODS else "an estimator that was handed in"}
-            for m in _models(comparison)
-        ],
+        "models": [{"name": m, "summary": describe_method(m)} for m in _models(comparison)],
         "metrics": [METRICS[name] for name in SHOWN],
         "condition_number": comparison.collinearity.condition_number,
         "vif": sorted(
@@ -170,7 +164,7 @@ def _formula(comparison: Comparison, best: Assessment | None, samples: Samples |
         return None
     if samples is not None:
         k = [c.name for c in samples.targets].index(best.target)
-        model = train(best.model, samples, k, np.ones(len(samples), dtype=np.bool_)).model
+        model = fit_whole(best.model, samples, k)
     else:
         folds = [
             a.frozen

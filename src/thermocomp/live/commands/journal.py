@@ -9,7 +9,7 @@ from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import OptionalOutput
 from thermocomp.cli.terminal import console, words
 from thermocomp.core.exceptions import InputError
-from thermocomp.files.draft import refuse_existing
+from thermocomp.core.outputs import refuse_existing
 
 if TYPE_CHECKING:
     from thermocomp.live.journal.journalreader import JournalReader, StoredRun

@@ -6,7 +6,7 @@ from itertools import chain, islice
 from pathlib import Path
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.files.draft import refuse_existing
+from thermocomp.core.outputs import refuse_existing
 from thermocomp.nc.interpreter.block import Setup
 from thermocomp.nc.interpreter.dialect import check_dialect
 from thermocomp.nc.linuxcnc import rs274

@@ -13,7 +13,7 @@ from thermocomp.cli.progress import show_share
 from thermocomp.cli.reading import read_recordings, tell_trouble
 from thermocomp.cli.terminal import console, make_console, marked, print_table, words
 from thermocomp.core.exceptions import InputError
-from thermocomp.files.draft import refuse_existing
+from thermocomp.core.outputs import refuse_existing
 from thermocomp.report.layout import Column, Layout, Toned
 
 if TYPE_CHECKING:

@@ -11,11 +11,14 @@ import tomlkit
 from tomlkit.items import Table
 
 from thermocomp.core.exceptions import InputError, RecordingError, Remedy, TwoReadingsError, UnitError
+from thermocomp.files.draft import write_text
+from thermocomp.files.plaintext import read_text
+from thermocomp.files.tomlfile import MOST
 from thermocomp.recordings.checks.findings import Finding, cut
 from thermocomp.recordings.checks.quality import check
 from thermocomp.recordings.readers.datecheck import holds_date, holds_own_date
 from thermocomp.recordings.readers.guesses import guess_columns, understand_or_none
-from thermocomp.recordings.readers.mapping import ADAPTER, ColumnMap, Mapping, check_content
+from thermocomp.recordings.readers.mapping import ADAPTER, ColumnMap, Mapping, check_content, read_mapping
 from thermocomp.recordings.readers.opening import open_table
 from thermocomp.recordings.readers.recordings import read
 from thermocomp.recordings.recording import Recording
@@ -145,6 +148,18 @@ class Mended:
     text: str
     recording: Recording
     decided: tuple[tuple[Question, Remedy | None], ...]
+
+    def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
+        """Write the mapping to a TOML file; return its path."""
+        return write_text(self.text, path, overwrite=overwrite)
+
+
+def read_draft(mapping: str | Path | None) -> str:
+    """Return the text of a mapping to begin with, once it is understood; empty for None."""
+    if mapping is None:
+        return ""
+    read_mapping(mapping)  # says what is wrong with it
+    return read_text(Path(mapping), "mapping file", MOST)
 
 
 def mend(path: str | Path, text: str, decide: Decide) -> Mended:

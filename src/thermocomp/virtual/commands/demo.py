@@ -7,7 +7,7 @@ from thermocomp.cli.fit import fit
 from thermocomp.cli.options import Output
 from thermocomp.cli.terminal import console
 from thermocomp.core.exceptions import InputError
-from thermocomp.files.draft import refuse_existing
+from thermocomp.core.outputs import refuse_existing
 from thermocomp.virtual.commands.simulate import simulate
 
 

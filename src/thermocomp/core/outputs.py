@@ -1,0 +1,81 @@
+"""Where an output may be written: looked at before any work is done, and again when it is."""
+
+import errno
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from thermocomp.core.exceptions import InputError
+
+OTHERWISE = "choose another name or allow overwriting with --overwrite"
+#: of a file beside the target, where the draft has to be
+_NOT_ALLOWED = {errno.EACCES, errno.EPERM, errno.EROFS}
+
+
+def refuse_existing(paths: Sequence[Path], overwrite: bool, inputs: Sequence[Path] = (), ending: str = "") -> None:
+    """Raise `InputError` if an output cannot be written, before any work is done.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        To be written.
+    overwrite : bool
+        Existing files may be replaced.
+    inputs : sequence of Path
+        What is read: never to be replaced.
+    ending : str
+        Of the names of such files, such as ``.html``.
+
+    Raises
+    ------
+    InputError
+        One is there already, is an input, cannot be there, or has another ending.
+    """
+    for path in paths:
+        place = find_place(path)
+        if any(place.exists() and other.exists() and place.samefile(other) for other in inputs):
+            raise InputError(f"{path}: is also an input; choose another name")
+        if place.exists() and not overwrite:
+            raise InputError(f"{path}: exists already; {OTHERWISE}")
+        if ending and path.suffix.lower() != ending:
+            raise InputError(f"{path}: the file is written as {ending[1:]}; name it {path.with_suffix(ending)}")
+
+
+def find_place(target: Path) -> Path:
+    """Return where a file is really written: links are followed, the last one even if it leads to nothing.
+
+    Returns
+    -------
+    Path
+        Its folder is there, and at it is nothing or a file that may be written.
+
+    Raises
+    ------
+    InputError
+        It is none.
+    """
+    place = Path(os.path.realpath(target))
+    try:
+        target.stat()
+    except FileNotFoundError:
+        pass
+    except OSError as e:  # links in a circle, a name that is too long, a file where a folder should be
+        raise cannot_be_written(target, e) from e
+    folder = place.parent if target.is_symlink() else target.parent
+    if not folder.is_dir():
+        raise InputError(f"{target}: there is no folder {folder}; make it first")
+    if place.is_dir():
+        raise InputError(f"{target}: is a folder; name a file")
+    if place.exists():
+        if not place.is_file():
+            raise InputError(f"{target}: is a pipe or a device and no file; choose another name")
+        if not os.access(place, os.W_OK):
+            raise InputError(f"{target}: is read-only; choose another name, or let it be written")
+    return place
+
+
+def cannot_be_written(target: Path, error: OSError) -> InputError:
+    """Return what a user must know of an error of the disk."""
+    hint = f"; a file must be allowed beside it, in {target.parent}" if error.errno in _NOT_ALLOWED else ""
+    why = os.strerror(error.errno) if error.errno else error
+    return InputError(f"{target}: cannot be written: {why}{hint}; what was there is as it was")
