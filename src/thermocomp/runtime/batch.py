@@ -65,7 +65,7 @@ def run(
         What counts as zero; see `ErrorModel.init`.
     resting : ndarray of bool of shape (n_rows,), optional
         The spindle is known to be stopped; nowhere if not given.
-    again : int, optional
+    anew : int, optional
         Row from which deviations count again: from there it is the model minus what it says there, on average over the
         rows that a zero is taken of, and the correction begins at zero again.
     undriven : ndarray of bool of shape (n_rows,), optional

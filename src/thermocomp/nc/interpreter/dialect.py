@@ -130,8 +130,8 @@ def check_dialect(lines: Iterable[str], *, whole: bool = False, startup: str = "
     if other:
         raise ProgramError(
             other.line,
-            f"{other.text!r} is {other.what}: give --controller fanuc (dwells, cycles, lengths are others there), or "
-            "--controller linuxcnc",
+            f"{other.text!r} is {other.what}: give --controller fanuc (dwells, cycles and lengths are others there), "
+            "or --controller linuxcnc",
         )
     if found.fault is not None and not mine:
         raise ProgramError(found.fault.line, found.fault.what)

@@ -135,12 +135,12 @@ class Reader:
             theirs = owner if owner in other else next((c for c in words.codes if c in other and c[0] == "G"), "")
             if theirs:
                 return (
-                    f"{theirs} with {letter} is LinuxCNC's, and a Fanuc's {theirs} has none: remove {letter}, or say "
+                    f"{theirs} with {letter} is LinuxCNC's, and a Fanuc's {theirs} has none: remove {letter}, or give "
                     "--controller linuxcnc if the program is for that"
                 )
             return f"the line has {letter}, and no code that uses it; remove it, or add the code"
         return (
-            f"the line has {letter}, and no code that uses it in LinuxCNC, but it may act on a Fanuc or Haas: say "
+            f"the line has {letter}, and no code that uses it in LinuxCNC, but it may act on a Fanuc or Haas: give "
             "--controller fanuc if the program is for one; else remove it, or add the code"
         )
 
