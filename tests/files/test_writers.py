@@ -41,7 +41,7 @@ WRITING = {
     "nc/linuxcnc/expansion/expand.py",
     "nc/revision/job.py",
     "export/verbs.py",
-    "cli/map.py",
+    "recordings/readers/mending.py",
     "live/commands/serve.py",  # the configuration of its demo: a text, never over another
     "files/jsonfile.py",
     "recordings/readers/recordings.py",

@@ -295,7 +295,7 @@ def test_lines_come_one_by_one() -> None:
 
 
 def test_a_file_without_line_ends_is_refused() -> None:
-    with pytest.raises(InputError, match="no NC program"):
+    with pytest.raises(InputError, match="not an NC program"):
         list(split_lines("X" * 2_000_000))
 
 

@@ -123,10 +123,10 @@ def _refuse_binary(lines: Sequence[str]) -> None:
     text = "".join(lines)
     for half, other in ((text[::2], text[1::2]), (text[1::2], text[::2])):
         if "\0" not in half and other.count("\0") > _MOSTLY * len(other):
-            raise InputError(f"the file is not a NC program but {_UTF_16}")
+            raise InputError(f"the file is not an NC program but {_UTF_16}")
     for magic, name in _MAGIC:
         if lines[0].startswith(magic):
-            raise InputError(f"the file is not a NC program but {name}")
+            raise InputError(f"the file is not an NC program but {name}")
     for number, line in enumerate(lines, 1):
         if "\0" in line:
             raise InputError(

@@ -93,7 +93,7 @@ def program_lines(stream: TextIO) -> Iterator[str]:
     while text := stream.readline(LONGEST):
         if len(text) == LONGEST:
             raise InputError(
-                f"a line has {LONGEST} characters or more: this is not a NC program; "
+                f"a line has {LONGEST} characters or more: this is not an NC program; "
                 "give the program as text, with line ends"
             )
         yield text
