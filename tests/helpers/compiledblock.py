@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Sequence
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -53,6 +54,24 @@ void run(void *at, int n, const tc_real *values, const double *age, const double
 """
 
 
+@lru_cache(maxsize=4)
+def compiled(files: tuple[tuple[str, str], ...], name: str, compiler: str, flags: tuple[str, ...]) -> ctypes.CDLL:
+    """Compile sources, by name and text, into a library that is loaded; the same ones once for several tables."""
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        for file, text in files:
+            (folder / file).write_text(text, encoding="utf-8")
+        for code in (name, "driver"):
+            strict = FLAGS if code == name else ("-O2",)
+            command = [compiler, *strict, *flags, "-fPIC", "-c", f"{code}.c", "-o", f"{code}.o"]
+            subprocess.run(command, check=True, cwd=folder)
+        objects = [f"{name}.o", "driver.o"]
+        subprocess.run([compiler, *flags, "-shared", *objects, "-o", "block.so", "-lm"], check=True, cwd=folder)
+        library = ctypes.CDLL(str(folder / "block.so"))
+    library.begin.restype = ctypes.c_void_p
+    return library
+
+
 class CompiledBlock:
     """A compensator in C.
 
@@ -80,18 +99,10 @@ class CompiledBlock:
             models=counts[2],
             sensors=counts[3],
         )
-        (folder / "driver.c").write_text(text, encoding="ascii")
         if compiler == "clang":  # its run-time library is for programs alone
             flags = ["-fsanitize-trap=undefined" if f == "-fno-sanitize-recover" else f for f in flags]
-        library = folder / "block.so"
-        for code in (sources.name, "driver"):
-            strict = FLAGS if code == sources.name else ("-O2",)
-            command = [compiler, *strict, *flags, "-fPIC", "-c", f"{code}.c", "-o", f"{code}.o"]
-            subprocess.run(command, check=True, cwd=folder)
-        objects = [f"{sources.name}.o", "driver.o"]
-        subprocess.run([compiler, *flags, "-shared", *objects, "-o", str(library), "-lm"], check=True, cwd=folder)
-        self._library = ctypes.CDLL(str(library))
-        self._library.begin.restype = ctypes.c_void_p
+        files = tuple((f.name, f.read_text(encoding="utf-8")) for f in sorted(folder.glob(f"{sources.name}.[ch]")))
+        self._library = compiled((*files, ("driver.c", text)), sources.name, compiler, tuple(flags))
 
     def run(self, readings: Readings) -> Answers:
         """Run it from the start."""
