@@ -181,7 +181,7 @@ def test_a_damaged_state_is_a_cold_start_and_is_kept(tmp_path: Path) -> None:
 def test_a_file_of_others_is_not_written_over(content: str | None, tmp_path: Path) -> None:
     path = tmp_path / "state.json"
     path.mkdir() if content is None else path.write_text(content, encoding="ascii")
-    with pytest.raises(InputError, match="no state file, and would be written over"):
+    with pytest.raises(InputError, match="not a state file, and would be written over"):
         Service(machine(), [], [], state_path=path)
     assert path.is_dir() if content is None else path.read_text(encoding="ascii") == content
 

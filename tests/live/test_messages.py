@@ -25,7 +25,7 @@ def test_values_by_name() -> None:
 @pytest.mark.parametrize(
     ("payload", "says"),
     [
-        (b"21.5", "no table"),
+        (b"21.5", "not a table"),
         (b"\xff\xfe", "no JSON"),
         (b"{", "no JSON"),
         (b"[" * 50_000, "no JSON"),
