@@ -51,7 +51,7 @@ def test_the_user_says_it() -> None:
     ("targets", "texts", "says"),
     [
         (("ch3", "z"), [], r"'ch3' does not state which axis.*ch3=Z.*targets are ch3, z"),
-        (("x_at_200", "x_at_0"), [], "'x_at_200' does not say"),
+        (("x_at_200", "x_at_0"), [], "'x_at_200' does not state"),
         (("ch3", "z"), ["ch4=Z"], "no model of 'ch4'.*ch3"),
         (("ch3",), ["ch3=Z", "ch3=X"], "ch3 was given before"),
         (("ch3",), ["ch3=A"], "want an axis"),

@@ -127,7 +127,7 @@ def test_columns_by_pattern_by_places_and_by_name(tmp_path: Path) -> None:
     table = wide(found)
     table = table.assign(**{c.replace("y_laser", "z_laser"): 0.0 for c in map(str, table) if c.startswith("y_laser")})
     table.to_csv(tmp_path / "both.csv", index=False)
-    with pytest.raises(RecordingError, match=r"profiles called y_laser_\*, z_laser_\*; state which .*'y_laser_"):
+    with pytest.raises(RecordingError, match=r"profiles y_laser_\*, z_laser_\*; state which .*'y_laser_"):
         read(tmp_path / "both.csv", "EYY")
     for pattern in ("y_laser_*", "y_laser_*_um"):
         same(read(tmp_path / "both.csv", ProfileOptions(target="EYY", columns=pattern)), _with_zeros(found))
