@@ -51,6 +51,7 @@ def test_every_option_says_what_it_is(name: str) -> None:
     for option, p in inspect.signature(MADE[name]).parameters.items():
         if is_group(p.annotation):
             assert p.annotation.__doc__
+            assert p.kind is p.KEYWORD_ONLY
             continue
         (said,) = (m for m in get_args(p.annotation)[1:] if isinstance(m, Parameter) and m.help)
         assert said.help is not None, option

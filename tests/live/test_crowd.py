@@ -12,7 +12,7 @@ import pytest
 from test_doors import HOLD, served, serving
 from test_page import RIGHT, fed
 
-from thermocomp.live.page import connections, page
+from thermocomp.live.page import connections, status
 
 #: an answer takes no longer, whoever else is there [s]; on an idle computer it takes some hundredths of a second
 SOON = 5.0
@@ -121,7 +121,7 @@ def test_half_a_request_is_closed(said: bytes, monkeypatch: pytest.MonkeyPatch) 
 
 def test_who_does_not_read_is_dropped_and_blocks_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(connections, "STUCK", 1.0)
-    monkeypatch.setattr(page, "OFTEN", 0.01)  # the buffers are full the sooner
+    monkeypatch.setattr(status, "OFTEN", 0.01)  # the buffers are full the sooner
     service = serving()
     for k in range(200):
         service.rezero("z_um", "x" * 400 + str(k))  # long messages

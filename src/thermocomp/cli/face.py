@@ -121,7 +121,8 @@ class Verb:
         self.reads = reads
         module, _, name = place.partition(":")
         self.function: Callable[..., Any] = getattr(import_module(module), name)
-        self.words = words or [n for n, p in self.parameters.items() if p.default is p.empty]
+        needed = (n for n, p in self.parameters.items() if p.default is p.empty and p.kind is not p.VAR_KEYWORD)
+        self.words = words or list(needed)
 
     @cached_property
     def parameters(self) -> dict[str, inspect.Parameter]:
