@@ -34,6 +34,7 @@ _NO_YEAR = re.compile(r"\d{1,2}[./-]\d{1,2}[./]?")
 _MONTH = re.compile(r"\d{1,2}[-. ]{1,2}[^\W\d_]{3,9}\.?|[^\W\d_]{3,9}\.?[- ]\d{1,2}")
 _COUNTED = re.compile(r"(?:day|tag|jour|giorno|d[ií]a|dag|dia|nap|den|dzień|gün)\W{0,3}\d{1,4}\.?", re.IGNORECASE)
 _DAY_WORD = re.compile(r"(?:day|tag|jour|giorno|d[ií]a|dia)\W+\w+", re.IGNORECASE)
+_WEEK_DAY = re.compile(r"^(?:KW|CW|W|wk|week) ?(\d\d?)[-/. ]?([1-7])$", re.IGNORECASE)
 #: full dates among other words
 _WITHIN = (
     r"(?<!\d)(\d{4}([-./])\d{1,2}\2\d{1,2})(?!\d)",
@@ -163,8 +164,8 @@ def _read_texts(texts: "pd.Series[str]", *, named: bool, beside_clock: bool) -> 
     first = plain.iloc[0]
     if re.fullmatch(f"{_ORDINAL}|{_WEEK}", first):
         return _read_forms(plain.str.replace("-", "", regex=False), "%GW%V%u" if "W" in first else "%Y%j")
-    week = texts.str.extract(r"^(?:KW|CW|W|wk|week) ?(\d\d?)[-/. ]?([1-7])$", flags=re.IGNORECASE)
-    if week.notna().to_numpy().all():
+    # a file may have thousands of columns: their first cells are looked at before all
+    if _WEEK_DAY.match(texts.iloc[0]) and (week := texts.str.extract(_WEEK_DAY)).notna().to_numpy().all():
         return [_unwrap(d, 364) for d in _read_forms("2020W" + week[0].str.zfill(2) + week[1], "%GW%V%u")]
     if _NO_YEAR.fullmatch(first) and (named or first.endswith(".") or (beside_clock and not _are_parts(plain))):
         bare = plain.str.rstrip("./").str.replace(r"[./]", "-", regex=True) + "-2000"
@@ -177,6 +178,8 @@ def _read_texts(texts: "pd.Series[str]", *, named: bool, beside_clock: bool) -> 
 def _read_dates_within(texts: "pd.Series[str]") -> list[IntArray]:
     """Return the days of dates among other words: ``2024-03-05 (Tue)``, ``log_20240305_1``, ``P050324``."""
     for form in _WITHIN:
+        if not re.search(form, texts.iloc[0]):
+            continue
         parts = texts.str.extract(form, expand=True)[0]
         if parts.notna().all():
             return read_days(parts) if re.search(r"\D", parts.iloc[0]) else _read_digits(parts)
