@@ -1,6 +1,7 @@
 """What a heading says: ``t1_C``, ``drift_mm``, ``T1 [degC]`` carry the unit of their column."""
 
 import re
+from contextlib import suppress
 from dataclasses import dataclass
 from difflib import get_close_matches
 
@@ -141,15 +142,15 @@ def _in_brackets(heading: str) -> tuple[str, Unit] | None:
     symbol = SUFFIXES.get(symbol, symbol)
     if symbol == "m" and is_time_name(base):
         raise UnitError("'m' stands for metres; minutes are min")
-    try:
-        return base, find_unit(symbol)
-    except UnitError:
-        # [kW], [%] or (front) are columns of no use here; [degX] is a slip that would lose a sensor silently
-        other = is_foreign_unit(symbol) or _FORMAT.fullmatch(symbol)
-        words = get_close_matches(symbol.casefold(), SPELLINGS, n=1, cutoff=0.85)
-        if not other and (words or get_close_matches(symbol, SUFFIXES, n=1, cutoff=0.6)):
-            raise
-        return None
+    if is_unit(symbol):
+        with suppress(UnitError):  # a share of degC
+            return base, find_unit(symbol)
+    # [kW], [%] or (front) are columns of no use here; [degX] is a slip that would lose a sensor silently
+    slip = not (is_foreign_unit(symbol) or _FORMAT.fullmatch(symbol)) and (
+        get_close_matches(symbol.casefold(), SPELLINGS, n=1, cutoff=0.85)
+        or get_close_matches(symbol, SUFFIXES, n=1, cutoff=0.6)
+    )
+    return (base, find_unit(symbol)) if slip else None  # it says what is meant
 
 
 def _behind(heading: str) -> tuple[str, Unit] | None:

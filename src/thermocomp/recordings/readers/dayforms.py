@@ -58,6 +58,9 @@ _DAYS = (
 )
 
 
+_WEEKDAYS = frozenset(day for names in _DAYS for day in names.split())
+
+
 def find_day_columns(table: FileTable, columns: Sequence[int], *, beside_clock: bool = False) -> list[int]:
     """Find the columns whose first cells are dates in a form that no timestamp has.
 
@@ -99,8 +102,16 @@ def names_day(heading: str) -> bool:
 
 
 def _read_filled(cells: Sequence[Any], heading: str, beside_clock: bool) -> list[IntArray]:
-    filled = pd.Series([str(cell) for cell in cells if not is_filler(str(cell))], dtype=object)
-    return read_other_days(filled, heading, beside_clock=beside_clock) if len(filled) else []
+    texts = [str(cell) for cell in cells if not is_filler(str(cell))]
+    if not texts or not _may_be_day(texts[0].strip().lstrip("'")):
+        return []
+    return read_other_days(pd.Series(texts, dtype=object), heading, beside_clock=beside_clock)
+
+
+def _may_be_day(first: str) -> bool:
+    """Return whether a column's first cell may be a day: at once, for a file may have thousands of columns."""
+    weekday = first.casefold().rstrip(".") in _WEEKDAYS
+    return weekday or re.search(r"\d", first) is not None or _DAY_WORD.fullmatch(first) is not None
 
 
 def read_other_days(cells: "pd.Series[Any]", heading: str, *, beside_clock: bool = False) -> list[IntArray]:
