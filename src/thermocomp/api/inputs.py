@@ -119,7 +119,7 @@ def starts_of(starts: Starts, recordings: Sequence[Recording]) -> tuple[Start, .
     Raises
     ------
     InputError
-        They are not as many as the recordings, or one continues from itself or is told to several.
+        They are not as many as the recordings, or one continues from itself or is given to several.
     """
     if starts is None:
         return None

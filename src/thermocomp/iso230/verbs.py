@@ -96,9 +96,9 @@ def iso230(
     ambient : str, optional
         Temperature of the surroundings; the first whose name says air, ambient or room if not given.
     model : ErrorModel, FittedModels, path of a model file, or sequence of ErrorModel, optional
-        Model file from thermocomp fit: what it leaves of each displacement is told beside it.
+        Model file from thermocomp fit: what it leaves of each displacement is reported beside it.
     limits : Limits
-        Of the compensator: what it would leave is told, not what the model alone would.
+        Of the compensator: what it would leave is reported, not what the model alone would.
     starts : Start or sequence of Start, optional
         How the recordings begin, as for `compare`; it matters to a model.
     positioning : sequence of str or Path

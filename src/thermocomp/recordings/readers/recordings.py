@@ -123,7 +123,7 @@ def _read_rows(source: Path, mapping: Mapping, *, rising: bool, extra: Sequence[
     with _guessing(table, mapping):
         refuse_nameless([table.headings[k] for k in numeric], str(source))
     notes.extend(f"left out: {why_left_out(table.headings[k])}" for k in numeric[:_MOST_NOTES])
-    texts_only = [table.headings[k] for k in left_out if k not in set(numeric)]
+    texts_only = [table.headings[k] for k in sorted({*left_out} - {*numeric})]
     if texts_only:
         notes.append(f"not read, holding no numbers: {', '.join(texts_only)}")
     rows = Rows(
