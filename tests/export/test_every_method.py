@@ -85,7 +85,7 @@ def prove(folder: Path) -> None:
     if not COMPILERS:
         pytest.skip("there is no C compiler")
     for switch in ("-UTC_FLOAT", "-DTC_FLOAT"):
-        command = [COMPILERS[0], *FLAGS[:-1], switch, "tc_thermal.c", "tc_thermal_test.c", "-lm", "-o", "prove"]
+        command = [COMPILERS[0], *FLAGS, switch, "tc_thermal.c", "tc_thermal_test.c", "-lm", "-o", "prove"]
         built = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
         if switch == "-DTC_FLOAT" and "single precision is too coarse" in built.stderr:
             assert "single precision is too coarse" in refusals()

@@ -41,7 +41,7 @@ def prove(folder: Path, texts: dict[str, bytes], switch: str) -> str:
     """Compile and run the test of an export; return what it says, or why it does not compile."""
     for file, text in texts.items():
         (folder / file).write_bytes(text)
-    command = [COMPILERS[0], *FLAGS[:-1], switch, "tc_x.c", "tc_x_test.c", "-lm", "-o", "prove"]
+    command = [COMPILERS[0], *FLAGS, switch, "tc_x.c", "tc_x_test.c", "-lm", "-o", "prove"]
     built = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     if built.returncode:
         return built.stderr

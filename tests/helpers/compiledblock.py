@@ -18,8 +18,10 @@ from thermocomp.runtime.compensator import Compensator
 
 FloatArray = NDArray[np.float64]
 
-FLAGS = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-O2")
+FLAGS = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic")
+#: what a program must not do ends it; compiled four times as fast as with optimisation
 SANITIZED = ("-fsanitize=undefined", "-fno-sanitize-recover")
+OPTIMISED = ("-O2",)
 COMPILERS = [c for c in ("gcc", "clang") if shutil.which(c)]
 
 _DRIVER = """
@@ -62,7 +64,7 @@ def compiled(files: tuple[tuple[str, str], ...], name: str, compiler: str, flags
         for file, text in files:
             (folder / file).write_text(text, encoding="utf-8")
         for code in (name, "driver"):
-            strict = FLAGS if code == name else ("-O2",)
+            strict = FLAGS if code == name else ()
             command = [compiler, *strict, *flags, "-fPIC", "-c", f"{code}.c", "-o", f"{code}.o"]
             subprocess.run(command, check=True, cwd=folder)
         objects = [f"{name}.o", "driver.o"]

@@ -70,5 +70,5 @@ def test_pages_that_are_named_are_served_and_no_others() -> None:
 
 
 def test_a_page_that_is_not_installed_is_refused() -> None:
-    with pytest.raises(InputError, match="'note' is not installed; there are status, orders"):
+    with pytest.raises(InputError, match="'note' is not installed; there are orders, status"):
         Page(pages=("note",))

@@ -395,7 +395,7 @@ def test_planted_outliers_of_the_virtual_machine_are_cut_and_no_other_value(
     raw.write_bytes(Path(clean).read_bytes())
     capsys.readouterr()
     rows = plant(raw, "y1_um", 1.0, seed)
-    fit = ["--target", "y1_um", "--model", "ols"]
+    fit = ["--target", "y1_um", "--model", "ols", "--inputs", "t_column_rear_left_C"]
     rms = unseen(["fit", clean, *fit, "-o", str(tmp_path / "clean.json")], capsys)
 
     assert run(["map", str(raw), "--yes", "-o", str(tmp_path / "raw.toml")]) == 0

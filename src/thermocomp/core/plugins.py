@@ -1,8 +1,10 @@
 """Parts that are found by entry points: those of this package, and those that other packages bring."""
 
 import re
+import sys
 from collections.abc import Callable
-from importlib.metadata import EntryPoint, entry_points
+from functools import cache
+from importlib.metadata import EntryPoint, EntryPoints, entry_points
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Literal
@@ -22,13 +24,20 @@ def find_plugins(group: Group, report: Callable[[str], object] = lambda _: None)
         Called with a line of text for each one that is skipped: this package's own name is taken.
     """
     found: dict[str, EntryPoint] = {}
-    # own ones first: nobody takes their names
-    for entry in sorted(entry_points(group=f"thermocomp.{group}"), key=lambda e: not e.value.startswith("thermocomp.")):
+    entries = _read_entries(tuple(sys.path)).select(group=f"thermocomp.{group}")
+    # own ones first: nobody takes their names; an installation keeps no order
+    for entry in sorted(entries, key=lambda e: (not e.value.startswith("thermocomp."), e.name)):
         if (first := found.setdefault(entry.name, entry)).value != entry.value:
             report(f"{describe_plugin(entry)} is skipped: {entry.name} is there already, {first.value}")
     if not any(entry.value.startswith("thermocomp.") for entry in found.values()):
         report(f"no {group} of thermocomp itself are installed: its installation is older than its code; reinstall it")
     return found
+
+
+@cache
+def _read_entries(_path: tuple[str, ...]) -> EntryPoints:
+    """Return what is installed on a path: reading it takes a file of every package."""
+    return entry_points()
 
 
 def describe_plugin(entry: EntryPoint) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core.watch import Watch
-from thermocomp.judging.replay import given_zero
+from thermocomp.judging.replay import given_zero, rows_until
 from thermocomp.models.watching import find_watch
 from thermocomp.recordings.samples import Samples
 from thermocomp.runtime.watch import begin, look
@@ -49,7 +49,7 @@ def find_guard(samples: Samples, learn: BoolArray, rows: BoolArray) -> Guard | N
     learn : ndarray of bool of shape (n_rows,)
         Rows that the watch may learn from.
     rows : ndarray of bool of shape (n_rows,)
-        Rows that are judged: their tests are gone through.
+        Rows that are judged: their tests are gone through up to the last of them.
 
     Returns
     -------
@@ -69,7 +69,7 @@ def let_fail(watch: Watch, samples: Samples, rows: BoolArray) -> Guard:
     samples : Samples
         With all its inputs.
     rows : ndarray of bool of shape (n_rows,)
-        Rows that are judged: their tests are gone through.
+        Rows that are judged: their tests are gone through up to the last of them.
 
     Returns
     -------
@@ -82,7 +82,8 @@ def let_fail(watch: Watch, samples: Samples, rows: BoolArray) -> Guard:
     cut = np.array([[names[c] in lost for c in columns] for lost in failing])
     found = np.broadcast_to(samples.values[:, columns], (len(failing), len(samples), len(columns))).copy()
     for test in np.unique(samples.test[rows]).tolist():
-        mine = np.flatnonzero((samples.test == test) & samples.valid)
+        mine = rows_until(samples, rows, test, watch.zeroing, columns)
+        mine = mine[samples.valid[mine]]
         _go_through(watch, samples, mine, columns, cut, found)
     changed = found != samples.values[:, columns]
     changed &= ~np.isnan(found)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from thermocomp.core.correction import Limits
 from thermocomp.core.model import ErrorModel, State
 from thermocomp.core.watch import Watch
-from thermocomp.core.zero import first_rows, robust_mean
+from thermocomp.core.zero import Zeroing, first_rows, robust_mean
 from thermocomp.judging.probing import Probed, Probings
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
@@ -101,7 +101,7 @@ def replay_compensated(
     deviations = samples.deviations[:, [c.name for c in samples.targets].index(model.target)] if probings else None
     at, shift, without, refused = np.zeros(n, dtype=np.bool_), np.zeros(n), np.zeros(n), list[str]()
     for test in np.unique(samples.test[rows]):
-        mine = _until(samples, rows, test, model, columns)
+        mine = rows_until(samples, rows, test, model.zeroing, columns)
         time, anew = samples.time[mine], samples.anew(test)
         step = float(np.median(np.diff(time))) if len(mine) > 1 else 0.0
         probed = None
@@ -296,7 +296,7 @@ def walk(model: ErrorModel, samples: Samples, rows: BoolArray, disturb: Disturb 
     values, reference = samples.values[:, columns], samples.reference()[:, columns]
     usable = np.all(np.isfinite(values), axis=1)
     for test in np.unique(samples.test[rows]):
-        mine = _until(samples, rows, test, model, columns)
+        mine = rows_until(samples, rows, test, model.zeroing, columns)
         own = mine[mine >= anew] if (anew := samples.anew(test)) is not None else mine[:0]
         window = _window(model, samples, own[usable[own]])
 
@@ -357,14 +357,16 @@ def _columns(model: ErrorModel, samples: Samples) -> list[int]:
     return [names.index(i.name) for i in model.inputs]
 
 
-def _until(samples: Samples, rows: BoolArray, test: int, model: ErrorModel, columns: list[int]) -> NDArray[np.intp]:
+def rows_until(
+    samples: Samples, rows: BoolArray, test: int, zeroing: Zeroing, columns: Sequence[int]
+) -> NDArray[np.intp]:
     """Return the rows of a test up to the last wanted one, at least those in which its zero is known."""
     mine = np.flatnonzero(samples.test == test)
     stop = int(np.flatnonzero(rows[mine]).max()) + 1
     usable = np.flatnonzero(np.isfinite(samples.values[mine][:, columns]).all(axis=1))
     begins = [usable, usable[mine[usable] >= anew]] if (anew := samples.anew(test)) is not None else [usable]
     for own in begins:
-        _, known = first_rows(model.zeroing, samples.time[mine[own]], samples.stands[mine[own]])
+        _, known = first_rows(zeroing, samples.time[mine[own]], samples.stands[mine[own]])
         stop = max(stop, int(own[min(known, len(own) - 1)]) + 1) if len(own) else stop
     return mine[:stop]
 

@@ -42,7 +42,8 @@ def one_fails(watch: Watch, difference: FloatArray, able: BoolArray) -> Blamed:
     for shape in watch.signatures / weights[:, None]:  # (n, n_faulty)
         amount = np.einsum("...i,ij->...j", scaled, shape) / (shape**2).sum(axis=0)
         left = np.swapaxes(scaled[..., :, None] - shape * amount[..., None, :], -1, -2) * weights
-        one = _least(watch, left, able, np.eye(len(weights), dtype=np.bool_))
+        rest = np.where(able, ((left / weights) ** 2).sum(axis=-1), np.inf)
+        one = _least(rest, np.abs(left / watch.limits("off")).max(axis=-1), np.eye(len(weights), dtype=np.bool_))
         better = one.rest < found.rest
         found = Blamed(
             np.where(better[..., None], one.sensors, found.sensors),
@@ -86,29 +87,31 @@ def weigh_swaps(
         The two that leave least.
     """
     n, (direct, states) = len(watch.sensors), watch.read_out
-    open_ = np.flatnonzero(np.isfinite(evidence).any(axis=tuple(range(evidence.ndim - 1))))
-    if not open_.size:
+    first, second = watch.pairs
+    mine = np.isfinite(evidence) & able[..., first] & able[..., second]
+    if not mine.any():
         return evidence, _nobody(able)
-    first, second = (of[open_] for of in watch.pairs)
+    # most are spoken against soon: only what is open is computed, one row for each two of each run
+    *run, pair = np.nonzero(mine)
+    one, other, of = first[pair], second[pair], tuple(run)
     own = np.eye(n) - direct
     difference = x @ own - memory @ states
-    left = difference[..., None, :] + (x[..., second] - x[..., first])[..., None] * (own[first] - own[second])
+    left = difference[of] + (x[*of, other] - x[*of, one])[:, None] * (own[one] - own[other])
     for k in range(0, n * len(watch.time_constants), n):
-        lag, weights = memory[..., k : k + n], states[k : k + n]
-        left -= (lag[..., second] - lag[..., first])[..., None] * (weights[first] - weights[second])
-    left = np.where(able[..., None, :], left, 0.0)
+        weights = states[k : k + n]
+        left -= (memory[*of, k + other] - memory[*of, k + one])[:, None] * (weights[one] - weights[other])
+    left = np.where(able[of], left, 0.0)
     unseen = watch.limits("unseen")
-    better = (np.where(able, difference / unseen, 0.0) ** 2).sum(axis=-1, keepdims=True) - ((left / unseen) ** 2).sum(
-        -1
-    )
-    still = np.isfinite(evidence[..., open_])
-    mine = still & able[..., first] & able[..., second]
-    before = np.where(still, evidence[..., open_], 0.0)
-    after = np.where(mine, lagbank.follow(before, better, np.broadcast_to(dt / USUAL, better.shape)), before)
+    rest = ((left / unseen) ** 2).sum(axis=-1)
+    better = (np.where(able, difference / unseen, 0.0) ** 2).sum(axis=-1)[of] - rest
+    step = np.broadcast_to(dt / USUAL, mine.shape)[mine]
+    after = lagbank.follow(evidence[mine], better, step)
     evidence = evidence.copy()
-    evidence[..., open_] = np.where(still & (after > -AGAINST * n), after, -np.inf)
+    evidence[mine] = np.where(after > -AGAINST * n, after, -np.inf)
+    rests, worst = np.full(mine.shape, np.inf), np.full(mine.shape, np.inf)
+    rests[mine], worst[mine] = rest, np.abs(left / watch.limits("off")).max(axis=-1)
     each = np.eye(n, dtype=np.bool_)
-    return evidence, _least(watch, left, mine, each[first] | each[second])
+    return evidence, _least(rests, worst, each[first] | each[second])
 
 
 def _nobody(able: BoolArray) -> Blamed:
@@ -116,14 +119,11 @@ def _nobody(able: BoolArray) -> Blamed:
     return Blamed(np.zeros(able.shape, dtype=np.bool_), nothing, nothing)
 
 
-def _least(watch: Watch, left: FloatArray, able: BoolArray, sensors: BoolArray) -> Blamed:
-    """Return which failure leaves least; `sensors` (n_failures, n_sensors), `left` (..., n_failures, n_sensors)."""
-    rest = ((left / watch.limits("unseen")) ** 2).sum(axis=-1)
-    rest[~able] = np.inf
+def _least(rest: FloatArray, worst: FloatArray, sensors: BoolArray) -> Blamed:
+    """Return which failure leaves least; `sensors` (n_failures, n_sensors), the others (..., n_failures)."""
     place = rest.argmin(axis=-1)[..., None]
-    most = np.abs(left / watch.limits("off")).max(axis=-1)
     return Blamed(
         sensors[place[..., 0]],
         np.take_along_axis(rest, place, axis=-1)[..., 0],
-        np.take_along_axis(most, place, axis=-1)[..., 0],
+        np.take_along_axis(worst, place, axis=-1)[..., 0],
     )

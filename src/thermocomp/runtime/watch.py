@@ -209,7 +209,7 @@ def _plausible(watch: Watch, change: FloatArray, values: FloatArray) -> BoolArra
 
 def _stand_in(state: WatchState, time: float) -> FloatArray:
     """Return what stands in for a sensor, minus the reference."""
-    gone = np.maximum(np.nan_to_num(time - state.since, nan=0.0), 0.0)
+    gone = np.fmax(time - state.since, 0.0)  # 0 where it has not failed
     return state.predicted + state.bridge * np.exp(-gone / FADE)
 
 
@@ -221,7 +221,7 @@ def _step(watch: Watch, state: WatchState, time: float, x: FloatArray, values: F
     s = _missing(s, seen)
     bridged = s.usual + s.predicted
     waiting = np.isfinite(s.jumped) & (s.fault == GOOD) & seen
-    used = np.where(s.fault != GOOD, _stand_in(s, time), np.where(waiting | ~seen, bridged, np.nan_to_num(x)))
+    used = np.where(s.fault != GOOD, _stand_in(s, time), np.where(waiting | ~seen, bridged, x))
     change = _calmed(watch, values - s.reference)
     change[..., watch.bank.temperatures] = used
     memory = watch.bank.advance(s.memory, change, dt)

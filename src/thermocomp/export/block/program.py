@@ -2,7 +2,7 @@
 
 import ast
 import inspect
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
 from types import MappingProxyType, ModuleType
 from typing import NamedTuple
@@ -153,8 +153,10 @@ def locals_of(tree: ast.FunctionDef, parameters: Mapping[str, Kind]) -> dict[str
     return {name: kind for name, kind in found.items() if name not in parameters}
 
 
-def _in_order(node: ast.AST) -> list[ast.AST]:
-    return [inner for child in ast.iter_child_nodes(node) for inner in (child, *_in_order(child))]
+def _in_order(node: ast.AST) -> Iterator[ast.AST]:
+    for child in ast.iter_child_nodes(node):
+        yield child
+        yield from _in_order(child)
 
 
 #: of the parameters of functions

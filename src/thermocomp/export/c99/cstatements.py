@@ -142,7 +142,8 @@ def write_tables(tables: Tables, used: str) -> str:
 
 
 def _used(owner: str, used: str, before: str) -> dict[str, Var]:
-    return {n: v for n, v in VARIABLES[owner].items() if re.search(rf"\b{before}{n}\b", used)}
+    names = set(re.findall(rf"\b{before}(\w+)", used))
+    return {n: v for n, v in VARIABLES[owner].items() if n in names}
 
 
 def _dims(var: Var, sizes: Mapping[str, int]) -> str:

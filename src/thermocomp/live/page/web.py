@@ -1,5 +1,6 @@
 """The page's server, in the same loop as the service."""
 
+import asyncio
 import contextlib
 import socket
 import time
@@ -120,3 +121,6 @@ async def serve(app: FastAPI, listening: socket.socket) -> None:
             if server.started and not server.should_exit:
                 server.should_exit = True
                 await server.shutdown([listening])
+            for connection in list(server.server_state.connections):  # that were taken in meanwhile
+                connection.transport.abort()
+            await asyncio.sleep(0)
