@@ -95,15 +95,14 @@ def fit_each(moments: Moments, structures: Sequence[LagStructure], parts: Iterab
         return weights
     n = moments.rows[chosen].sum()
     gram, cross = moments.gram[chosen].sum(axis=0) / n, moments.cross[chosen].sum(axis=0) / n
+    noisy, own = gram + moments.noise, gram.diagonal()
     of_size: dict[int, list[int]] = {}
     for k, structure in enumerate(structures):
         of_size.setdefault(len(structure.columns), []).append(k)
     for size, places in of_size.items():  # as many small systems at once as there are of a size
-        columns = np.array([structures[k].columns for k in places])
-        among = columns[:, :, None], columns[:, None, :]
-        systems, every = gram[among], np.arange(size)
-        squares = systems[:, every, every]
-        systems += moments.noise[among]
+        columns, every = np.array([structures[k].columns for k in places]), np.arange(size)
+        systems = noisy.take(columns[:, :, None] * len(gram) + columns[:, None, :])
+        squares = own[columns]
         # a feature that is zero in all rows keeps the weight zero
         strengths = np.array([structures[k].strengths for k in places])
         systems[:, every, every] += np.where(squares > 0, strengths * squares, 1.0)
