@@ -24,7 +24,7 @@ def find_plugins(group: Group, report: Callable[[str], object] = lambda _: None)
         Called with a line of text for each one that is skipped: this package's own name is taken.
     """
     found: dict[str, EntryPoint] = {}
-    entries = _read_entries(tuple(sys.path)).select(group=f"thermocomp.{group}")
+    entries = _read_entries(group, tuple(sys.path))
     # own ones first: nobody takes their names; an installation keeps no order
     for entry in sorted(entries, key=lambda e: (not e.value.startswith("thermocomp."), e.name)):
         if (first := found.setdefault(entry.name, entry)).value != entry.value:
@@ -35,9 +35,9 @@ def find_plugins(group: Group, report: Callable[[str], object] = lambda _: None)
 
 
 @cache
-def _read_entries(_path: tuple[str, ...]) -> EntryPoints:
+def _read_entries(group: Group, _path: tuple[str, ...]) -> EntryPoints:
     """Return what is installed on a path: reading it takes a file of every package."""
-    return entry_points()
+    return entry_points(group=f"thermocomp.{group}")
 
 
 def describe_plugin(entry: EntryPoint) -> str:

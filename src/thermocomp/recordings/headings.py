@@ -4,6 +4,7 @@ import re
 from contextlib import suppress
 from dataclasses import dataclass
 from difflib import get_close_matches
+from functools import lru_cache
 
 from thermocomp.core.exceptions import UnitError
 from thermocomp.core.units import SPELLINGS, Unit, find_unit, is_unit
@@ -145,12 +146,16 @@ def _in_brackets(heading: str) -> tuple[str, Unit] | None:
     if is_unit(symbol):
         with suppress(UnitError):  # a share of degC
             return base, find_unit(symbol)
-    # [kW], [%] or (front) are columns of no use here; [degX] is a slip that would lose a sensor silently
-    slip = not (is_foreign_unit(symbol) or _FORMAT.fullmatch(symbol)) and (
+    return (base, find_unit(symbol)) if _is_mistyped(symbol) else None  # it says what is meant
+
+
+@lru_cache(maxsize=1024)
+def _is_mistyped(symbol: str) -> bool:
+    """Return whether a unit is a slip, such as [degX]; [kW], [%] or (front) are columns of no use here."""
+    return not (is_foreign_unit(symbol) or _FORMAT.fullmatch(symbol)) and bool(
         get_close_matches(symbol.casefold(), SPELLINGS, n=1, cutoff=0.85)
         or get_close_matches(symbol, SUFFIXES, n=1, cutoff=0.6)
     )
-    return (base, find_unit(symbol)) if slip else None  # it says what is meant
 
 
 def _behind(heading: str) -> tuple[str, Unit] | None:

@@ -55,14 +55,14 @@ def find_edges(signal: Signal) -> Edges:
     deviation; 3 times the resolution where that is 0). Others are over half as much.
     """
     x, rows = signal.x, signal.rows
-    if len(x) < 2 * _BESIDE + 3:
+    moves = np.abs(np.diff(x))
+    if len(x) < 2 * _BESIDE + 3 or not moves.any():
         none = np.empty(0, dtype=np.intp)
         return Edges(signal=signal, before=none, after=none, height=np.empty(0), clear=np.empty(0, dtype=np.bool_))
-    moves = np.abs(np.diff(x))
     jump = x[2:] - x[:-2]
     noise = 1.4826 * float(np.median(np.abs(jump - np.median(jump))))
     if noise == 0:
-        noise = 3 / _NOISE * float(np.median(moves[moves > 0])) if moves.any() else 0.0
+        noise = 3 / _NOISE * float(np.median(moves[moves > 0]))
     padded = np.concatenate([np.zeros(_BESIDE), moves, np.zeros(_BESIDE)])
     most = sliding_window_view(padded, _BESIDE).max(axis=1)
     beside = np.maximum(most[: len(jump)], most[2 + _BESIDE :][: len(jump)])

@@ -87,6 +87,8 @@ def displacement_units(signals: Sequence[Signal], temperatures: Sequence[Signal]
     """
     spans = {s.channel.name: s.span for s in signals if len(s.x) >= 5}
     moving = {s.channel.name: width for s in signals if s.channel.name in spans and (width := float(np.ptp(s.x))) > 0}
+    if not moving:
+        return
     warming = max((t.span for t in temperatures if len(t.x) >= 5), default=np.inf)
     largest = max(spans.values(), default=0.0)
     all_of_them = np.isfinite(warming) and warming >= 1 and largest < 0.05 * warming

@@ -51,7 +51,7 @@ def find_kind(cells: Sequence[str]) -> Kind:
     def are(what: Callable[[str], object]) -> bool:
         return 2 * sum(bool(what(text)) for text in texts) > len(texts)
 
-    if are(lambda t: CLOCK.fullmatch(t) or HALF.fullmatch(t)):
+    if are(lambda t: ":" in t and (CLOCK.fullmatch(t) or HALF.fullmatch(t))):
         clocks = [found for t in texts if (found := CLOCK.fullmatch(t))]
         return "passed" if any(c["days"] or int(c["hours"]) > 23 for c in clocks) else "clock"
     if are(is_number_like):

@@ -58,6 +58,8 @@ _DAYS = (
 )
 
 
+#: a number that is no date, unless the heading says so
+_SMALL = re.compile(r"[-+]?\d{1,7}(?:[.,]\d+)?")
 _WEEKDAYS = frozenset(day for names in _DAYS for day in names.split())
 
 
@@ -104,6 +106,8 @@ def names_day(heading: str) -> bool:
 def _read_filled(cells: Sequence[Any], heading: str, beside_clock: bool) -> list[IntArray]:
     texts = [str(cell) for cell in cells if not is_filler(str(cell))]
     if not texts or not _may_be_day(texts[0].strip().lstrip("'")):
+        return []
+    if not names_day(heading) and all(_SMALL.fullmatch(text) for text in texts):
         return []
     return read_other_days(pd.Series(texts, dtype=object), heading, beside_clock=beside_clock)
 

@@ -231,10 +231,9 @@ def _is_heading(row: Sequence[str]) -> bool:
 
 
 def _is_row(row: Sequence[str], columns: Sequence[int]) -> bool:
-    values = sum(k < len(row) and (_is_value(row[k]) or is_filler(row[k])) for k in columns)
-    some = any(k < len(row) and _is_value(row[k]) for k in columns)
-    begins = bool(columns) and columns[0] < len(row) and (_is_value(row[columns[0]]) or is_filler(row[columns[0]]))
-    return begins and some and values > _ROW * len(columns)
+    values = {k: _is_value(row[k]) for k in columns if k < len(row)}
+    full = [k for k, is_value in values.items() if is_value or is_filler(row[k])]
+    return any(values.values()) and full[0] == columns[0] and len(full) > _ROW * len(columns)
 
 
 def _is_remark(row: Sequence[str], columns: Sequence[int], width: int) -> bool:
