@@ -12,7 +12,19 @@ from hostile_files import HOSTILE, bases, damaged, try_file
 
 #: made in the long test alone: seconds of work each
 HEAVY = {
-    *("numbers", "empty rows", "strings", "styles", "columns", "starts", "labels", "zip bomb", "long text", "digits"),
+    *(
+        "numbers",
+        "empty rows",
+        "strings",
+        "more strings",
+        "styles",
+        "columns",
+        "starts",
+        "labels",
+        "zip bomb",
+        "long text",
+        "digits",
+    ),
     *(
         "parquet dictionary",
         "parquet zeros",

@@ -176,8 +176,8 @@ HOSTILE: dict[str, tuple[str, Callable[[], bytes]]] = {
     "wide empty rows": ("xlsx", lambda: _sheet(_HEAD + "<row><c r='XFD1'/></row>" * 300_000)),
     "empty cells": ("xlsx", lambda: _sheet(_HEAD + ("<row>" + "<c/>" * 10_000 + "</row>") * 400)),
     "one row": ("xlsx", lambda: _sheet(_HEAD + "<row>" + "<c/>" * 3_000_000 + "</row>")),
-    "empty rows": ("xlsx", lambda: _sheet(_HEAD + "<row/>" * 1_390_000)),
-    "numbers": ("xlsx", lambda: _sheet(_HEAD + ("<row>" + "<c><v>1</v></c>" * 1000 + "</row>") * 690)),
+    "empty rows": ("xlsx", lambda: _sheet(_HEAD + "<row/>" * 1_040_000)),
+    "numbers": ("xlsx", lambda: _sheet(_HEAD + ("<row>" + "<c><v>1</v></c>" * 1000 + "</row>") * 520)),
     "zip bomb": ("xlsx", lambda: _sheet(_HEAD + " " * 500_000_000)),
     "long text": ("xlsx", lambda: _sheet(_HEAD + "<row><c><v>" + "1" * 60_000_000 + "</v></c></row>")),
     "sizes that lie": ("xlsx", _lying),
@@ -185,6 +185,13 @@ HOSTILE: dict[str, tuple[str, Callable[[], bytes]]] = {
     "file entity": ("xlsx", lambda: _sheet("", **{SHEET: f"{_FILE}<worksheet {_MAIN}>&a;</worksheet>"})),
     "utf-16 entities": ("xlsx", lambda: _zip({**_unzip(_sheet("")), SHEET: f"{_BOMB}<x>&j;</x>".encode("utf-16")})),
     "strings": (
+        "xlsx",
+        lambda: _sheet(
+            "<row><c t='s'><v>0</v></c></row>",
+            **{"xl__sharedStrings.xml": f"<sst {_MAIN}>{'<si><t/></si>' * 520_000}</sst>"},
+        ),
+    ),
+    "more strings": (
         "xlsx",
         lambda: _sheet(
             "<row><c t='s'><v>0</v></c></row>",
