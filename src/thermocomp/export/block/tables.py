@@ -54,21 +54,7 @@ def gather(compensator: Compensator) -> Tables:
     zeroing = zeroings.pop()
     watch = watches[0] if watches else None
     ranges = tuple(dict.fromkeys(i for m in models for i in m.inputs))
-    known = [*ranges, *(watch.inputs if watch else ())]
-    if zeroing.speed:
-        known.append(
-            Input(
-                name=zeroing.speed,
-                quantity="spindle_speed",
-                unit="1/min",
-                reference=0.0,
-                rezero=False,
-                low=0.0,
-                high=0.0,
-            )
-        )
-    by_name = {i.name: i for i in reversed(known)}
-    channels = tuple(by_name[name] for name in dict.fromkeys(i.name for i in known))
+    channels = _channels([*ranges, *(watch.inputs if watch else ())], zeroing.speed)
     place = {c.name: k for k, c in enumerate(channels)}
     sets = list(dict.fromkeys(m.inputs for m in models))
     sensors = watch.names if watch else ()
@@ -95,19 +81,14 @@ def gather(compensator: Compensator) -> Tables:
     sizes = {
         "CHANNELS": len(channels),
         "RANGES": len(ranges),
-        "SETS": len(sets),
-        "ENDS_OF_SETS": len(sets) + 1,
-        "MEMBERS": len(values["set_range"]),
         "MODELS": len(models),
         "TARGETS": len(lines),
         "ENDS_OF_LINES": len(lines) + 1,
-        "JUDGED": len(values["judged_model"]),
         "ENDS": 2,
         "MOST": MOST if max(zeroing.at_rest, zeroing.otherwise) > 0 else 2,
         "COLUMN": max(MOST, len(ranges)),
         "has_speed": int(bool(zeroing.speed)),
-        "has_zero": int(any(values["model_rezeroed"])),
-        "has_absolute": int(not all(values["model_rezeroed"])),
+        **_sizes(values),
         **_watch_sizes(watch),
         **own_sizes,
     }
@@ -121,6 +102,26 @@ def gather(compensator: Compensator) -> Tables:
         values=values,
         formulas=formulas.functions,
     )
+
+
+def _channels(known: list[Input], speed: str) -> tuple[Input, ...]:
+    """Return what a reading brings, each once: what models and watch want, and the speed that says when it stands."""
+    if speed:
+        known.append(Input(speed, "spindle_speed", unit="1/min", reference=0.0, rezero=False, low=0.0, high=0.0))
+    by_name = {i.name: i for i in reversed(known)}
+    return tuple(by_name[name] for name in dict.fromkeys(i.name for i in known))
+
+
+def _sizes(values: dict[str, Any]) -> dict[str, int]:
+    """Return the sizes of the lists among the values."""
+    return {
+        "SETS": len(values["set_begin"]) - 1,
+        "ENDS_OF_SETS": len(values["set_begin"]),
+        "MEMBERS": len(values["set_range"]),
+        "JUDGED": len(values["judged_model"]),
+        "has_zero": int(any(values["model_rezeroed"])),
+        "has_absolute": int(not all(values["model_rezeroed"])),
+    }
 
 
 def formula(model: ErrorModel, ranges: tuple[Input, ...]) -> Node:

@@ -5,6 +5,7 @@ without a model; then one and two exponentials are fitted. None of it is prescri
 The curve is averaged over minutes first (`thermocomp.judging.settling.averaging`): no single row decides anything.
 """
 
+import math
 from collections.abc import Collection
 from dataclasses import dataclass
 from itertools import pairwise
@@ -53,7 +54,7 @@ class Phase:
 
 @dataclass(frozen=True)
 class Settling:
-    """How a channel goes from one state to the next in a phase.
+    """How a channel goes from one state to the next in a phase; without the later ones it has too few values.
 
     Parameters
     ----------
@@ -89,18 +90,18 @@ class Settling:
     channel: str
     unit: str
     phase: Phase
-    change: float
-    uncertainty: float
-    noise: float
-    moves: bool
-    clear: bool
-    returns: bool
-    overshoots: bool
-    settled: bool
-    t63: float
-    t90: float
-    one: ExponentialFit | None
-    two: ExponentialFit | None
+    change: float = math.nan
+    uncertainty: float = math.nan
+    noise: float = math.nan
+    moves: bool = False
+    clear: bool = False
+    returns: bool = False
+    overshoots: bool = False
+    settled: bool = False
+    t63: float = math.nan
+    t90: float = math.nan
+    one: ExponentialFit | None = None
+    two: ExponentialFit | None = None
 
     @property
     def words(self) -> str:
@@ -239,25 +240,8 @@ def settle(
     """
     there = np.isfinite(values)
     lead, (t, y) = int(there[:lead].sum()), (time[there], values[there])
-    nan = float("nan")
     if len(y) - lead < _ROWS:
-        return Settling(
-            channel=channel,
-            unit=unit,
-            phase=phase,
-            change=nan,
-            uncertainty=nan,
-            noise=nan,
-            moves=False,
-            clear=False,
-            returns=False,
-            overshoots=False,
-            settled=False,
-            t63=nan,
-            t90=nan,
-            one=None,
-            two=None,
-        )
+        return Settling(channel=channel, unit=unit, phase=phase)
     c = average_test(t, y, lead, len(y) - 1, rests=rests)
     t, y, curve = t[lead:] - time[min(np.flatnonzero(there)[lead], len(time) - 1)], y[lead:] - c.zero.value, c.values
     change, span = float(curve[-1]), float(np.ptp(curve))
@@ -283,8 +267,8 @@ def settle(
         returns=returns,
         overshoots=overshoots,
         settled=settled,
-        t63=_reached(t, y, c, 1.0 - np.exp(-1.0)) if reads else nan,
-        t90=_reached(t, y, c, 0.9) if reads else nan,
+        t63=_reached(t, y, c, 1.0 - np.exp(-1.0)) if reads else math.nan,
+        t90=_reached(t, y, c, 0.9) if reads else math.nan,
         one=one,
         two=two,
     )

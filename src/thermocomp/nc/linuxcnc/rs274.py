@@ -58,11 +58,11 @@ class Canonical(NamedTuple):
     kind: str
     line: int  #: of the file the block stands in, from 1
     file: str  #: empty for the program itself, else the file of the subprogram
-    program: Place  #: end of a move in program coordinates, X to W [mm, deg]
-    machine: Place  #: end of a move in machine coordinates [mm, deg]
-    arc: ArcPath | None
-    values: tuple[float, ...]
-    text: str
+    program: Place = ORIGIN  #: end of a move in program coordinates, X to W [mm, deg]
+    machine: Place = ORIGIN  #: end of a move in machine coordinates [mm, deg]
+    arc: ArcPath | None = None
+    values: tuple[float, ...] = ()
+    text: str = ""
 
 
 class ProgramFrame:
@@ -234,16 +234,7 @@ def calls(run: InterpreterRun) -> Iterator[Canonical]:
             kind = names[code]
             values = tuple(numbers[:count])
             if kind in {"rapid", "feed", "probe"}:
-                yield Canonical(
-                    kind=kind,
-                    line=line,
-                    file=file,
-                    program=values,
-                    machine=frame.machine(values),
-                    arc=None,
-                    values=(),
-                    text="",
-                )
+                yield Canonical(kind=kind, line=line, file=file, program=values, machine=frame.machine(values))
             elif kind == "centre":
                 centre[:], turns, plane = values[:2], int(values[2]), int(values[3])
             elif kind == "arc":
@@ -252,42 +243,13 @@ def calls(run: InterpreterRun) -> Iterator[Canonical]:
                 at[i], at[j] = centre
                 about = at[0], at[1], at[2]
                 arc = ArcPath(plane, about, frame.machine(_nine(at))[:3], turns)
-                yield Canonical(
-                    kind=kind,
-                    line=line,
-                    file=file,
-                    program=values,
-                    machine=frame.machine(values),
-                    arc=arc,
-                    values=(),
-                    text="",
-                )
+                yield Canonical(kind=kind, line=line, file=file, program=values, machine=frame.machine(values), arc=arc)
             elif kind in {"comment", "message"}:
-                yield Canonical(
-                    kind=kind,
-                    line=line,
-                    file=file,
-                    program=ORIGIN,
-                    machine=ORIGIN,
-                    arc=None,
-                    values=(),
-                    text=more[int(values[0])],
-                )
+                yield Canonical(kind=kind, line=line, file=file, text=more[int(values[0])])
             elif kind == "file":
                 file = Path(more[int(values[0])]).name
             elif kind == "curve":
-                yield Canonical(
-                    kind=kind,
-                    line=line,
-                    file=file,
-                    program=ORIGIN,
-                    machine=ORIGIN,
-                    arc=None,
-                    values=tuple(more[int(values[0])]),
-                    text="",
-                )
+                yield Canonical(kind=kind, line=line, file=file, values=tuple(more[int(values[0])]))
             elif kind != "done":
                 frame.take(kind, values)
-                yield Canonical(
-                    kind=kind, line=line, file=file, program=ORIGIN, machine=ORIGIN, arc=None, values=values, text=""
-                )
+                yield Canonical(kind=kind, line=line, file=file, values=values)

@@ -73,14 +73,13 @@ def prepare_job(
     models = _files(found, drifting.hashes())
     taken = tuple(dict.fromkeys(h.taken for s in found if (h := s.model.honest_error) is not None and h.taken))
     states = "" if way.unproved else foresee_sentence(setup)
-    header_lines = headers.count_lines(models, taken, states, by_position=drift.by_position)
     revision = Revision(
         setup=setup,
         kinematics=kinematics,
         drift=drift,
         method=method,
         demand=way.demand(),
-        header_lines=header_lines,
+        header_lines=headers.count_lines(models, taken, states, by_position=drift.by_position),
         split=not way.no_split,
     )
     _check_interpreter(way, setup, diameters=controller.diameter is not None)

@@ -156,29 +156,10 @@ def plan(table: FileTable, mapping: Mapping) -> ColumnPlan:
     beside = () if mapping.time.column else tuple(twins)
     _refuse_twins(headings, mapping, source, headings[time] if beside else "")
     cycle = _find_cycle(headings, mapping, source)
-    columns: list[PlannedColumn] = []
-    tables: dict[int, str] = {}
     ignored = {k for k in (time, times.date, times.half, times.fraction, cycle, *beside) if k is not None}
-    for name, rule in mapping.columns.items():
-        place = rule.column or name
-        if rule.role == "ignore" and isinstance(place, str) and place not in headings:
-            continue
-        index = find_position(place, headings, f"[columns.{name}]", source)
-        heading = headings[index]
-        ignored.add(index)
-        if rule.role == "ignore":
-            continue
-        other = tables.setdefault(index, name)
-        if other != name:
-            raise RecordingError(
-                f"{source}: mapping: [columns.{other}] and [columns.{name}] both take the column {heading!r}; "
-                "delete one of the two tables"
-            )
-        if rule.role == "cycle":
-            continue
-        meant, note = _meant(rule, meanings[index], f"{source}: mapping [columns.{name}]", heading)
-        notes.extend([f"{name}: {note}"] if note else [])
-        columns.append(PlannedColumn(index, Channel(name, meant.quantity, meant.house, rule.place), meant, rule))
+    columns, used, noted = _plan_mapped(mapping, headings, meanings, source)
+    ignored |= used
+    notes += noted
     left_out: list[int] = []
     if not mapping.read.only_mapped:
         for k, meaning in enumerate(meanings):
@@ -204,6 +185,35 @@ def plan(table: FileTable, mapping: Mapping) -> ColumnPlan:
         aliases=_aliases(columns, headings, meanings),
         notes=tuple(notes),
     )
+
+
+def _plan_mapped(
+    mapping: Mapping, headings: Sequence[str], meanings: Sequence[Meaning | None], source: str
+) -> tuple[list[PlannedColumn], set[int], list[str]]:
+    """Return the columns that a mapping takes, the numbers of all that it names, and notes."""
+    columns, used, notes = list[PlannedColumn](), set[int](), list[str]()
+    tables: dict[int, str] = {}
+    for name, rule in mapping.columns.items():
+        place = rule.column or name
+        if rule.role == "ignore" and isinstance(place, str) and place not in headings:
+            continue
+        index = find_position(place, headings, f"[columns.{name}]", source)
+        heading = headings[index]
+        used.add(index)
+        if rule.role == "ignore":
+            continue
+        other = tables.setdefault(index, name)
+        if other != name:
+            raise RecordingError(
+                f"{source}: mapping: [columns.{other}] and [columns.{name}] both take the column {heading!r}; "
+                "delete one of the two tables"
+            )
+        if rule.role == "cycle":
+            continue
+        meant, note = _meant(rule, meanings[index], f"{source}: mapping [columns.{name}]", heading)
+        notes.extend([f"{name}: {note}"] if note else [])
+        columns.append(PlannedColumn(index, Channel(name, meant.quantity, meant.house, rule.place), meant, rule))
+    return columns, used, notes
 
 
 def _meant(rule: ColumnMap, meaning: Meaning | None, where: str, heading: str) -> tuple[Unit, str]:

@@ -84,11 +84,7 @@ def read(path: str | Path) -> tuple[Positioning, ...]:
             _refuse(table, int(row), column, "is missing; complete or delete the line")
         values[role] = raw * meant.scale
     told = {role: ["" if not isinstance(v, str) else v.strip() for v in cells[k]] for role, k in texts.items()}
-    directions = []
-    for row, text in enumerate(told["direction"]):
-        if text.casefold() not in _DIRECTIONS:
-            _refuse(table, row, columns["direction"], f"is {text!r}: write + or - for the direction of approach")
-        directions.append(_DIRECTIONS[text.casefold()])
+    directions = _read_directions(table, columns["direction"], told["direction"])
     for row, text in enumerate(told["run"]):
         if not text:
             _refuse(table, row, columns["run"], "is missing: number the runs")
@@ -123,6 +119,13 @@ def read(path: str | Path) -> tuple[Positioning, ...]:
             )
         )
     return tuple(found)
+
+
+def _read_directions(table: CsvTable, column: int, texts: Sequence[str]) -> list[str]:
+    for row, text in enumerate(texts):
+        if text.casefold() not in _DIRECTIONS:
+            _refuse(table, row, column, f"is {text!r}: write + or - for the direction of approach")
+    return [_DIRECTIONS[text.casefold()] for text in texts]
 
 
 def _matrix(
