@@ -13,9 +13,8 @@ from thermocomp.runtime.compensator import Compensator
 async def main() -> float:
     """Take a machine from its recordings to corrections; return the largest deviation that is left [um]."""
     with TemporaryDirectory() as folder:
-        *days, new_day = tc.simulate(
-            "wessel-milling"
-        )  # virtual/verbs.py; for a file tc.read("drift.csv"), api/inputs.py
+        # virtual/verbs.py; for a file tc.read("drift.csv"), api/inputs.py
+        *days, new_day = tc.simulate("wessel-milling")
         found = tc.compare(days, "s1_um", ["ols", "mra"], leave_one="file", jobs=1)  # api/verbs.py, judging/compare.py
         print(found)  # the do-no-harm gate: judging/do_no_harm.py
         best = found.best["s1_um"]  # "ols": models/ols.py

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from compiledblock import COMPILERS, CompiledBlock
+from compiledblock import COMPILERS, OPTIMISED, SANITIZED, CompiledBlock
 from spoiling import models_of, spoiled
 from watchedmachine import LOST, failing, watched_model
 
@@ -91,7 +91,7 @@ def test_a_million_readings_of_sensors_that_fail(tmp_path: Path) -> None:
     assert model.honest_error is not None
     assert set(model.honest_error.lost) == set(LOST)
     compensator = Compensator.of([model], limits)
-    block, rng = CompiledBlock(compensator, tmp_path), np.random.default_rng(7)
+    block, rng = CompiledBlock(compensator, tmp_path, flags=(*SANITIZED, *OPTIMISED)), np.random.default_rng(7)
     day, calls, most, statuses, faults = failing(), 0, 0.0, set[int](), set[int]()
     whole = readings_of(day, block)
     for seed in range(1250):
