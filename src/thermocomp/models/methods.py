@@ -86,7 +86,8 @@ def expand(names: Sequence[Any]) -> list[str]:
     Parameters
     ----------
     names : sequence of str or estimator
-        An estimator becomes a `NamedEstimator`, called by its class; of several of one class the later ones get a number.
+        An estimator becomes a `NamedEstimator`, called by its class; of several of one class the later ones get a
+        number.
 
     Returns
     -------
