@@ -88,7 +88,7 @@ def test_what_both_read_alike_is_not_asked_for(text: str) -> None:
         ("G98 G81 X1. Z-1. R1. L3", "G81 L3 repeats"),
         ("G98 G81 X1. Z-1. R1.\nX2. K3", "G81 K3 repeats"),
         ("G98 G83 X1. Z-1. R1. Q1.", "G83 stays 0.254 mm off the ground"),
-        ("G99 G84 X1. Z-1. R1.", "G84 wants a turning spindle"),
+        ("G99 G84 X1. Z-1. R1.", "G84 needs a turning spindle"),
         ("G76 X1. Z-1. R1.", "G76 is another cycle"),
         ("G92 X0", "G92 is kept by LinuxCNC in one store"),
         ("G52 X1.", "G52 is kept by LinuxCNC in one store"),

@@ -203,7 +203,7 @@ def test_the_drift_of_x_can_vary_along_z() -> None:
 
 
 def test_an_input_that_nobody_gives_is_refused() -> None:
-    with pytest.raises(InputError, match=r"wants t3_C, a temperature.*--constant t3_C=21.5degC or --forecast"):
+    with pytest.raises(InputError, match=r"needs t3_C, a temperature.*--constant t3_C=21.5degC or --forecast"):
         alone(lags(room=True))
 
 

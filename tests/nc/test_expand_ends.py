@@ -164,7 +164,7 @@ def test_a_file_outside_the_folders_is_not_read(refusal: Refusal, tmp_path: Path
         (tmp_path / "programs" / "sub.ngc").symlink_to(outside / "sub.ngc")
     error = refusal(f"{HEAD}o<{name.format(root=tmp_path)}> call\nM30\n")
     assert error.line == 4
-    assert f"it would read {outside / 'sub.ngc'}, which is outside the folder of the program" in error.reason
+    assert f"the program would read {outside / 'sub.ngc'}, which is outside its own folder" in error.reason
 
 
 def test_a_link_to_a_folder_leads_nowhere(refusal: Refusal, tmp_path: Path) -> None:
@@ -176,7 +176,7 @@ def test_a_link_to_a_folder_leads_nowhere(refusal: Refusal, tmp_path: Path) -> N
     (given / "7.ngc").symlink_to(outside / "7.ngc")
     for call in ("o7 call", "M98 P7"):
         error = refusal(f"{HEAD}{call}\nM30\n", subroutines=[given])
-        assert (error.line, f"it would read {outside / '7.ngc'}" in error.reason) == (4, True)
+        assert (error.line, f"the program would read {outside / '7.ngc'}" in error.reason) == (4, True)
 
 
 def test_what_is_in_the_folders_is_read(tmp_path: Path) -> None:

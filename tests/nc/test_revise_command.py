@@ -195,7 +195,7 @@ def test_a_measured_start(job_folder: Path) -> None:
         (["--cold", "--pause", "3 min"], "--pause is the time since the last job"),
         (["--carried", "gone.json"], "gone.json: no such state file of a job"),
         (["--carried", "model.json"], "model.json: not a state file of a job"),
-        (["--measured", "z=12"], "want an axis or target, and a value with its unit"),
+        (["--measured", "z=12"], "expected an axis or target, and a value with its unit"),
         (["--cold", "--zero", "last"], "no state of one is carried over"),
     ],
 )

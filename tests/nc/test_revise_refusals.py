@@ -109,7 +109,7 @@ def test_a_refusal_leaves_an_earlier_run_as_it_was(job_folder: Path) -> None:
     ("model", "options", "message"),
     [
         (replace(lags("z_um"), honest_error=replace(HONEST, verdict="refused", reason="harm")), [], "was refused"),
-        (judged(lags("z_um", room=True)), [], "wants t3_C, a temperature: it is not driven by the speed alone"),
+        (judged(lags("z_um", room=True)), [], "needs t3_C, a temperature: it is not driven by the speed alone"),
         (judged(lags("height_um")), [], "does not state which axis it is; give --axis height_um=Z, or --axis"),
         (judged(lags("y1_um")), [], 'give --axis y1_um=Y, or --axis "y1_um=Y at Z 200 mm"'),
         (judged(lags("X_probe")), [], "give --axis X_probe=X, or --axis"),
@@ -117,7 +117,7 @@ def test_a_refusal_leaves_an_earlier_run_as_it_was(job_folder: Path) -> None:
         (judged(lags("z_um")), ["--axis", "zz=Z"], "there is no model of 'zz'"),
         (judged(lags("z_um")), ["--constant", "t3=20degC"], "driven by the spindle speed alone"),
         (judged(lags("z_um")), ["--origin", "G60=1 mm, 2 mm, 3 mm"], "want a work coordinate system"),
-        (judged(lags("z_um")), ["--origin", "G54=1 mm, 2 mm"], "want X, Y and Z"),
+        (judged(lags("z_um")), ["--origin", "G54=1 mm, 2 mm"], "expected X, Y and Z"),
         (judged(lags("z_um")), ["--tool", "one=1 mm"], "want the number of a tool"),
         (judged(lags("z_um")), ["--harmless", "M88"], "LinuxCNC has no such code; a user's own are M100 to M199"),
         (judged(lags("z_um")), ["--harmless", "M3"], "M3 is known (spindle on, clockwise), and is followed as that"),

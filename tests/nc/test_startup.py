@@ -27,9 +27,9 @@ def test_codes_are_tidied(text: str, tidied: str) -> None:
 @pytest.mark.parametrize(
     ("text", "controller", "message"),
     [
-        ("", "linuxcnc", "want G61, G61.1 or G64, and G98 or G99"),
-        ("G7", "linuxcnc", "want G61, G61.1 or G64, and G98 or G99"),
-        ("G98 M3", "linuxcnc", "all else the program has to say itself"),
+        ("", "linuxcnc", "startup codes may only be G61, G61.1 or G64, and G98 or G99"),
+        ("G7", "linuxcnc", "startup codes may only be G61, G61.1 or G64, and G98 or G99"),
+        ("G98 M3", "linuxcnc", "put all other codes in the program"),
         ("G98 G99", "linuxcnc", "G98 and G99 exclude each other"),
         ("G64 G61", "linuxcnc", "G64 and G61 exclude each other"),
         ("G98 P1", "linuxcnc", "tolerances of LinuxCNC's G64"),
@@ -37,9 +37,9 @@ def test_codes_are_tidied(text: str, tidied: str) -> None:
         ("G64 Q1", "linuxcnc", "P alone or P and Q"),
         ("G64 P-1", "linuxcnc", "not negative"),
         ("G64 P1", "fanuc", "tolerances of LinuxCNC's G64"),
-        ("G64 P[1]", "linuxcnc", "want codes and plain numbers only"),
-        ("N1 G64", "linuxcnc", "want codes and plain numbers only"),
-        ("G64 (why)", "linuxcnc", "want codes and plain numbers only"),
+        ("G64 P[1]", "linuxcnc", "expected codes and plain numbers only"),
+        ("N1 G64", "linuxcnc", "expected codes and plain numbers only"),
+        ("G64 (why)", "linuxcnc", "expected codes and plain numbers only"),
         ("G64 Px", "linuxcnc", "column 6"),
     ],
 )

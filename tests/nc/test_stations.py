@@ -54,7 +54,7 @@ def test_the_user_says_it() -> None:
         (("x_at_200", "x_at_0"), [], "'x_at_200' does not state"),
         (("ch3", "z"), ["ch4=Z"], "no model of 'ch4'.*ch3"),
         (("ch3",), ["ch3=Z", "ch3=X"], "ch3 was given before"),
-        (("ch3",), ["ch3=A"], "want an axis"),
+        (("ch3",), ["ch3=A"], "expected an axis"),
         (("ch3",), ["ch3=Z at Z 200"], "has no unit; write 200 mm"),
         (("ch3",), ["ch3=Z at Z 200 degC"], "measures temperature"),
         (("z_at_200",), [], "one model at a position.*z_at_200=Z"),

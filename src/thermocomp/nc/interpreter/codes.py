@@ -175,7 +175,7 @@ _CALL = "subprograms are not followed; write the moves into the program"
 
 _COMMON_M: Final = (
     Code("M0", "stop", "stop"),
-    Code("M1", "stop", "stop if the operator wants it"),
+    Code("M1", "stop", "optional stop"),
     Code("M2", "stop", "end"),
     Code("M3", "spindle", "spindle on, clockwise"),
     Code("M4", "spindle", "spindle on, counterclockwise"),

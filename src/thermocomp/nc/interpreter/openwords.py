@@ -270,7 +270,7 @@ def _open_cycle(codes: set[float], values: dict[str, str], force: InForce) -> It
         )
         yield OpenWord("peck", code, what)
     if motion in _TAPS and motion in codes:
-        what = "wants a turning spindle in LinuxCNC, and starts it itself in a Fanuc: write G33.1, or M29 for a Fanuc"
+        what = "needs a turning spindle in LinuxCNC, and starts it itself in a Fanuc: write G33.1, or M29 for a Fanuc"
         yield OpenWord("tap", code, what)
 
 

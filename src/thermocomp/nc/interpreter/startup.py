@@ -22,11 +22,13 @@ def tidy(text: str, controller: Controller) -> str:
     line = read_line(text, 1, controller)
     rest = line.assignments or line.comment or line.label or line.flow or line.demarcation or line.optional
     if line.error or rest or any(w.number is None for w in line.words):
-        raise InputError(f"{text!r}: {line.error or 'want codes and plain numbers only'}")
+        raise InputError(f"{text!r}: {line.error or 'expected codes and plain numbers only'}")
     path, retract = _of(line.words, _PATHS), _of(line.words, _RETRACTS)
     lengths = {w.letter: w.value for w in line.words if w.letter in "PQ"}
     if len(path) + len(retract) + len(lengths) < len(line.words) or not line.words:
-        raise InputError(f"{text!r}: want G61, G61.1 or G64, and G98 or G99; all else the program has to say itself")
+        raise InputError(
+            f"{text!r}: startup codes may only be G61, G61.1 or G64, and G98 or G99; put all other codes in the program"
+        )
     if len(path) > 1 or len(retract) > 1:
         raise InputError(f"{text!r}: {' and '.join(path if len(path) > 1 else retract)} exclude each other")
     if lengths and (path != ["G64"] or controller == "fanuc" or "P" not in lengths or "-" in "".join(lengths.values())):

@@ -72,11 +72,12 @@ class ProgramReading:
         folders = [self.home] if write else [self.home, *self.folders]
         if any(os.path.commonpath((path, folder)) == folder for folder in folders) or not os.path.exists(path):  # noqa: PTH110
             return
-        what = "would write" if write else "would read"
         raise RefusedError(
             self.where()[0],
-            f"it {what} {path}, which is outside the folder of the program and those of --subroutines; copy the file "
-            "into one of them, or name its folder with --subroutines and call it by its name alone",
+            f"the program would write {path}, which is outside its own folder; write to a file in that folder"
+            if write
+            else f"the program would read {path}, which is outside its own folder and the --subroutines folders; copy "
+            "the file into one of them, or add its folder with --subroutines and call it by file name only",
         )
 
     def count_line(self) -> None:

@@ -65,7 +65,7 @@ class Ini:
         except ValueError:
             found = math.nan
         if not math.isfinite(found):
-            raise InputError(f"{self.path}: [{section}] {key} = {text}: want a number")
+            raise InputError(f"{self.path}: [{section}] {key} = {text}: expected a number")
         return found
 
 

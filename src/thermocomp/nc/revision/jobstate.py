@@ -58,7 +58,7 @@ def loads(text: str, source: str = "state of a job") -> SavedJob:
     """
     jobs: list[SavedJob] = jsonfile.unpack(KIND, SavedJob, text, source).models
     if len(jobs) > 1:
-        raise ModelFileError(f"{source}: holds the states of {len(jobs)} jobs: want one")
+        raise ModelFileError(f"{source}: holds the states of {len(jobs)} jobs: expected one")
     saved = jobs[0]
     return SavedJob(saved.written.astimezone(UTC), saved.state)
 

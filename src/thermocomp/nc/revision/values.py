@@ -161,7 +161,7 @@ def point_of(text: str, said: str) -> Point:
     """
     parts = [part.strip() for part in text.split(",")]
     if len(parts) != 3:
-        raise InputError(f"{said}: want X, Y and Z, such as 100 mm, 50 mm, 0 mm")
+        raise InputError(f"{said}: expected X, Y and Z, such as 100 mm, 50 mm, 0 mm")
     x, y, z = (read_value(part, "position", said, "100 mm") for part in parts)
     return x, y, z
 
@@ -213,7 +213,7 @@ def m_code_of(text: str, controller: Controller) -> int:
     """
     number = text.upper().removeprefix("M")
     if not number.isdecimal():
-        raise InputError(f"--harmless {text!r}: want an M code, such as M{101 if controller == 'linuxcnc' else 88}")
+        raise InputError(f"--harmless {text!r}: expected an M code, such as M{101 if controller == 'linuxcnc' else 88}")
     if (code := find_code("M", float(number), controller)) is not None:
         raise InputError(f"--harmless {text!r}: {code.name} is known ({code.does}), and is followed as that")
     if controller == "linuxcnc" and not 100 <= int(number) < 200:

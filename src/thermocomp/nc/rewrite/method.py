@@ -180,8 +180,8 @@ class CorrectionMethod(ABC):
         if block.values["L"] != 20:
             raise ProgramError(
                 block.line.number,
-                "G10 L10 and L11 take the tool's length from where it stands, which holds the drift already; "
-                "measure tools outside the program",
+                "G10 L10 and L11 set the tool length from the current position, which already includes the thermal "
+                "drift; measure tools outside the program",
             )
         if (number := int(block.values.get("P", 0))) and not (block.modal.system_told and number == block.modal.system):
             raise ProgramError(

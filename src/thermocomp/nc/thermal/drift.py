@@ -135,7 +135,9 @@ class Drift:
         """
         speed = abs(speed)
         if not (0.0 <= dt < math.inf and speed < math.inf):
-            raise InputError(f"drift: {dt} s at {speed} 1/min: want finite numbers, and a time that is not negative")
+            raise InputError(
+                f"drift: {dt} s at {speed} 1/min: expected finite numbers, and a time that is not negative"
+            )
         if speed != self._speed:
             self._change(speed)
         self._pending += dt

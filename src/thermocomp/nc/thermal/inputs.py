@@ -50,7 +50,7 @@ class InputSignal:
     def __post_init__(self) -> None:
         if not self.time or len(self.time) != len(self.values):
             raise InputError(
-                f"forecast: {len(self.time)} times and {len(self.values)} values: want as many, at least 1"
+                f"forecast: {len(self.time)} times and {len(self.values)} values: expected as many of both, at least 1"
             )
         if not all(map(math.isfinite, (*self.time, *self.values))):
             raise InputError("forecast: times and values must be finite numbers")
@@ -174,7 +174,7 @@ def _signal(model: ErrorModel, channel: Input, others: Inputs) -> InputSignal:
         return InputSignal.constant(channel.reference)
     kind = channel.quantity.replace("_", " ")
     raise InputError(
-        f"model of {model.target} wants {channel.name}, a {kind}: it is not driven by the speed alone; give "
+        f"model of {model.target} needs {channel.name}, a {kind}: it is not driven by the speed alone; give "
         f"--constant {_written(channel, channel.name)} or --forecast FILE"
     )
 

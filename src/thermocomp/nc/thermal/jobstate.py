@@ -69,4 +69,4 @@ class JobState:
     def __post_init__(self) -> None:
         names = [s.station for s in self.stations]
         if not names or len(set(names)) != len(names):
-            raise SettingError(f"state of a job: want each station once, found {', '.join(names) or 'none'}")
+            raise SettingError(f"state of a job: expected each station once, found {', '.join(names) or 'none'}")

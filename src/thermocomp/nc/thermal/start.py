@@ -179,7 +179,9 @@ def deviations(texts: Sequence[str]) -> dict[str, float]:
         name = name.upper() if len(name) == 1 else name
         number = with_unit(value, "displacement")
         if not name or number is None:
-            raise InputError(f"measured {text!r}: want an axis or target, and a value with its unit, such as Z=12um")
+            raise InputError(
+                f"measured {text!r}: expected an axis or target, and a value with its unit, such as Z=12um"
+            )
         if name in found:
             raise InputError(f"measured {text!r}: {name} was given before")
         found[name] = number

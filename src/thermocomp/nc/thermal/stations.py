@@ -126,7 +126,9 @@ def check_stations(found: Sequence[Station]) -> list[Station]:
                 f"{mine[0].along}; give another one, or give --axis {mine[0].model.target}={axis}"
             )
         if len(mine) > 1 and (len(along) > 1 or None in along):
-            raise InputError(f"{axis} has several models, {names}: want one, or one per position along a single axis")
+            raise InputError(
+                f"{axis} has several models, {names}: expected one, or one per position along a single axis"
+            )
         if len({s.at for s in mine}) < len(mine):
             raise InputError(f"{axis} has two models at the same position among {', '.join(map(str, mine))}: {names}")
     return ordered
@@ -151,7 +153,7 @@ def _by_name(model: ErrorModel, targets: Sequence[str]) -> Station:
 def _stated(text: str, place: str, model: ErrorModel) -> Station:
     match = _PLACE.fullmatch(place)
     if match is None:
-        raise InputError(f'{text!r}: want an axis, such as {model.target}=Z or "{model.target}=X at Z 200 mm"')
+        raise InputError(f'{text!r}: expected an axis, such as {model.target}=Z or "{model.target}=X at Z 200 mm"')
     axis, along, at = match.groups()
     if along is None:
         return Station(axis.upper(), model)
