@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from thermocomp.core.reading import Reading
     from thermocomp.export.verbs import export
     from thermocomp.iso230.verbs import iso230
+    from thermocomp.judging.probing import Probings
     from thermocomp.models.ace import ACE
     from thermocomp.models.ace_monotone import MonotoneACE
     from thermocomp.models.arx import ARX
