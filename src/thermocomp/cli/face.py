@@ -256,10 +256,10 @@ def command(
         none: Any = inspect.Parameter.empty if required else None
         alone = [
             _option("output", output, none, described.get("output", ""), ["--output", "-o"]),
-            _option("overwrite", bool, False, "Write over an existing file."),
+            _option("overwrite", bool, False, "Overwrite an existing file."),
         ]
         mine = [_option(p.name, p.annotation, p.default, described[p.name]) for p in own]
-        json = _option("json", bool, False, "Print results for a program instead of tables.")
+        json = _option("json", bool, False, "Print results as JSON instead of tables.")
         parameters = [*options, *mine, *(alone if writes else []), json]
         run.__name__ = run.__qualname__ = show.__name__
         run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]

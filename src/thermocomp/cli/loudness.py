@@ -11,9 +11,9 @@ if TYPE_CHECKING:
     from thermocomp.recordings.recording import Recording
 
 FLAGS = {
-    "--quiet": "Nothing on the error stream but errors: no progress, no trouble of recordings.",
-    "--verbose": "More on the error stream: what is read, what is worked on, how long it took; all of an unexpected "
-    "error.",
+    "--quiet": "Print only errors on the error stream: no progress, no data-quality problems of recordings.",
+    "--verbose": "Print more on the error stream: files read, current task, elapsed time; the full traceback of an "
+    "unexpected error.",
 }
 
 #: verbosity of the command line that is being run
@@ -26,7 +26,7 @@ def taken_off(words: Sequence[str]) -> list[str]:
     Raises
     ------
     InputError
-        Both are there.
+        Both are given.
     """
     global quiet, verbose  # noqa: PLW0603 - one process runs one command line
     quiet, verbose = (flag in words for flag in FLAGS)

@@ -67,7 +67,7 @@ class Band:
 
     @property
     def words(self) -> str:
-        """What it is called wherever it is shown."""
+        """Name of the band wherever it is shown."""
         by = "by assumption" if self.basis == "assumption" else "conformal"
         return f"{100 * self.level:g} % band {by}, {self.cycles} cycles"
 

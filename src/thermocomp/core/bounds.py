@@ -1,4 +1,4 @@
-"""What numbers and names a model may hold at all: stated once, and so wide that no machine comes near.
+"""Bounds of numbers and names in a model: defined once, and so wide that no machine comes near.
 
 A model is read from files that somebody may have altered. Within these bounds nothing that it computes overflows: a
 reading is clipped to the trained range, widened at most `MARGIN` times (2e15); a variable is a sum of at most `INPUTS`

@@ -1,4 +1,4 @@
-"""What a frozen model is, in plain words and numbers: what it is made of, how good it is, and what a failure does."""
+"""Explanation of a frozen model in plain words and numbers: its terms, its accuracy, and the effect of a failure."""
 
 import math
 from collections.abc import Sequence
@@ -76,7 +76,7 @@ class SensorExplanation:
 
 @dataclass(frozen=True)
 class Explanation:
-    """What a model is. Print it to read it.
+    """Explanation of a model. Print it to read it.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ class Explanation:
 
 @dataclass(frozen=True)
 class Explanations:
-    """What the models of several targets are. Print it to read it.
+    """Explanations of the models of several targets. Print it to read it.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ class Explanations:
 
 
 def explain(model: ErrorModel) -> Explanation:
-    """Return what a model is.
+    """Return the explanation of a model.
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ def explain(model: ErrorModel) -> Explanation:
 
 
 def explain_all(models: Sequence[ErrorModel]) -> Explanations:
-    """Return what the models of several targets are.
+    """Return the explanations of the models of several targets.
 
     Parameters
     ----------
@@ -222,7 +222,7 @@ def explain_all(models: Sequence[ErrorModel]) -> Explanations:
 
 
 def _spare(model: ErrorModel, name: str, seen: Watched | None) -> str:
-    """Say why a spare sensor beside a temperature is recommended; the empty string if none is."""
+    """Return the reason why a spare sensor for a temperature is recommended; empty if none is."""
     if seen is None:
         return "nothing predicts it"
     if not model.may_lose([name]):

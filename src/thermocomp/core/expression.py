@@ -1,4 +1,4 @@
-"""What a frozen model computes, as a small tree: the printed formula and every export walk it, and ask for no family.
+"""Expression of a frozen model as a small tree: the printed formula and all exports use it, independent of the family.
 
 The leaves are the inputs minus what counts as zero. A tree is the model within its trained range: inputs are clipped to
 that range, widened by the margin, and what `Support` adds beyond (``hold``, ``fade``) is not in the tree.
@@ -51,7 +51,7 @@ class Sum:
 
 @dataclass(frozen=True)
 class Difference:
-    """What is left of the first when the second is taken off."""
+    """Difference of two expressions."""
 
     of: "Node"
     minus: "Node"

@@ -1,4 +1,4 @@
-"""What a model wants to know, in which range it was trained, and what it does beyond."""
+"""Inputs of a model, their training range, and the behaviour of the model outside it."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -54,7 +54,7 @@ class Input:
 
 @dataclass(frozen=True)
 class Support:
-    """What a model does outside its trained range.
+    """Behaviour of a model outside its training range.
 
     Inputs are always clipped to the trained range widened by `margin`; on top of that
 

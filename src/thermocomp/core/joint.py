@@ -73,7 +73,7 @@ class JointSupport:
         return 1 + max([*self.columns, *self.speeds], default=-1)
 
     def distance(self, change: FloatArray) -> FloatArray:
-        """Return how far states are from what was trained, by the limit: outside is what is not at most 1.
+        """Return the distance of states from the training data, normalised by the limit; above 1 or nan: outside.
 
         Parameters
         ----------

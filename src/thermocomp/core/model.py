@@ -141,7 +141,7 @@ class ErrorModel(ABC):
 
     @abstractmethod
     def _expression(self, change: Sequence[Node]) -> Node:
-        """Return what `_advance` gives, made of the clipped changes of the inputs."""
+        """Return the result of `_advance` as an expression of the clipped changes of the inputs."""
 
     @abstractmethod
     def coefficients_by_name(self) -> dict[str, float]:
@@ -163,7 +163,7 @@ class ErrorModel(ABC):
         return found is not None and max(left) <= found.none_rms
 
     def widening(self, names: Collection[str]) -> float:
-        """Return how many times its error on unseen cycles grows without some of its inputs; at least 1."""
+        """Return the factor by which its error on unseen cycles increases without some of its inputs; at least 1."""
         found, key = self.honest_error, ", ".join(i.name for i in self.inputs if i.name in names)
         return 1.0 if found is None or not found.rms else max(1.0, found.lost.get(key, 0.0) / found.rms)
 
@@ -191,7 +191,7 @@ class ErrorModel(ABC):
         return State(zero, None, np.zeros(()), np.zeros(len(self.inputs), dtype=np.bool_))
 
     def step(self, state: State, inputs: FloatArray, dt: float) -> tuple[State, FloatArray]:
-        """Take one reading in and give the deviation at its instant.
+        """Process one reading and return the deviation at its instant.
 
         Parameters
         ----------
@@ -240,7 +240,7 @@ class ErrorModel(ABC):
         return clipped, np.asarray(clipped != change)
 
     def distance(self, state: State, inputs: FloatArray) -> FloatArray:
-        """Return how far a reading is from what was trained, in all inputs together.
+        """Return the distance of a reading from the training data, in all inputs together.
 
         Parameters
         ----------
@@ -284,7 +284,7 @@ class ErrorModel(ABC):
         return self.band.half_width(change, spread) + kept
 
     def directions(self, state: State, inputs: FloatArray) -> FloatArray:
-        """Return what the structures differ in that the model is the average of.
+        """Return the directions in which the structures averaged by the model differ.
 
         Parameters
         ----------
@@ -444,7 +444,7 @@ class ErrorModel(ABC):
         return low.tolist(), high.tolist(), self._fade_span.tolist()
 
     def expression(self, change: Sequence[Node] | None = None) -> Node:
-        """Return what the model computes as a tree: what `step` gives with the support policy ``clip``.
+        """Return the computation of the model as a tree: that of `step` with the support policy ``clip``.
 
         Parameters
         ----------

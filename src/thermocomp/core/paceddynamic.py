@@ -145,7 +145,7 @@ class PacedDynamic(ErrorModel):
 
     @cached_property
     def bank(self) -> Bank:
-        """What its states follow; models with the same one can share them."""
+        """Bank of its states; models with the same bank can share them."""
         taus, states = self.time_constants, self.states
         stopped = [1 / s.stopped for s in states]
         lags = [1 / tau for tau in taus for _ in self.temperatures]

@@ -36,12 +36,12 @@ def find_plugins(group: Group, report: Callable[[str], object] = lambda _: None)
 
 @cache
 def _read_entries(group: Group, _path: tuple[str, ...]) -> EntryPoints:
-    """Return what is installed on a path: reading it takes a file of every package."""
+    """Return the entry points installed on a path: this reads a file of every package."""
     return entry_points(group=f"thermocomp.{group}")
 
 
 def describe_plugin(entry: EntryPoint) -> str:
-    """Return what names a plug-in in messages."""
+    """Return the name of a plug-in for messages."""
     package = f" of the package {entry.dist.name}" if entry.dist is not None else ""
     return f"plug-in {entry.name} ({entry.group}){package}"
 

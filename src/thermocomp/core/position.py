@@ -91,7 +91,7 @@ class PositionModel:
         return tuple(k for k, _ in self._by_power)
 
     def ranges(self) -> tuple[tuple[str, str, tuple[float, float]], ...]:
-        """Return what is known of it over a range: profile or slope, along which axis, from where to where [mm]."""
+        """Return the valid ranges: profile or slope, axis, start and end [mm]."""
         profile = self.profile.ranges() if self.profile is not None else {}
         slopes = (("slope", self.axis, self.travel),) if self.slopes else ()
         return (*(("profile", name, known) for name, known in profile.items()), *slopes)

@@ -1,4 +1,4 @@
-"""What stands beside the numbers of a model: where it comes from, and how it was judged."""
+"""Metadata of a model: its origin, and the results of judging."""
 
 from dataclasses import dataclass, field
 from statistics import median
@@ -11,7 +11,7 @@ from thermocomp.core.learned import Learned
 
 @dataclass(frozen=True)
 class Provenance:
-    """Where a model comes from.
+    """Origin of a model.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What the shop floor says at one instant."""
+"""Readings of the machine at one instant."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

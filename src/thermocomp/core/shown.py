@@ -44,7 +44,7 @@ def escape(text: object, longest: int) -> str:
 
 
 def explain_unfit(text: str, longest: int = 200) -> str:
-    """Say why a text of others cannot be a name; the empty string if it can.
+    """Return the reason why an external text cannot be a name; empty if it can.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ Tap = tuple[Input, float, float]
 
 
 class StackState(NamedTuple):
-    """All that a stack remembers between two steps; leading axes, if any, are a batch of independent runs."""
+    """State of a stack between two steps; leading axes, if any, are a batch of independent runs."""
 
     reference: FloatArray  #: (..., n_taps), what counts as zero
     memory: FloatArray | None  #: (..., n_lags); None before the first reading
@@ -149,7 +149,7 @@ class Stack:
         )
 
     def step(self, state: StackState, values: FloatArray, dt: float) -> tuple[StackState, FloatArray]:
-        """Take one reading in and give the deviations at its instant.
+        """Process one reading and return the deviations at its instant.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""What the units that a model was judged on have covered."""
+"""Conditions covered by the units on which a model was judged."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from thermocomp.core.exceptions import SettingError
 
 @dataclass(frozen=True)
 class Validity:
-    """What the judged units covered: for these conditions the honest error speaks.
+    """Conditions covered by the judged units, for which the honest error is valid.
 
     Parameters
     ----------

@@ -136,7 +136,7 @@ class Watch:
 
     @cached_property
     def bank(self) -> Bank:
-        """What its states follow."""
+        """Bank of its states."""
         stopped = [1 / slow for _, _, slow, _ in self.states]
         lags = [1 / tau for tau in self.time_constants for _ in self.sensors]
         return Bank(
@@ -157,7 +157,7 @@ class Watch:
 
     @cached_property
     def signatures(self) -> FloatArray:
-        """What one degree in one sensor does to the differences of all, at once and in the end, (2, n, n), by row."""
+        """Effect of one degree in one sensor on the residuals of all, at once and in the end, (2, n, n), by row."""
         n = len(self.sensors)
         direct, states = self.read_out
         lagged = states[: n * len(self.time_constants)].reshape(-1, n, n).sum(axis=0)

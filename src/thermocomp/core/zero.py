@@ -1,4 +1,4 @@
-"""What temperatures are counted from: not one reading but the mean over the first minutes, as long as nothing turns.
+"""Reference temperatures (zero): not one reading but the mean over the first minutes, while the spindle is stopped.
 
 The same few lines decide it live, in a replay and in training: a model finds at the machine what it has learned from.
 The readings of the zero are themselves taken as their mean: the machine rests in it, and what has a memory begins
@@ -91,7 +91,7 @@ class Gathered(NamedTuple):
 
 
 def first_rows(zeroing: Zeroing, time: FloatArray, resting: BoolArray) -> tuple[int, int]:
-    """Return how many readings of a test, from its first on, its zero is averaged of, and when it is known.
+    """Return the number of readings from the start of a test over which its zero is averaged, and the time it is known.
 
     Parameters
     ----------

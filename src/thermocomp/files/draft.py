@@ -84,7 +84,7 @@ class _Move(NamedTuple):
 
     @property
     def old(self) -> Path:
-        """Where the old file is kept until all is done."""
+        """Path at which the old file is kept until all is done."""
         return self.path.with_name(f"{self.path.name}-old")
 
     def seal(self) -> None:

@@ -1,4 +1,4 @@
-"""What the files of models share: JSON with a format, a version and a checksum."""
+"""Common part of the model files: JSON with a format, a version and a checksum."""
 
 import hashlib
 import json
@@ -94,7 +94,7 @@ def _lay_out(value: Any, depth: int = 1) -> str:
 
 
 def unpack(kind: Format, entry: Any, text: str, source: str, **shared: Any) -> Any:
-    """Return what is in the text of a file: its ``models``, and what stands once for all of them.
+    """Return the content of a file's text: its ``models``, and the data common to all of them.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def unpack(kind: Format, entry: Any, text: str, source: str, **shared: Any) -> A
 
 @cache
 def _reader_of(entry: Any, **shared: Any) -> SchemaValidator:
-    """Return what reads the models of a file, each of the type `entry`, and what may stand once for all of them.
+    """Return the reader of the models of a file, each of the type `entry`, and of the data common to all of them.
 
     Strict: a number in quotes, a missing or an unknown key is damage, not something to guess at. Of a list of numbers
     the first wrong one is enough: the errors of a million would take a gigabyte.
@@ -213,7 +213,7 @@ def _parse(text: str, no: str, source: str, command: str) -> Any:
 
 
 def _found(text: str) -> str:
-    """Return what a text is that is no JSON."""
+    """Return a description of a text that is not JSON."""
     line = next((line.strip() for line in text.splitlines() if line.strip()), "")
     if not line:
         return "it is empty"

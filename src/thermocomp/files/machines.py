@@ -192,7 +192,7 @@ class _Sources:
         self._files: dict[Path, Sequence[ErrorModel | PositionModel]] = {}
 
     def read(self, code: str, value: Any) -> Source:
-        """Return what stands under ``components.CODE``."""
+        """Return the content of ``components.CODE``."""
         where: Keys = ("components", code)
         if code not in BY_CODE:
             raise explain_unknown("component", code, BY_CODE, where)

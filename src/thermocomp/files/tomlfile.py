@@ -1,4 +1,4 @@
-"""What the files of settings share: TOML, and what is said if it is none."""
+"""Common part of the settings files: TOML, and its error messages."""
 
 import json
 import re

@@ -248,7 +248,7 @@ def _do(shared: tuple[Any, Sequence[Any], Any], number: int, versions: Mapping[s
 
 
 def _unsendable(what: Any) -> str:
-    """Return why it cannot be sent to another process; empty if it can."""
+    """Return the reason why it cannot be sent to another process; empty if it can."""
     try:
         cloudpickle.dumps(what)
     except Exception as e:  # noqa: BLE001 - whatever it raises on its way

@@ -133,7 +133,7 @@ def compare(
 def _guards(
     samples: Samples, by_target: Sequence[Judging], watched: Sequence[str] | None, jobs: int
 ) -> dict[str, Guard | None]:
-    """Return what a watch lets through in each block, made of what may be learned from there."""
+    """Return the readings that a watch passes in each block, trained on the training rows of the block."""
     splits = {split.name: split for own in by_target for split in own.splits}
     known = samples if watched is None else samples.only(watched)
     found = work_through(partial(_guard, known), list(splits.values()), _unwatched, jobs=jobs)
@@ -165,7 +165,7 @@ def _concluded(
     best: Recommendation | None,
     caps: tuple[str, ...],
 ) -> list[Assessment]:
-    """Return what was found for one target: each method in each block, and over all of them with its verdict."""
+    """Return the results for one target: each method in each block, and over all of them with its verdict."""
     whole = {name: do_no_harm.join_verdicts(v, caps=caps) for name, v in verdicts.items()}
     after = correct_verdicts(whole, rules.primary, best)
     found = []
@@ -176,7 +176,7 @@ def _concluded(
 
 
 def _heat(samples: Samples) -> Collinearity:
-    """Return how far the temperatures repeat each other."""
+    """Return the collinearity of the temperatures."""
     temperatures = [j for j, c in enumerate(samples.inputs) if c.quantity == "temperature"]
     values = samples.change()[samples.valid][:, temperatures]
     return collinearity(values, tuple(samples.inputs[j].name for j in temperatures))

@@ -44,7 +44,7 @@ MOVES = 0.1
 
 @dataclass(frozen=True)
 class JudgedUnit:
-    """What was found in one unseen cycle or file.
+    """Results in one unseen cycle or file.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ class Verdict:
 
     @property
     def reason(self) -> str:
-        """Why, in one sentence, by the unit or baseline that decided."""
+        """Reason for the verdict, in one sentence, by the unit or baseline that decided."""
         if self.refusal or not self.units:
             return self.refusal or f"fewer than {MIN_ROWS} rows of any cycle to judge on"
         stated = "" if self.stated is None else f"; the harm margin of {self.stated:g} {self.unit} was stated"
@@ -228,7 +228,7 @@ class Verdict:
 
     @property
     def advice(self) -> str:
-        """Which test would decide an unproven verdict; empty for the other words."""
+        """Test that would decide an unproven verdict; empty for the other verdicts."""
         if self.word != "unproven" or self.caps == (UNTRIED,):  # which says it itself
             return ""
         if any("not alike" in cap for cap in self.caps):
@@ -246,7 +246,7 @@ class Verdict:
         return f"about {more} cycles or files in all would decide" if more else "many more cycles would be needed"
 
     def _units_for(self, level: float) -> int | None:
-        """Return how many units of this kind would show it; None if there are over 50."""
+        """Return the number of units of this kind that would be sufficient; None if it is over 50."""
         ratios = np.array([u.log_ratios[self.worst] for u in self.units])
         effect = -ratios.mean() / max(ratios.std(ddof=1), 1e-9)
         for n in range(len(ratios) + 1, 51):

@@ -1,4 +1,4 @@
-"""Which temperatures fell out in recordings, what stood in for them, and what that cost: a replay of the watch."""
+"""Failed temperature sensors in recordings, their substitutes, and the loss of accuracy: a replay of the watch."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ class Fault(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class FaultLog:
-    """What a watch found in a recording.
+    """Findings of a watch in a recording.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class FaultLog:
 
 
 class Cost(NamedTuple):
-    """What a model left while the same of its sensors had failed."""
+    """Residual of a model while the same of its sensors had failed."""
 
     failed: tuple[str, ...]  #: of the model's sensors; none: all were good
     hours: float  #: judged rows of that, in all [h]
@@ -104,7 +104,7 @@ def find_faults(judged: Judged, recordings: Sequence[Recording]) -> tuple[FaultL
 
 
 def find_costs(model: ErrorModel, assessment: Assessment, logs: Sequence[FaultLog]) -> tuple[Cost, ...]:
-    """Return what a model left before its sensors failed and from then on, by which of them had.
+    """Return the residual of a model before and after its sensors failed, by the set of failed sensors.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def _runs(fault: IntArray) -> Iterator[tuple[int, int]]:
 
 
 def _lost(model: ErrorModel, log: FaultLog) -> list[tuple[str, ...]]:
-    """Return which of a model's sensors had failed in each row, in the order of its inputs."""
+    """Return the failed sensors of a model in each row, in the order of its inputs."""
     own = [i.name for i in model.inputs if i.name in model.sensors and i.name in log.watch.names]
     lost = log.fault[:, [log.watch.names.index(n) for n in own]] != GOOD
     cases, which = np.unique(lost, axis=0, return_inverse=True)

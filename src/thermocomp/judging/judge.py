@@ -178,7 +178,7 @@ def _verdict(
 
 
 def _worse(both: Iterable[do_no_harm.JudgedUnit]) -> do_no_harm.JudgedUnit:
-    """Return what is worse of a unit, by what would run or by the model alone: limits make no model pass."""
+    """Return the worse result of a unit, of the compensator or of the model alone: limits make no model pass."""
     ran, alone = both
     rezeroed = max((u.rezeroed for u in (ran, alone) if u.rezeroed), default=None)
     return replace(ran, rms=max(ran.rms, alone.rms), largest=max(ran.largest, alone.largest), rezeroed=rezeroed)
@@ -196,7 +196,7 @@ def cap_alike_units(samples: Samples, judging: Judging) -> tuple[str, ...]:
 def _caps(
     split: Split, learned: Learned | None, samples: Samples, target: int, watched: Collection[str]
 ) -> tuple[str, ...]:
-    """Return what keeps a model from being accepted, whatever its errors.
+    """Return the reasons that prevent acceptance of a model, whatever its errors.
 
     What is wrong with temperatures that a watch looks after (`watched`) is judged with what stood in for them.
     """

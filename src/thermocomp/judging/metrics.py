@@ -38,7 +38,7 @@ class Metric:
         return self.function(measured, predicted)
 
     def better(self, a: float, b: float) -> bool:
-        """Say whether the value `a` is better than the value `b`."""
+        """Return whether the value `a` is better than the value `b`."""
         if self.best == "zero":
             return abs(a) < abs(b)
         return a < b if self.best == "low" else a > b

@@ -67,7 +67,7 @@ def work_through(
 
 
 def attempt(work: Callable[[_Piece], _Found], piece: _Piece, failed: Callable[[_Piece, str], _Found]) -> _Found:
-    """Return what comes of one piece of work; of `failed` if anything is raised."""
+    """Return the result of one task; that of `failed` if an exception is raised."""
     try:
         return work(piece)
     except (Exception, SystemExit) as e:  # noqa: BLE001 - whatever a method raises, the others have their results
@@ -75,7 +75,7 @@ def attempt(work: Callable[[_Piece], _Found], piece: _Piece, failed: Callable[[_
 
 
 def explain(error: BaseException) -> str:
-    """Return why something failed, in one line: our own errors say it, of others the kind is said too."""
+    """Return the reason of a failure in one line; for foreign exceptions with the type."""
     if isinstance(error, ThermocompError):
         return str(error)
     if isinstance(error, BrokenProcessPool):

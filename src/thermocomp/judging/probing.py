@@ -104,14 +104,14 @@ class Probings:
 
     @property
     def words(self) -> str:
-        """What they are called wherever they are shown."""
+        """Name of the probings wherever they are shown."""
         often = f"{self.every / 3600:g} h" if self.every >= 3600 else f"{self.every / 60:g} min"
         return f"a probing every {often}"
 
 
 @dataclass(frozen=True, eq=False)
 class Probed:
-    """What probings did, by judged row.
+    """Effect of probings, by judged row.
 
     Parameters
     ----------
@@ -133,11 +133,11 @@ class Probed:
     refused: tuple[str, ...] = ()
 
     def take(self, rows: BoolArray) -> "Probed":
-        """Return what they did in some of the rows."""
+        """Return the effect in some of the rows."""
         return replace(self, at=self.at[rows], shift=self.shift[rows], without=self.without[rows])
 
     def held(self, measured: FloatArray, test: NDArray[np.intp]) -> FloatArray:
-        """Return what probings alone would gain: the last one, held; zero before the first of a test [um]."""
+        """Return the correction from probings alone: the last one, held; zero before the first of a test [um]."""
         rows = np.arange(len(measured))
         last = np.maximum.accumulate(np.where(self.at, rows, -1))
         before = np.concatenate([[-1], last[:-1]])[: len(rows)]  # it counts from the next row on

@@ -1,4 +1,4 @@
-"""Which method to take: chosen inside the training part of every left-out unit, so that the choosing is judged too.
+"""Recommended method: chosen inside the training part of every left-out unit, so that the choice is judged too.
 
 The error of a choice among methods is not the error of the method that comes out best: the best of twenty is partly
 luck. So the choice is made again for every left-out unit, by the error on units left out of the rest (nested

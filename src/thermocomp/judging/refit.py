@@ -1,4 +1,4 @@
-"""What would be written: a method fitted to all rows, tried with noise and lost sensors.
+"""Model to be written: a method fitted to all rows, tested with noise and lost sensors.
 
 It has seen more than the models that were judged, and may lean on a sensor as they did not.
 """

@@ -28,7 +28,7 @@ Disturb = Callable[[int, FloatArray, FloatArray], FloatArray]
 
 @dataclass(frozen=True, eq=False)
 class Replayed:
-    """What would have run in the rows that are judged.
+    """Outputs of the models that would have run in the judged rows.
 
     Parameters
     ----------
@@ -372,7 +372,7 @@ def rows_until(
 
 
 def given_zero(samples: Samples, columns: Sequence[int], test: int) -> FloatArray | None:
-    """Return what counts as zero in a test, if that is given; without it the first readings decide."""
+    """Return the given zero of a test, if any; without it the first readings determine the zero."""
     given = samples.zero is not None and not np.isnan(samples.zero[test]).any()
     return samples.reference()[test, columns] if given else None
 

@@ -1,4 +1,4 @@
-"""What judging needs to be told, and what it comes out as."""
+"""Rules of judging, and its results."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ IntArray = NDArray[np.intp]
 
 @dataclass(frozen=True)
 class Rules:
-    """What is stated before judging.
+    """Rules stated before judging.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class Rules:
 
 @dataclass(frozen=True, eq=False)
 class Assessment:
-    """How one model did for one target on one unseen block.
+    """Result of one model for one target on one unseen block.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ class Assessment:
 
     @property
     def _fragile(self) -> str:
-        """What noise or a lost sensor does to a model that is good without them; empty if they do no harm."""
+        """Effect of noise or a lost sensor on a model that is good without them; empty if it is harmless."""
         if self.robustness is None or self.verdict.word != "accepted":
             return ""
         margin = max(u.margin for u in self.verdict.units)  # one that was stated is for what was judged, not for this
@@ -202,7 +202,7 @@ class Assessment:
 
     @property
     def reason(self) -> str:
-        """Why, and for what is unproven which test would decide it."""
+        """Reason for the verdict, and for an unproven one the test that would decide it."""
         if self.failure:
             return f"could not be judged: {self.failure}"
         fragile = (

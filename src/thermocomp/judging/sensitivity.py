@@ -1,4 +1,4 @@
-"""What random sensor error does to the R2 of models as they are (Hwang, section 3.2.4 and Fig. 6; H-18)."""
+"""Effect of random sensor error on the R2 of unchanged models (Hwang, section 3.2.4 and Fig. 6; H-18)."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What is learned from and what is judged: rows, spans of time, thermal cycles, days or files, never at random."""
+"""Training and validation data: rows, spans of time, thermal cycles, days or files, never at random."""
 
 from dataclasses import dataclass
 
@@ -41,13 +41,13 @@ class Split:
 
     @property
     def name(self) -> str:
-        """What was left out, without the word for what it is."""
+        """Name of the left-out unit, without the word for its kind."""
         return self.block.partition(" ")[2]
 
 
 @dataclass(frozen=True)
 class Judging:
-    """How models are judged: one split or several.
+    """Split or splits by which models are judged.
 
     Parameters
     ----------

@@ -309,7 +309,7 @@ def _known_targets(models: Sequence[ErrorModel], recordings: Sequence[Recording]
 
 
 def _stacked(model: ErrorModel, recordings: Sequence[Recording], starts: Start | Sequence[Start]) -> Samples:
-    """Return what a model needs of recordings, without rows in trouble."""
+    """Return the data of recordings that a model needs, without rows in trouble."""
     samples = stack(
         recordings,
         [model.target],
@@ -402,7 +402,7 @@ def _assess(
 
 
 def _guard(model: ErrorModel, samples: Samples, watched: Samples | None, known: list[Guard]) -> Guard | None:
-    """Return what a model's watch lets through while sensors fail; models of one file share it (`known`)."""
+    """Return the readings that a model's watch passes while sensors fail; models of one file share it (`known`)."""
     watch = model.watch
     if watch is None or watched is None or not can_look(watch, watched):
         return None

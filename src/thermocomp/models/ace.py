@@ -64,7 +64,7 @@ class TransformRegressor(StaticRegressor):
         return self._inverse(total)
 
     def outside(self, X: ArrayLike) -> NDArray[np.bool_]:
-        """Tell which values lie beyond the trained range, where the prediction is cropped (W-07).
+        """Return a mask of the values beyond the training range, where the prediction is cropped (W-07).
 
         Parameters
         ----------

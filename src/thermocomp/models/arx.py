@@ -23,7 +23,7 @@ from thermocomp.models.timed import Time
 
 @dataclass(frozen=True, eq=False)
 class _Setting:
-    """What is tried: data on one clock, orders to choose from, with an intercept or without."""
+    """Candidates to try: data on one clock, orders to choose from, with an intercept or without."""
 
     data: Clocked
     ks: tuple[int, ...]

@@ -54,7 +54,7 @@ class _Net:
         )
 
     def settled(self, inputs: FloatArray) -> FloatArray:
-        """Return where the free run is after many ticks of the same inputs."""
+        """Return the state of the free run after many ticks with the same inputs."""
         own = np.zeros((len(inputs), max(self.k, 1)))
         driven = np.tile(inputs, self.m + 1)
         for _ in range(SETTLED if self.k else 1):

@@ -1,4 +1,4 @@
-"""What all estimators of the training wing share: scikit-learn's contract and `freeze`."""
+"""Common base of all estimators: the contract of scikit-learn and `freeze`."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""What `averaged` does not know: the covariance of its weights, and what a further test would take from it."""
+"""Parameter uncertainty of `averaged`: the covariance of its weights, and its reduction by a further test."""
 
 from dataclasses import dataclass
 
@@ -17,7 +17,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Doubt:
-    """What an average of ridge regressions does not know, and how temperatures follow the speed.
+    """Uncertainty of an average of ridge regressions, and the response of temperatures to the speed.
 
     The covariance of the weights is that of the structures: they fit the rows alike and differ where these say nothing.
     A part that is left out in turn (half a thermal cycle) counts as one observation, whose error is the one left out:
@@ -72,12 +72,12 @@ class Doubt:
         return np.vstack(list(self.features.tables(rows, step)))
 
     def spread(self, table: FloatArray) -> FloatArray:
-        """Return what is expected to be wrong in some rows, root mean square, (n_targets,) [unit of the target]."""
+        """Return the expected error in some rows, root mean square, (n_targets,) [unit of the target]."""
         squares = (self.covariance * (table.T @ table / len(table))).sum(axis=(1, 2))
         return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
 
     def after(self, table: FloatArray, duration: float) -> "Doubt":
-        """Return what would not be known after a test.
+        """Return the uncertainty that remains after a test.
 
         Parameters
         ----------
@@ -102,7 +102,7 @@ class Doubt:
 
 
 def find_doubt(samples: Samples, settings: AveragedDynamic | None = None) -> Doubt:
-    """Return what `averaged` does not know after some recordings.
+    """Return the uncertainty of `averaged` after some recordings.
 
     Parameters
     ----------

@@ -84,7 +84,7 @@ def catch_failures(what: str) -> Iterator[None]:
 
 
 def check_numbers(predicted: Any, n_rows: int, name: str) -> FloatArray:
-    """Return what was predicted as one finite number per row.
+    """Return the predictions as one finite number per row.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def adopt_estimator(estimator: Any) -> Any:
 
 
 def title(estimator: Any) -> str:
-    """Return what to call an estimator: its class, or the classes of the steps of a Pipeline."""
+    """Return the title of an estimator: its class, or the classes of the steps of a Pipeline."""
     if isinstance(estimator, ForeignRegressor):
         return title(estimator.estimator)
     if isinstance(estimator, PipelineRegressor):

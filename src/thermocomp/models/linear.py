@@ -1,4 +1,4 @@
-"""What the regressions on terms share: the fit of chosen terms, how good it is, and `freeze`."""
+"""Common part of the regressions on terms: the fit of chosen terms, its accuracy, and `freeze`."""
 
 from collections.abc import Sequence
 from typing import Any

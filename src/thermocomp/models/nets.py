@@ -1,4 +1,4 @@
-"""What the nets share, whoever trains them: reading, scaling, the caution about too many weights, and `freeze`."""
+"""Common part of the neural nets: reading, scaling, the caution about too many weights, and `freeze`."""
 
 from collections.abc import Sequence
 from typing import Any

@@ -28,7 +28,7 @@ _CHUNK = 20_000  # rows of features held at once: bounds the memory of a fit, wh
 
 @dataclass(frozen=True)
 class PacedFeatures:
-    """What features there are, and in which order: the temperatures, their lags, lag by lag, and the speed states.
+    """Features and their order: the temperatures, their lags, lag by lag, and the speed states.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ class PacedFeatures:
         return covariance
 
     def shares(self, step: FloatArray) -> FloatArray:
-        """Return how much of a jump each copy of a temperature follows within the usual step, (n_copies,)."""
+        """Return the fraction of a step that each copy of a temperature follows within the usual step, (n_copies,)."""
         return np.append(1.0, lagbank.step_response(usual_step(step), np.array(self.lags, dtype=np.float64)))
 
     def draw(self, count: int, random_state: int, keep: Sequence[int] | None = None) -> list[LagStructure]:

@@ -137,7 +137,7 @@ class ProjectionPursuit(CycledRegressor):
 
 @dataclass(frozen=True)
 class _Model:
-    """What is fitted, on raw inputs."""
+    """Fitted model, on raw inputs."""
 
     intercept: float
     directions: FloatArray

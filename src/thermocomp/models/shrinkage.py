@@ -1,4 +1,4 @@
-"""What linear regressions share that are chosen from a path of ever richer ones by leaving thermal cycles out."""
+"""Common part of linear regressions chosen from a path of increasing complexity by leaving out thermal cycles."""
 
 from abc import abstractmethod
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ Rule = Literal["one-standard-error", "minimum"]
 
 
 def scaling(X: FloatArray, *, centred: bool = True) -> tuple[FloatArray, FloatArray]:
-    """Return what to subtract from each column and what to divide it by, so that its mean square is 1.
+    """Return the offset and the scale of each column for a mean square of 1.
 
     Parameters
     ----------

@@ -227,7 +227,7 @@ class TimedRegressor(ThermalRegressor):
         return super()._names()[self._hidden :]
 
     def _place(self, column: str | int, what: str) -> int:
-        """Return which input a name or an index into the columns of X means.
+        """Return the input denoted by a name or by an index into the columns of X.
 
         Raises
         ------

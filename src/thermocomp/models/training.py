@@ -1,4 +1,4 @@
-"""How a method is trained on the rows it may learn from."""
+"""Training of a method on the training rows."""
 
 import time
 from collections.abc import Sequence

@@ -25,7 +25,7 @@ class UnfrozenRegressor(StaticRegressor):
 
     @abstractmethod
     def _bulk(self) -> str:
-        """Return why it cannot be frozen, in words."""
+        """Return the reason why it cannot be frozen, in words."""
 
     def unfrozen(
         self, *, inputs: Sequence[Input] | None = None, rows: FloatArray | None = None, **header: Any
@@ -114,5 +114,5 @@ class EstimatorModel(ErrorModel):
         raise InputError(f"{self.estimator.name} is no expression: it cannot be exported")
 
     def formula(self) -> str:
-        """Return what it is, as one line of text."""
+        """Return the description of the model, as one line of text."""
         return f"{self.estimator.name} of {', '.join(self.sensors)}: no formula"

@@ -1,4 +1,4 @@
-"""What `check` found in recordings, as one offline page: the channels drawn, the findings marked at their rows."""
+"""Findings of `check` in recordings, as a single offline page: plots of the channels with the findings marked."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""What all figures share: the house's style, words that stay words, and how a figure becomes SVG or PNG.
+"""Shared by all figures: the style, escaping of text, and output as SVG or PNG.
 
 Words that people typed (names of channels, cycles, files, methods, places) are never read as formulas; what cannot be
 printed is replaced, and what is too long is cut, whatever draws it. So legends and names at ticks are made here, and

@@ -1,4 +1,4 @@
-"""Which sensors fell out in recordings, what stood in, and what it cost: figures, tables and their section."""
+"""Failed sensors in recordings, their substitutes, and the loss of accuracy: figures, tables and their section."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -31,7 +31,7 @@ TITLE = "Sensors"
 
 
 def section(judged: Judged, recordings: Sequence[Recording]) -> Section:
-    """Return what the page says of sensors that failed.
+    """Return the section of the page about failed sensors.
 
     Parameters
     ----------

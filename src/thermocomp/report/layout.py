@@ -99,7 +99,7 @@ class Layout:
     sections: frozenset[int] = frozenset()
 
     def tone(self, row: int) -> str:
-        """Return how a row stands out; empty if it does not."""
+        """Return the highlighting of a row; empty if none."""
         return (self.tones or {}).get(row, "")
 
 

@@ -61,7 +61,7 @@ class Probing(NamedTuple):
 
 
 class Adaptation(NamedTuple):
-    """What is known of a model's error since the last probing: the directions' shares, and last the offset."""
+    """Estimated error of a model since the last probing: the coefficients of the directions, then the offset."""
 
     mean: FloatArray  #: (n_directions + 1,)
     covariance: FloatArray  #: (n_directions + 1, n_directions + 1)
@@ -82,7 +82,7 @@ class Adaptation(NamedTuple):
         return kept * self.mean, covariance + np.eye(len(prior)) * ((1.0 - kept**2) * prior)[..., None, :]
 
     def shift(self, time: FloatArray | float, directions: FloatArray) -> FloatArray:
-        """Return what is added to the deviation at later times.
+        """Return the value added to the deviation at later times.
 
         Parameters
         ----------
@@ -100,7 +100,7 @@ class Adaptation(NamedTuple):
         return np.asarray(np.clip(found, -self.most, self.most))
 
     def narrowing(self, time: FloatArray | float, directions: FloatArray, floor: float) -> FloatArray:
-        """Return what is left of the half-width of a band, as a share of it; `floor` is that of the band [um].
+        """Return the remaining fraction of the half-width of a band; `floor` is that of the band [um].
 
         More than 1 where probings have shown that the machine is unlike what the band was judged on.
         """
@@ -117,7 +117,7 @@ class Adaptation(NamedTuple):
 
 
 def find_most(size: float, drift: float, magnitude: float) -> float:
-    """Return what a model can be wrong by at most [um].
+    """Return the largest possible error of a model [um].
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def find_most(size: float, drift: float, magnitude: float) -> float:
 
 
 def begin(size: float, n_directions: int, typical: float = np.inf, most: float = np.inf) -> Adaptation:
-    """Return what is known without a probing.
+    """Return the initial estimate, without a probing.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def begin(size: float, n_directions: int, typical: float = np.inf, most: float =
 def take(
     before: Adaptation, directions: FloatArray, time: float, error: float, repeatability: float
 ) -> tuple[Adaptation, str]:
-    """Take a probing in.
+    """Process a probing.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ def advance(
     time: float,
     dt: float,
 ) -> Advanced:
-    """Take a reading that passed the gate into all models.
+    """Pass a reading that passed the gate to all models.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def advance(
 def _zeroed(
     group: Group, states: list[State], gathered: Gathered, reading: tuple[float, FloatArray, bool]
 ) -> tuple[list[State], Gathered, bool, FloatArray]:
-    """Take a reading into the zero if it belongs there; return whether that is known now, and what the reading says.
+    """Add a reading to the zero if it belongs there; return whether the zero is now known, and the zeroed reading.
 
     Once it is, the models go through the readings before this one, as if it had been known from the first of them; all
     readings of the zero say their mean.

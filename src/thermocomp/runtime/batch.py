@@ -23,7 +23,7 @@ BoolArray = NDArray[np.bool_]
 
 
 class ModelRun(NamedTuple):
-    """What a model says in a test, and what a compensator with it does."""
+    """Outputs of a model in a test, and those of a compensator with it."""
 
     deviation: FloatArray  #: (n_rows,), of the model alone: every complete reading is used, nothing is limited
     compensated: FloatArray  #: (n_rows,), minus the correction in force: what is taken off the deviation
@@ -220,7 +220,7 @@ def _counted(
 def _said(
     model: ErrorModel, time: FloatArray, values: FloatArray, used: BoolArray, zero: FloatArray, shown: _Shown
 ) -> _Answers:
-    """Return what the model says per row; an unused reading holds it."""
+    """Return the output of the model per row; it is held at an unused reading."""
     rows = np.flatnonzero(used)
     nothing = np.full(len(time), np.nan)
     found = _Answers(np.zeros(len(time)), np.zeros(len(time), dtype=np.bool_), nothing, np.zeros((len(time), 0)))

@@ -213,7 +213,7 @@ class Compensator:
         return state._replace(models=tuple(found))
 
     def gate(self, state: CompensatorState, reading: Reading) -> str:
-        """Say why a reading must not be used, whenever it was taken; the empty string if it may.
+        """Return the reason why a reading must not be used, regardless of its time; empty if it may.
 
         A temperature is plausible while it stays within its trained range widened by the whole span of that range. The
         first readings decide what counts as zero: there the temperatures as a whole (their median) have to be within
@@ -249,7 +249,7 @@ class Compensator:
         probings: Mapping[str, Probing] | None = None,
         tick: float | None = None,
     ) -> tuple[CompensatorState, Compensated]:
-        """Take one reading in and give the corrections that are in force after it.
+        """Process one reading and return the corrections that are in force after it.
 
         Parameters
         ----------
@@ -441,7 +441,7 @@ class _Idle(NamedTuple):
 
 
 def _unjudged(models: Sequence[ErrorModel], failed: Collection[str]) -> str:
-    """Say why models must not drive a correction without the sensors that failed; the empty string if they may."""
+    """Return the reason why models must not drive a correction without the failed sensors; empty if they may."""
     for model in models:
         lost = [n for n in failed if n in model.sensors]
         if lost and not model.may_lose(lost):
@@ -450,5 +450,5 @@ def _unjudged(models: Sequence[ErrorModel], failed: Collection[str]) -> str:
 
 
 def _apart(one: Correction, other: Correction, travel: tuple[float, float]) -> float:
-    """Return how far two corrections are apart at most along the travel [um]."""
+    """Return the largest difference of two corrections along the travel [um]."""
     return max(abs(one.at(p) - other.at(p)) for p in travel)

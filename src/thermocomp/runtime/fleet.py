@@ -86,7 +86,7 @@ class Fleet:
         self.corrections = np.zeros(n, dtype=kind)
 
     def tick(self, readings: Array, dt: float) -> NDArray[np.bool_]:
-        """Take one reading of each machine in; `corrections` are in force after it.
+        """Process one reading of each machine; `corrections` are in force after it.
 
         Parameters
         ----------

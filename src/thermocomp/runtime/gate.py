@@ -39,7 +39,7 @@ CLOCK_SKEW = 1.0
 
 
 def explain_implausible(model: ErrorModel, values: Sequence[object], reference: Sequence[float]) -> str:
-    """Say which value of a reading must not be used and why; the empty string if all may.
+    """Return which value of a reading must not be used and why; empty if all may.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def explain_implausible(model: ErrorModel, values: Sequence[object], reference: 
 
 
 def _no_start(offsets: Sequence[tuple[Input, float]]) -> str:
-    """Say why temperatures, given from the zero of the training, cannot be those of a machine that starts."""
+    """Return why temperatures, relative to the zero of the training, cannot be those of a starting machine."""
     middle = median(offset for _, offset in offsets)
     for channel, offset in offsets:
         start = f"{channel.name} = {channel.reference + offset:g} {channel.unit} is not plausible as a start"
@@ -79,7 +79,7 @@ def _no_start(offsets: Sequence[tuple[Input, float]]) -> str:
 
 
 def explain_untimely(reading: Reading, now: float, limits: Limits) -> str:
-    """Say why a reading comes at a wrong time by its own clock; the empty string if it does not.
+    """Return the reason why the time stamp of a reading is invalid; empty if it is valid.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def find_plausible_range(channel: Input, zero: float) -> tuple[float, float]:
 
 
 class Ranges:
-    """What some inputs can read, worked out once per zero: the quick way through `explain_implausible`.
+    """Plausible ranges of some inputs, computed once per zero: the fast path of `explain_implausible`.
 
     Parameters
     ----------

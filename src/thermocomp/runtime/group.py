@@ -55,7 +55,7 @@ class Group:
     def step(
         self, states: Sequence[State], values: FloatArray, dt: float
     ) -> tuple[list[State], list[float], list[float]]:
-        """Take a reading in, as `ErrorModel.step` does.
+        """Process a reading, as `ErrorModel.step` does.
 
         Returns
         -------

@@ -1,4 +1,4 @@
-"""What a correction may never do: leave its magnitude, move faster than its rate, chatter."""
+"""Limits of a correction: its magnitude, its rate, its dead band."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""What some models together say of one target or axis, with what probings have taught of it."""
+"""Joint output of some models for one target or axis, adapted by probings."""
 
 import math
 from collections.abc import Callable, Collection, Sequence
@@ -17,7 +17,7 @@ from thermocomp.runtime.geometry.straight import best_line
 
 
 class DeviationLine(NamedTuple):
-    """What some models together say of one target or axis, in the form that controllers take."""
+    """Joint output of some models for one target or axis, in the form that controllers use."""
 
     models: slice  #: which they are, of the compensator's models
     travel: tuple[float, float]  #: where the axis goes [mm]: the limits hold from end to end
@@ -25,7 +25,7 @@ class DeviationLine(NamedTuple):
 
 
 class Said(NamedTuple):
-    """What a line says of one reading."""
+    """Output of a line for one reading."""
 
     deviation: Deviation  #: with what was learned from probings before
     half_width: float  #: of the band about it [um]; nan without one
@@ -41,7 +41,7 @@ def constant(said: Sequence[float]) -> Deviation:
 
 
 def straight(source: PositionModel) -> Callable[[Sequence[float]], Deviation]:
-    """Return what makes the best straight line over the travel of the powers in a model."""
+    """Return a function that converts the outputs of a model to their best straight line over the travel."""
     low, high = source.travel
     positions, zero = np.linspace(low, high, 41), source.reference_position
     lines = [best_line(positions, (1e-3 * (positions - zero)) ** k, zero) for k in source.powers]
@@ -64,7 +64,7 @@ def evaluate(
     zero: Deviation,
     magnitude: float,
 ) -> Said:
-    """Return what a line says of a reading.
+    """Return the output of a line for a reading.
 
     Parameters
     ----------

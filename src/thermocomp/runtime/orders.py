@@ -1,4 +1,4 @@
-"""What somebody, or the controller, has a compensator do: take a target out, count again, let all corrections go."""
+"""Commands to a compensator, from a person or the controller: suspend a target, reset its zero, release corrections."""
 
 from dataclasses import replace
 
@@ -28,7 +28,7 @@ def withdraw(compensator: Compensator, state: CompensatorState, passed: float) -
 
 
 def order(compensator: Compensator, state: CompensatorState, target: str, status: Status | None) -> CompensatorState:
-    """Take a target or axis out, or let it run again.
+    """Suspend a target or axis, or resume it.
 
     Parameters
     ----------

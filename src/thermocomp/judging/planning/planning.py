@@ -1,4 +1,4 @@
-"""Which test next: what each of a grid of tests is expected to take from the error on what was not seen."""
+"""Next test: expected reduction of the error on unseen data by each of a grid of tests."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -55,7 +55,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Covered:
-    """What was recorded so far.
+    """Conditions recorded so far.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class Covered:
 
     @classmethod
     def of(cls, samples: Samples, column: int) -> "Covered":
-        """Return what some samples cover; their spindle speed is in a column."""
+        """Return the conditions covered by some samples; their spindle speed is in a column."""
         runs: list[tuple[float, float, float]] = []
         ranges = []
         air = [j for j, c in enumerate(samples.inputs) if AMBIENT.search(c.name) and c.quantity == "temperature"]
@@ -88,7 +88,7 @@ class Covered:
         return cls(tuple(runs), tuple(ranges))
 
     def news(self, trial: Trial, top_speed: float, swing: float) -> str:
-        """Say what in a test was not there so far; its speeds, lengths and stops, each by itself."""
+        """Return what is new in a test: its speeds, durations and stops, each separately."""
         if trial.kind == "room" and not self.rooms:
             return "no temperature of the room was recorded"
         if trial.kind == "room":
@@ -170,7 +170,7 @@ def make_grid(top_speed: float, hours: float) -> tuple[Trial, ...]:
 
 
 def plan(samples: Samples, top_speed: float | None = None, *, hours: float = 12.0, swing: float = 5.0) -> Plan:
-    """Return which test would bring most.
+    """Return the test with the largest expected benefit.
 
     What is expected to be wrong follows from the covariance of the weights of `averaged` (`thermocomp.models.doubt`),
     over all tests of the grid, the room changing in each of them. A test takes from the covariance what regression on

@@ -34,7 +34,7 @@ class Trial:
 
     @property
     def words(self) -> str:
-        """What is done, in words."""
+        """Description of the test in words."""
         _, (_, longest), *_ = self.steps
         if self.kind == "room":
             return f"spindle is stopped {longest / 3600:g} h, the room changes"

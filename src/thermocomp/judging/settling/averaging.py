@@ -31,7 +31,7 @@ _MEANS = 6  # fewer tell nothing of their own scatter
 
 @dataclass(frozen=True)
 class Noise:
-    """What the rows of one curve scatter by.
+    """Scatter of the rows of one curve.
 
     Parameters
     ----------

@@ -54,7 +54,7 @@ class Phase:
 
 @dataclass(frozen=True)
 class Settling:
-    """How a channel goes from one state to the next in a phase; without the later ones it has too few values.
+    """Transition of a channel between two states in a phase; without the later values it has too few rows.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ class Settling:
 
     @property
     def words(self) -> str:
-        """Say what a reader must know of it; empty if there is nothing."""
+        """Return cautions for the reader; empty if there are none."""
         if not self.moves:
             return "does not move"
         if not self.clear:
@@ -286,7 +286,7 @@ def _rests(t: FloatArray, y: FloatArray, curve: FloatArray, limit: float, noise:
 
 
 def _reached(t: FloatArray, y: FloatArray, c: AveragedCurve, share: float) -> float:
-    """Return when the average first reached a share of its change [s]; a parabola through the rows nearby tells it."""
+    """Return the time at which the average first reached a fraction of its change [s], by a local parabola."""
     level = share * c.values[-1]
     done = c.values / c.values[-1]
     k = int(np.argmax(done >= share))

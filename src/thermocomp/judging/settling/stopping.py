@@ -36,7 +36,7 @@ K = 2.0
 
 @dataclass(frozen=True)
 class SteadyState:
-    """What is known of the end of a curve that still moves.
+    """Estimated steady state of a curve that has not settled yet.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ class Running:
 
     @property
     def words(self) -> str:
-        """Say what to do."""
+        """Return the recommended action."""
         what = f"{self.phase.kind} {self.phase.number}, {self.seconds / 3600:.1f} h"
         if self.may_stop:
             then = (

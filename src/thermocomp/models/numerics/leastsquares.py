@@ -56,7 +56,7 @@ class Triangle:
 
     @property
     def noise(self) -> FloatArray:
-        """What rounding alone may leave of each column, shape (n_columns + 1,).
+        """Residual that rounding alone may cause in each column, shape (n_columns + 1,).
 
         64 units in the last place, and one more for each column. A column of which not more is left, given the columns
         before it, depends on them.
@@ -214,7 +214,7 @@ def _independent(factor: FloatArray, norms: FloatArray, noise: FloatArray) -> ND
 
 
 def effective_sample_size(residual: FloatArray) -> float:
-    """Return how many independent rows the rows of a time series stand for (E-C12).
+    """Return the number of independent rows equivalent to the rows of a time series (E-C12).
 
     n / (1 + 2 sum of the autocorrelations), the sum taken over the lags before the first autocorrelation that is not
     positive; at least 1 and at most n. Where several tests follow one another, the seams between them are ignored.

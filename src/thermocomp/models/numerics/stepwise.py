@@ -185,7 +185,7 @@ class StepwiseStep:
 
 @dataclass(frozen=True)
 class StepwiseSelection:
-    """What stepwise regression found.
+    """Result of stepwise regression.
 
     Parameters
     ----------
@@ -330,7 +330,7 @@ class _Tableau:
         return None if np.isinf(loss) else (self.active[place], _ratio(loss, self.sse, self.df))
 
     def enter(self, index: int) -> None:
-        """Take a column into the model: a Householder reflection of the rows below the model."""
+        """Add a column to the model: a Householder reflection of the rows below the model."""
         rest = self._rows[len(self.active) :]
         v = rest[:, index].copy()
         length = math.copysign(math.sqrt(v @ v), v[0])
@@ -342,7 +342,7 @@ class _Tableau:
         self._changed([*self.active, index])
 
     def remove(self, index: int) -> None:
-        """Take a column out of the model: Givens rotations make the others triangular again."""
+        """Remove a column from the model: Givens rotations make the others triangular again."""
         place = self.active.index(index)
         active = [j for j in self.active if j != index]
         for row, column in enumerate(active[place:], start=place):

@@ -1,4 +1,4 @@
-"""How far variables repeat each other, and what each has to do with the error (Hwang, section 3.2.3)."""
+"""Collinearity of variables, and the correlation of each with the error (Hwang, section 3.2.3)."""
 
 from dataclasses import dataclass
 
@@ -69,7 +69,7 @@ def spectrum(X: FloatArray) -> Spectrum:
 
 
 def find_varying(X: FloatArray, size: FloatArray | None = None) -> BoolArray:
-    """Say which columns are not constant.
+    """Return a mask of the columns that are not constant.
 
     Parameters
     ----------

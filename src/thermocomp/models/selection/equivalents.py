@@ -21,7 +21,7 @@ _DECIMALS = 12  # differences of psi are compared to so many: the rest is roundi
 
 @dataclass(frozen=True, eq=False)
 class Equivalents:
-    """What the comparison of the sets found.
+    """Result of the comparison of sensor sets.
 
     Parameters
     ----------
@@ -197,7 +197,7 @@ def _below(ranks: NDArray[np.intp]) -> FloatArray:
 
 
 def _rejected(p: FloatArray, level: float, holm: bool) -> BoolArray:
-    """Say which hypotheses are rejected, with or without Holm's step-down rule."""
+    """Return a mask of the rejected hypotheses, with or without Holm's step-down rule."""
     if not holm:
         return np.asarray(p <= level)
     order = np.argsort(p, kind="stable")

@@ -206,7 +206,7 @@ def uncentre(tri: Triangle) -> FloatArray:
 
 @dataclass(frozen=True)
 class Grouped:
-    """What Hwang's method chose.
+    """Result of Hwang's method.
 
     Parameters
     ----------
@@ -263,7 +263,7 @@ def choose(tri: Triangle, groups: Groups, *, limit: int = LIMIT) -> Grouped:
 
 @dataclass(frozen=True)
 class Swept:
-    """What an interval of thresholds leads to.
+    """Result for an interval of thresholds.
 
     Parameters
     ----------

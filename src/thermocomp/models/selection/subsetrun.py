@@ -141,7 +141,7 @@ def run(
 
 
 class _Watch:
-    """What stops a search, and who is told of it."""
+    """Stop conditions of a search, and its progress receiver."""
 
     def __init__(
         self, result: SearchResult, nodes: int | None, seconds: float | None, progress: Callable[[str], None] | None

@@ -120,7 +120,7 @@ class Kinematics:
         return error, np.broadcast_to(values @ _TILT, (*shape, 3)).copy()
 
     def sensitivity(self, point: ArrayLike, tool: ArrayLike | None = None) -> FloatArray:
-        """Return what one um or one urad of each component does to the tool's tip.
+        """Return the effect of one um or one urad of each component at the tool tip.
 
         Parameters
         ----------
@@ -137,7 +137,7 @@ class Kinematics:
         return np.asarray(np.tensordot([1.0, *np.asarray(point, dtype=np.float64)], self._at_tool(tool), 1))
 
     def _at_tool(self, tool: ArrayLike | None) -> FloatArray:
-        """Return what a component does to the tip, per 1, x, y and z, of shape (4, 32, 3) [um per um, urad, mm]."""
+        """Return the effect of a component at the tip, per 1, x, y and z, of shape (4, 32, 3) [um per um, urad, mm]."""
         if tool is None:
             return self._own
         maps = self._maps[:4].copy()
@@ -150,7 +150,7 @@ class Kinematics:
 
     @cached_property
     def _maps(self) -> FloatArray:
-        """What a component does to the tip, per 1, x, y, z and the three coordinates of the tool: (7, 32, 3)."""
+        """Effect of a component at the tip, per 1, x, y, z and the three coordinates of the tool: (7, 32, 3)."""
         maps = np.zeros((7, len(COMPONENTS), 3))
         once, position, tool = maps[0], maps[1:4], maps[4:]
         for name in self.axes:
@@ -178,7 +178,7 @@ class Kinematics:
 
 
 def _turning(lever: FloatArray) -> FloatArray:
-    """Return what 1 urad about X, Y and Z does at the end of a lever [um], one row each."""
+    """Return the effect of 1 urad about X, Y and Z at the end of a lever [um], one row each."""
     return np.asarray(_LEVER * np.cross(np.eye(3), lever))
 
 

@@ -36,7 +36,7 @@ class StraightLine:
 
     @property
     def correction(self) -> Correction:
-        """What the controller has to add along this axis."""
+        """Correction to be added by the controller along this axis."""
         return Correction.opposing(self.deviation)
 
 

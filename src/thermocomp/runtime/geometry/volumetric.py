@@ -75,7 +75,7 @@ class VolumetricModel:
     def step(
         self, state: VolumetricState, values: Mapping[str, float], dt: float
     ) -> tuple[VolumetricState, ErrorField]:
-        """Take one reading in and give the errors at its instant.
+        """Process one reading and return the errors at its instant.
 
         Parameters
         ----------
