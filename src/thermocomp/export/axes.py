@@ -1,4 +1,4 @@
-"""Which axis a correction goes to, and what a controller takes for it: offset, slope, and where that counts from."""
+"""Axis of each correction, and its form for a controller: offset, slope, and reference position."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -60,7 +60,7 @@ WHOLE = 2**31 - 1
 
 
 class Value(NamedTuple):
-    """What a controller takes of an axis."""
+    """Value that a controller accepts for an axis."""
 
     name: str
     about: str

@@ -1,4 +1,4 @@
-"""What a page says of an exported compensator, in whatever language: what goes in, what comes out, what it means."""
+"""Page of an exported compensator, for all languages: inputs, outputs, and their meaning."""
 
 from thermocomp.export.block.tables import Tables
 from thermocomp.runtime.compensator import Compensator

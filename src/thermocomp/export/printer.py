@@ -78,7 +78,7 @@ class Printer(ABC):
         return text
 
     def kind(self, node: ast.expr) -> Kind:
-        """Return what an expression gives."""
+        """Return the type of an expression."""
         return kind_of(node, self._known)
 
     def bare(self, node: ast.expr, kind: Kind | None = None) -> str:

@@ -24,7 +24,7 @@ _Model = TypeVar("_Model", bound=ErrorModel | PositionModel)
 
 @dataclass(frozen=True, kw_only=True)
 class ExportOrder:
-    """What is to be written.
+    """Export to be written.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class ExportOrder:
 
 
 class Outcome(NamedTuple):
-    """What comes of an export."""
+    """Result of an export."""
 
     files: dict[str, bytes]  #: by their names
     refused: dict[str, str]  #: targets that may not be written, and why

@@ -1,4 +1,4 @@
-"""What an export is: a writer, and what its controller takes."""
+"""Export target: a writer, and the options of its controller."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

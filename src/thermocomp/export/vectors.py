@@ -29,7 +29,7 @@ STATUS = ("restarting", "active", "holding", "fading", "shadow")
 
 
 class Readings(NamedTuple):
-    """What a block is called with."""
+    """Readings passed to a block."""
 
     values: FloatArray  #: (n_calls, n_channels), in the order of `Tables.channels`
     age: FloatArray  #: (n_calls,), of the values [s]
@@ -37,7 +37,7 @@ class Readings(NamedTuple):
 
 
 class Answers(NamedTuple):
-    """What it says."""
+    """Outputs of a block."""
 
     correction: FloatArray  #: (n_calls, n_targets), at the reference position [um]
     slope: FloatArray  #: (n_calls, n_targets) [um/m]
@@ -55,7 +55,7 @@ def replay(
     *,
     rounded: Callable[[FloatArray], FloatArray] | None = None,
 ) -> Answers:
-    """Return what a compensator says of readings, from its start.
+    """Replay readings through a compensator from its initial state and return its outputs.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def round_all(value: Any, rounded: Callable[[FloatArray], FloatArray]) -> Any:
 
 
 def find_tolerance(tables: Tables) -> float:
-    """Return how far another code of double precision may be off: what feeds itself makes more of rounding.
+    """Return the tolerance for other code in double precision: feedback amplifies rounding errors.
 
     Parameters
     ----------

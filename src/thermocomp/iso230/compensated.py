@@ -1,4 +1,4 @@
-"""What models leave in a thermal test of ISO 230-3."""
+"""Residuals of models in a thermal test of ISO 230-3."""
 
 from collections.abc import Sequence
 

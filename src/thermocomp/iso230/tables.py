@@ -25,7 +25,7 @@ WITH = "with model"
 
 
 def thermal_tables(test: ThermalTest) -> tuple[Table, ...]:
-    """Return what is told of a thermal test: displacements, tilts, targets and lengths, each in a table of its own.
+    """Return the results of a thermal test: displacements, tilts, targets and lengths, each in a separate table.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a thermal test after ISO 230-3 comes out as: curves, and what is told of each.
+"""Result of a thermal test after ISO 230-3: curves, and their characteristic values.
 
 Which names are the standard's and which are ours stands in `thermocomp.iso230.part3`.
 """
@@ -235,12 +235,12 @@ class ThermalTest:
 
     @property
     def running(self) -> float:
-        """How long the drives ran [s]; of an ETVE test, how long it was."""
+        """Running time of the drives [s]; for an ETVE test, its duration."""
         return float(self.time[self.stop - self.start])
 
     @property
     def described(self) -> str:
-        """What was done, in what surroundings, with what distance between the probes, in one line."""
+        """Test conditions in one line: load, surroundings, distance between the probes."""
         parts = [self.load]
         hours = [self.running / HOUR, (self.time[-1] - self.running) / HOUR]
         parts.append(f"{hours[0]:.3g} h" if self.kind == "etve" else f"{hours[0]:.3g} h, cool-down {hours[1]:.3g} h")
@@ -258,7 +258,7 @@ class ThermalTest:
 
 
 def evaluate_averaged_curve(time: FloatArray, course: AveragedCurve, rows: FloatArray, stop: int) -> Figures:
-    """Return what is told of an averaged curve, with its uncertainty.
+    """Return the characteristic values of an averaged curve, with their uncertainty.
 
     Parameters
     ----------
@@ -291,7 +291,7 @@ def evaluate_averaged_curve(time: FloatArray, course: AveragedCurve, rows: Float
 
 
 def evaluate_curve(time: FloatArray, values: FloatArray, stop: int) -> Figures:
-    """Return what is told of a curve as it stands, row by row.
+    """Return the characteristic values of a curve, from its rows without averaging.
 
     Parameters
     ----------

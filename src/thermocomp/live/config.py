@@ -88,7 +88,7 @@ class MachineOf:
 
 @dataclass(frozen=True, kw_only=True)
 class JournalOut:
-    """Where it is written down what happens.
+    """Output of the journal.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ Probings = Annotated[MqttProbing | SimulatedProbing, Discriminator("kind")]
 
 @dataclass(frozen=True, kw_only=True)
 class Config:
-    """What the service runs.
+    """Configuration of the service.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ class Config:
             raise SettingError("\n".join(found))
 
     def _wrong(self) -> Iterator[str]:
-        """Say what does not fit together."""
+        """Yield the settings that are missing or exclude each other."""
         if bool(self.models) == bool(self.machine):
             yield (
                 f"models = {list(self.models)}: name at least one model file, as 'thermocomp fit' writes it, or a "
@@ -206,7 +206,7 @@ class Config:
 
 
 def _place(one: SourceSection | SinkSection | Probings) -> str:
-    """Return what two links must not share."""
+    """Return the resource that two links must not share."""
     if isinstance(one, OnBroker):
         return f"topic = {one.topic!r} of {one.host}:{one.port}"
     found = {"file": getattr(one, "file", ""), "socket": getattr(one, "socket", "")}
@@ -261,7 +261,7 @@ def read_config(path: str | Path) -> ServiceSettings:
 
 
 def _adapter(content: dict[str, Any]) -> TypeAdapter[Config]:
-    """Return what validates a configuration: with this package's sections, and those of others that it names."""
+    """Return the validator of a configuration: sections of this package, and those of plug-ins that it names."""
     fields = [(group, tuple[_section_of(group, content.get(group)), ...], ()) for group in _KINDS]  # type: ignore[misc]
     made = make_dataclass("Config", [fields[0][:2], fields[1]], bases=(Config,), frozen=True, kw_only=True)
     return TypeAdapter(with_config(ConfigDict(strict=True, extra="forbid", allow_inf_nan=False))(made))
@@ -285,7 +285,7 @@ def _load_section(entry: EntryPoint) -> type:
 
 
 def _unfit(value: Any, place: str = "") -> Iterator[str]:
-    """Say which keys and texts cannot be printed, or are longer than any topic."""
+    """Yield the keys and texts that cannot be printed, or are longer than any topic."""
     if isinstance(value, str) and (why := explain_unfit(value, 65_535)):
         yield f"{place}: {why}"
     pairs = value.items() if isinstance(value, dict) else enumerate(value, 1) if isinstance(value, list) else ()
@@ -299,7 +299,7 @@ def _unfit(value: Any, place: str = "") -> Iterator[str]:
 def _behind(
     adapter: TypeAdapter[Config], content: dict[str, Any], errors: Sequence[ErrorDetails]
 ) -> list[ErrorDetails]:
-    """Return what else is wrong in tables that have a key of a wrong type: they are not judged as a whole then."""
+    """Return the other faults in tables with a key of a wrong type: these are then not validated as a whole."""
     content = deepcopy(content)
     tables = set[tuple[int | str, ...]]()
     for error in errors:

@@ -1,4 +1,4 @@
-"""What happened, to be shown: the newest events; others cannot drown them."""
+"""Recent events for display; the number of frequent kinds is limited so that they cannot displace the others."""
 
 import time
 from collections import deque

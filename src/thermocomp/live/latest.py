@@ -22,11 +22,11 @@ class Latest(dict[str, tuple[float, float]]):
 
     @property
     def left_out(self) -> int:
-        """How many names were not kept; at `COUNTED` it may be more."""
+        """Number of names that were not kept; at `COUNTED` it may be more."""
         return len(self._left_out)
 
     def take(self, values: Mapping[str, float], tick: float, longest: float) -> str:
-        """Take values in; return a name that is not kept if none was left out before.
+        """Store values; return a name that is not kept if none was left out before.
 
         Parameters
         ----------

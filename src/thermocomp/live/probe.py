@@ -1,4 +1,4 @@
-"""What probings of the running machine said: a chart of what the models were wrong by, with an action limit."""
+"""Results of probings on the running machine: a control chart of the model errors, with an action limit."""
 
 import math
 from typing import NamedTuple
@@ -31,7 +31,7 @@ class Checked(NamedTuple):
 def check(
     time: float, target: str, probing: Probing, predicted: Deviation, learned: Adaptation | None, refused: str
 ) -> Checked:
-    """Return how a probing compares with what was predicted.
+    """Return the comparison of a probing with the prediction.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What the service writes into its journal."""
+"""Records of the service for its journal."""
 
 import math
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""How long a machine still drifts: told from the curve of the predicted deviation alone."""
+"""Remaining duration of the drift of a machine: estimated from the curve of the predicted deviation alone."""
 
 import math
 from collections.abc import Sequence

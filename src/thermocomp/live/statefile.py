@@ -52,7 +52,7 @@ class Saved:
 
 
 def fingerprint(compensator: Compensator) -> str:
-    """Return what tells the models of a compensator from others."""
+    """Return the fingerprint of the models of a compensator."""
     watches = [asdict(w) for w in compensator.watches]
     entries = [entry_of(m) for m in compensator.models]
     text = json.dumps([list(compensator.lines), entries, watches], sort_keys=True, default=str)

@@ -26,7 +26,7 @@ _FRICTION = ("front_bearing", "rear_bearing", "coolant")
 
 @dataclass(frozen=True, eq=False)
 class CentreState:
-    """All that the machine remembers.
+    """State of the machine.
 
     Parameters
     ----------
@@ -190,7 +190,7 @@ class MachiningCentre:
         return self.heat.front.heat(ratio, front, shaft - seat), self.heat.rear.heat(ratio, rear, 0.0)
 
     def _correction(self, _operators: Operators, _drive: FeedDrive) -> Correction | None:
-        """Return what changes the state after a step beside the reduced model: nothing."""
+        """Return a change of the state after a step, in addition to the reduced model: none here."""
         return None
 
     def _shaft(self, place: Mapping[str, FloatArray], ratio: FloatArray) -> FloatArray:
@@ -198,7 +198,7 @@ class MachiningCentre:
         return self.joints.shaft(place["shaft"] - place["front_seat"], ratio)
 
     def _theta(self, drive: FeedDrive) -> tuple[float, ...]:
-        """Return what decides the conductances, in steps of a 64th: nobody knows them better."""
+        """Return the parameters of the conductances, in steps of 1/64: they are not known more accurately."""
         shares = {"rotation": self.heat.rotation(drive.speed), "flow": float(drive.cooled and drive.powered)}
         shares |= {f"feed_{a}": self.heat.moving(f) for a, f in zip("xyz", drive.feed, strict=True)}
         return tuple(round(64.0 * shares[name]) / 64.0 for name in self.model.theta)

@@ -1,4 +1,4 @@
-"""What surfaces lose to the air, as it depends on temperature and speed: free and rotating convection, radiation.
+"""Heat loss of surfaces to the air, depending on temperature and speed: free and rotating convection, radiation.
 
 References
 ----------

@@ -226,7 +226,7 @@ def _soaked(
 
 
 def _weights(machine: VirtualMachine[S], instruments: Sequence[Instrument]) -> FloatArray:
-    """Return what each instrument reads of temperatures, observables and air, of shape (n_values, n_instruments)."""
+    """Return the weights of temperatures, observables and air per instrument, of shape (n_values, n_instruments)."""
     names = {n: k for k, n in enumerate([*machine.places, *machine.observables])}
     weights = np.zeros((len(names) + 3, len(instruments)))
     for k, instrument in enumerate(instruments):
@@ -244,7 +244,7 @@ def _values(truth: Truth, air: FloatArray, weights: FloatArray) -> FloatArray:
 
 
 def _driven(programme: Programme, kit: Kit) -> tuple[list[Channel], FloatArray]:
-    """Return what is recorded of the drive; a row tells the one that led to it."""
+    """Return the recorded channels of the drive; a row has the command that led to it."""
     segments = programme.segments
     lengths = [1, *(round(s.duration / programme.sampling) for s in segments)]
     channels, columns = [], []

@@ -76,7 +76,7 @@ class Fit:
 
     @property
     def compliances(self) -> tuple[float, float]:
-        """How far the joint's radius yields to a pressure, of the inner and of the outer part (Lame) [um/MPa]."""
+        """Radial compliance of the inner and of the outer part of the joint to pressure (Lame) [um/MPa]."""
         r, b, o = self.radius**2, self.bore**2, self.outside**2
         inner = ((r + b) / (r - b) - self.poisson[0]) / self.modulus[0]
         outer = ((o + r) / (o - r) + self.poisson[1]) / self.modulus[1]
@@ -104,12 +104,12 @@ class Fit:
         return self.area / (1.0 / (spots + air) + 1.0 / self.behind)
 
     def wish(self, inner: ArrayLike, outer: ArrayLike) -> FloatArray:
-        """How far the inner part's end would stay behind the outer one's if nothing held it [um]."""
+        """Free displacement of the inner part's end relative to the outer one's, without friction [um]."""
         own, other = (np.asarray(t) - REFERENCE_TEMPERATURE for t in (inner, outer))
         return np.asarray(5e-4 * self.length * (self.expansion[1] * other - self.expansion[0] * own))
 
     def hold(self, pressure: ArrayLike) -> FloatArray:
-        """How far it may wish that before friction has given way over the whole length [um]."""
+        """Free displacement at which friction has given way over the whole length [um]."""
         sections = (self.radius**2 - self.bore**2, self.outside**2 - self.radius**2)
         stretch = 1.0 / sum(1.0 / (e * math.pi * s) for e, s in zip(self.modulus, sections, strict=True))
         drag = 2.0 * math.pi * self.radius * self.friction * np.asarray(pressure)

@@ -1,4 +1,4 @@
-"""Where the heat of the virtual machining centre comes from; plausible engineering values, not a certain machine's."""
+"""Heat sources of the virtual machining centre; plausible engineering values, not those of a real machine."""
 
 import math
 from dataclasses import dataclass
@@ -138,7 +138,7 @@ class HeatSources:
 
 
 def swept(stroke: tuple[float, float], travel: float) -> list[float]:
-    """Return how an even movement over a stroke spreads over the hat functions along a travel.
+    """Return the distribution of an even movement over a stroke on the hat functions along a travel.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What instruments make of the truth; plausible values of their data sheets.
+"""Instruments applied to the true values; plausible values of their data sheets.
 
 Whatever an instrument reads is a weighted sum of what the machine tells (temperatures of places, displacements) and of
 the air: so all of them together are one matrix.
@@ -23,7 +23,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Mounting:
-    """How the temperature sensor at a place is fixed: the same in every test, whatever its seed.
+    """Mounting of the temperature sensor at a place: the same in every test, whatever its seed.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Mounting:
 
 
 def mounting(place: str) -> Mounting:
-    """Return how the sensor at a place is mounted."""
+    """Return the mounting of the sensor at a place."""
     rng = np.random.default_rng([*place.encode()])
     low, high = (20.0, -0.15, 0.88, -0.03), (60.0, 0.15, 0.97, 0.03)
     lag, bias, contact, drift = (float(v) for v in rng.uniform(low, high))

@@ -1,4 +1,4 @@
-"""Where the virtual machining centre is not linear: preload, spinning shaft, sliding foot; engineering values."""
+"""Nonlinear parts of the virtual machining centre: preload, spinning shaft, sliding foot; engineering values."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Joints:
-    """How the joints yield, beside the linear thermo-elastic displacements.
+    """Displacements of the joints, in addition to the linear thermo-elastic displacements.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class Joints:
 
 
 def slide_with_friction(slid: float, wish: FloatArray, stiction: float | FloatArray) -> FloatArray:
-    """Return how far a part has slid that follows its wish, but for the friction that holds it.
+    """Return the sliding of a part that follows its free displacement against friction.
 
     Parameters
     ----------

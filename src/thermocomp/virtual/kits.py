@@ -1,4 +1,4 @@
-"""What can be mounted on the virtual machines, and done to them: places, probes, lasers, loads."""
+"""Equipment of the virtual machines, and their loads: places, probes, lasers, loads."""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -77,7 +77,7 @@ USUAL_PLACES = (
 
 @dataclass(frozen=True)
 class Kit:
-    """What can be mounted on one of the virtual machines, and done to it.
+    """Equipment of one of the virtual machines, and its loads.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ class Kit:
     top_speed: float = 0.0
 
     def place(self, name: str, *, perfect: bool) -> str:
-        """Return where a temperature is, in words.
+        """Return the place of a temperature in words.
 
         Parameters
         ----------
@@ -159,7 +159,7 @@ class Kit:
 
 
 def labelled(names: Sequence[str] | Mapping[str, T], sets: Mapping[str, tuple[str, ...]]) -> dict[str, str | T]:
-    """Return what is mounted by the label that it gets in its channel's name.
+    """Return the mounted instruments by the label used in their channel names.
 
     Parameters
     ----------

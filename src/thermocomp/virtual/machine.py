@@ -48,7 +48,7 @@ class Air:
 
 @dataclass(frozen=True)
 class FeedDrive:
-    """What is done to the machine during one step.
+    """Commands to the machine during one step.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ class FeedDrive:
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """What the machine really does, before any sensor: one row per step.
+    """True behaviour of the machine, before any sensor: one row per step.
 
     Parameters
     ----------
@@ -113,12 +113,12 @@ class VirtualMachine(Protocol[S]):
 
     @property
     def places(self) -> tuple[str, ...]:
-        """Where temperatures are known, as names."""
+        """Names of the places with known temperatures."""
         ...
 
     @property
     def observables(self) -> tuple[str, ...]:
-        """What deviates, as names."""
+        """Names of the observed deviations."""
         ...
 
     def init(self, air: Air) -> S:

@@ -114,7 +114,7 @@ class AngularContact:
         return self.preload * math.pow(approach / self.mounted, 1.5)
 
     def shift(self, approach: ArrayLike) -> FloatArray:
-        """How far the shaft is pushed out since 20 degC: the pair yields less than the single bearing [um]."""
+        """Displacement of the shaft since 20 degC: the pair yields less than the single bearing [um]."""
         lean = (self._unlike - 1.0) / (self._unlike + 1.0) / math.sin(math.radians(self.angle))
         return np.asarray(lean * (np.asarray(approach) - self.mounted))
 

@@ -1,4 +1,4 @@
-"""What probes and lasers read of the virtual machining centre, as weights of what it tells of itself."""
+"""Readings of probes and lasers on the virtual machining centre, as weights of its observables."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -211,7 +211,7 @@ def _at_station(code: str, position: int) -> dict[str, float]:
 
 
 def swing(along: str, way: FloatArray) -> list[tuple[str, float]]:
-    """Return which turns move the end of a way along an axis, and by how much: turn x way.
+    """Return the rotations that move the end of a lever along an axis, with their effect: turn x way.
 
     Parameters
     ----------

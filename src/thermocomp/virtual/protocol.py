@@ -34,7 +34,7 @@ MOST_ROWS, MOST_COPIES = 10_000_000, 10_000
 
 @dataclass(frozen=True, kw_only=True)
 class RecordingSetup:
-    """What is recorded of a test, and where it stands.
+    """Recorded channels of a test, and their places.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ class RecordingSetup:
             raise SettingError("nothing is recorded: name a place or a probe", ("places",))
 
     def instruments(self, kit: Kit, noise: float | None = None) -> list[Instrument]:
-        """Return what is mounted: temperatures, displacements, the points that are touched.
+        """Return the mounted instruments: temperatures, displacements, probed points.
 
         Parameters
         ----------
@@ -230,7 +230,7 @@ class Experiment:
 
     @property
     def kit(self) -> Kit:
-        """What can be mounted on its machine."""
+        """Equipment of its machine."""
         return KITS[self.machine]
 
     @property

@@ -1,4 +1,4 @@
-"""What a test is made of: segments, and what a seed draws by lot."""
+"""Components of a test: segments, and the values drawn at random by a seed."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -69,7 +69,7 @@ class Lot:
 
     @property
     def values(self) -> tuple[float, ...]:
-        """All that can be drawn."""
+        """All values that can be drawn."""
         if self.between is None or self.step is None:
             return self.one_of
         return tuple(self.between[0] + k * self.step for k in range(round(self._steps) + 1))
@@ -175,7 +175,7 @@ class Stretch:
 
     @property
     def longest(self) -> float:
-        """How long it may last, whatever is drawn [s]."""
+        """Longest possible duration, for any draw [s]."""
         return self._longest(0.0)
 
     def _longest(self, outer: float) -> float:

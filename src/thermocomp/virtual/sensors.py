@@ -1,4 +1,4 @@
-"""What the sensors make of the truth: lag, bias, noise, steps; and what they do when they fail."""
+"""Sensor models: lag, bias, noise, quantisation; and their behaviour in a failure."""
 
 import math
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ FaultKind = Literal["stuck", "lost", "drift", "spike"]
 
 @dataclass(frozen=True)
 class Sensor:
-    """How one channel differs from the truth; the default is a perfect sensor.
+    """Difference of one channel from the true value; the default is a perfect sensor.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class Sensor:
 
 
 def apply_lags(lags: FloatArray, felt: FloatArray, before: FloatArray, true: FloatArray, dt: float) -> FloatArray:
-    """Return what sensors feel that lag behind the truth.
+    """Return the values at sensors with a lag.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def apply_lags(lags: FloatArray, felt: FloatArray, before: FloatArray, true: Flo
 
 
 def read(sensors: Sequence[Sensor], felt: FloatArray, time: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """Return what the sensors say: what they feel with bias, drift of the zero, noise, and in steps.
+    """Return the readings of the sensors: with bias, drift of the zero, noise and quantisation.
 
     Parameters
     ----------

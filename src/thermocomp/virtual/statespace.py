@@ -19,7 +19,7 @@ REFERENCE_TEMPERATURE = 20.0
 
 @dataclass(frozen=True, eq=False)
 class Operators:
-    """What one step does while conductances and heat stay the same: ``[z, w]+ = state z + heat u + air a``.
+    """Operators of one step with constant conductances and heat: ``[z, w]+ = state z + heat u + air a``.
 
     Parameters
     ----------

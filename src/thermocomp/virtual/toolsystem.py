@@ -19,7 +19,7 @@ LOADS = ("heater", "tip")
 
 @dataclass(frozen=True, eq=False)
 class ToolState:
-    """All that the tool remembers.
+    """State of the tool.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How far inputs are beyond what a model was trained on, as scalars and loops: see `thermocomp.core.joint`."""
+"""Distance of inputs from the training data of a model, as scalars and loops: see `thermocomp.core.joint`."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""What the models say: written from their formulas (`thermocomp.export.block.models`); nothing runs here."""
+"""Outputs of the models: generated from their formulas (`thermocomp.export.block.models`); nothing runs here."""
 
 from thermocomp.export.block.names import Names
 

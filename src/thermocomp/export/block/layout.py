@@ -1,4 +1,4 @@
-"""What a compensator's block remembers, works with and knows: the variables of `thermocomp.export.block`."""
+"""State, working memory and constants of a compensator's block: the variables of `thermocomp.export.block`."""
 
 from typing import Literal, NamedTuple
 

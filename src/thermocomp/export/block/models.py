@@ -17,7 +17,7 @@ _FACTORS = 16
 
 
 class Formulas:
-    """What the functions of `thermocomp.export.block.formulas` do, in Python, and the numbers that they need.
+    """Bodies of the functions of `thermocomp.export.block.formulas`, in Python, and the numbers that they need.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ class _Clock(Clock):
         self.average_begin = sum(c.means * len(c.leaves) for c in before)
 
     def text(self, node: e.Node) -> str:
-        """Return where a past value is; nothing if it is none."""
+        """Return the location of a past value; empty if it is none."""
         match node:
             case e.Past(ticks):
                 return f"s.past[{self.past_begin + ticks - 1}]"

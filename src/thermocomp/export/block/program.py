@@ -95,7 +95,7 @@ class _Decided(ast.NodeTransformer):
         self._sizes = sizes
 
     def visit_If(self, node: ast.If) -> ast.AST | list[ast.stmt]:
-        """Take an ``if`` that is decided for what it does."""
+        """Replace an ``if`` with a known condition by the branch it selects."""
         self.generic_visit(node)
         match node.test:
             case ast.Attribute(ast.Name("t"), name) if name in self._sizes:
@@ -103,7 +103,7 @@ class _Decided(ast.NodeTransformer):
         return node
 
     def visit_For(self, node: ast.For) -> ast.AST | list[ast.stmt]:
-        """Take away a loop over nothing."""
+        """Remove a loop without iterations."""
         self.generic_visit(node)
         match node.iter:
             case ast.Call(args=[ast.Attribute(ast.Name("t"), name)]) if self._sizes[name] == 0:
@@ -112,7 +112,7 @@ class _Decided(ast.NodeTransformer):
 
 
 def kind_of(node: ast.expr, local: Mapping[str, Kind]) -> Kind:  # noqa: PLR0911 - a case for every kind of node
-    """Return what an expression gives: ``time`` where one is in it."""
+    """Return the type of an expression: ``time`` if it contains one."""
     match node:
         case ast.Compare() | ast.BoolOp() | ast.UnaryOp(ast.Not()):
             return "bool"

@@ -1,4 +1,4 @@
-"""What models do beyond their trained range: ``hold`` and ``fade``, as statements of a block and their numbers."""
+"""Models outside their training range: ``hold`` and ``fade``, as statements of a block and their numbers."""
 
 import math
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ class Supports:
         self._models: list[ErrorModel] = []
 
     def statements(self, model: ErrorModel, place: int, said: str, worked_out: set[int]) -> list[str]:
-        """Return what becomes of what a model says: they change ``s.deviation[place]``.
+        """Return the statements applied to the output of a model: they change ``s.deviation[place]``.
 
         Parameters
         ----------
@@ -97,5 +97,5 @@ class Supports:
 
 
 def _begins(sizes: Sequence[int]) -> list[int]:
-    """Return where each of several lists begins in one after the other, and where the last ends."""
+    """Return the start index of each of several concatenated lists, and the end of the last."""
     return list(accumulate(sizes, initial=0))

@@ -65,7 +65,7 @@ def make_up(s: Names, w: Names, t: Names) -> None:
 
 
 def begin(s: Names, w: Names, t: Names) -> None:
-    """Take a reading into the zero, if that is not known; begin at rest in it, or in the first reading."""
+    """Add a reading to the zero, if that is not known; start at rest in it, or in the first reading."""
     belongs = t.watch_waits and s.watch_gathered == 0
     if t.watch_waits and not belongs and s.watch_gathered < t.MOST and (w.stands or not s.watch_resting):
         belongs = w.now - s.watch_gathered_at[0] <= (t.at_rest if s.watch_resting else t.otherwise)

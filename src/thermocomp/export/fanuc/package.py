@@ -214,7 +214,7 @@ def _real(number: float | str) -> str:
 
 
 def _comment(text: str) -> str:
-    """Return what may stand in a comment: no brackets, no small letters, nothing beyond ASCII."""
+    """Return text that is valid in a comment: no brackets, no lower-case letters, ASCII only."""
     plain = text.upper().encode("ascii", "replace").decode()
     return re.sub(r"[^-+#*/=:,. 0-9A-Z_]", ".", plain.replace("(", " ").replace(")", " "))
 

@@ -31,7 +31,7 @@ class Memory:
         self.after: list[str] = []  #: what goes out
 
     def before(self, size: int = 1) -> str:
-        """Return what was kept in the next places; what is kept there now goes to `after`, in the same order."""
+        """Return the values stored in the next places; those to be stored there are in `after`, in the same order."""
         self.end += size
         return self._graph.part(self._state, self.end - size, self.end)
 
@@ -174,7 +174,7 @@ def _tick(g: Graph, clock: Clock, past: str, kept: str, mean: str) -> str:
 
 
 def arithmetic(g: Graph, node: e.Node, value: Callable[[e.Node], str]) -> str:  # noqa: PLR0911 - a case for every kind
-    """Return what a part without memory is, its parts being named by `value`."""
+    """Return the ONNX form of a part without memory, with its parts named by `value`."""
     match node:
         case e.Constant(number):
             return g.constant(float(number))

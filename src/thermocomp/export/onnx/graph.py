@@ -126,7 +126,7 @@ def _changes(g: Graph, tables: Tables, value: str, zero: str) -> tuple[str, str]
 
 
 def _moment(g: Graph, tables: Tables, state: str, dt: str, plausible: str) -> _Moment:
-    """Return when a call is; a time that is none moves nothing.
+    """Return the time of a call; an invalid time changes nothing.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def _moment(g: Graph, tables: Tables, state: str, dt: str, plausible: str) -> _M
 
 
 def _models(g: Graph, tables: Tables, memory: Memory, moment: _Moment, change: str) -> str:
-    """Return what the models say, and what they remember after it.
+    """Return the outputs of the models, and their state afterwards.
 
     Parameters
     ----------

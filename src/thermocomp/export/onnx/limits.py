@@ -1,4 +1,4 @@
-"""What a correction may never do, as operators of ONNX: all targets at once."""
+"""Limits of a correction as operators of ONNX: all targets at once."""
 
 import numpy as np
 from numpy.typing import NDArray

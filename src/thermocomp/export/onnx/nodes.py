@@ -19,7 +19,7 @@ OPSET, IR = 17, 8
 
 @dataclass(frozen=True)
 class Port:
-    """What goes into a graph, or comes out of it.
+    """Input or output of a graph.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ class Graph:
         return self.put("Slice", of, np.array([begin]), np.array([end]))
 
     def loop(self, trips: str, carried: Sequence[str], body: "Graph") -> list[str]:
-        """Return what a body leaves of values that it changes again and again.
+        """Return the final values of variables that a loop body updates.
 
         Parameters
         ----------

@@ -89,7 +89,7 @@ def pick_readings(tables: Tables) -> Readings:
 
 
 def answer(compensator: Compensator, tables: Tables, readings: Readings, zero: FloatArray) -> Answers:
-    """Return what a compensator says of readings, its zero being known from the start.
+    """Return the outputs of a compensator for readings, its zero being known from the start.
 
     Parameters
     ----------

@@ -249,7 +249,7 @@ def used_in(bag: str, used: str) -> dict[str, Var]:
 
 
 def size_of(var: Var, sizes: Mapping[str, int]) -> int:
-    """Return how many numbers a variable holds."""
+    """Return the number of elements of a variable."""
     size = 1
     for dim in var.dims:
         size *= max(sizes[dim], 1)

@@ -1,4 +1,4 @@
-"""What a configuration says of the network: brokers, topics, hosts."""
+"""Network settings of a configuration: brokers, topics, hosts."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ _TOPIC, _HOST, _LABEL = 65_535, 253, 63
 
 @dataclass(frozen=True, kw_only=True)
 class OnBroker:
-    """What is said on an MQTT topic.
+    """Source or sink on an MQTT topic.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ class MqttOut(OnBroker):
 
 
 def explain_topic(topic: str, *, published: bool) -> str:
-    """Say why a topic cannot be one; the empty string if it can.
+    """Return the reason why a topic is invalid; empty if it is valid.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def explain_topic(topic: str, *, published: bool) -> str:
 
 
 def explain_host_name(host: str) -> str:
-    """Say why a host cannot be one; the empty string if it can be: an address or a name.
+    """Return the reason why a host is invalid; empty if it is valid: an address or a name.
 
     Parameters
     ----------

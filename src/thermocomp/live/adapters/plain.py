@@ -81,7 +81,7 @@ class Played:
             raise
 
     def status(self) -> LinkStatus:
-        """Return how it is, at once."""
+        """Return the status without blocking."""
         return self._connection.now
 
     async def close(self) -> None:
@@ -167,7 +167,7 @@ class FileSink:
             raise ThermocompError(str(e)) from e
 
     async def confirmed(self) -> dict[str, Correction] | None:
-        """Return what stands in the file; None if there is none yet."""
+        """Return the content of the file; None if there is none yet."""
         try:
             table = json.loads(self.path.read_text(encoding="utf-8"))["corrections"]
             return {
@@ -178,7 +178,7 @@ class FileSink:
             return None
 
     def status(self) -> LinkStatus:
-        """Return how it is, at once."""
+        """Return the status without blocking."""
         return self._connection.now
 
     async def close(self) -> None:

@@ -27,7 +27,7 @@ _INSERT = "INSERT OR IGNORE INTO rows (run, seq, time, kind, content, crc) VALUE
 
 @dataclass(frozen=True)
 class JournalLimits:
-    """What a journal may take.
+    """Limits of the size of a journal.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class JournalLimits:
 
 
 class JournalStatus(NamedTuple):
-    """How a journal is."""
+    """Status of a journal."""
 
     file: Path | None  #: that is written; None: there is none at the moment
     files: int
@@ -154,7 +154,7 @@ class Journal:
             return True
 
     def status(self) -> JournalStatus:
-        """Return how the journal is; for no price an error."""
+        """Return the status of the journal; never raises."""
         files: list[Path] = []
         total = 0
         with suppress(OSError):

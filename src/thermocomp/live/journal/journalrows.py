@@ -1,4 +1,4 @@
-"""What a journal holds: rows of fixed types, checked before they are written and when they are read."""
+"""Rows of a journal: fixed types, checked before they are written and when they are read."""
 
 import json
 import math
@@ -26,7 +26,7 @@ _MOST = 10_000
 
 
 class TargetRow(NamedTuple):
-    """What is compensated: a target or an axis."""
+    """A compensated target or axis."""
 
     name: str
     quantity: str = "displacement"  #: or ``angle``
@@ -68,7 +68,7 @@ class ConfirmationRow(NamedTuple):
 
 
 class StateRow(NamedTuple):
-    """How a target is from now on."""
+    """Status of a target from now on."""
 
     time: float
     target: str
@@ -115,7 +115,7 @@ class AlarmRow(NamedTuple):
 
 
 class UpdateRow(NamedTuple):
-    """What a probing changed."""
+    """Change by a probing."""
 
     time: float
     target: str

@@ -72,5 +72,5 @@ class Guarded(H11Protocol):
         return self.cycle is None or self.cycle.response_complete or self.cycle.more_body
 
     def _rank(self) -> tuple[bool, bool, bool, float]:
-        """Return what tells who goes first: idle before stuck before busy, never served before served, by age."""
+        """Return the sort key for precedence: idle before stuck before busy, never served before served, by age."""
         return not self._waits(), not self.unsent, self._served, self._since

@@ -140,7 +140,7 @@ class Door:
 
 
 def explain_host(header: str, names: Collection[str], server: str) -> str:
-    """Say why a request may not be answered under a name; the empty string if it may.
+    """Return the reason why a request must not be answered under a host name; empty if it may.
 
     A page of another site whose name leads to this computer (DNS rebinding) carries that name. An address cannot be
     made to lead elsewhere.
@@ -165,7 +165,7 @@ def explain_host(header: str, names: Collection[str], server: str) -> str:
 
 
 def explain_foreign(request: Request) -> str:
-    """Say why a request comes from a page of another origin; the empty string if it comes from this page or no page.
+    """Return the reason why a request comes from a page of another origin; empty if from this page or from no page.
 
     Browsers state the origin of the page with whatever may change something; programs state none.
 

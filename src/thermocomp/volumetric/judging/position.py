@@ -57,7 +57,7 @@ class CycleErrors:
 
 @dataclass(frozen=True, eq=False)
 class PositionAssessment:
-    """How a position model does on cycles that it has not seen.
+    """Result of a position model on unseen cycles.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ class PositionAssessment:
 
     @property
     def reason(self) -> str:
-        """Why, and what would decide it."""
+        """Reason for the verdict, and the data that would decide it."""
         return self.verdict.told
 
 
@@ -274,7 +274,7 @@ def _study(one: _All, parts: Sequence["_Part"], options: PositionOptions, fit: P
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """What was judged in one split: errors of all points per state, and the predicted thermal parts."""
+    """Judged data of one split: errors of all points per state, and the predicted thermal parts."""
 
     state: NDArray[np.intp]  # (n,) row of the samples
     errors: tuple[tuple[FloatArray, FloatArray, FloatArray], ...]  # per state: none, cold profile alone, model

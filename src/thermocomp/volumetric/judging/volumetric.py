@@ -33,7 +33,7 @@ _PICKED = (_START, _LARGEST, _END, f"{_START} = {_LARGEST}", f"{_END} = {_LARGES
 
 @dataclass(frozen=True, eq=False)
 class PointCourse:
-    """What happens at one point while a recording is replayed.
+    """Course of the errors at one point while a recording is replayed.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ class PointCourse:
         return int(np.argmax(np.linalg.norm(self.error, axis=-1)))
 
     def contributions(self, row: int) -> FloatArray:
-        """Return what each component adds to the error in one row, of shape (32, 3) [um]."""
+        """Return the contribution of each component to the error in one row, of shape (32, 3) [um]."""
         return self.values[row, :, None] * self.sensitivity
 
 
@@ -111,12 +111,12 @@ class Moment:
         return self.field.error(points, self.tool, exact=True)
 
     def after_lines(self, points: FloatArray) -> FloatArray:
-        """Return what is left after the straight lines of the axes, of shape (..., 3) [um]."""
+        """Return the residual after the straight lines of the axes, of shape (..., 3) [um]."""
         lines = {line.axis: line.correction for line in self.straight.lines}
         return find_remaining_error(self.field, points, lines, self.tool, exact=True)
 
     def after_all(self, points: FloatArray) -> FloatArray:
-        """Return what is left after the whole correction, a vector at every point, of shape (..., 3) [um]."""
+        """Return the residual after the whole correction, a vector at every point, of shape (..., 3) [um]."""
         correction = self.field.correction(points, self.tool)
         return self.error(points + 1e-3 * correction) + correction
 
@@ -132,7 +132,7 @@ class Moment:
 
     @cached_property
     def shares(self) -> FloatArray:
-        """What each component alone adds to the error on the grid: RMS of the vector's length, of shape (32,) [um]."""
+        """Contribution of each component to the error on the grid: RMS of the vector's length, of shape (32,) [um]."""
         points = self.grid.reshape(-1, 3)
         values, shares = self.field.components(points), np.zeros(len(COMPONENTS))
         for k in np.flatnonzero(values.any(axis=0)):
@@ -166,7 +166,7 @@ class Volumetric:
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """What is to be said of the machine: see `thermocomp.volumetric.notes`."""
+        """Notes on the machine: see `thermocomp.volumetric.notes`."""
         return notes.notes(replace(self.machine, tool=self.course.tool))
 
     @property
@@ -278,7 +278,7 @@ def models_of(source: Source | None) -> tuple[ErrorModel, ...]:
 
 
 def describe_source(source: Source | None) -> str:
-    """Say in a few words what tells the value of a component."""
+    """Return a short description of the source of a component's value."""
     if source is None:
         return "nothing"
     if isinstance(source, PositionModel):

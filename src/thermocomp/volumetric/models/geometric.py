@@ -94,7 +94,7 @@ class ProfileFit:
 
     @property
     def words(self) -> str:
-        """Say what a reader must know of it; empty if there is nothing."""
+        """Return cautions for the reader; empty if there are none."""
         if self.leaves_more:
             return (
                 f"leaves {self.rms:.3g} where repeated values differ by {self.noise:.3g}: it misses part of the shape"

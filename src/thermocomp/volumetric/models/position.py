@@ -167,7 +167,7 @@ def fit_position(
 def slope_samples(
     tests: Sequence[Profiles], options: PositionOptions, learn: BoolArray | None = None
 ) -> tuple[Samples, tuple[Slopes, ...]]:
-    """Return what the factors are learned from: one row per state, the measured factors as targets.
+    """Return the training data of the factors: one row per state, the measured factors as targets.
 
     Parameters
     ----------
@@ -238,7 +238,7 @@ def _with_factors(test: Profiles, slopes: Slopes, names: Sequence[str], options:
 
 
 def _cold_inputs(samples: Samples, rows: NDArray[np.intp]) -> FloatArray:
-    """Return what the inputs are counted from."""
+    """Return the reference values of the inputs."""
     values = samples.values[rows]
     there = np.isfinite(values)
     counted = np.array([c.quantity == "temperature" for c in samples.inputs])
@@ -278,7 +278,7 @@ def _coefficient_errors(
 
 
 def _profile_alone(samples: Samples, seen: BoolArray) -> Provenance:
-    """Return where a model without factors comes from."""
+    """Return the provenance of a model without factors."""
     tests: Sequence[int] = np.unique(samples.test[seen]).tolist()
     return Provenance(
         method="cold profile alone",

@@ -1,4 +1,4 @@
-"""How a position-dependent error is modelled, and what of that its own profiles tell."""
+"""Model options of a position-dependent error, and those determined from its profiles."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -26,7 +26,7 @@ WORTH_OF_REST, WORTH_OF_THERMAL = 0.1, 0.05
 
 @dataclass(frozen=True, kw_only=True)
 class PositionOptions:
-    """How a position-dependent error is modelled.
+    """Model options of a position-dependent error.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def fill_options(
 
 
 def reference_position(tests: Sequence[Profiles], options: PositionOptions) -> float:
-    """Return where q is zero [mm]: see `PositionOptions`.
+    """Return the reference position, where q is zero [mm]: see `PositionOptions`.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ def set_cold_profiles(
 def blank_unlearned(
     tests: Sequence[Profiles], options: PositionOptions, learn: BoolArray | None = None
 ) -> tuple[Profiles, ...]:
-    """Return what may be learned from: the other states are blank, tests of which there is none are left out.
+    """Return the training data: the other states are blank, tests without training states are left out.
 
     Parameters
     ----------
@@ -207,7 +207,7 @@ def blank_unlearned(
 
 
 def remainder(tests: Sequence[Profiles], options: PositionOptions, m: int) -> float:
-    """Return what powers up to m leave of the thermal part, RMS per degree of freedom; reference states do not count.
+    """Return the residual of the thermal part after powers up to m, RMS per degree of freedom, no reference states.
 
     Parameters
     ----------

@@ -207,7 +207,7 @@ def _nice(value: float) -> float:
 
 
 def _seen(points: FloatArray) -> FloatArray:
-    """Return where points are on the paper, (..., 3) -> (..., 2): a parallel projection."""
+    """Return the positions of points on the figure, (..., 3) -> (..., 2): a parallel projection."""
     a, e = math.radians(AZIMUTH), math.radians(ELEVATION)
     right = np.array([-math.sin(a), math.cos(a), 0.0])
     up = np.array([-math.cos(a) * math.sin(e), -math.sin(a) * math.sin(e), math.cos(e)])

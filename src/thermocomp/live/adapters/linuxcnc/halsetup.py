@@ -22,7 +22,7 @@ LONGEST = 107
 
 @dataclass(frozen=True, kw_only=True)
 class HalSettings:
-    """What a correction may do inside LinuxCNC, whatever the service says.
+    """Limits of a correction inside LinuxCNC, regardless of the service.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class HalSettings:
 
 
 class HalSetup(NamedTuple):
-    """What `prepare` returns."""
+    """Result of `prepare`."""
 
     hal: str  #: text of the HAL file
     component: str  #: text of the component
@@ -79,7 +79,7 @@ class HalSetup(NamedTuple):
 
 
 def prepare(path: Path, folder: Path, settings: HalSettings) -> HalSetup:
-    """Return what corrects a machine; nothing is written.
+    """Return the files and settings for corrections of a machine; nothing is written.
 
     Parameters
     ----------
