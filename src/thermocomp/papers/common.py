@@ -1,4 +1,4 @@
-"""What the studies share: recordings in a paper's names, models replayed over whole tests, errors and their tables."""
+"""Common part of the studies: recordings in a paper's names, replay of models over whole tests, error tables."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -280,7 +280,7 @@ def take_measured(samples: Samples, target: str) -> FloatArray:
 
 
 def residual(model: ErrorModel, samples: Samples) -> FloatArray:
-    """Return what a model, replayed, leaves of its target, shape (n_rows,) [unit of the model]."""
+    """Return the residual of a replayed model for its target, shape (n_rows,) [unit of the model]."""
     return take_measured(samples, model.target) - predict_deviation(model, samples)
 
 
@@ -289,7 +289,7 @@ def residual(model: ErrorModel, samples: Samples) -> FloatArray:
 
 @dataclass(frozen=True)
 class Errors:
-    """What a residual amounts to.
+    """Error figures of a residual.
 
     Parameters
     ----------

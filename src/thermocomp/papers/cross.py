@@ -80,7 +80,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Row:
-    """How one method did on one task; nan where it could not be fitted.
+    """Result of one method on one task; nan where it could not be fitted.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def simulate_task(experiment: CrossExperiment, seed: int) -> Task:
 
 
 def take_task(recordings: Sequence[Recording], target: str) -> Task:
-    """Take the recordings of a machine: every thermal cycle is unseen once (X-02).
+    """Return a task from the recordings of a machine: every thermal cycle is unseen once (X-02).
 
     Parameters
     ----------

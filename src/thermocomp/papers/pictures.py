@@ -1,4 +1,4 @@
-"""What the studies draw alike: curves over the same axis, figures of one panel, tests one after the other."""
+"""Common figures of the studies: curves over the same axis, figures of one panel, tests one after the other."""
 
 from collections.abc import Mapping, Sequence
 

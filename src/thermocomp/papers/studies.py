@@ -114,7 +114,7 @@ def _joined(found: Sequence[Study], seed: int) -> Study:
 
 
 def not_redone(name: str, why: str) -> Study:
-    """Return what stands for a study that failed.
+    """Return the replacement of a study that failed.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ Progress = Callable[[float, str], None]
 
 
 def tell_nobody(_: float, __: str) -> None:
-    """Tell nobody."""
+    """Report no progress."""
 
 
 @dataclass(frozen=True)
@@ -214,7 +214,7 @@ class StudyTable:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """What one part of a study tells.
+    """Report of one part of a study.
 
     Parameters
     ----------

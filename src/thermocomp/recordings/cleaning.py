@@ -51,7 +51,7 @@ class Step:
 
     @property
     def name(self) -> str:
-        """How the step is called in a message."""
+        """Name of the step in a message."""
         return f"[[clean]] do = {self.do!r}"
 
     def _refuse(self, found: str) -> InputError:
@@ -63,7 +63,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Cut(Step):
-    """Take out values, or whole rows where no channel is named.
+    """Remove values, or whole rows if no channel is given.
 
     Parameters
     ----------

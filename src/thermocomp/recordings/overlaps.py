@@ -103,7 +103,7 @@ def _tries(prints: Prints, interval: float) -> Iterator[tuple[Runs, int]]:
 
 
 def _matches(run: Runs, marks: dict[str, Marks]) -> tuple[IntArray, IntArray]:
-    """Return where a run of the target and one of an input are those of a run that is kept, and of which."""
+    """Return the rows where a run of the target and one of an input match a stored run, and which."""
     first, *others = run.marks
     stored = {name: unpack_marks(text) for name, text in run.marks.items()}
     known, which = np.unique(stored[first], return_index=True)
@@ -162,7 +162,7 @@ def _chains(here: IntArray, there: IntArray, test: IntArray, scale: float, bridg
 
 
 def _reach(prints: Prints, learned: IntArray, there: IntArray) -> tuple[int, int]:
-    """Return how many learned rows before the first match and after the last one may be known too.
+    """Return the number of training rows before the first match and after the last one that may be known too.
 
     Up to the next run that is kept, or three times as far as matches are apart, as not every run is found again; never
     beyond what was learned from.

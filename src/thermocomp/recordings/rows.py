@@ -18,7 +18,7 @@ Instant = float | datetime | str
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """What a file holds, row by row, in house units.
+    """Content of a file, row by row, in internal units.
 
     Parameters
     ----------

@@ -90,7 +90,7 @@ class Samples:
         return np.array([self.rezero and c.quantity == "temperature" for c in self.inputs], dtype=np.bool_)
 
     def reference(self) -> FloatArray:
-        """Return what counts as zero, (n_tests, n_inputs): the mean over each test's start; 0 for absolute inputs."""
+        """Return the reference (zero), (n_tests, n_inputs): the mean over each test's start; 0 for absolute inputs."""
         temperatures = [c.quantity == "temperature" for c in self.inputs]
         if self.zero is not None and not self.rezero:
             return np.where(temperatures, self.zero, 0.0)
@@ -158,7 +158,7 @@ class Samples:
         return float(np.median(steps[np.isfinite(steps)])) if np.isfinite(steps).any() else 1.0
 
     def learned(self, target: int, rows: BoolArray, before: int | None = None) -> Learned:
-        """Return what some rows show of a target.
+        """Return the training statistics of a target in some rows.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""How a test begins: cold, continued from an earlier file, re-zeroed on a warm machine, or with a known zero."""
+"""Initial thermal state of a test: cold, continued from an earlier file, re-zeroed on a warm machine, or known zero."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -34,7 +34,7 @@ SOON = 600.0
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """How a test begins.
+    """Initial thermal state of a test.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ def find_resting_rows(recording: Recording, zeroing: Zeroing) -> BoolArray:
 
 
 def level(recording: Recording, name: str, zeroing: Zeroing, *, end: bool = False) -> float:
-    """Return what a channel begins, or ends, with.
+    """Return the level of a channel at its start or at its end.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a Fanuc does in its own way: G80 with words, G0 beside G28, G68, and what its makers leave open in cycles."""
+"""Special behaviour of a Fanuc: G80 with words, G0 next to G28, G68, and manufacturer-specific parts of cycles."""
 
 from typing import Final
 

@@ -270,7 +270,7 @@ class Follower:
         return fanuc.motion_beside_g80(self.state, words)
 
     def _beside(self, words: BlockWords, told: str | None, other: str) -> None:
-        """Take in a motion code beside another one that takes the axis words."""
+        """Process a motion code next to another one that uses the axis words."""
         if told in ("G0", "G1") and self.state.fanuc and other in ("G28", "G30", "G68"):
             fanuc.put_in_force(self.state, told)
         elif told not in (None, "G80"):

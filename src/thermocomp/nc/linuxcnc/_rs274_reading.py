@@ -1,4 +1,4 @@
-"""What LinuxCNC's interpreter reads: no file outside the folders of the job, and nothing without end.
+"""Limits on the input of LinuxCNC's interpreter: no file outside the folders of the job, and no endless loop.
 
 Part of the script `_rs274_child.py`: standard library only.
 """
@@ -80,7 +80,7 @@ class ProgramReading:
         )
 
     def count_line(self) -> None:
-        """Take in that a line is read; refuse a program whose loop does not end."""
+        """Count a line that is read; refuse a program whose loop does not end."""
         self.lines += 1
         if not self.lines % LOOK:
             self.look_at_time()
@@ -108,7 +108,7 @@ class ProgramReading:
         self.late = now - self.since > MOST_SECONDS
 
     def count_call(self, *, moved: bool) -> str | None:
-        """Take in that a line does something, and whether an axis moves; return why it does too much."""
+        """Count an action of a line, and whether an axis moves; return the reason if there are too many."""
         if moved:
             self.moved = self.lines
         if self.acted != self.lines:

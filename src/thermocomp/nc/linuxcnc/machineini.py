@@ -1,4 +1,4 @@
-"""What a LinuxCNC configuration says of its axes, and what its HAL files already use."""
+"""Axes in a LinuxCNC configuration, and the names already used in its HAL files."""
 
 import math
 import re
@@ -71,7 +71,7 @@ class Ini:
 
 @dataclass
 class HalFiles:
-    """What HAL files use, as far as it can be seen: no Tcl, no conditions.
+    """Names used in HAL files, as far as they can be determined: no Tcl, no conditions.
 
     Parameters
     ----------

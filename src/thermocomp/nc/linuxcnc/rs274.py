@@ -34,7 +34,7 @@ ORIGIN: Place = (0.0,) * 9
 
 
 class ArcPath(NamedTuple):
-    """How an arc turns; the third coordinate of its centre is that of the arc's end."""
+    """Geometry of an arc; the third coordinate of its centre is that of the arc's end."""
 
     plane: int  #: 17, 18, 19
     centre: tuple[float, float, float]  #: program coordinates [mm]
@@ -66,7 +66,7 @@ class Canonical(NamedTuple):
 
 
 class ProgramFrame:
-    """What stands between program and machine coordinates.
+    """Transformation between program and machine coordinates.
 
     Attributes
     ----------
@@ -138,7 +138,7 @@ def _nine(values: Iterator[float] | Sequence[float]) -> Place:
 
 @cache
 def find_obstacle() -> str | None:
-    """Return why the interpreter cannot be used here; None if it can."""
+    """Return the reason why the interpreter cannot be used here; None if it can."""
     advice = f"LinuxCNC's interpreter is needed: install the Debian package {PACKAGE} (apt-get install {PACKAGE})"
     python = rs274process.PYTHON
     if not python.exists():

@@ -18,7 +18,7 @@ _TIME = ("time", "t", "elapsed")
 
 @dataclass(frozen=True)
 class Forecast:
-    """What a forecast file holds, in house units.
+    """Content of a forecast file, in internal units.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What the texts of the options of ``thermocomp revise`` mean."""
+"""Conversion of the texts of the options of ``thermocomp revise``."""
 
 import re
 from collections.abc import Sequence

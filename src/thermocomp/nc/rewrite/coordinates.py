@@ -85,7 +85,7 @@ class Coordinates(CorrectionMethod):
         return self.digits.mm >= 4
 
     def held_by(self, block: Block) -> str:
-        """Return what keeps the correction from following the drift in a block."""
+        """Return the reason why the correction cannot follow the drift in a block."""
         if block.modal.cutter:
             return "cutter radius compensation"
         if block.kind in ("arc", "curve", "cycle"):
@@ -263,7 +263,7 @@ class Coordinates(CorrectionMethod):
     # -- what may change ---------------------------------------------------------------------------------------------
 
     def _placed(self, block: Block, axis: int, carried: float, *, moved: bool) -> None:
-        """Take in that an axis goes to a place in absolute coordinates, if the line is run."""
+        """Register that an axis moves to a position in absolute coordinates, if the line is run."""
         self.fixed[axis] = False
         if not block.line.optional:
             self.doubtful[axis] = False

@@ -38,7 +38,7 @@ class Offset(CorrectionMethod):
     _level: float | None = field(default=None, init=False)
 
     def held_by(self, block: Block) -> str:  # noqa: ARG002 - whatever it does
-        """Return what keeps the correction from following the drift in a block."""
+        """Return the reason why the correction cannot follow the drift in a block."""
         return "a long way between safe points"
 
     @property
@@ -206,5 +206,5 @@ class Offset(CorrectionMethod):
 
 
 def ending(text: str) -> str:
-    """Return how a line ends."""
+    """Return the line ending of a line."""
     return text[len(text.rstrip("\r\n")) :] or "\n"

@@ -243,7 +243,7 @@ class Revision:
         self._refuse_open(ended, carried)
 
     def _cut(self, block: Block, samples: list[Sample], knots: list[tuple[float, Vector]], demand: Vector) -> CutErrors:
-        """Return how far the tool is off in a cut, and note what has held the correction."""
+        """Return the errors of the tool in a cut, and note what has limited the correction."""
         cut = self.left.take(block.line.number, _beside(samples, knots))
         self._note_held(block, demand, samples[0].deviation, (knots[0][1], knots[-1][1]), cut)
         return cut
@@ -274,7 +274,7 @@ class Revision:
         return revised
 
     def _changed(self, block: Block, samples: list[Sample], check: Check) -> tuple[Change, list[tuple[float, Vector]]]:
-        """Return what becomes of a block, and what the axes carry where on its way."""
+        """Return the revision of a block, and the corrections of the axes along its path."""
         method = self.method
         before, begun = method.before, method.carried
         parts = [1.0]

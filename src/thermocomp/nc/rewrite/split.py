@@ -83,7 +83,7 @@ def may_split(block: Block, before: Known) -> bool:
 
 
 def shares(samples: Sequence[Sample], carried: Vector, axes: Sequence[int], step: float, way: float) -> list[float]:
-    """Return where the pieces of a cut end, as shares of its way; one alone if it is not split.
+    """Return the ends of the parts of a cut, as fractions of its path; a single one if it is not split.
 
     Parameters
     ----------

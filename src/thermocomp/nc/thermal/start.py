@@ -194,7 +194,7 @@ def hand_over_state(
     *,
     zero_known: bool,
 ) -> JobState:
-    """Return what the next job can start from.
+    """Return the state from which the next job can start.
 
     Parameters
     ----------
@@ -235,7 +235,7 @@ def identity(model: ErrorModel) -> str:
 
 
 def _names(station: Station) -> list[str]:
-    """Return how a measured deviation of a station may be named, the best first; its axis is another name."""
+    """Return the valid names for a measured deviation of a station, the best first; its axis is another name."""
     target = station.model.target
     return [n for n in (target.removesuffix("_um"), target) if n != station.axis]
 
@@ -328,7 +328,7 @@ def _begun(model: Ticking, wiring: Wiring, deviation: float) -> State:
 
 
 def _bisected(too_much: Callable[[float], float], low: float, high: float) -> float:
-    """Return where a function with another sign at either end is zero, as closely as numbers can."""
+    """Return the zero of a function with a sign change between both ends, to the precision of the numbers."""
     rising = too_much(low) <= 0
     while low < (middle := 0.5 * (low + high)) < high:
         if (too_much(middle) <= 0) == rising:

@@ -1,4 +1,4 @@
-"""Which model stands for the drift of which axis, and where (P-04)."""
+"""Assignment of models to the drift of axes, and their positions (P-04)."""
 
 import re
 from collections.abc import Sequence

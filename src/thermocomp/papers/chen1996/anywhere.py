@@ -45,7 +45,7 @@ TOOLS = (60.0, 300.0)
 
 @dataclass(frozen=True, eq=False)
 class Volume:
-    """What compensation leaves at random points of the work volume, in random thermal states of unseen tests.
+    """Residuals of compensation at random points of the work volume, in random thermal states of unseen tests.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class Volume:
         return {name: np.linalg.norm(e, axis=1) for name, e in self.errors.items()}
 
     def gain(self, what: str = WITH) -> float:
-        """Return how many times smaller the error is, by its RMS."""
+        """Return the factor by which the RMS error is reduced."""
         return rms(self.sizes[WITHOUT]) / rms(self.sizes[what])
 
 
@@ -122,7 +122,7 @@ def judge(learned: LearnedVolume, seed: int) -> Volume:
     truth, kinematics = VolumetricTruth(MachiningCentre().observables), Kinematics(learned.machine)
 
     def effect(values: FloatArray, codes: Collection[str] = INDEX) -> FloatArray:
-        """Return what the errors of some components do to the tool points [um]."""
+        """Return the effect of the errors of some components at the tool points [um]."""
         alone = np.zeros_like(values)
         columns = [INDEX[code] for code in codes]
         alone[:, columns] = values[:, columns]
@@ -325,7 +325,7 @@ def tables(found: Volume) -> list[StudyTable]:
 
 
 def figures(found: Volume) -> list[Figure]:
-    """Return how large the error is in what share of the points."""
+    """Return the cumulative distribution of the error over the points, before and after."""
     share = 100.0 * np.arange(1, POINTS + 1) / POINTS
     lines = [PlotCurve(name, np.sort(size), share) for name, size in found.sizes.items()]
     text = f"The volumetric error at {POINTS} random points and thermal states, before and after."
@@ -334,7 +334,7 @@ def figures(found: Volume) -> list[Figure]:
 
 
 def _off(fit: PositionFit) -> float:
-    """Return how far the cold profile of EYX is off the true one, RMS over the travels of X and Z [um]."""
+    """Return the error of the cold profile of EYX from the true one, RMS over the travels of X and Z [um]."""
     x, z = np.meshgrid(*(np.linspace(0.0, TRAVEL[a], 31) for a in "xz"))
     points = np.stack([x.ravel(), np.full(x.size, float(TEST_POSITION["y"])), z.ravel()], axis=-1)
     assert fit.model.profile is not None

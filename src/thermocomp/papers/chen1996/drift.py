@@ -53,7 +53,7 @@ class LearnedNet:
 
 @dataclass(frozen=True, eq=False)
 class LearnedDrift:
-    """All that was learned from the 810 sets.
+    """Results of learning from the 810 sets.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ class LearnedDrift:
 
     @property
     def independent(self) -> dict[str, float]:
-        """How many independent rows their residuals count as."""
+        """Number of independent rows equivalent to their residuals."""
         return {t: r.n_effective_ for t, r in self.regressions.items()}
 
     @property

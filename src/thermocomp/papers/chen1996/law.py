@@ -39,7 +39,7 @@ POSITIONS = np.arange(0.0, 551.0, 50.0)
 
 @dataclass(frozen=True)
 class Design:
-    """How 51 profiles are measured and what is counted from where.
+    """Measurement of 51 profiles, and the reference of each quantity.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ DESIGNS = (
 
 
 class Measured(NamedTuple):
-    """What is read in one test.
+    """Measured data of one test.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ class Measured(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Recovery:
-    """What came back of the law in many draws.
+    """Recovery of the law in many draws.
 
     Parameters
     ----------
@@ -236,7 +236,7 @@ def recover(design: Design, days: Sequence[Sequence[FloatArray]], n_draws: int, 
 
 @dataclass(frozen=True, eq=False)
 class Law:
-    """What was found of the planted law.
+    """Results of recovering the known (synthetic) law.
 
     Parameters
     ----------
@@ -368,7 +368,7 @@ def numbers(found: Law) -> dict[str, float]:
 
 
 def tables(found: Law) -> list[StudyTable]:
-    """Return how often the law came back, and its coefficients."""
+    """Return the frequency with which the law was recovered, and its coefficients."""
     rates = [
         [d.name, f"{d.laser:g}", f"{d.sensor:g}", *(f"{v:.1%}" for v in (r.whole, r.missing, r.wrong))]
         for d, r in found.recoveries.items()

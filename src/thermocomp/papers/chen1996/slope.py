@@ -35,7 +35,7 @@ NONE, MRA, NET, DYNAMIC, MEASURED = "no compensation", "MRA", "net", "dynamic (o
 
 @dataclass(frozen=True, eq=False)
 class LearnedPositioning:
-    """What was learned from the profiles of one test, and those of another day.
+    """Models learned from the profiles of one test, and from those of another day.
 
     Parameters
     ----------
@@ -254,7 +254,7 @@ def _lateral(found: LearnedPositioning) -> Ours:
 
 
 def residuals(found: LearnedPositioning, day: Profiles) -> dict[str, FloatArray]:
-    """Return what each method leaves of the profiles of a day, cold profile taken off, (n_states, n_points) [um]."""
+    """Return the residuals of each method for a day's profiles minus the cold profile, (n_states, n_points) [um]."""
     thermal, k1 = day.values - found.geometric(day), found.slope(day)
     slopes = {m: found.predicted(fit, day) for m, fit in found.fits.items()} | {MEASURED: k1}
     return {NONE: thermal} | {m: thermal - 1e-3 * np.outer(slope, day.position) for m, slope in slopes.items()}

@@ -95,7 +95,7 @@ class Changing(Climate):
 
 @dataclass(frozen=True, eq=False)
 class Surfaces:
-    """What came out of all tests, milled with programs that were revised in one way.
+    """Surfaces of all tests, milled with programs that were revised by one method.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ class Surfaces:
 
 @dataclass(frozen=True, eq=False)
 class Milled:
-    """All that was milled.
+    """All milled surfaces.
 
     Parameters
     ----------
@@ -151,11 +151,11 @@ class Milled:
     first: dict[str, list[tuple[program.FacedSurface, FloatArray]]] = field(default_factory=dict)
 
     def without(self, case: str) -> Surfaces:
-        """Return what the programs mill that nobody has revised."""
+        """Return the surfaces milled by the unrevised programs."""
         return self.surfaces[case, NONE, ""]
 
     def paper(self, case: str, model: str = NET) -> Surfaces:
-        """Return what comes of the paper's way."""
+        """Return the surfaces of the paper's method."""
         return self.surfaces[case, model, program.EVERY]
 
 

@@ -98,7 +98,7 @@ def write_program(test: Recording) -> list[str]:
 
 
 def milling(test: Recording) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return when the cold faces and the other ones are milled, from and to [s]: see `MILLING`."""
+    """Return the times at which the cold faces and the other ones are milled, from and to [s]: see `MILLING`."""
     running = np.flatnonzero(_speeds(test)[1:] > 0)
     begin, end = float(test.time[running[0]]), float(test.time[running[-1] + 1])
     return (begin, begin + MILLING * MINUTE), (end - MILLING * MINUTE, end)
@@ -234,7 +234,7 @@ class FacedSurface:
     z: FloatArray
 
     def surface(self, drift: Recording) -> FloatArray:
-        """Return where the surface lies, actual minus drawing, (n,) [um].
+        """Return the position of the surface, actual minus drawing, (n,) [um].
 
         Parameters
         ----------
@@ -254,7 +254,7 @@ def run(lines: Iterable[str]) -> Iterator[Timed]:
 
 
 def faces(lines: Iterable[str]) -> list[FacedSurface]:
-    """Return what a program cuts; it says itself, in comments, where a face begins.
+    """Return the faces that a program cuts; comments in the program mark the start of each face.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ COLUMNS, INDENT = 88, "    "
 
 
 def count_verdicts(study: Study) -> dict[str, int]:
-    """Return how many claims there are by verdict: ``yes``, ``no``, ``some`` (runs do not agree) and ``-``."""
+    """Return the number of claims by verdict: ``yes``, ``no``, ``some`` (runs do not agree) and ``-``."""
     words = [c.verdict if c.verdict in ("yes", "no", "-") else "some" for c in study.claims]
     return {word: words.count(word) for word in ("yes", "no", "some", "-")}
 
@@ -80,7 +80,7 @@ def format_table(table: StudyTable) -> str:
 
 
 def words(table: StudyTable) -> list[int]:
-    """Return which columns of a table hold words: in the others most cells are numbers, and stand on the right."""
+    """Return the text columns of a table: in the others most cells are numbers, and right-aligned."""
     cells = [[row[k] for row in table.rows if row[k]] for k in range(len(table.header))]
     return [k for k, column in enumerate(cells) if column and 2 * sum(map(_is_number, column)) <= len(column)]
 

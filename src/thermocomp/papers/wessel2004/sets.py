@@ -34,7 +34,7 @@ TOLERANCE, TOLERANCE_LARGER = 1e-6, 1e-5
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """What Appendix B finds.
+    """Results of Appendix B.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def appendix_b(seed: int, progress: Progress, physics: Physics | None = None) ->
 
 
 def told(s: Selection) -> Part:
-    """Return what is told of Appendix B."""
+    """Return the report of Appendix B."""
     numbers = {
         "sets_models": float(s.models(s.sets)),
         "sets_small": float(len(s.psi.subsets)),

@@ -22,7 +22,7 @@ _LONGEST = 20_000
 
 @dataclass(frozen=True, eq=False)
 class _Fits:
-    """How well each channel follows the spindle, by the shift of its clock.
+    """Fit of each channel to the spindle speed, by the shift of its clock.
 
     Parameters
     ----------

@@ -135,7 +135,7 @@ def cut_out(severity: Severity, channel: Channel, kind: str, text: str, rows: In
 
 
 def column(name: str, **keys: object) -> Remedy:
-    """Return what a mapping says of the column of a channel."""
+    """Return the mapping entry for the column of a channel."""
     return {"columns": {name: keys}}
 
 

@@ -150,7 +150,7 @@ def _explained(mine: Edges, k: int, moved: BoolArray) -> bool:
 
 
 def _step(mine: Edges, lone: list[int], time: FloatArray) -> Finding:
-    """Tell the largest step; two that cancel each other are told as a stretch to be deleted."""
+    """Return the finding of the largest step; two that cancel each other are reported as a stretch to be deleted."""
     channel = mine.signal.channel
     k = max(lone, key=lambda j: abs(mine.height[j]))
     height, row = float(mine.height[k]), int(mine.after[k])

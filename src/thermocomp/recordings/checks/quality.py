@@ -1,4 +1,4 @@
-"""What is wrong with a recording: gaps, dead, stuck and spiking sensors, codes, wrong units, steps, swaps, clocks."""
+"""Data-quality problems: gaps, dead, stuck and spiking sensors, codes, wrong units, steps, swaps, clocks."""
 
 from collections.abc import Iterator, Sequence
 
@@ -245,7 +245,7 @@ def _no_cycle(recording: Recording) -> Iterator[Finding]:
 
 
 def _coded(channel: Channel, values: FloatArray, plausible: BoolArray) -> BoolArray:
-    """Return where a known code stands, if it stands apart from the other values by half their span and by 5 units."""
+    """Return the rows with a known code, if it is apart from the other values by half their span and by 5 units."""
     none = np.zeros(len(values), dtype=np.bool_)
     if channel.quantity not in _SENSED:
         return none

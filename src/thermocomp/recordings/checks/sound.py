@@ -1,4 +1,4 @@
-"""What `check` finds reaches the judgement: rows in trouble are left out, other trouble is kept in mind."""
+"""Effect of the findings of `check` on judging: rows in trouble are excluded, other trouble is kept as a note."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -58,7 +58,7 @@ def stuck(signal: Signal, time: FloatArray) -> Iterator[Finding]:
 
 
 def _by_chance(x: FloatArray, step: float, lively: BoolArray) -> float:
-    """Return how many rows the noise may leave a value in the middle of a step, by chance, somewhere in `x`."""
+    """Return the number of rows for which noise may hold a value within a step by chance, anywhere in `x`."""
     moves = np.diff(x)[lively[1:]]
     moving = moves[np.abs(moves) <= max(8 * float(np.median(np.abs(moves))), 2 * step)] if moves.size else moves
     if moving.size < 8:

@@ -1,4 +1,4 @@
-"""What the columns of a recording are: understood by their headings' units, or by a mapping."""
+"""Columns of a recording: determined by the units in their headings, or by a mapping."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -101,7 +101,7 @@ class PlannedColumn:
 
 @dataclass(frozen=True)
 class ColumnPlan:
-    """Which columns of a file are read, and as what.
+    """Columns of a file that are read, and their meaning.
 
     Parameters
     ----------

@@ -90,7 +90,7 @@ def find_day_columns(table: FileTable, columns: Sequence[int], *, beside_clock: 
 
 
 def find_column_kind(table: FileTable, column: int) -> Kind:
-    """Return what a column holds, also one that holds numbers by its type."""
+    """Return the kind of a column's contents, also of one that holds numbers by its type."""
     head = table.head(column)
     if not head and names_day(table.headings[column]) and table.is_number(column, empty=False):
         head = [str(cell).removesuffix(".0") for cell in table.load([], [column])[0][column].dropna().iloc[:100]]

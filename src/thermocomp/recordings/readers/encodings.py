@@ -1,4 +1,4 @@
-"""How the characters of a text file are written, where they are not UTF-8."""
+"""Character encoding of a text file that is not UTF-8."""
 
 import re
 from collections.abc import Iterable
@@ -74,7 +74,7 @@ def find_encoding(lines: Iterable[bytes]) -> str:
 
 
 def _find_utf16(head: bytes) -> str:
-    """Return which UTF-16 the head of a file is written in, with or without its mark; empty if in none."""
+    """Return the UTF-16 variant of the head of a file, with or without byte order mark; empty if it is none."""
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16-le" if head[0] == 0xFF else "utf-16-be"
     half = len(head) // 2

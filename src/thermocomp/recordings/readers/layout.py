@@ -1,4 +1,4 @@
-"""Where in a file its headings, its units and its first and last row stand: loggers write more than a table."""
+"""Position of the headings, the units, and the first and last row in a file: loggers write more than a table."""
 
 import re
 from collections import Counter
@@ -126,7 +126,7 @@ def find_end(first: Sequence[Sequence[str]], last: Sequence[Sequence[str]]) -> i
 
 
 def tell_layout(numbers: Sequence[int], layout: FileLayout, word: str) -> tuple[str, ...]:
-    """Return what was passed over and taken for units, in words.
+    """Return the lines that were skipped and those read as units, in words.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ def refuse_nameless(headings: Sequence[str], source: str) -> None:
 
 
 def why_left_out(heading: str) -> str:
-    """Say what a heading that `understand` makes nothing of lacks, and what to do."""
+    """Return what a heading that `understand` cannot interpret lacks, and what to do."""
     found = BRACKETS.fullmatch(heading.strip())
     symbol = (found["square"] or found["round"] or "").strip() if found else heading.rpartition("_")[2]
     mapped = f'a mapping [columns.NAME] with column = "{heading}" and'

@@ -1,4 +1,4 @@
-"""What the readers take at most: every limit in one place, so that no file costs more time or memory than it may."""
+"""Limits of the readers, all in one place, so that no file needs more time or memory than allowed."""
 
 import stat
 from dataclasses import dataclass, field, fields

@@ -104,7 +104,7 @@ class ColumnMap:
 
     @property
     def conversion(self) -> Unit | None:
-        """What leads to the house unit; None if neither unit nor role says."""
+        """Conversion to the internal unit; None if neither unit nor role defines it."""
         quantity = self.role if self.role in HOUSE_UNITS else None
         if self.unit:
             return find_unit(self.unit, quantity)
@@ -170,7 +170,7 @@ class CycleRule:
 
 @dataclass(frozen=True)
 class Mapping:
-    """What the columns of a file are; see the tables' classes.
+    """Roles and units of the columns of a file; see the classes of the tables.
 
     Parameters
     ----------
@@ -299,7 +299,7 @@ def check_content(content: dict[str, Any], owner: str) -> Mapping:
 
 
 def _explain(failure: ValidationError) -> str:
-    """Say table, key and the nearest known key of pydantic's first error."""
+    """Return the table, the key and the nearest known key of pydantic's first error."""
     errors = failure.errors()
     error = errors[0]
     if error["loc"][:1] == ("clean",):
@@ -316,7 +316,7 @@ def _explain(failure: ValidationError) -> str:
 
 
 def _explain_step(error: ErrorDetails) -> str:
-    """Say what is wrong with a table ``[[clean]]``."""
+    """Return the fault of a table ``[[clean]]``."""
     loc = error["loc"]
     table = f"[[clean]] number {int(loc[1]) + 1}" if len(loc) > 1 else "[[clean]]"
     if len(loc) < 4:

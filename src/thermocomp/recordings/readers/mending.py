@@ -40,7 +40,7 @@ _T = TypeVar("_T")
 
 @dataclass(frozen=True)
 class Question:
-    """What has to be decided.
+    """Decision to be made by the user.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Question:
 
     @property
     def others(self) -> tuple[str, ...]:
-        """What else may be true of a file that can be read in several ways, a line each."""
+        """Other possible interpretations of a file that can be read in several ways, a line each."""
         return tuple(to_toml(r).replace("\n", " ") for r in self.options[1:]) if self.severity == "error" else ()
 
 
@@ -100,7 +100,7 @@ class Draft:
         return f"{re.sub(_TIGHT, _APART, written)}\n" if written else ""
 
     def mapping(self, owner: str) -> Mapping:
-        """Return what it says.
+        """Return the resulting mapping.
 
         Raises
         ------

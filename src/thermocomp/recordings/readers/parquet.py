@@ -121,7 +121,7 @@ class ParquetTable:
         return pd.DataFrame({k: data[k] for k in wanted}, copy=False), notes
 
     def place(self, row: int) -> str:
-        """Say in which row of the file, counted from 1, a row stands."""
+        """Return the location of a row in the file, counted from 1."""
         return f"row {row + 1}"
 
     def _batches(self, columns: Sequence[int]) -> Iterator["RecordBatch"]:

@@ -36,7 +36,7 @@ _PLACED = re.compile(r"(?P<base>.+)_(?P<position>-?\d+(?:\.\d+)?)_(?:um|urad)")
 
 @dataclass(frozen=True, kw_only=True)
 class ProfileOptions:
-    """What a table of profiles is of.
+    """Content of a table of profiles.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ def read_components(
 
 
 def from_recording(recording: Recording, options: ProfileOptions | str) -> Profiles:
-    """Take profiles out of a recording that has a column per position.
+    """Extract profiles from a recording that has a column per position.
 
     Parameters
     ----------

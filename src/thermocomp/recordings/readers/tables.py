@@ -46,7 +46,7 @@ class FileTable(Protocol):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a user should know."""
+        """Notes for the user."""
 
     def is_number(self, column: int, *, empty: bool = True) -> bool:
         """Return whether the first filled cell of a column is a number; `empty` if there is none."""
@@ -66,7 +66,7 @@ class FileTable(Protocol):
         """
 
     def place(self, row: int) -> str:
-        """Say where a row stands in the file, such as ``line 7``."""
+        """Return the location of a row in the file, such as ``line 7``."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ class FrameTable:
         return pd.DataFrame(data, copy=False), notes
 
     def place(self, row: int) -> str:
-        """Say in which row of the sheet or file, counted from 1, a row stands."""
+        """Return the location of a row in the sheet or file, counted from 1."""
         return f"row {self.rows[row]}"
 
 
@@ -214,7 +214,7 @@ def check_headings(path: Path, headings: Sequence[str], n_rows: int, limits: Fil
 
 
 def refuse_cell(table: FileTable, row: int, column: int, cell: object) -> NoReturn:
-    """Tell which cell holds text where a number belongs.
+    """Raise the error for a cell that contains text where a number is expected.
 
     Parameters
     ----------
@@ -238,12 +238,12 @@ def refuse_cell(table: FileTable, row: int, column: int, cell: object) -> NoRetu
 
 
 def skip_row(table: FileTable, row: int) -> Remedy:
-    """Return what of a mapping passes over a row."""
+    """Return the mapping entry that skips a row."""
     return {"read": {"skip": [int(table.place(row).split()[-1])]}}
 
 
 def decide(signs: Signs, stated: str, delimiter: str, path: Path) -> Notation:
-    """Return how the numbers of a file are written; see `thermocomp.recordings.readers.numbers.Signs.decide`.
+    """Return the number format of a file; see `thermocomp.recordings.readers.numbers.Signs.decide`.
 
     Parameters
     ----------
@@ -288,7 +288,7 @@ def convert_all(
 
 
 def tell_notation(notation: Notation) -> tuple[str, ...]:
-    """Say how numbers are written, where not as in Python."""
+    """Return the number format in words, where it differs from Python's."""
     notes: tuple[str, ...] = ("the decimal sign is a comma",) if notation.decimal == "," else ()
     if notation.thousands:
         notes += (f"thousands are separated by {' or '.join(map(repr, notation.thousands))}",)

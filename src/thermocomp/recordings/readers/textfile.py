@@ -141,7 +141,7 @@ class CsvTable:
         return frame
 
     def place(self, row: int) -> str:
-        """Say in which line of the file, counted from 1, a row stands."""
+        """Return the location of a row in the file, as a line counted from 1."""
         line = row
         while (shifted := row + bisect_right(self.skipped, line)) != line:
             line = shifted
@@ -234,7 +234,7 @@ def open_csv(path: Path, options: ReadOptions, limits: FileLimits) -> CsvTable:
 
 
 class _Head(NamedTuple):
-    """What the first lines of a file say."""
+    """Content of the first lines of a file."""
 
     lines: list[tuple[int, bytes]]  #: with their numbers from 0
     delimiter: str
@@ -243,7 +243,7 @@ class _Head(NamedTuple):
 
 
 class _Body(NamedTuple):
-    """What a pass over all lines of a file finds."""
+    """Result of a pass over all lines of a file."""
 
     skipped: list[int]  #: lines that are no rows, from 0
     width: int

@@ -175,14 +175,14 @@ def split_line(line: str, delimiter: str) -> list[str]:
 
 
 def count_cells(line: bytes, delimiter: str) -> int:
-    """Return how many cells a line has."""
+    """Return the number of cells of a line."""
     if delimiter == " " or b'"' in line:
         return len(split_line(line.decode("latin-1"), delimiter))
     return line.count(delimiter.encode()) + 1
 
 
 def describe_ragged(path: Path, number: int, cells: int, width: int, line: bytes, delimiter: str) -> str:
-    """Say what is wrong with a line that is too short or too long, and what to do.
+    """Return the fault of a line that is too short or too long, and what to do.
 
     Parameters
     ----------

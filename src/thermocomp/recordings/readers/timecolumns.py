@@ -1,4 +1,4 @@
-"""Which columns of a file hold the time: found by headings, and by what the cells hold."""
+"""Columns of a file that contain the time: found by headings, and by the contents of the cells."""
 
 import re
 from collections.abc import Sequence

@@ -37,7 +37,7 @@ MOST = 2_000_000
 
 @dataclass(frozen=True)
 class Expansion:
-    """What `expand` wrote.
+    """Result of `expand`.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class Expansion:
 
 @dataclass(frozen=True)
 class _Around:
-    """What a program is run in; see `expand`."""
+    """Context in which a program is run; see `expand`."""
 
     inch: bool | None
     startup: str | None

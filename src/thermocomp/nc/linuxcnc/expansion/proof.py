@@ -109,7 +109,7 @@ def trace_acts(calls: Iterator[Canonical]) -> Iterator[Act]:
 
 
 def _way(call: Canonical, frame: ProgramFrame, here: Place) -> tuple[Place, tuple[float, ...]]:
-    """Return where a move ends and all that tells its way, in machine coordinates."""
+    """Return the end of a move and all data of its path, in machine coordinates."""
     if call.arc is not None:
         arc = call.arc
         return call.machine, (

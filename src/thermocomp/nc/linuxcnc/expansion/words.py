@@ -7,7 +7,7 @@ STILL = 1e-8  #: [mm] an axis does not move
 
 
 def agree(first: float, second: float) -> bool:
-    """Tell whether two runs agree."""
+    """Return whether two runs agree."""
     return abs(first - second) < EQUAL
 
 
@@ -76,6 +76,6 @@ class Side:
         self.program, self.machine = program, self.frame.machine(program)
 
     def take(self, kind: str, values: tuple[float, ...]) -> None:
-        """Take an offset; the machine stays where it is."""
+        """Apply an offset; the machine stays where it is."""
         self.frame.take(kind, values)
         self.program = self.frame.program(self.machine)

@@ -117,7 +117,7 @@ class Side:
             yield kept
 
     def is_kind(self, kinds: Integers, *names: str) -> "np.ndarray[Any, np.dtype[np.bool_]]":
-        """Tell which calls are of some kinds."""
+        """Return a mask of the calls of some kinds."""
         table = np.zeros(len(self.run.codes), bool)
         table[[self.run.codes[name] for name in names]] = True
         return table[kinds]
@@ -168,7 +168,7 @@ class Side:
     # -- where -------------------------------------------------------------------------------------------------------
 
     def _ends(self, block: CallBlock, kind: Integers, values: Floats) -> tuple[Floats, "np.ndarray[Any, Any]"]:
-        """Return where moves end; the frame changes between some of them."""
+        """Return the ends of moves; the frame changes between some of them."""
         end = np.zeros((len(kind), 9))
         moving = self.is_kind(kind, *STRAIGHT)
         bent = self.is_kind(kind, "tap", "curve")
@@ -217,7 +217,7 @@ class Side:
     # -- when --------------------------------------------------------------------------------------------------------
 
     def _seconds(self, calls: Calls, moving: "np.ndarray[Any, Any]") -> Floats:
-        """Return how long moves in feed take; while F is per turn and the spindle is stopped, in minutes per 1/min."""
+        """Return the duration of feed moves; while F is per turn and the spindle is stopped, in minutes per 1/min."""
         feed = self._state("feed", calls, "feedrate")
         if self.is_kind(calls.kind, *_SPINDLE).any() or self._states["sync"][0] or self._states["feedmode"][1]:
             mode = self._state("feedmode", calls, "feedmode")[:, 1]
