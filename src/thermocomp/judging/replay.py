@@ -360,7 +360,23 @@ def _columns(model: ErrorModel, samples: Samples) -> list[int]:
 def rows_until(
     samples: Samples, rows: BoolArray, test: int, zeroing: Zeroing, columns: Sequence[int]
 ) -> NDArray[np.intp]:
-    """Return the rows of a test up to the last wanted one, at least those in which its zero is known."""
+    """Return the rows of a test up to the last requested one, at least up to the one where its zero is known.
+
+    Parameters
+    ----------
+    samples : Samples
+    rows : ndarray of bool
+        Requested rows.
+    test : int
+        Index of the test.
+    zeroing : Zeroing
+    columns : sequence of int
+        Inputs that must be finite.
+
+    Returns
+    -------
+    ndarray of int
+    """
     mine = np.flatnonzero(samples.test == test)
     stop = int(np.flatnonzero(rows[mine]).max()) + 1
     usable = np.flatnonzero(np.isfinite(samples.values[mine][:, columns]).all(axis=1))
