@@ -284,11 +284,11 @@ class AutoregressiveNet(Ticking):
     family : str
         Its word in a file.
     k, m : int
-        How many past deviations, and how many past values of each input.
+        Number of past deviations, and of past values of each input.
     net : Perceptron
         With one output; its inputs are dz(t-h) .. dz(t-kh), all inputs at t, all inputs at t-h, ...
     input_scaling : Affine
-        Of the same, to what the net takes.
+        Scaling of the same to the inputs of the net.
     output_scaling : Affine
         From what the net gives to the deviation [unit].
     """

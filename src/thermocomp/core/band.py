@@ -35,7 +35,7 @@ class Band:
     cycles : int
         Thermal cycles it was made from, each left out in turn.
     floor : float
-        What is reckoned with where the structures agree [unit].
+        Smallest half-width, used where the structures agree [unit].
     running, stopped : float
         Factor while the spindle turns, and while it stands [-].
     speeds : tuple of int
@@ -90,7 +90,7 @@ class Band:
         change : ndarray of shape (..., n_inputs)
             Inputs minus their reference [their units].
         spread : ndarray of shape (...,)
-            Of the structures [unit].
+            Spread of the structures [unit].
 
         Returns
         -------

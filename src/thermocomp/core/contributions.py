@@ -32,7 +32,7 @@ def contributions(
     Parameters
     ----------
     model : PacedDynamic
-        Of the method `averaged`; of no other family it is known.
+        Model of the method `averaged`; for no other family it is known.
     table, time, reference
         See `thermocomp.core.model.ErrorModel.predict`.
 
@@ -66,7 +66,7 @@ def gains(model: ErrorModel, step: float) -> list[Gain]:
     Parameters
     ----------
     model : PacedDynamic
-        Of the method `averaged`; of no other family it is known.
+        Model of the method `averaged`; for no other family it is known.
     step : float
         Time between two rows [s].
 

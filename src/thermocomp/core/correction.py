@@ -24,7 +24,7 @@ class Deviation:
     slope : float
         Change of the deviation along the axis [um/m].
     reference_position : float
-        Where `offset` holds [mm].
+        Position at which `offset` is valid [mm].
 
     Raises
     ------

@@ -50,13 +50,13 @@ def explain_unknown(what: str, name: str, known: Iterable[str], path: tuple[str 
     Parameters
     ----------
     what : str
-        What kind of thing was asked for.
+        Kind of the requested item.
     name : str
-        What was found.
+        Name found.
     known : iterable of str
-        What there is.
+        Valid names.
     path : tuple of str or int
-        Where it stands, see `SettingError`.
+        Location, see `SettingError`.
     """
     return SettingError(f"there is no {what} {name!r}; {tell_nearest(name, known)}", path)
 
@@ -92,7 +92,7 @@ class ProgramError(InputError):
     line : int
         Number of the line, from 1.
     reason : str
-        What stands there, why it cannot be, and what to do.
+        Value found, why it is invalid, and what to do.
     """
 
     def __init__(self, line: int, reason: str) -> None:

@@ -45,13 +45,13 @@ class SensorExplanation:
     unseen : float or None
         RMS error of its prediction in cycles that were left out [degC].
     undetected : float or None
-        What a drift up to `off` does to the model's answer, once settled [unit of the model].
+        Effect of a drift up to `off` on the output of the model, once settled [unit of the model].
     lost : float or None
         RMS error on unseen cycles without it [unit of the model]; None: never judged.
     runs_on : bool
         The correction continues with the prediction in its place; otherwise it is held, then fades.
     spare : str
-        Why a spare sensor beside it is recommended; empty if none is.
+        Reason why a spare sensor for it is recommended; empty if none is.
     """
 
     name: str
@@ -86,7 +86,7 @@ class Explanation:
     sensors : tuple of SensorExplanation
         Inputs with an influence; those that can add most first where that is known.
     zero : str
-        What its inputs count from.
+        Reference of its inputs.
     word, reason : str
         Verdict of the do-no-harm gate, and why.
     rms, max_abs, none_rms : float or None
@@ -96,9 +96,9 @@ class Explanation:
     band : str
         In words; empty without one.
     outside : str
-        What it does outside its trained range.
+        Behaviour outside its training range.
     covered : str
-        What the judged cycles covered; empty if that is not known.
+        Conditions covered by the judged cycles; empty if unknown.
     pairs : tuple of int
         Pairs of sensors that were judged lost together, and those of them with which the correction runs on.
     """

@@ -78,7 +78,7 @@ class Prints:
     learned : tuple of (int, int)
         First row, and the row after the last, of each stretch that was learned from; counted through all tests.
     steps : dict of str to float
-        What differences are rounded to, per channel, the target first [its unit].
+        Step to which differences are rounded, per channel, the target first [its unit].
     runs : tuple of Runs
         Per stride.
     """

@@ -17,7 +17,7 @@ class Input:
     name : str
         Channel name.
     quantity, unit : str
-        What it measures, a key of `HOUSE_UNITS`, and its house unit.
+        Measured quantity, a key of `HOUSE_UNITS`, and its internal unit.
     reference : float
         Value that counts as zero [unit].
     rezero : bool

@@ -53,25 +53,25 @@ class ErrorModel(ABC):
     Parameters
     ----------
     family : str
-        Which of the families it is: its word in a file.
+        Name of the family, as in a file.
     target : str
         Displacement channel (or error component) it predicts.
     unit : str
         Unit of the deviation it gives: um or urad; of a factor along an axis um/m, urad/m^2 and so on.
     inputs : tuple of Input
-        What it wants to know, in this order.
+        Inputs, in this order.
     intercept : float
         Deviation in the reference state [unit].
     support : Support
-        What it does outside its trained range.
+        Behaviour outside its training range.
     provenance : Provenance or None
-        Where it comes from.
+        Origin of the model.
     honest_error : HonestError or None
         Error on unseen cycles; None if it was never judged.
     validity : Validity or None
-        What these cycles covered.
+        Conditions covered by these cycles.
     joint : JointSupport or None
-        What of its inputs' space was trained; None: a range per input is all that is known.
+        Training region in the space of its inputs; None: only a range per input is known.
     zeroing : Zeroing
         Over how long a compensator averages what the inputs with ``rezero`` count from, as in its training.
     band : Band or None
@@ -337,7 +337,7 @@ class ErrorModel(ABC):
             of its own: the mean over its start, see `Zeroing`; whether the spindle is stopped there is read from its
             column, if there is one. A model without memory does without; then the first row is the zero.
         reference : array-like of shape (n_inputs,), optional
-            What counts as zero, as in `init`.
+            Zero of the inputs, as in `init`.
 
         Returns
         -------
@@ -360,7 +360,7 @@ class ErrorModel(ABC):
         Parameters
         ----------
         table, time, reference
-            Of `predict`.
+            As for `predict`.
 
         Returns
         -------
@@ -378,7 +378,7 @@ class ErrorModel(ABC):
         Parameters
         ----------
         table, time, reference
-            Of `predict`.
+            As for `predict`.
 
         Yields
         ------
@@ -449,7 +449,7 @@ class ErrorModel(ABC):
         Parameters
         ----------
         change : sequence of Node, optional
-            What stands for the inputs minus their zero, clipped to the trained range.
+            Expressions of the inputs minus their zero, clipped to the training range.
         """
         bounds = zip(self.inputs, *(b.tolist() for b in self._bounds), strict=True)
         return self._expression(change or [Clip(Leaf(k, i.name), low, high) for k, (i, low, high) in enumerate(bounds)])
@@ -469,7 +469,7 @@ class ErrorModel(ABC):
         Parameters
         ----------
         by : str or None
-            Who, and why, such as ``"M. Weber, trial on machine 7"``; None is nobody.
+            Person and reason, such as ``"M. Weber, trial on machine 7"``; None: not approved.
 
         Raises
         ------

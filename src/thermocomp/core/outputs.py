@@ -22,9 +22,9 @@ def refuse_existing(paths: Sequence[Path], overwrite: bool, inputs: Sequence[Pat
     overwrite : bool
         Existing files may be replaced.
     inputs : sequence of Path
-        What is read: never to be replaced.
+        Input files: never overwritten.
     ending : str
-        Of the names of such files, such as ``.html``.
+        Extension of such files, such as ``.html``.
 
     Raises
     ------

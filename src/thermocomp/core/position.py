@@ -30,11 +30,11 @@ class PositionModel:
         Component it models, such as ``EYY``.
     unit : {'um', 'urad'}
     axis : {'X', 'Y', 'Z'}
-        Whose position p is.
+        Axis of the position p.
     travel : tuple of float
         From where to where the slopes were measured [mm]; beyond, the value at the end holds.
     reference_position : float
-        Where q is zero [mm].
+        Position at which q is zero [mm].
     profile : Profile or None
         f_g, in the reference state; None: zero.
     offset : ErrorModel or None
@@ -104,7 +104,7 @@ class PositionModel:
         points : ndarray of shape (..., 3)
             x, y, z [mm].
         factors : ndarray of shape (n_models,)
-            What `models` say, in their order.
+            Outputs of `models`, in their order.
 
         Returns
         -------

@@ -12,7 +12,7 @@ class Reading:
     Parameters
     ----------
     time : float
-        When it was taken [s]; any clock that only moves forward.
+        Time of the reading [s]; any clock that only moves forward.
     values : mapping of str to float
         Channel name to value in house units: temperatures [degC], spindle speed [1/min].
     positions : mapping of str to float

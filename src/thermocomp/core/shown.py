@@ -55,7 +55,7 @@ def explain_unfit(text: str, longest: int = 200) -> str:
     Returns
     -------
     str
-        What is wrong, with the text escaped.
+        Fault, with the text escaped.
     """
     if len(text) > longest:
         return f"{text[:40]!a}... has {len(text):,} characters; at most {longest:,}"

@@ -26,7 +26,7 @@ class Together:
     Parameters
     ----------
     models : sequence of PacedDynamic
-        Of one `key`.
+        Models with the same `key`.
     """
 
     def __init__(self, models: Sequence[PacedDynamic]) -> None:

@@ -224,7 +224,7 @@ def read_with_unit(text: object, quantity: str) -> float | None:
     text : object
         Such as ``"250 mm"``.
     quantity : str
-        What it must measure, a key of `HOUSE_UNITS`.
+        Required quantity, a key of `HOUSE_UNITS`.
 
     Returns
     -------

@@ -15,7 +15,7 @@ class Validity:
     units : int
         Cycles, files or blocks that were judged.
     independent : int
-        So many of them are left when those that are alike count once.
+        Number of them when similar ones count once.
     nearest : float or None
         Distance of the two units that are most alike, in standard deviations of the inputs; None with a single unit.
         Below `thermocomp.judging.coverage.ALIKE` two units are alike.

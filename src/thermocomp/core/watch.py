@@ -76,11 +76,11 @@ class Watch:
     zeroing : Zeroing
         Over how long their zero is averaged.
     time_constants : tuple of float
-        Of the lags, the same for all temperatures [s].
+        Time constants of the lags, the same for all temperatures [s].
     top_speed : float
         [1/min]
     states : tuple of (int, float, float, float)
-        Of the speed: input, power, time constants at rest and at top speed [s].
+        States of the speed: input, power, time constants at rest and at top speed [s].
     sensors : tuple of Watched
         One per temperature, in the order of the inputs.
     pace : float

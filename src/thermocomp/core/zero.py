@@ -97,7 +97,7 @@ def first_rows(zeroing: Zeroing, time: FloatArray, resting: BoolArray) -> tuple[
     ----------
     zeroing : Zeroing
     time : ndarray of shape (n_readings,)
-        Of the usable readings, rising [s].
+        Times of the usable readings, increasing [s].
     resting : ndarray of bool of shape (n_readings,)
         The spindle is known to be stopped.
 
@@ -146,7 +146,7 @@ def find_zero(
     ----------
     zeroing : Zeroing
     zero : ndarray of shape (n_inputs,)
-        What is known of it; nan where the first readings decide.
+        Known part of the zero; nan where the first readings decide.
     time : ndarray of shape (n_rows,)
         [s]
     values : ndarray of shape (n_rows, n_inputs)

@@ -33,7 +33,7 @@ class Drafts(dict[Path, Path]):
     ----------
     drafts : dict of Path to Path
     places : dict of Path to Path
-        Where each target really is, links followed.
+        Real path of each target, with links followed.
     overwrite : bool
     """
 
@@ -189,7 +189,7 @@ def draft(target: Path, *, overwrite: bool) -> Iterator[Path]:
     Yields
     ------
     Path
-        Of a file that does not exist yet.
+        Path of a file that does not exist yet.
 
     Raises
     ------

@@ -36,11 +36,11 @@ class Format:
         As it stands in the file.
     version : int
     words : str
-        What to call it.
+        Name of the format in messages.
     command : str
-        What writes it.
+        Command that writes it.
     shared : tuple of str
-        What may stand once for all of its models.
+        Keys that are stored once for all of its models.
     """
 
     name: str
@@ -65,7 +65,7 @@ def pack(kind: Format, body: list[Any], shared: dict[str, Any] | None = None) ->
     body : list
         The models.
     shared : dict, optional
-        What stands once in the file, for all of them.
+        Data stored once in the file, for all of them.
 
     Raises
     ------
@@ -99,14 +99,14 @@ def unpack(kind: Format, entry: Any, text: str, source: str, **shared: Any) -> A
     Parameters
     ----------
     kind : Format
-        What it must be.
+        Expected format.
     entry : type
-        What each of the models must be.
+        Expected type of each model.
     text : str
     source : str
-        What to call it in an error.
+        Name of the source in an error.
     **shared : type
-        What may stand once for all of them.
+        Types of data stored once for all of them.
 
     Raises
     ------

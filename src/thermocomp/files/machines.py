@@ -181,7 +181,7 @@ class _Sources:
     Parameters
     ----------
     folder : Path
-        Where the files of models are.
+        Folder of the model files.
     structure : Structure
     axes : mapping of str to Axis
         Those of it that could be read.

@@ -55,7 +55,7 @@ def loads(text: str, source: str = "model") -> tuple[ErrorModel, ...]:
     ----------
     text : str
     source : str
-        What to call it in an error.
+        Name of the source in an error.
 
     Raises
     ------

@@ -20,11 +20,11 @@ def read_text(path: str | Path, what: str, most: int, failure: type[InputError] 
     ----------
     path : str or Path
     what : str
-        What to call it, such as ``machine file``.
+        Name of the kind of file, such as ``machine file``.
     most : int
         Bytes it may have.
     failure : type of InputError
-        What is raised.
+        Exception type to raise.
 
     Returns
     -------

@@ -50,7 +50,7 @@ def loads(text: str, source: str = "position model") -> tuple[PositionModel, ...
     ----------
     text : str
     source : str
-        What to call it in an error.
+        Name of the source in an error.
 
     Raises
     ------

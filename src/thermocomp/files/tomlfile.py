@@ -24,7 +24,7 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
     ----------
     path : str or Path
     what : str
-        What to call it, such as ``machine file``.
+        Name of the kind of file, such as ``machine file``.
 
     Returns
     -------

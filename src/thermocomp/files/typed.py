@@ -36,9 +36,9 @@ def decode(kind: Any, value: Any, place: str) -> Any:
     kind : type
         Made of named tuples, dataclasses, tuples, dicts, arrays, plain values and ``None``.
     value : Any
-        What `encode` made of it.
+        Result of `encode`.
     place : str
-        What to call it in an error.
+        Name of the source in an error.
 
     Raises
     ------
@@ -68,9 +68,9 @@ def want(right: bool, value: Any, place: str, what: str) -> None:
     ----------
     right : bool
     value : Any
-        What was found; None is not repeated.
+        Value found; None is not repeated.
     place, what : str
-        Where, and what is wanted.
+        Location, and expected value.
     """
     if not right:
         raise ValueError(f"{place}: want {what}" + ("" if value is None else f", found {value!r:.40}"))

@@ -37,7 +37,7 @@ class Budget:
     ----------
     targets : tuple of str
     unit : str
-        What they are counted in together, see `thermocomp.judging.sensorsets.weigh_targets`.
+        Common unit of the targets, see `thermocomp.judging.sensorsets.weigh_targets`.
     scales : ndarray of shape (n_targets,)
         One such unit, in that of each target.
     candidates : tuple of str
@@ -57,9 +57,9 @@ class Budget:
     condition : ndarray of shape (n_sizes,)
         Condition number of the correlation matrix of `sensors`.
     answer : StandInAnswer
-        Of `averaged` with all temperatures and rows, for what can stand in for what; targets in `unit`.
+        Output of `averaged` with all temperatures and rows, for the substitutes; targets in `unit`.
     failures : mapping of str to str
-        Why a model could not be judged somewhere, by model.
+        Reason why a model could not be judged somewhere, by model.
     """
 
     targets: tuple[str, ...]

@@ -108,7 +108,7 @@ class Cluster:
     ----------
     client : Client
     address : str
-        Of the scheduler, for messages.
+        Address of the scheduler, for messages.
     """
 
     def __init__(self, client: Client, address: str) -> None:

@@ -58,11 +58,11 @@ def compare(
     methods : sequence of str or estimator
         ``all`` stands for all of them; see `thermocomp.models.methods.expand`.
     judging : Judging
-        What is learned from and what is judged.
+        Training and validation data.
     rules : Rules
-        What is stated before judging.
+        Rules stated before judging.
     support : Support
-        What the models do outside their trained range.
+        Behaviour of the models outside their training range.
     robustness : bool
         Also replay with noise and lost sensors.
     refit : bool
@@ -215,7 +215,7 @@ def n_pieces(samples: Samples, methods: Sequence[Any], judging: Judging, rules: 
     Parameters
     ----------
     samples, methods, judging, rules
-        Of `compare`.
+        As for `compare`.
 
     Returns
     -------

@@ -155,7 +155,7 @@ def table(named: dict[str, Validity]) -> Table:
     Parameters
     ----------
     named : dict of str to Validity
-        What each is to be called; at least one.
+        Judgements by name; at least one.
 
     Returns
     -------

@@ -51,13 +51,13 @@ class JudgedUnit:
     name : str
     rows : int
     rms, largest : float
-        Of the residual [um].
+        Figures of the residual [um].
     baselines : tuple of float
         RMS left by each of `BASELINES` [um].
     none_largest : float
         Largest deviation without compensation [um].
     noise : float
-        Of the probe: smaller errors are taken as being of this size [um].
+        Noise of the probe: smaller errors are replaced by this value [um].
     margin : float
         Harm that is let pass [um].
     moves : bool
@@ -108,19 +108,19 @@ class Verdict:
     ----------
     units : tuple of JudgedUnit
     unit : str
-        Of the deviations.
+        Unit of the deviations.
     caps : tuple of str
-        What keeps the model from being accepted, whatever the figures say: one stretch, trouble in the data.
+        Reasons that prevent acceptance whatever the figures: a single stretch, trouble in the data.
     refusal : str
-        What refuses it, whatever the figures say: no sensor.
+        Reason that refuses it, whatever the figures: no sensor.
     tried : int
         Methods that were tried for this target.
     p : float or None
-        Of the test, corrected for their number; that of the units if None.
+        P-value of the test, corrected for their number; that of the units if None.
     about : str
-        Why it is not corrected for that number, if it is not.
+        Reason why it is not corrected for that number, if it is not.
     names : tuple of str
-        Of the baselines.
+        Names of the baselines.
     stated : float or None
         Harm that is let pass, as the user stated it before judging; None: by rule.
     """
@@ -284,9 +284,9 @@ def measure(
     measured, predicted : ndarray of shape (n_rows,)
         Deviations of one unseen cycle or file [um].
     learned : Learned
-        What the training part showed.
+        Training statistics of the target.
     unit : str
-        Of the deviations.
+        Unit of the deviations.
     margin : float, optional
         Harm that is let pass [um], stated before judging; see `margin_of`.
     stretch : bool
@@ -337,7 +337,7 @@ def holm(verdicts: Sequence[Verdict]) -> list[Verdict]:
     Parameters
     ----------
     verdicts : sequence of Verdict
-        Of every method that was tried for one target.
+        Verdicts on all methods tried for one target.
 
     Returns
     -------

@@ -49,7 +49,7 @@ class FaultLog:
     fault : ndarray of int of shape (n_rows, n_sensors)
         See `thermocomp.runtime.watch.WORDS`.
     read, stood_in : ndarray of shape (n_rows, n_sensors)
-        What was recorded, and what stood in; nan where nothing was, or a sensor was believed [degC].
+        Recorded values, and substitutes; nan where there was none, or the sensor was trusted [degC].
     faults : tuple of Fault
         In the order in which they were found.
     """
@@ -110,9 +110,9 @@ def find_costs(model: ErrorModel, assessment: Assessment, logs: Sequence[FaultLo
     ----------
     model : ErrorModel
     assessment : Assessment
-        Of it, over all that was judged.
+        Assessment of the model, over all judged rows.
     logs : sequence of FaultLog
-        Of these recordings; those of other watches are passed over.
+        Logs of these recordings; those of other watches are ignored.
 
     Returns
     -------

@@ -68,24 +68,24 @@ def judge(
     Parameters
     ----------
     name : str
-        What to call the model.
+        Name of the model.
     model : ErrorModel
     samples : Samples
         With all of the model's inputs, and its target.
     split : Split
         Only its block is looked at.
     learned : Learned, optional
-        What the model is held against; what it learned itself if not given.
+        Reference for the model. Default: its own training statistics.
     rules : Rules
-        What was stated before judging.
+        Rules stated before judging.
     fit_s : float
         The fit took [s].
     robustness : bool
         Also replay with noise and lost sensors.
     limits : Limits or None
-        Of the compensator; None: the model alone is judged.
+        Limits of the compensator; None: the model alone is judged.
     guard : Guard, optional
-        What a watch that knows nothing of the block lets through while sensors fail; without it nothing notices.
+        Readings that a watch, trained without the block, passes while sensors fail. Default: no failure is noticed.
     probings : Probings, optional
         Made in the block.
     widening : ndarray of shape (n_rows,), optional
@@ -216,12 +216,12 @@ def refuse_method(samples: Samples, name: str, target: int, split: Split, why: s
     ----------
     samples : Samples
     name : str
-        Of the method.
+        Name of the method.
     target : int
         Index into ``samples.targets``.
     split : Split
     why : str
-        What is told.
+        Reason.
 
     Returns
     -------

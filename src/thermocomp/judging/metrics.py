@@ -19,7 +19,7 @@ class Metric:
     ----------
     name : str
     best : {'low', 'high', 'zero'}
-        Which way is good.
+        Best value.
     unit : str
         ``um`` stands for the unit of the deviation; ``%`` and ``1`` for themselves.
     description : str

@@ -24,7 +24,7 @@ class Probings:
     every : float
         Time between two; the first is so long after the start [s].
     repeatability : float
-        Of the probe, standard deviation [um].
+        Repeatability of the probe, standard deviation [um].
 
     Raises
     ------
@@ -119,11 +119,11 @@ class Probed:
     at : ndarray of bool of shape (n_judged,)
         A probing was made: what it says counts from the next row on.
     shift : ndarray of shape (n_judged,)
-        What was learned, and is in the correction [um].
+        Learned shift, which is included in the correction [um].
     without : ndarray of shape (n_judged,)
         Minus the correction that would have been in force without any [um].
     refused : tuple of str
-        Why probings were not used.
+        Reasons why probings were not used.
     """
 
     plan: Probings

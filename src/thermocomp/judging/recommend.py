@@ -83,7 +83,7 @@ def score(samples: Samples, name: str, target: int, judging: Judging, inner: Inn
     ----------
     samples : Samples
     name : str
-        Of the method.
+        Name of the method.
     target : int
         Index into ``samples.targets``.
     judging : Judging
@@ -117,7 +117,7 @@ class Recommendation:
     ----------
     target, method : str
     chosen : tuple of str
-        What was chosen without each unit.
+        Choice without each unit.
     verdict : Verdict
         On the choosing: each unit is predicted by what was chosen without it.
     """

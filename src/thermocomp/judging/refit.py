@@ -31,7 +31,7 @@ def stress_written(judged: Assessment, model: ErrorModel, samples: Samples, guar
         Fitted to all rows.
     samples : Samples
     guard : Guard, optional
-        What a watch, made of all rows, lets through while sensors fail.
+        Readings that a watch, trained on all rows, passes while sensors fail.
 
     Returns
     -------

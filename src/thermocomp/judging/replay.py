@@ -33,7 +33,7 @@ class Replayed:
     Parameters
     ----------
     deviation : ndarray of shape (n_wanted,)
-        What the model alone says: no gate but for missing values, no limits [its unit].
+        Output of the model alone: no gate except for missing values, no limits [its unit].
     compensated : ndarray of shape (n_wanted,)
         Minus the correction that the compensator had in force: gate, model, limits [its unit].
     outside : ndarray of bool of shape (n_wanted,)
@@ -45,9 +45,9 @@ class Replayed:
     limits : Limits or None
         None: they were not applied, because the model does not predict micrometres.
     half_width : ndarray of shape (n_wanted,)
-        Of the band about `deviation` [its unit]; nan where there is none.
+        Half-width of the band about `deviation` [its unit]; nan where there is none.
     probed : Probed or None
-        What probings did; None: there were none.
+        Effect of probings; None: there were none.
     """
 
     deviation: FloatArray
@@ -80,7 +80,7 @@ def replay_compensated(
     rows : ndarray of bool of shape (n_rows,)
         Rows that are judged.
     limits : Limits
-        Of the corrections [um]; a model of another unit runs without them, behind the gate.
+        Limits of the corrections [um]; a model of another unit runs without them, behind the gate.
     probings : Probings, optional
         Made in the rows that are judged, from the first of each test on: the only displacements that are used, each
         from the next row on.
@@ -202,7 +202,7 @@ def stack_watched(
         A displacement channel: samples have one.
     recordings : sequence of Recording
     starts : Start or sequence of Start or None
-        How each begins.
+        Initial state of each.
     """
     known = [i.name for i in watch.inputs if all(r.has(i.name) for r in recordings)]
     if not known:
@@ -235,7 +235,7 @@ def look_through(watch: Watch, samples: Samples, test: int) -> Iterator[tuple[in
     state : WatchState
         After the reading.
     let : ndarray of shape (n_inputs,)
-        What it lets through, in the order of its inputs.
+        Readings passed, in the order of its inputs.
     """
     names = [c.name for c in samples.inputs]
     known = [i.name in names for i in watch.inputs]

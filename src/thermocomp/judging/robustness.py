@@ -89,7 +89,7 @@ def worse(one: Robustness, other: Robustness) -> Robustness:
     Parameters
     ----------
     one, other : Robustness
-        Of the same rows.
+        Results for the same rows.
 
     Returns
     -------
@@ -189,9 +189,9 @@ def stress(
     draws : int
         Number of noise draws of each law.
     seed : int
-        Of the noise.
+        Seed of the noise.
     guard : Guard, optional
-        What is let through while sensors fail, also several at once.
+        Readings passed while sensors fail, also several at once.
 
     Returns
     -------

@@ -102,7 +102,7 @@ def select(
         Rows stand in the samples twice and would be learned from and judged on at once (``pareto``).
         A cluster shall do the work of another method than ``pareto`` and ``ace``.
     Exception
-        What the method fails with, if it does for all targets.
+        Failure of the method, if it fails for all targets.
     """
     if elsewhere.get() is not None and method not in SHARED:
         raise InputError(

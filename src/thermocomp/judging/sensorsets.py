@@ -29,7 +29,7 @@ def weigh_targets(samples: Samples, rows: BoolArray) -> tuple[str, FloatArray]:
     Returns
     -------
     unit : str
-        Of the targets; `PERCENT` of the error without compensation where they have several.
+        Unit of the targets; `PERCENT` of the error without compensation where they have several.
     scales : ndarray of shape (n_targets,)
         1 in the first case. A target without a number, or that does not move, counts in its own unit.
     """

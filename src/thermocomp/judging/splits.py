@@ -114,7 +114,7 @@ def join_short_cycles(cycle: IntArray, test: IntArray, least: int = MIN_ROWS) ->
     Parameters
     ----------
     cycle, test : ndarray of int of shape (n_rows,)
-        Of each row, in the order of time.
+        Cycle and test of each row, in chronological order.
     least : int
         Rows that say something.
 

@@ -87,13 +87,13 @@ def fit(
         See `thermocomp.models.methods.expand`.
     judging : Judging
     rules : Rules
-        What is stated before judging.
+        Rules stated before judging.
     support : Support
         For the models.
     recordings : sequence of Recording
         The tests of `samples`, in their order: for the surroundings and the days in the models' validity.
     limits : Limits
-        Of the compensator that is judged with them.
+        Limits of the compensator that is judged with them.
     jobs : int
         Processes to share the work among; -1 takes all cores.
     progress : callable
@@ -193,7 +193,7 @@ class Judged:
     seen : tuple of str
         Names of recordings that a model was fitted to, as they are: they are not judged on if there is another.
     validity : Validity or None
-        What the thermal cycles of these recordings cover.
+        Conditions covered by the thermal cycles of these recordings.
     starts : tuple of (str, Start)
         Names of the recordings, and how each begins.
     """
@@ -230,11 +230,11 @@ def assess(
     recordings : sequence of Recording
         With the models' inputs and targets.
     rules : Rules
-        What is stated before judging.
+        Rules stated before judging.
     limits : Limits
-        Of the compensator that is judged with them.
+        Limits of the compensator that is judged with them.
     starts : Start or sequence of Start, optional
-        How each recording begins, or all of them; found out if not given.
+        Initial state of each recording, or of all of them. Default: determined from the recordings.
     probings : Probings, optional
         Made in the rows that are judged: see `thermocomp.runtime.adaptation`.
     progress : callable

@@ -93,11 +93,11 @@ class NetARX(ClockedRegressor):
     momentum : float
         Part of the previous change that is added to the next one.
     random_state : int
-        Of the initial weights and of the order of the patterns.
+        Seed of the initial weights and of the order of the patterns.
     jobs : int
         Threads that train nets.
     time : {'column', 'routed', 'none'} or None
-        Where it finds the time, see `thermocomp.models.timed.TimedRegressor`; without it, it refuses to work.
+        Source of the time, see `thermocomp.models.timed.TimedRegressor`; without it, the estimator raises an error.
 
     Attributes
     ----------
@@ -112,7 +112,7 @@ class NetARX(ClockedRegressor):
     free_run_rms_ : float
         In the training data [unit of y].
     caution_ : str
-        What the model cannot know (E-P6).
+        Limitation of the model (E-P6).
 
     References
     ----------

@@ -51,9 +51,9 @@ class ThermalRegressor(RegressorMixin, BaseEstimator, ABC):
             One per feature. Without it they are made from the training data: named like the features, without unit,
             with reference 0 and the range seen in `fit`.
         support : Support
-            What the model does outside its trained range.
+            Behaviour of the model outside its training range.
         provenance : Provenance, optional
-            Where it comes from.
+            Origin of the model.
 
         Returns
         -------
@@ -192,7 +192,7 @@ class CycledRegressor(MemorylessRegressor):
     Attributes
     ----------
     chosen_by_ : str
-        What was left out to choose.
+        Units left out for the choice.
     """
 
     def fit(self, X: ArrayLike, y: ArrayLike, *, cycle: ArrayLike | None = None) -> Self:

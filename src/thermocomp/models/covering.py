@@ -37,7 +37,7 @@ def find_joint_support(change: FloatArray, channels: Sequence[Channel], cycle: I
     change : ndarray of shape (n_rows, n_inputs)
         Inputs minus their reference, finite [their units].
     channels : sequence of Channel
-        What they are.
+        Channels of the values.
     cycle : ndarray of int of shape (n_rows,)
         Thermal cycle of each row; with a single one its quarters are left out in turn.
 

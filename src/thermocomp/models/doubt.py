@@ -29,7 +29,7 @@ class Doubt:
     columns : int
         Inputs of the recordings.
     covariance : ndarray of shape (n_targets, n_features, n_features)
-        Of the weights.
+        Covariance of the weights.
     error : ndarray of shape (n_targets,)
         Root mean square error on what was left out [unit of the target].
     part : float
@@ -60,7 +60,7 @@ class Doubt:
         dt : float
             Between two rows [s].
         room : ndarray of shape (n_rows, n_temperatures), optional
-            What the room does to each temperature [degC]. The rest is predicted from the speed.
+            Effect of the room on each temperature [degC]. The rest is predicted from the speed.
         """
         step = np.full(len(speed), dt)
         step[0] = np.inf
@@ -109,7 +109,7 @@ def find_doubt(samples: Samples, settings: AveragedDynamic | None = None) -> Dou
     samples : Samples
         With a spindle speed and at least one temperature.
     settings : AveragedDynamic, optional
-        Of the method; its own if not given.
+        Settings of the method. Default: its default settings.
 
     Returns
     -------

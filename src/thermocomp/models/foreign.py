@@ -66,7 +66,7 @@ def catch_failures(what: str) -> Iterator[None]:
     Parameters
     ----------
     what : str
-        What it cannot do, such as ``Ridge cannot be fitted to z_um``.
+        Failed operation, such as ``Ridge cannot be fitted to z_um``.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def check_numbers(predicted: Any, n_rows: int, name: str) -> FloatArray:
     predicted : array-like of shape (n_rows,) or (n_rows, 1)
     n_rows : int
     name : str
-        Of the method.
+        Name of the method.
 
     Returns
     -------

@@ -42,7 +42,7 @@ class TermRegressor(MemorylessRegressor):
     standard_error_ : float
         Standard error of estimate, as if the rows were independent [unit of y].
     n_effective_ : float
-        How many independent rows the training rows stand for, by the autocorrelation of the residual (E-C12).
+        Number of independent rows equivalent to the training rows, by the autocorrelation of the residual (E-C12).
     data_min_, data_max_ : ndarray of shape (n_features,)
         Trained range.
     """

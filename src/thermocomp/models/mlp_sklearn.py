@@ -25,16 +25,16 @@ class SklearnNet(StaticRegressor, NetRegressor):
     hidden : int
         Number of hidden nodes.
     activation : {'logistic', 'tanh'}
-        Of the hidden nodes.
+        Activation of the hidden nodes.
     solver : {'lbfgs', 'adam', 'sgd'}
     alpha : float
         Strength of the penalty on squared weights.
     max_iter : int
         Most iterations of the solver.
     max_patterns : int
-        Of more rows than these only so many are learned, spread evenly in time.
+        Maximum number of training rows; of more, this number is used, spread evenly in time.
     seed : int
-        Of initial weights and order.
+        Seed of the initial weights and the order.
 
     Attributes
     ----------

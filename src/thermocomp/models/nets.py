@@ -31,7 +31,7 @@ class NetRegressor(MemorylessRegressor):
         How many independent rows they stand for, by the autocorrelation of the residual (E-C12); of several outputs,
         the smallest.
     caution_ : str
-        What speaks against trusting the net, above all more parameters than independent rows (C-27); else empty.
+        Reason not to trust the net, above all more parameters than independent rows (C-27); else empty.
     data_min_, data_max_ : ndarray of shape (n_features,)
         Trained range.
     """

@@ -73,7 +73,7 @@ class PacedFeatures:
         speeds : sequence of int
             Columns that are spindle speeds; the others are temperatures.
         lags, powers, stopped, running : sequence of float
-            Of `thermocomp.models.averaged.AveragedDynamic`.
+            As for `thermocomp.models.averaged.AveragedDynamic`.
         """
         usual = usual_step(step)
         # where the spindle was stopped in the rows learned from, it may have turned before
@@ -125,11 +125,11 @@ class PacedFeatures:
         ----------
         rows : ndarray of shape (n_rows, n_inputs)
         targets : ndarray of shape (n_rows, n_targets)
-            What is predicted.
+            Predicted quantities.
         step : ndarray of shape (n_rows,)
             [s]
         parts : ndarray of int of shape (n_rows,)
-            What is left out together; -1 is not learned from.
+            Part of each row; a part is left out together; -1 is not used for training.
         noise : float
             Standard deviation of the temperatures in use [degC].
         """

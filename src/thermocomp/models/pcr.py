@@ -20,7 +20,7 @@ class PrincipalComponents(ComponentRegressor):
     max_components : int, optional
         Most to choose from; as many as inputs if not given.
     rule : {'one-standard-error', 'minimum'}
-        How the number of components is chosen.
+        Rule by which the number of components is chosen.
     fit_intercept : bool
         False: the model gives zero in the reference state, and the components are those about zero.
 

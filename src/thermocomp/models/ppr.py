@@ -40,7 +40,7 @@ class ProjectionPursuit(CycledRegressor):
     degrees : sequence of float
         Degrees of freedom of each curve to choose from, above 2 (a straight line).
     rule : {'one-standard-error', 'minimum'}
-        How the number of terms is chosen, within the best degrees of freedom.
+        Rule by which the number of terms is chosen, within the best degrees of freedom.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class ProjectionPursuit(CycledRegressor):
     cv_rms_ : float
         Mean over the cycles left out of their RMS, at the choice [unit of y].
     chosen_by_ : str
-        What was left out to choose.
+        Units left out for the choice.
     data_min_, data_max_ : ndarray of shape (n_features,)
         Trained range.
 

@@ -73,7 +73,7 @@ class ShrunkRegressor(CycledRegressor, TermRegressor):
     cv_rms_ : float
         Mean over the cycles left out of their RMS, at the choice [unit of y].
     chosen_by_ : str
-        What was left out to choose.
+        Units left out for the choice.
     r_squared_, adjusted_r_squared_, standard_error_, n_effective_, condition_ : float
         See `thermocomp.models.linear.TermRegressor`; each coefficient that is not 0 counts as a parameter.
     dependent_ : tuple of str
@@ -159,7 +159,7 @@ class ComponentRegressor(ShrunkRegressor):
     max_components : int, optional
         Most to choose from; as many as inputs if not given.
     rule : {'one-standard-error', 'minimum'}
-        How the number of components is chosen.
+        Rule by which the number of components is chosen.
     fit_intercept : bool
         False: the model gives zero in the reference state, and the components are those about zero.
 

@@ -97,7 +97,7 @@ class BestSubset(TermRegressor):
         What the size was chosen by; ``size`` if it was given. After a KeyboardInterrupt the search stops with what it
         has found, and ``bic`` takes the place of ``cycles``.
     chosen_by_ : str
-        What was left out to choose; empty if nothing was.
+        Units left out for the choice; empty if none were.
     terms_, coef_, intercept_, r_squared_, adjusted_r_squared_, standard_error_, n_effective_, condition_
         See `thermocomp.models.linear.TermRegressor`.
 

@@ -267,7 +267,7 @@ def derive_steps(time: FloatArray, index: object = None, *, fitting: bool = Fals
     time : ndarray of shape (n_rows,)
         [s]; a row that is not later than the one before starts a new test.
     index : pandas.Index, optional
-        Of the rows; whole numbers show rows that were left out.
+        Index of the rows; whole numbers show rows that were left out.
     fitting : bool
         Also refuse what is too short to be learned from.
 

@@ -50,7 +50,7 @@ class Trained:
     r_squared : float
         In-sample, about the mean.
     predicted : ndarray of shape (n_rows,)
-        What the estimator says of every row; nan where an input is missing.
+        Predictions of the estimator for every row; nan where an input is missing.
     """
 
     method: str
@@ -76,7 +76,7 @@ class FittedMethod:
     seconds : float
         The fit took [s].
     predicted : ndarray of shape (n_rows,)
-        What it says of every row; nan where an input is missing.
+        Predictions for every row; nan where an input is missing.
     left_out : ndarray of shape (n_rows, 2) or None
         What it would have said of a row without that row's cycle, and the spread of its structures; nan where it has
         not learned. None: it does not tell.
@@ -185,7 +185,7 @@ def train(
     Parameters
     ----------
     name, samples, target, learn
-        Of `fit_method`.
+        As for `fit_method`.
     support : Support
         For the frozen model.
     prints : bool

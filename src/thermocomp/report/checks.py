@@ -30,7 +30,7 @@ def render(recordings: Sequence[Recording], findings: Sequence[Sequence[Finding]
     ----------
     recordings : sequence of Recording
     findings : sequence of sequence of Finding
-        Of each recording, the gravest first.
+        Findings of each recording, the most serious first.
 
     Returns
     -------

@@ -74,7 +74,7 @@ def add_legend(where: Axes | Figure, **how: Any) -> None:
     where : Axes or Figure
         A figure's legend has each label of its axes once.
     **how
-        Of matplotlib's ``legend``.
+        Keyword arguments of matplotlib's ``legend``.
     """
     if isinstance(where, Axes):
         named = list(_labelled(where))
@@ -108,7 +108,7 @@ def name_ticks(axis: Axis, names: Sequence[str], longest: int = _NAME, **how: An
     longest : int
         Characters that find room.
     **how
-        Of the labels, such as ``fontsize``.
+        Properties of the labels, such as ``fontsize``.
     """
     axis.set_ticks(range(len(names)), [shorten(name, longest) for name in names], **how)
 

@@ -126,7 +126,7 @@ def draw_timeline(log: FaultLog, recording: Recording) -> Drawn:
     ----------
     log : FaultLog
     recording : Recording
-        Of it.
+        Recording of the log.
 
     Returns
     -------

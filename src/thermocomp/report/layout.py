@@ -78,10 +78,10 @@ class Layout:
     ----------
     columns : sequence of Column
     rows : sequence
-        What the columns take their values from: records, tuples or results.
+        Source of the column values: records, tuples or results.
     title : str
     caption : str
-        What its numbers are; a page says it in its own words around the table.
+        Meaning of the numbers; a page explains it in its text around the table.
     note : str
         A paragraph below it.
     tones : dict of int to str

@@ -12,7 +12,7 @@ def describe_losses(models: Sequence[ErrorModel]) -> Iterator[str]:
     Parameters
     ----------
     models : sequence of ErrorModel
-        Of one file.
+        Models of one file.
 
     Yields
     ------

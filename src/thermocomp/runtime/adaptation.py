@@ -89,7 +89,7 @@ class Adaptation(NamedTuple):
         time : array of shape (...,)
             [s]
         directions : ndarray of shape (..., n_directions)
-            Of the model there, see `ErrorModel.directions` [um].
+            Directions of the model at that time, see `ErrorModel.directions` [um].
 
         Returns
         -------
@@ -126,7 +126,7 @@ def find_most(size: float, drift: float, magnitude: float) -> float:
     drift : float
         The same without compensation: an error of a thermal model is no larger than what heat does to the machine [um].
     magnitude : float
-        What a correction may be at most [um].
+        Largest permitted correction [um].
 
     Returns
     -------
@@ -170,19 +170,19 @@ def take(
     ----------
     before : Adaptation
     directions : ndarray of shape (n_directions,)
-        Of the model when it was made [um].
+        Directions of the model at the time of the probing [um].
     time : float
-        When it was made [s].
+        Time of the probing [s].
     error : float
-        What was measured, minus what the model said without any probing [um].
+        Measured error minus the output of the model without any probing [um].
     repeatability : float
-        Of the probe, standard deviation [um].
+        Repeatability of the probe, standard deviation [um].
 
     Returns
     -------
     Adaptation
     str
-        Why the probing is refused, and nothing is learned from it; empty if it is taken.
+        Reason why the probing is refused and not used; empty if it is used.
     """
     if not (np.isfinite(error) and 0.0 <= repeatability < np.inf):
         return before, f"{error} um with a repeatability of {repeatability} um: want finite numbers"

@@ -37,10 +37,10 @@ def advance(
     ----------
     groups : sequence of Group
     states, gathered : sequence of State, Gathered
-        Of the models.
+        States of the models.
     reading : Reading
     time : float
-        When it was taken [s].
+        Time of the reading [s].
     dt : float
         Since the reading before [s].
 

@@ -54,7 +54,7 @@ def run(
     Parameters
     ----------
     model : ErrorModel
-        Of any unit; refused or not: it is being judged.
+        Model of any unit; refused or not: it is being judged.
     limits : Limits or None
         None: the correction follows the model at once, as for a model that predicts another unit than that of limits.
     time : ndarray of shape (n_rows,)
@@ -62,7 +62,7 @@ def run(
     values : ndarray of shape (n_rows, n_inputs)
         In the order of the model's inputs; nan where a value is missing.
     reference : array-like of shape (n_inputs,), optional
-        What counts as zero; see `ErrorModel.init`.
+        Zero of the inputs; see `ErrorModel.init`.
     resting : ndarray of bool of shape (n_rows,), optional
         The spindle is known to be stopped; nowhere if not given.
     anew : int, optional
@@ -73,7 +73,7 @@ def run(
     probed : ndarray of shape (n_rows,), optional
         Deviation that a probing says, nan where there was none: it counts from the next row on [um].
     repeatability : float
-        Of the probe, standard deviation [um].
+        Repeatability of the probe, standard deviation [um].
 
     Returns
     -------
@@ -136,7 +136,7 @@ def find_test_zero(
     values : ndarray of shape (n_rows, n_inputs)
     resting, usable : ndarray of bool of shape (n_rows,)
     reference : array-like of shape (n_inputs,), optional
-        What is known of it; see `ErrorModel.init`.
+        Known part of the zero; see `ErrorModel.init`.
 
     Returns
     -------

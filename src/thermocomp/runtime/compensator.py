@@ -159,7 +159,7 @@ class Compensator:
         machine : Machine
             With its components.
         at : array-like of shape (3,)
-            Where the other axes stand while one moves [mm].
+            Positions of the other axes while one moves [mm].
         tool : array-like of shape (3,), optional
             From the gauge point to the tip [mm]; the machine's own if not given.
         limits : Limits
@@ -349,7 +349,7 @@ class Compensator:
         tick : float
             The monotone clock of the process, now [s].
         why : str
-            Why there is none.
+            Reason why there is none.
 
         Returns
         -------

@@ -31,9 +31,9 @@ class Fleet:
     model : LinearDynamic
         Accepted, or taken by somebody; each signal a single input, and readings outside the trained range clipped.
     zeros : array-like of shape (n_machines, n_inputs)
-        What counts as zero at each machine.
+        Zero of the inputs at each machine.
     limits : Limits
-        Of all of them.
+        Limits of all of them.
     dtype : dtype
         ``float32`` is half the memory and time; it differs from ``float64`` by less than 1e-3 um.
 
@@ -98,7 +98,7 @@ class Fleet:
         Returns
         -------
         ndarray of bool of shape (n_machines,)
-            Whose reading was used. The others stay where they are for `Limits.hold`, then fade.
+            Machines whose reading was used. The others stay where they are for `Limits.hold`, then fade.
 
         Raises
         ------

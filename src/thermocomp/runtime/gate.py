@@ -47,7 +47,7 @@ def explain_implausible(model: ErrorModel, values: Sequence[object], reference: 
     values : sequence of shape (n_inputs,)
         As a source gave them; None is a value that is missing.
     reference : sequence of float of shape (n_inputs,)
-        What counts as zero; nan where it is not known yet.
+        Zero of the inputs; nan where it is not known yet.
 
     Returns
     -------
@@ -152,7 +152,7 @@ class Ranges:
         values : sequence of shape (n_inputs,)
             As a source gave them.
         reference : ndarray of shape (n_inputs,)
-            What counts as zero; nan where it is not known yet.
+            Zero of the inputs; nan where it is not known yet.
         """
         known, ranges = self._of
         if known is not reference:

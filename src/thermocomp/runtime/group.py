@@ -21,9 +21,9 @@ class Group:
     Parameters
     ----------
     models : sequence of ErrorModel
-        Of a compensator.
+        Models of a compensator.
     members : sequence of int
-        Which of them.
+        Indices of the members.
     """
 
     def __init__(self, models: Sequence[ErrorModel], members: Sequence[int]) -> None:
@@ -63,7 +63,7 @@ class Group:
         deviations : list of float
             One per model [its unit].
         half_widths : list of float
-            Of the bands about them; nan without one.
+            Half-widths of their bands; nan without one.
         """
         lead = states[0]
         if self._together is None or any(

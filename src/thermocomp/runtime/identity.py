@@ -41,7 +41,7 @@ def remember(state: CompensatorState, probings: Mapping[str, Probing], time: flo
     state : CompensatorState
     probings : mapping of str to Probing
     time : float
-        Of the state, now [s].
+        Present time of the state [s].
     """
     found = dict(state.probed)
     for target, probing in probings.items():

@@ -70,11 +70,11 @@ def evaluate(
     ----------
     line : DeviationLine
     models : sequence of ErrorModel
-        Of the compensator.
+        Models of the compensator.
     spoken : Advanced
-        What they say.
+        Outputs of the models.
     time : float
-        Of the reading [s].
+        Time of the reading [s].
     learned : Adaptation or None
         From the probings before.
     probing : Probing or None
@@ -82,9 +82,9 @@ def evaluate(
     failed : collection of str
         Sensors that are not believed.
     zero : Deviation
-        What is taken off what the models say: where the target counts from.
+        Deviation subtracted from the outputs of the models: the zero of the target.
     magnitude : float
-        What a correction may be at most [um]: no probing moves the deviation further.
+        Largest permitted correction [um]: no probing moves the deviation further.
 
     Returns
     -------

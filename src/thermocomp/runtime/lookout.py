@@ -32,7 +32,7 @@ class Lookout:
         state : WatchState
             Before the reading.
         time : float
-            When it was taken [s].
+            Time of the reading [s].
         values : mapping of str to float
             As a source gave them, by channel.
         """

@@ -84,12 +84,12 @@ def rezero(
     why : str
         For the ledger, such as ``homing`` or ``work offset, by M. Weber``.
     in_force : Correction, optional
-        What the controller says is in force now; the last one without it.
+        Correction now in force as reported by the controller. Default: the last one.
 
     Returns
     -------
     CompensatorState
-        What was learned from probings is gone: it counted from the zero before.
+        State without the results of probings, which were relative to the previous zero.
 
     Raises
     ------

@@ -107,11 +107,11 @@ def resume(
     state : CompensatorState
         As it was saved.
     cold : CompensatorState
-        Of a compensator that starts.
+        State of a compensator that starts.
     age : float
         Since the last reading in it [s].
     in_force : mapping of str to Correction, optional
-        What the controller says is in force; what was saved without it.
+        Correction in force as reported by the controller. Default: the saved one.
     tick : float, optional
         The monotone clock of the process, now: what goes by until the first reading is part of the outage, too [s].
 

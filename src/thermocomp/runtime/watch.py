@@ -72,7 +72,7 @@ def begin(watch: Watch, reference: FloatArray | None = None, runs: tuple[int, ..
     ----------
     watch : Watch
     reference : ndarray of shape (n_inputs,), optional
-        What counts as zero; without it the first readings decide for inputs with ``rezero``.
+        Zero of the inputs; without it the first readings decide for inputs with ``rezero``.
     runs : tuple of int
         Shape of a batch of runs.
     """
@@ -123,7 +123,7 @@ def look(
     state : WatchState
         From `begin` or the previous `look`.
     time : float
-        Of the reading, later than the last [s].
+        Time of the reading, later than the last [s].
     values : ndarray of shape (..., n_inputs)
         In the order of the watch's inputs; nan where a value is missing. Without its speeds nothing is predicted: it
         is passed on as it is.

@@ -134,7 +134,7 @@ def learning_curve(
     jobs : int
         Processes to share the work among; -1 takes all cores.
     seed : int
-        Of the draw.
+        Seed of the draw.
     progress : callable
         Called with a line of text after each piece of work; there are `n_pieces` of them.
 

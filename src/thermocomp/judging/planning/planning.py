@@ -42,9 +42,9 @@ class Candidate:
     doubt : float
         Error that is expected in the test itself, mean over the targets [um].
     gain : float
-        What it is expected to take from the error over all tests of the grid, mean over the targets [um].
+        Expected reduction of the error over all tests of the grid, mean over the targets [um].
     news : str
-        What in it was not there so far; empty if nothing.
+        New conditions in the test; empty if there are none.
     """
 
     trial: Trial
@@ -62,7 +62,7 @@ class Covered:
     runs : tuple of (float, float, float)
         Mean speed [1/min] and length [s] of each run, and length of the stop after it [s]; 0 without one.
     rooms : tuple of float
-        How far the room's temperature changed within each test [degC]; none: it is not known.
+        Change of the ambient temperature within each test [degC]; none: it is not known.
     """
 
     runs: tuple[tuple[float, float, float], ...]
@@ -120,9 +120,9 @@ class Plan:
         Error over all tests of the grid as things are, mean over the targets [um]. Of the same calculation as the
         gains; an order of size, no judged error.
     top_speed, hours, swing : float
-        What the grid was made with [1/min], [h], [degC].
+        Settings of the grid [1/min], [h], [degC].
     covered : Covered
-        What was recorded so far.
+        Conditions recorded so far.
     """
 
     candidates: tuple[Candidate, ...]
@@ -139,7 +139,7 @@ def make_grid(top_speed: float, hours: float) -> tuple[Trial, ...]:
     Parameters
     ----------
     top_speed : float
-        Of the machine [1/min].
+        Maximum spindle speed of the machine [1/min].
     hours : float
         Each lasts so long, after a stop of 15 min [h].
 
@@ -180,9 +180,9 @@ def plan(samples: Samples, top_speed: float | None = None, *, hours: float = 12.
     Parameters
     ----------
     samples : Samples
-        Of the recordings so far.
+        Samples of the recordings so far.
     top_speed : float, optional
-        Of the machine [1/min]; the highest recorded one if not given.
+        Maximum spindle speed of the machine [1/min]. Default: the highest recorded speed.
     hours : float
         Length of a test [h].
     swing : float

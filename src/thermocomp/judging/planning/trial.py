@@ -18,7 +18,7 @@ class Trial:
         repeated: short runs and stops in turn; stop: a run, then a stop as long; run: a run without a stop; room: the
         spindle is stopped while the temperature of the room changes.
     speed : float
-        Of the spindle [1/min].
+        Spindle speed [1/min].
     steps : tuple of (float, float)
         Speed [1/min] and duration [s], one after the other; the first is the stop before the start.
     """

@@ -41,7 +41,7 @@ class Phase:
     ----------
     kind : {'warm-up', 'cool-down'}
     number : int
-        Of its kind, from 1.
+        Number among those of its kind, from 1.
     start, end : int
         Row of the state it begins in, and its last row.
     """
@@ -63,7 +63,7 @@ class Settling:
     change : float
         Value at the end minus that at the start, both averaged [unit].
     uncertainty : float
-        Of `change`, expanded (k = 2) [unit].
+        Uncertainty of `change`, expanded (k = 2) [unit].
     noise : float
         Standard deviation from row to row [unit].
     moves : bool
@@ -230,7 +230,7 @@ def settle(
     channel, unit : str
     phase : Phase
     lead : int
-        So many rows come before the phase: what it starts from is averaged over them.
+        Number of rows before the phase over which its initial value is averaged.
     rests : bool
         The machine has rested in these rows.
 

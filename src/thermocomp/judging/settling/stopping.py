@@ -43,7 +43,7 @@ class SteadyState:
     final : float
         Value it tends to, counted from the start of the phase [unit].
     uncertainty : float
-        Of that, expanded (k = 2) [unit]; inf where too little was recorded.
+        Expanded uncertainty of that (k = 2) [unit]; inf where too little was recorded.
     change : float
         Last value, counted from the start of the phase [unit].
     largest : float
@@ -77,7 +77,7 @@ class Running:
     seconds : float
         It has lasted so long [s].
     states : tuple of (str, SteadyState)
-        Of each target, by name.
+        State of each target, by name.
     """
 
     phase: Phase
@@ -166,7 +166,7 @@ def judge_running(recording: Recording, targets: Sequence[str]) -> Running:
     Parameters
     ----------
     recording : Recording
-        Of the test, up to now.
+        Recording of the test, up to now.
     targets : sequence of str
         Displacements.
 

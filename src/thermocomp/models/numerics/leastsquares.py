@@ -24,7 +24,7 @@ class Triangle:
     factor : ndarray of shape (min(n_rows, n_columns + 1), n_columns + 1)
         R of the QR factorisation; the last column is that of y.
     centre : ndarray of shape (n_columns + 1,)
-        What was subtracted from the columns: their means, or zeros without an intercept.
+        Offsets subtracted from the columns: their means, or zeros without an intercept.
     n_rows : int
     intercept : bool
     """
@@ -169,7 +169,7 @@ def solve(X: FloatArray, y: FloatArray, tri: Triangle, *, columns: Sequence[int]
     X : ndarray of shape (n_rows, n_columns)
     y : ndarray of shape (n_rows,)
     tri : Triangle
-        Of [X y].
+        Triangle of [X y].
     columns : sequence of int, optional
         Fit these only: ``Solution.coefficients`` and ``Solution.dependent`` go by their order.
 

@@ -39,7 +39,7 @@ class MaximalCorrelations:
     Parameters
     ----------
     psi : ndarray of shape (n_displacements, n_subsets, n_tests)
-        Of models that were not reached before the work was stopped: nan.
+        Psi; nan for models that were not reached before the work was stopped.
     subsets : tuple of tuple of int
         Indices of the temperatures.
     tests : tuple of str

@@ -81,7 +81,7 @@ def compute_orders(
     Parameters
     ----------
     tri : Triangle
-        Of dz(t-1) .. dz(t-K), all inputs at t, all inputs at t-1, .. at t-M, and dz(t).
+        Triangle of dz(t-1) .. dz(t-K), all inputs at t, all inputs at t-1, .. at t-M, and dz(t).
     n_inputs : int
     ks, ms : sequence of int
         Orders wanted; K and M are the greatest of them.

@@ -22,7 +22,7 @@ class SensorSets:
     Parameters
     ----------
     sets : tuple of tuple of int
-        Of 1, 2, ... temperatures, each their places in ``PacedFeatures.temperatures``; the last holds all.
+        Sets of 1, 2, ... temperatures, as indices into ``PacedFeatures.temperatures``; the last holds all.
     error : ndarray of shape (n_sets, n_targets)
         Mean root mean square error on what was left out [unit of the target].
     loss : ndarray of shape (n_sets, n_targets)
@@ -127,13 +127,13 @@ def reduce_sensors(
     ----------
     features : PacedFeatures
     moments : Moments
-        Of all targets.
+        Moments of all targets.
     noise : float
         Standard deviation of the temperatures in use [degC].
     most : int
         Largest set, beside that of all.
     structures : int
-        Of the model with all temperatures.
+        Structures of the model with all temperatures.
     random_state : int
 
     Returns

@@ -107,9 +107,9 @@ class Kinematics:
         Returns
         -------
         error : ndarray of shape (..., 3)
-            Of the tool's tip, actual minus commanded, along X, Y, Z [um].
+            Error of the tool tip, actual minus commanded, along X, Y, Z [um].
         tilt : ndarray of shape (..., 3)
-            Of the tool about X, Y, Z [urad].
+            Tilt of the tool about X, Y, Z [urad].
         """
         # the error is a sum of products: value of a component times 1, x, y or z
         shape = np.broadcast_shapes(values.shape[:-1], points.shape[:-1])

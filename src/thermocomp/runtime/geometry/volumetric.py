@@ -109,7 +109,7 @@ class VolumetricModel:
         Parameters
         ----------
         deviations : ndarray of shape (n_models,)
-            What the models of `stack` say.
+            Outputs of the models of `stack`.
         """
         uniform = self._constants.copy()
         components, models = self._of_time
@@ -171,7 +171,7 @@ class ThermalStates:
     time : ndarray of shape (n,)
         [s]
     deviations : ndarray of shape (n, n_models)
-        What the models of ``model.stack`` say.
+        Outputs of the models of ``model.stack``.
     """
 
     model: VolumetricModel
