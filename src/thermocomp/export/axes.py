@@ -25,7 +25,7 @@ def find_drives(tables: Tables, named: Mapping[str, str]) -> list[Drive]:
     Parameters
     ----------
     tables : Tables
-        Of the compensator.
+        Tables of the compensator.
     named : mapping of str to str
         Axes by target; those of the names, such as z_um, if there are none.
 
@@ -76,7 +76,7 @@ def write_values(
     Parameters
     ----------
     name : str
-        Of the block.
+        Name of the block.
     dialect : {'codesys', 'twincat', 'scl'}
     drives : list of Drive
     taken : mapping of str to Value

@@ -15,11 +15,11 @@ class Facts:
     source : str
         Model file.
     sha256 : str
-        Of that file.
+        SHA-256 of that file.
     version : str
         thermocomp version that exports.
     date : str
-        Of the export.
+        Date of the export.
     left_out : mapping of str to str
         Targets of the model file that are not in the export, and why.
     """

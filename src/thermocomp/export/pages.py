@@ -11,7 +11,7 @@ def describe(compensator: Compensator, tables: Tables, of: str = "") -> dict[str
     ----------
     compensator : Compensator
     tables : Tables
-        Of it.
+        Tables of the compensator.
     of : str
         Before the names of what comes out.
     """

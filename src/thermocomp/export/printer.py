@@ -19,7 +19,7 @@ class Printer(ABC):
     ----------
     function : Function
     sizes : mapping of str to int
-        Of the block's tables.
+        Sizes of the block's tables.
     """
 
     #: by the type of the syntax tree

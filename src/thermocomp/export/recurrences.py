@@ -11,7 +11,7 @@ class Clock:
     Parameters
     ----------
     tick : Node
-        What it becomes.
+        New value.
     interval : float
         From tick to tick [s].
     """

@@ -33,7 +33,7 @@ class ExportOrder:
     target : Target
     limits : Limits
     name : str
-        Of the files.
+        Name of the files.
     facts : Facts
     options : ReductionOptions
     """
@@ -71,9 +71,9 @@ def export_reduced(
     recordings : sequence of Recording
         That they are reduced on.
     starts : Start or sequence of Start, optional
-        How the recordings begin.
+        Initial state of the recordings.
     accept_unproven : str or None
-        Who takes an unproven model, and why.
+        Person who approves use of an unproven model, and reason.
     listener : Listener
 
     Raises

@@ -61,12 +61,12 @@ def replay(
     ----------
     compensator : Compensator
     tables : Tables
-        Of it.
+        Tables of the compensator.
     readings : Readings
     start : CompensatorState, optional
         Another one than that of `Compensator.start`.
     rounded : callable, optional
-        What becomes of all numbers that are kept between two calls.
+        Rounding of all numbers that are kept between two calls.
     """
     names, targets = [c.name for c in tables.channels], tables.targets
     state, clock, begun, rows = start or compensator.start(), 0.0, False, []
@@ -129,7 +129,7 @@ def find_tolerance(tables: Tables) -> float:
     Parameters
     ----------
     tables : Tables
-        Of the compensator.
+        Tables of the compensator.
 
     Returns
     -------

@@ -85,9 +85,9 @@ class PositioningResult:
     repeatability : ndarray of shape (n_targets,) or None
         Bidirectional R of each target.
     A, E, M, R, B, B_mean : float
-        Of the axis.
+        Characteristic values of the axis.
     notes : tuple of str
-        Where the test falls short of what the standard wants.
+        Deviations of the test from the requirements of the standard.
     """
 
     test: Positioning

@@ -108,9 +108,9 @@ def assess(
         Of displacements or angles of the recording: what they leave is told beside each quantity. They are replayed
         reading by reading from the start of the recording, as a compensator would run them.
     start : Start, optional
-        How the recording begins; found out if not given.
+        Initial state of the recording. Default: determined from the recording.
     limits : Limits
-        Of the compensator.
+        Limits of the compensator.
 
     Returns
     -------

@@ -140,7 +140,7 @@ def time_constant_tables(settlings: Sequence[Settling]) -> tuple[Table, ...]:
     Parameters
     ----------
     settlings : sequence of Settling
-        Of one recording.
+        Settlings of one recording.
 
     Returns
     -------

@@ -134,9 +134,9 @@ class ThermalCurve:
         The same averaged: what `figures` tells.
     figures : Figures
     settling : Settling or None
-        How fast it follows the start of the drives; None if they never start.
+        Settling after the start of the drives; None if they never start.
     after : ndarray of shape (n_rows,) or None
-        What a model leaves of it; None without a model.
+        Residual with a model; None without a model.
     after_course : AveragedCurve or None
     after_figures : Figures or None
     """
@@ -160,7 +160,7 @@ class Targets:
     Parameters
     ----------
     name : str
-        What the channels' names begin with, such as ``x_laser``.
+        Prefix of the channels' names, such as ``x_laser``.
     axis : {'X', 'Y', 'Z'}
     positions : ndarray of shape (n_targets,)
         Rising [mm].
@@ -196,9 +196,9 @@ class ThermalTest:
         Its first row, from which everything is counted, the one in which the drives stop (`end` if they do not), and
         its last one.
     load : str
-        What the spindle or the axis did, in words.
+        Load of the spindle or the axis, in words.
     curves : tuple of ThermalCurve
-        Of every displacement and angle that is not a target.
+        Curves of every displacement and angle that is not a target.
     tilts : tuple of ThermalCurve
         From paired probes [urad].
     pairs : tuple of Pair
@@ -209,7 +209,7 @@ class ThermalTest:
     ambient_range : tuple of float
         Its lowest and highest value during the test [degC]; nan if there is none.
     notes : tuple of str
-        What one should know before relying on the figures.
+        Cautions on the characteristic values.
     """
 
     kind: Kind

@@ -35,7 +35,7 @@ class Page:
     Parameters
     ----------
     host, port : str, int
-        Where it is served; loopback unless it is stated otherwise.
+        Address of the page. Default: loopback.
     hosts : tuple of str
         Names by which it may be called beside `host`, ``localhost`` and the addresses of this computer.
     token_file : str
@@ -76,7 +76,7 @@ class MachineOf:
     ----------
     file : str
     at : tuple of 3 float
-        Where the other axes stand while one moves [mm].
+        Positions of the other axes while one moves [mm].
     tool : tuple of 3 float or None
         From the gauge point to the tip [mm]; the machine file's own if not given.
     """
@@ -97,7 +97,7 @@ class JournalOut:
     size_mb : float
         A file that has become larger is followed by a new one.
     files : int
-        So many at most: the oldest is removed.
+        Maximum number of files: the oldest is removed.
     channels : dict of str to str
         Quantity of what readings hold beside the models' inputs, such as ``{t9_C = "temperature"}``: kept, too. A
         displacement that is named as a target measures what its correction leaves.
@@ -125,12 +125,12 @@ class Config:
     Parameters
     ----------
     sources, sinks : tuple
-        Where readings come from, where corrections go.
+        Sources of readings, receivers of corrections.
     models : tuple of str
         Model files, a target each model; or none, and a machine.
     machine : MachineOf or None
     probes : tuple
-        Where measurements of the tool point come from.
+        Sources of measurements of the tool point.
     state : str
         File that the state is kept in; without one every start is a cold one.
     limits : Limits
@@ -143,7 +143,7 @@ class Config:
     own_compensation : {'on', 'off', 'unknown'}
         Whether the controller compensates for temperature by itself.
     at_stop : {'hold', 'fade'}
-        When it is stopped corrections stay as they are, or go to zero first, within the limits.
+        Corrections after a stop: stay as they are, or go to zero first, within the limits.
     """
 
     sources: tuple[SourceSection, ...]

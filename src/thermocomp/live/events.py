@@ -19,7 +19,7 @@ class Event:
     Parameters
     ----------
     time : float
-        Of the machine, seconds since 1970.
+        Time of the machine, seconds since 1970.
     kind : str
         ``reference``, ``state``, ``sensor``, ``probing``, ``link`` or ``service``.
     text : str
@@ -44,9 +44,9 @@ class Events(deque[Event]):
         Parameters
         ----------
         time_of_it : float
-            Of the machine, seconds since 1970.
+            Time of the machine, seconds since 1970.
         kind, text : str
-            Of `Event`; what cannot be printed is shown escaped.
+            As for `Event`; unprintable characters are shown escaped.
         """
         if (lately := self._lately.get(kind)) is not None:
             now = time.monotonic()

@@ -46,7 +46,7 @@ class ProbingLedger:
         found : Measurement
         state : CompensatorState
         in_force : Correction or None
-            When it was made; None: not known.
+            Correction at the time of the measurement; None: unknown.
         """
         probing = Probing(found.measured, found.repeatability, found.position, found.keys)
         if found.left and in_force is not None:
@@ -104,7 +104,7 @@ class ProbingLedger:
         state : CompensatorState
             After it.
         recorder : Recorder or None
-            Of the journal.
+            Recorder of the journal.
         """
         for target, probing in probings.items():
             if target in said.deviations:

@@ -36,10 +36,10 @@ class Service:
     sinks : sequence of Sink
     clock : ServiceClock
     state_path : Path or None
-        Where the state is kept.
+        Path of the saved state.
     probes : sequence of Probe
     recorder : Recorder or None
-        Of the journal.
+        Recorder of the journal.
     """
 
     compensator: Compensator

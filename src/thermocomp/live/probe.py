@@ -36,7 +36,7 @@ def check(
     Parameters
     ----------
     time : float
-        Of the machine [s].
+        Time of the machine [s].
     target : str
     probing : Probing
     predicted : Deviation

@@ -66,7 +66,7 @@ def dumps(state: CompensatorState, compensator: Compensator, written: datetime) 
     ----------
     state : CompensatorState
     compensator : Compensator
-        Whose state it is.
+        Compensator of the state.
     written : datetime
         Now, with its time zone.
 
@@ -92,9 +92,9 @@ def loads(text: str, compensator: Compensator, source: str = "state") -> Saved:
     ----------
     text : str
     compensator : Compensator
-        Whose state it must be.
+        Compensator expected in the file.
     source : str
-        What to call it in an error.
+        Name of the source in an error.
 
     Raises
     ------
@@ -139,7 +139,7 @@ def read(path: str | Path, compensator: Compensator) -> Saved:
     ----------
     path : str or Path
     compensator : Compensator
-        Whose state it must be.
+        Compensator expected in the file.
 
     Raises
     ------

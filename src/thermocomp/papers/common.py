@@ -130,7 +130,7 @@ def cut_off(samples: Samples, name: str) -> Samples:
     ----------
     samples : Samples
     name : str
-        Of the input.
+        Name of the input.
 
     Returns
     -------
@@ -171,9 +171,9 @@ def fit_and_freeze(
     samples : Samples
         Its inputs are the features, see `Samples.only`.
     targets : sequence of str
-        Of several, one estimator learns them all at once: a net with as many outputs.
+        Targets; of several, one estimator learns them all at once: a net with as many outputs.
     support : Support
-        What the frozen models do outside the trained range.
+        Behaviour of the frozen models outside the training range.
     **fit
         For the estimator's ``fit``, such as ``cycle=samples.cycle`` and ``dt=samples.dt()``.
 
@@ -212,7 +212,7 @@ def trained(method: str, samples: Samples, target: int = 0, support: Support = S
     target : int
         Place of the target.
     support : Support
-        What the model does outside the trained range.
+        Behaviour of the model outside the training range.
 
     Returns
     -------
@@ -231,7 +231,7 @@ def frozen(
     samples : Samples
         It was fitted to.
     columns : sequence of int
-        Of the inputs.
+        Indices of the inputs.
     coefficients : sequence of float
     intercept : float
         [unit of the target]
@@ -327,7 +327,7 @@ def table(caption: str, items: Iterable[_Item], columns: Mapping[str, Callable[[
     caption : str
     items : iterable
     columns : mapping of str to callable
-        What is written of an item, by what stands above it.
+        Functions for the cells of an item, by column heading.
 
     Returns
     -------
@@ -345,7 +345,7 @@ def errors_table(caption: str, residuals: Mapping[tuple[str, str], FloatArray], 
     residuals : mapping of (str, str) to ndarray
         Residual by what is judged and by method, such as ``("z, 1250 1/min", "no compensation")``.
     unit : str
-        Of the residuals.
+        Unit of the residuals.
 
     Returns
     -------

@@ -28,11 +28,11 @@ class Step:
     Parameters
     ----------
     channels : tuple of str
-        What it concerns, by channel name.
+        Channels concerned, by name.
     do : str
-        Which one.
+        Operation.
     reason : str
-        Why, in words; it is reported with the step.
+        Reason, in words; it is reported with the step.
     """
 
     channels: tuple[str, ...] = ()
@@ -115,7 +115,7 @@ class Shift(Step):
     Parameters
     ----------
     by_s : float
-        What is added to their time [s].
+        Offset added to their time [s].
     """
 
     by_s: float = 0.0
@@ -158,7 +158,7 @@ class Rezero(Step):
     at : float or str
         Time of the first row that is moved.
     to : float, optional
-        What the value there becomes, in the house unit; without it the channel continues as it went before.
+        New value there, in the internal unit. Default: the channel continues as it went before.
     until : float or str, optional
         Time of the first row that is not moved any more; without it the rest of the test is moved.
     """

@@ -151,7 +151,7 @@ def hash_runs(x: FloatArray, step: float, stride: int, length: int = LENGTH) -> 
     ----------
     x : ndarray of shape (n_rows,)
     step : float
-        What differences are rounded to [unit of x].
+        Step to which differences are rounded [unit of x].
     stride : int
         Rows between the rows of a run.
     length : int

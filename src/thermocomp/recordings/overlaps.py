@@ -21,7 +21,7 @@ def overlap(prints: Prints, samples: Samples, target: int) -> IntArray:
     Parameters
     ----------
     prints : Prints
-        Of the rows that were learned from.
+        Fingerprints of the training rows.
     samples : Samples
     target : int
         Index into ``samples.targets``; it is looked up under the target's prints whatever its name.

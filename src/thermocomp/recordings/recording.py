@@ -27,7 +27,7 @@ class Recording:
     Parameters
     ----------
     name : str
-        What the test is called; mostly the file's name without its ending.
+        Name of the test; mostly the file's name without its extension.
     time : ndarray of shape (n_rows,)
         Seconds since the first row [s], strictly rising.
     table : DataFrame of shape (n_rows, n_channels)
@@ -47,7 +47,7 @@ class Recording:
     aliases : mapping of str to str
         Other names a channel answers to: the file's own heading, the name without its unit.
     notes : tuple of str
-        What the reader did that a user should know.
+        Notes of the reader for the user.
     changed : tuple of str
         Those of the notes that say what a mapping has changed in the values.
     compensation : {'', 'off', 'known', 'unknown'}
@@ -119,7 +119,7 @@ class Recording:
             Name of a column, or the label of each row's thermal cycle. Without it a column ``cycle``, or the spindle
             speed tells.
         name : str
-            What the test is called.
+            Name of the test.
 
         Returns
         -------

@@ -46,9 +46,9 @@ class Rows:
     aliases : mapping of str to str
         Headings and names without unit to channel names.
     notes : tuple of str
-        What the reader did.
+        Notes of the reader.
     changed : tuple of str
-        What a mapping has changed in the values.
+        Changes of the values by a mapping.
     compensation : str
         Whether a correction was in force, see `Recording`.
     """
@@ -93,7 +93,7 @@ class Rows:
         ----------
         at : float, datetime or str
         owner : str
-            What it belongs to, for messages.
+            Owner, for messages.
 
         Raises
         ------

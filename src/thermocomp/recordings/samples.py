@@ -25,9 +25,9 @@ class Samples:
     Parameters
     ----------
     inputs : tuple of Channel
-        What models may use; never a displacement.
+        Channels that models may use; never a displacement.
     targets : tuple of Channel
-        What they shall predict.
+        Channels to be predicted.
     values : ndarray of shape (n_rows, n_inputs)
         Inputs as recorded, in house units.
     deviations : ndarray of shape (n_rows, n_targets)
@@ -50,7 +50,7 @@ class Samples:
     resting : ndarray of bool of shape (n_rows,), optional
         The spindle is known to be stopped; None: it is known nowhere.
     starts : tuple of Start
-        How each test begins; empty: cold.
+        Initial state of each test; empty: cold.
     stamps : tuple of str
         ISO timestamp of each test's first row, that of an earlier file it continues from; empty: not known.
     trouble : tuple of (str, str)

@@ -41,9 +41,9 @@ class Start:
     word : {'cold', 'continued', 'rezeroed', 'known'}
         See `WORDS`.
     why : str
-        How that is known: stated, or found out.
+        Origin of that state: stated, or determined from the recording.
     earlier : tuple of Recording
-        What the machine went through before, in the order of time.
+        Earlier recordings of the machine, in chronological order.
     gap : float or None
         From the last row of each of them to the first row of what follows [s]; None: from their time stamps, or else
         one sampling interval.
@@ -119,7 +119,7 @@ def bridge_files(start: Start, recording: Recording) -> tuple[Start, FloatArray]
     start : Start
         With its gaps told.
     begins : ndarray of shape (n_earlier + 1,)
-        When each earlier file and the recording itself begin, since the first of them [s].
+        Start of each earlier file and of the recording itself, since the first of them [s].
 
     Raises
     ------
@@ -164,7 +164,7 @@ def find_starts(
     targets : sequence of Channel
         Displacements that are judged or learned from.
     zeroing : Zeroing
-        What counts as the start.
+        Definition of the zero at the start.
     absolute : bool
         Temperatures are taken as they are: their zero is known.
 
@@ -211,7 +211,7 @@ def level(recording: Recording, name: str, zeroing: Zeroing, *, end: bool = Fals
     ----------
     recording : Recording
     name : str
-        Of the channel.
+        Name of the channel.
     zeroing : Zeroing
         Over how long the start is averaged.
     end : bool

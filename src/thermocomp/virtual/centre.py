@@ -31,11 +31,11 @@ class CentreState:
     Parameters
     ----------
     field : ndarray of shape (n_states,)
-        Of the reduced model.
+        State of the reduced model.
     chilling : bool
         The chiller runs.
     slid : float
-        How far the column's foot has slid on the bed [um].
+        Displacement of the column's foot on the bed [um].
     """
 
     field: FloatArray
@@ -55,7 +55,7 @@ class MachiningCentre:
     Parameters
     ----------
     model : ReducedModel
-        Of spindle, column, bed and screws by finite elements, and of the other parts as lumps.
+        Model of spindle, column, bed and screws by finite elements, and of the other parts as lumps.
     heat : HeatSources
     joints : Joints
     longest_step : float

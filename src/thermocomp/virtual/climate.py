@@ -75,12 +75,12 @@ class Climate:
         state : ndarray of shape (2, 3)
             From `init`, or from the steps before.
         start : float
-            When the first step begins, since the start of the test [s].
+            Start of the first step, since the start of the test [s].
         step : float
             [s]
         n_steps : int
         rng : Generator
-            Of the weather.
+            Generator of the weather.
 
         Returns
         -------

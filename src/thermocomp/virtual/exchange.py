@@ -23,13 +23,13 @@ class Exchange:
     Parameters
     ----------
     into : ndarray of shape (n_states + n_watched, n_paths)
-        What a watt along each path does in a step.
+        Effect of a watt along each path in a step.
     difference : ndarray of shape (n_paths, n_watched)
         First side minus second one; the air is no place.
     to_air : ndarray of shape (n_paths, 3)
         Air on the second side.
     mutual : ndarray of shape (n_paths, n_paths)
-        What a watt along each path does to the difference at each.
+        Effect of a watt along each path on the difference at each.
     """
 
     into: FloatArray
@@ -47,7 +47,7 @@ class Exchange:
         ----------
         model : ReducedModel
         operators : Operators
-            Of the step.
+            Operators of the step.
         watched : sequence of str
             Places that `operators` tells of after the step.
         paths : sequence of (str, str or None)
@@ -74,7 +74,7 @@ class Exchange:
         after : ndarray of shape (n_states + n_watched,)
             State after the step without it; is changed.
         extra : ndarray of shape (n_paths,)
-            What each conductance is more than that of the model [W/K].
+            Difference of each conductance from that of the model [W/K].
         air : ndarray of shape (3,)
         """
         apart = self.difference @ after[-self.difference.shape[1] :] - self.to_air @ air

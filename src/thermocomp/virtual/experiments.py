@@ -50,7 +50,7 @@ class SimulatedTest:
         Temperatures [degC]; displacements [um]; spindle speed [1/min], if there is a spindle; feed [mm/min], where axes
         move.
     values : ndarray of shape (n_rows, n_channels)
-        What sensors and probes said; displacements are zero at the start but for the probes' noise.
+        Readings of sensors and probes; displacements are zero at the start but for the probes' noise.
     truth : ndarray of shape (n_rows, n_displacements)
         The displacements without noise and faults, in the order of their channels [um].
     observables : ndarray of shape (n_rows, n_observables) or None
@@ -85,7 +85,7 @@ def simulate(
     ----------
     experiment : Experiment
     seed : int
-        Of weather, noise, and what is drawn by lot; the machine and its sensors stay the same ones.
+        Random seed of weather, noise and random draws; the machine and its sensors stay the same.
     sensor_noise : float, optional
         Standard deviation of the temperature noise [degC] (C-33: 0.4); the sensors' own if not given. The truth does
         not depend on it.
@@ -135,11 +135,11 @@ def run(
     ----------
     machine : VirtualMachine
     kit : Kit
-        What is mounted on it.
+        Equipment mounted on it.
     programme : Programme
-        What is done and what is recorded.
+        Programme of the test, and recorded channels.
     weather, noise : numpy.random.Generator
-        Of the air round the machine, and of sensors and probes.
+        Generators of the ambient air, and of sensors and probes.
     sensor_noise : float, optional
         Standard deviation of the temperature noise [degC]; the sensors' own if not given.
     faults : sequence of SensorFault

@@ -30,25 +30,25 @@ class Fit:
     Parameters
     ----------
     radius, bore, outside : float
-        Of the joint, of the inner part's bore (0: solid) and of the outer part [mm].
+        Radii of the joint, of the inner part's bore (0: solid) and of the outer part [mm].
     length : float
-        Of the joint [mm].
+        Length of the joint [mm].
     squeeze : float
         By how much the inner part's radius is too large at 20 degC; negative: a gap [um].
     linear : float
         Conductance that the linear model has in its place [W/(m2 K)].
     expansion : tuple of float
-        Of inner and outer part [um/(m K)].
+        Thermal expansion of inner and outer part [um/(m K)].
     modulus, poisson : tuple of float
-        Of inner and outer part [MPa].
+        Young's modulus [MPa] and Poisson's ratio of inner and outer part.
     behind : float
         Conductance in series, such as that of an oil film behind a sleeve [W/(m2 K)].
     friction : float
         Coulomb's coefficient, dry steel: 0.1 to 0.2; an engineering value.
     roughness, slope : float
-        Of both surfaces together, ground to Ra 0.4: rms height [um], mean slope; engineering values.
+        Roughness of both surfaces together, ground to Ra 0.4: rms height [um], mean slope; engineering values.
     hardness : float
-        Of the softer surface, 60 HRC [MPa].
+        Hardness of the softer surface, 60 HRC [MPa].
     conductivity : float
         Harmonic mean of both parts [W/(m K)].
     """

@@ -44,7 +44,7 @@ class HeatSources:
     Parameters
     ----------
     top_speed : float
-        Of the spindle [1/min].
+        Maximum spindle speed [1/min].
     front, rear : BearingFriction
     motor_on, motor_top : float
         Loss of the running spindle motor: magnetising; iron and windage at top speed, with its square [W].
@@ -55,9 +55,9 @@ class HeatSources:
     cabinet, cabinet_share : float
         Conducted into the column's rear right by the electric cabinet: always [W], and per watt of motor loss.
     rotor_share : float
-        Of the motor's loss that arises in the rotor; the rest in the stator.
+        Fraction of the motor's loss that arises in the rotor; the rest in the stator.
     screw_share : float
-        Of the nut's friction that goes into the screw.
+        Fraction of the nut's friction that goes into the screw.
     top_feed : float
         Feed rate at which a screw has all its extra convection [mm/min].
     hydraulics : float

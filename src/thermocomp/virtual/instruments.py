@@ -34,7 +34,7 @@ class Mounting:
     contact : float
         Weight of the part's temperature in what it feels; the rest is the air round it.
     drift : float
-        Of its zero [degC per day].
+        Drift of its zero [degC per day].
     """
 
     lag: float
@@ -61,7 +61,7 @@ class Instrument:
     reads : mapping of str to float
         Weights by the machine's names of places and observables.
     air : tuple of float
-        Of `Air.values`.
+        Values of `Air.values`.
     cold : float
         Value in the state from which it counts [um].
     zeroed : bool
@@ -84,7 +84,7 @@ def thermometer(kit: Kit, label: str, place: str, *, perfect: bool, noise: float
     Parameters
     ----------
     kit : Kit
-        Of the machine.
+        Equipment of the machine.
     label : str
         Its channel is ``t_LABEL_C``.
     place : str
@@ -142,7 +142,7 @@ class Touch:
     noise : float
         Repeatability of the probe, one standard deviation [um]; data sheets say 1 um for two.
     resolution : float
-        Of the controller's reading [um].
+        Resolution of the controller's reading [um].
     """
 
     every: float

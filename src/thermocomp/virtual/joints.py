@@ -20,7 +20,7 @@ class Joints:
     centrifugal, lift : float
         Shift of the shaft along Z and Y at top speed by centrifugal forces, with the square of speed [um].
     stiction : float
-        How far the column's foot may want to slide on the bed before it does [um].
+        Free displacement of the column's foot on the bed at which it starts to slide [um].
     share : float
         Of what the foot does not slide, the share that moves the tool: the column is located midway between carriages.
     """
@@ -53,9 +53,9 @@ def slide_with_friction(slid: float, wish: FloatArray, stiction: float | FloatAr
     slid : float
         Before the first step [um].
     wish : ndarray of shape (n_steps,)
-        Where it would be if nothing held it [um].
+        Free displacement without friction [um].
     stiction : float, or ndarray of shape (n_steps,)
-        How far it may want to slide before it does [um].
+        Free displacement at which it starts to slide [um].
 
     Returns
     -------

@@ -87,15 +87,15 @@ class Kit:
         Height above the floor of those `places` that are in the air [m].
     probes : mapping of str to VirtualProbe
     observables : tuple of str
-        What probes can be made of.
+        Quantities from which probes can be made.
     outfits, nests : mapping of str to tuple of str
         Names that stand for several places, or several probes.
     loads : mapping of str to str
-        Where further heat can be put in.
+        Places where further heat can be applied.
     inner : mapping of str to str
         Places that only a calculation can read: they turn.
     top_speed : float
-        Of the spindle [1/min]; 0: there is none.
+        Maximum spindle speed [1/min]; 0: there is none.
     """
 
     places: Mapping[str, str]
@@ -114,7 +114,7 @@ class Kit:
         Parameters
         ----------
         name : str
-            Of the place.
+            Name of the place.
         perfect : bool
             It is calculated, not measured.
 

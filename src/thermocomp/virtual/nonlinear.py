@@ -92,7 +92,7 @@ class NonlinearTool(RestingTool):
     expansion_grows : float
         [1/K]
     stiction, convection, usual_rise
-        Of the linear tool; not used here.
+        Settings of the linear tool; not used here.
     """
 
     model: ReducedModel = field(default_factory=lambda: ReducedModel.load("tool_joints"))
@@ -161,7 +161,7 @@ class NonlinearCentre(MachiningCentre):
     front, rear : AngularContact or None
         None: friction and thermal preload of the linear machine.
     expansion_grows : float
-        Of spindle and test bar [1/K].
+        Temperature coefficient of the expansion of spindle and test bar [1/K].
     """
 
     model: ReducedModel = field(default_factory=lambda: ReducedModel.load("centre_joints"))

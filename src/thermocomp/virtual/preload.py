@@ -58,7 +58,7 @@ class AngularContact:
     pair : int
         Bearings in tandem against one.
     angle : float
-        Of contact [degrees].
+        Contact angle [degrees].
     spread : float
         Length of rings between the two sides; a longer inner one loosens a set that is back to back [mm].
     sprung : bool
@@ -126,7 +126,7 @@ class AngularContact:
         speed : float
             [1/min]
         temperature : float
-            Of the grease [degC].
+            Temperature of the grease [degC].
         approach : float
             See `approach` [um].
         """

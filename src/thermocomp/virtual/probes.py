@@ -162,9 +162,9 @@ def component(code: str, position: float, z: float = TEST_POSITION["z"]) -> Virt
     Parameters
     ----------
     code : str
-        Of ISO 230-1, such as ``EYX``.
+        Code of ISO 230-1, such as ``EYX``.
     position : float
-        Of its axis [mm].
+        Position of its axis [mm].
     z : float
         Where Z stands instead [mm]; the bed gives way under the column. Only X can be measured so: what its turns do by
         the lever is read too.

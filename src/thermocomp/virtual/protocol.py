@@ -42,7 +42,7 @@ class RecordingSetup:
         Time between two rows [s].
     climate : Climate
     places : tuple of str, or mapping of str to str
-        Where temperatures are measured, see `thermocomp.virtual.kits`; a mapping gives the channels other names.
+        Places of temperature sensors, see `thermocomp.virtual.kits`; a mapping gives the channels other names.
     probes : tuple of str, or mapping of str to str or mapping of str to float
         Displacements, in the same way; a mapping of the machine's observables to weights is a probe of one's own.
     perfect : bool
@@ -72,7 +72,7 @@ class RecordingSetup:
         Parameters
         ----------
         kit : Kit
-            Of the machine.
+            Equipment of the machine.
         noise : float, optional
             Standard deviation of the temperature noise [degC]; the sensors' own if not given.
 
@@ -109,7 +109,7 @@ class Programme(RecordingSetup):
     segments : tuple of SteadySegment
         Each lasts a whole number of samplings.
     soak : tuple of SteadySegment
-        What was done before, from a machine that was off for long; the test begins in the state it leads to.
+        Segments before the test, from a machine that was off for a long time; the test begins in the resulting state.
     """
 
     name: str
@@ -131,7 +131,7 @@ class PlannedTest(RecordingSetup, Stretch):
     name : str
         Appended to the experiment's; empty: its number, if there are several tests.
     copies : int
-        So many tests, each with lots of its own.
+        Number of tests, each with separate random draws.
     soak : Stretch
         What was done before, from a machine that was off for long; the test begins in the state it leads to. What the
         test says of speed, coolant ... does not hold in it.

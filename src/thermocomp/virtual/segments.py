@@ -129,7 +129,7 @@ class Stretch:
     duration : float or Lot, optional
         [s]
     speed : float or Lot, optional
-        Of the spindle [1/min]; it stands if nobody says otherwise.
+        Spindle speed [1/min]; 0 if not given anywhere.
     feed : Feed, optional
         The axes stand if nobody says otherwise.
     stroke : Stroke, optional
@@ -140,13 +140,13 @@ class Stretch:
     powered : bool, optional
         The machine is switched on; it is if nobody says otherwise.
     segments : tuple of Stretch
-        What happens within it; none: it is a segment itself.
+        Segments within it; none: it is a segment itself.
     repeat : int
         So often its `segments` are done; or so many draws.
     order : {'given', 'shuffled', 'drawn'}
         One after the other; all of them (`repeat` times each) in random order; or each time one of them drawn by lot.
     weight : float
-        How likely this one is where the outer order is ``drawn``, against the others beside it.
+        Probability weight of this one relative to its neighbours where the outer order is ``drawn``.
     """
 
     duration: Number | None = None

@@ -33,7 +33,7 @@ class Sensor:
     bias : float
         In the channel's unit.
     drift : float
-        Of the zero, in the channel's unit per day.
+        Drift of the zero, in the channel's unit per day.
     """
 
     channel: Channel
@@ -52,7 +52,7 @@ def apply_lags(lags: FloatArray, felt: FloatArray, before: FloatArray, true: Flo
     lags : ndarray of shape (n_sensors,)
         Time constants [s]; 0: no lag.
     felt, before : ndarray of shape (n_sensors,)
-        What they felt, and what was true, before the first step.
+        Sensor values, and true values, before the first step.
     true : ndarray of shape (n_steps, n_sensors)
         At the end of each step.
     dt : float
@@ -85,7 +85,7 @@ def read(sensors: Sequence[Sensor], felt: FloatArray, time: FloatArray, rng: np.
     time : ndarray of shape (n_rows,)
         [s]
     rng : Generator
-        Of the noise.
+        Generator of the noise.
 
     Returns
     -------
@@ -110,9 +110,9 @@ class SensorFault:
     kind : {'stuck', 'lost', 'drift', 'spike'}
         It keeps its last value; gives no value (nan); runs away; or jumps.
     start : float
-        When it begins [s].
+        Start time [s].
     end : float or None
-        When it is over [s]; None: never, but a spike after one row.
+        End time [s]; None: never, but a spike after one row.
     size : float
         Drift per hour, or height of the spike, in the channel's unit.
     """

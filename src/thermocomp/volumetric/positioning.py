@@ -21,7 +21,7 @@ class Positioning:
     state : str
         Thermal state, such as ``cold`` or ``after 4 h``; empty if there is only one.
     unit : {'um', 'urad'}
-        Of the deviations.
+        Unit of the deviations.
     positions : ndarray of shape (n_targets,)
         Target positions, rising [mm].
     up : ndarray of shape (n_runs, n_targets)

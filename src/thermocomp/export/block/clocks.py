@@ -17,7 +17,7 @@ def run_clock(s: Names, w: Names, t: Names, c: int, begun: bool) -> None:
     s, w, t : Names
         Variables that are kept, worked out again, and known.
     c : int
-        Of the clock.
+        Index of the clock.
     begun : bool
         It was called before.
     """

@@ -19,5 +19,5 @@ def tick(s: Names, w: Names, t: Names, c: int) -> None:
     s, w, t : Names
         Variables that are kept, worked out again, and known.
     c : int
-        Of the clock.
+        Index of the clock.
     """

@@ -24,7 +24,7 @@ class Formulas:
     ranges : sequence of Input
         Inputs of the models, each once.
     channels : sequence of int
-        Which of the values that are read each of them is.
+        Index of each of them among the values that are read.
     """
 
     def __init__(self, ranges: Sequence[Input], channels: Sequence[int]) -> None:
@@ -45,7 +45,7 @@ class Formulas:
         Parameters
         ----------
         name : str
-            Of the function; ``models_`` stands before it.
+            Name of the function; ``models_`` is prefixed.
         models : iterable of (int, ErrorModel, Node)
             Place of each, and its formula, whose inputs are numbered as the ranges are.
         """

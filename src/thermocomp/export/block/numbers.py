@@ -88,7 +88,7 @@ def find_linear(s: Names, w: Names, t: Names, at: float, first: int, end: int) -
     s, w, t : Names
         Variables that are kept, worked out again, and known.
     at : float
-        Where.
+        Position.
     first, end : int
         Points of the table.
     """
@@ -111,7 +111,7 @@ def find_step(s: Names, w: Names, t: Names, at: float, first: int, end: int) -> 
     s, w, t : Names
         Variables that are kept, worked out again, and known.
     at : float
-        Where.
+        Position.
     first, end : int
         Points of the table, the last beyond everything.
     """

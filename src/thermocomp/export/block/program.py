@@ -60,7 +60,7 @@ def functions(tables: Tables, own: Mapping[str, str] = MappingProxyType({})) -> 
     Parameters
     ----------
     tables : Tables
-        Of the compensator: an ``if`` that one of their sizes decides is decided here.
+        Tables of the compensator: an ``if`` that depends on one of their sizes is resolved here.
     own : mapping of str to str
         Functions of the block that stand for those of a library, by the names of these.
     """

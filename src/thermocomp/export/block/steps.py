@@ -100,7 +100,7 @@ def check_start(s: Names, w: Names, t: Names, g: int) -> None:
     s, w, t : Names
         Variables that are kept, worked out again, and known.
     g : int
-        Of the sets of ranges.
+        Index of the set of ranges.
     """
     w.rows = 0
     for m in range(t.set_begin[g], t.set_begin[g + 1]):
@@ -201,7 +201,7 @@ def drive(s: Names, w: Names, t: Names, k: int) -> None:
     s, w, t : Names
         Variables that are kept, worked out again, and known.
     k : int
-        Of the target.
+        Index of the target.
     """
     w.offset = 0.0
     w.tilt = 0.0
@@ -236,7 +236,7 @@ def idle(s: Names, w: Names, t: Names, k: int) -> None:
     s, w, t : Names
         Variables that are kept, worked out again, and known.
     k : int
-        Of the target.
+        Index of the target.
     """
     s.idle[k] = s.idle[k] + w.travel
     if s.idle[k] > t.hold:
@@ -264,7 +264,7 @@ def limit(wanted: float, current: float, travel: float, magnitude: float, rate: 
     travel : float
         Time it has had to move [s].
     magnitude, rate, band : float
-        Of `thermocomp.core.correction.Limits`.
+        As for `thermocomp.core.correction.Limits`.
     """
     aim = larger(-magnitude, smaller(magnitude, wanted))
     moved = current

@@ -16,7 +16,7 @@ class Supports:
     Parameters
     ----------
     ranges : sequence of Input
-        Of which the inputs of the models are.
+        Ranges that include those of the inputs of the models.
     """
 
     def __init__(self, ranges: Sequence[Input]) -> None:
@@ -31,9 +31,9 @@ class Supports:
         ----------
         model : ErrorModel
         place : int
-            Of the model.
+            Index of the model.
         said : str
-            What it says.
+            Output of the model.
         worked_out : set of int
             Distances that the function has already.
         """

@@ -274,7 +274,7 @@ def judge(s: Names, w: Names, t: Names, k: int) -> None:
     s, w, t : Names
         Variables that are kept, worked out again, and known.
     k : int
-        Of the target.
+        Index of the target.
     """
     for m in range(t.line_begin[k], t.line_begin[k + 1]):
         lost = 0

@@ -88,11 +88,11 @@ def write_test(name: str, tables: Tables, readings: Readings, answers: Answers, 
     Parameters
     ----------
     name : str
-        Of the code.
+        Name of the code.
     tables : Tables
     readings : Readings
     answers : Answers
-        Of the compensator.
+        Outputs of the compensator.
     double, single : float
         Difference that is allowed in double and in single precision, as a share of a correction, or in um of one below
         1 um; 0: it is not made for single precision.

@@ -83,7 +83,7 @@ def write_fanuc(
         One per axis.
     limits : Limits
     name : str
-        Of the files.
+        Name of the files.
     facts : Facts
     figure : str
         File of the figure; empty if there is none.

@@ -21,7 +21,7 @@ class Memory:
     ----------
     graph : Graph
     state : str
-        What comes in.
+        Incoming state.
     begin : int
         First place that is free.
     """

@@ -31,7 +31,7 @@ class GraphBlock:
     size : int
         Numbers in its state.
     deviation : int
-        Where in the state the deviations of the models begin.
+        Index in the state at which the deviations of the models begin.
     """
 
     graph: Graph
@@ -66,7 +66,7 @@ def translate(tables: Tables) -> GraphBlock:
     Parameters
     ----------
     tables : Tables
-        Of the compensator without its watch.
+        Tables of the compensator without its watch.
 
     Raises
     ------
@@ -160,7 +160,7 @@ def _models(g: Graph, tables: Tables, memory: Memory, moment: _Moment, change: s
     memory : Memory
     moment : _Moment
     change : str
-        Of all inputs.
+        Changes of all inputs.
     """
     last = memory.before(len(tables.models))
     inputs = [g.pick(change, k) for k in range(len(tables.ranges))]

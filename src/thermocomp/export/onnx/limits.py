@@ -43,7 +43,7 @@ class Drive:
         Parameters
         ----------
         deviation : str
-            Of all models.
+            Deviations of all models.
         correction, slope, travel : str
         """
         g = self._graph
@@ -68,7 +68,7 @@ class Drive:
         ----------
         correction, slope : str
         idle : str
-            How long nothing has driven them [s].
+            Time without a demand [s].
         travel : str
         """
         g, largest = self._graph, self._largest(correction, slope)

@@ -26,7 +26,7 @@ class Port:
     name : str
     shape : tuple of int
     kind : type
-        Of its numbers.
+        Type of its numbers.
     """
 
     name: str
@@ -178,7 +178,7 @@ def serialize(graph: Graph, name: str, facts: Sequence[str], properties: dict[st
     properties : dict of str to str
         The same for programs.
     version : str
-        Of thermocomp.
+        Version of thermocomp.
     """
     from onnx import checker, helper, numpy_helper
 

@@ -145,7 +145,7 @@ def _readme(compensator: Compensator, tables: Tables, name: str, said: list[str]
         Facts.
     block : GraphBlock
     calls : int
-        Of the test vectors.
+        Number of calls in the test vectors.
     """
     slopes, zeroing = any(tables.values["to_slope"]), compensator.models[0].zeroing
     counted = sorted({r.name for r in tables.ranges if r.rezero})

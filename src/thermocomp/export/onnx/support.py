@@ -19,7 +19,7 @@ def support(g: Graph, model: ErrorModel, change: str, said: str, before: str) ->
     change : str
         Its inputs minus their zero.
     said : str
-        What it says of them within its range.
+        Output of the model within its range.
     before : str
         The last deviation that passed.
     """

@@ -114,11 +114,11 @@ def write_vectors(
     tables : Tables
     readings : Readings
     answers : Answers
-        Of the compensator.
+        Outputs of the compensator.
     zero : ndarray of shape (n_channels,)
     facts : sequence of str
     sha256 : str
-        Of the model file.
+        SHA-256 of the model file.
     size : int
         Numbers in the state.
     """

@@ -85,9 +85,9 @@ def reduce_model(
     sensors : sequence of str, optional
         Temperatures to choose from; all if not given.
     starts : Start or sequence of Start, optional
-        How the recordings begin; found out if not given.
+        Initial state of the recordings. Default: determined from the recordings.
     rules : Rules
-        What is stated before judging.
+        Rules stated before judging.
     jobs : int
         Processes to share the work among; -1 takes all cores.
     progress : callable

@@ -57,7 +57,7 @@ class LeftOut:
     Parameters
     ----------
     name : str
-        Of the cycle.
+        Name of the cycle.
     model : ErrorModel
         Reduced.
     none, full, reduced : float
@@ -82,7 +82,7 @@ class Reduced:
     axis : str
         X, Y or Z.
     beside : str
-        What the full model is, and on what its error was found.
+        Description of the full model, and the data on which its error was found.
     none, full, reduced : RemainingError
         On unseen cycles: without compensation, with the full model, with this one.
     cycles : tuple of LeftOut

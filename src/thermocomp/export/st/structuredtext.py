@@ -85,9 +85,9 @@ def translate(tables: Tables, name: str, dialect: Dialect) -> list[SourceUnit]:
     Parameters
     ----------
     tables : Tables
-        Of the compensator.
+        Tables of the compensator.
     name : str
-        Of the function block, and before all other names.
+        Name of the function block, and prefix of all other names.
     dialect : {'codesys', 'twincat', 'scl'}
 
     Raises

@@ -56,7 +56,7 @@ def write_functions(tables: Tables, name: str, dialect: Dialect) -> dict[str, tu
     Parameters
     ----------
     tables : Tables
-        Of the compensator.
+        Tables of the compensator.
     name : str
         Before all names.
     dialect : {'codesys', 'twincat', 'scl'}
@@ -223,7 +223,7 @@ def write_type(tables: Tables, name: str, bag: str, used: str, dialect: Dialect)
     Parameters
     ----------
     tables : Tables
-        Of the compensator.
+        Tables of the compensator.
     name : str
         Before all names.
     bag : {'s', 'w', 't'}

@@ -127,7 +127,7 @@ def profiles(test: ThermalTest, number: int) -> str:
     ----------
     test : ThermalTest
     number : int
-        Which of its targets.
+        Index of the target.
     """
     targets = test.targets[number]
     time, running = test.time, test.running

@@ -23,7 +23,7 @@ class OnBroker:
     ----------
     topic : str
     host, port : str, int
-        Of the broker.
+        Host and port of the broker.
     """
 
     published: ClassVar[bool] = False
@@ -55,7 +55,7 @@ class MqttIn(OnBroker):
     Parameters
     ----------
     topic, host, port
-        Of `OnBroker`.
+        As for `OnBroker`.
     kind : {'mqtt'}
     names : dict of str to str
         Channel by the name in the message, for those that are called otherwise there.
@@ -86,7 +86,7 @@ class MqttProbing(OnBroker):
     Parameters
     ----------
     topic, host, port
-        Of `OnBroker`.
+        As for `OnBroker`.
     kind : {'mqtt'}
     """
 
@@ -100,7 +100,7 @@ class MqttOut(OnBroker):
     Parameters
     ----------
     topic, host, port
-        Of `OnBroker`.
+        As for `OnBroker`.
     kind : {'mqtt'}
     """
 

@@ -31,7 +31,7 @@ class Played:
     Parameters
     ----------
     speed : float
-        How many times faster than they were taken.
+        Replay speed relative to real time.
     """
 
     speed: float = 1.0
@@ -111,7 +111,7 @@ class SimulatedSource(Played):
     Parameters
     ----------
     experiment : Experiment
-        What it does; all its tests, one after the other.
+        Experiment to run; all its tests, one after the other.
     seed : int
     """
 

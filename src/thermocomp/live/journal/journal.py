@@ -34,7 +34,7 @@ class JournalLimits:
     size_bytes : int
         A file that has become larger is followed by a new one.
     files : int
-        So many at most: the oldest is removed.
+        Maximum number of files: the oldest is removed.
     waiting_bytes : int
         Memory of rows that wait for the disk; beyond it the oldest are lost.
     """
@@ -100,7 +100,7 @@ class Journal:
             Its files are numbered: ``live.db`` is ``live.000001.db`` and so on.
         limits : JournalLimits
         start : StartRow
-            What readings hold, and what is compensated.
+            Channels of the readings, and compensated targets.
 
         Raises
         ------

@@ -92,7 +92,7 @@ def export(reader: JournalReader, every: float = 0.0) -> Exported:
     ----------
     reader : JournalReader
     every : float
-        Of readings that follow closer, the first is taken [s].
+        Minimum interval: of readings that follow closer, the first is used [s].
 
     Raises
     ------

@@ -161,9 +161,9 @@ def measured_by(row: MeasurementRow, start: StartRow, in_force: Correction | Non
     ----------
     row : MeasurementRow
     start : StartRow
-        Of its run.
+        Start row of its run.
     in_force : Correction, optional
-        What was in force, where the row does not tell.
+        Correction in force, where the row does not contain it.
 
     Returns
     -------
@@ -202,7 +202,7 @@ def dumps(row: Row, start: StartRow) -> str:
     ----------
     row : Row
     start : StartRow
-        Of its run: readings are written in the order of its channels.
+        Start row of its run: readings are written in the order of its channels.
 
     Raises
     ------
@@ -229,7 +229,7 @@ def loads(kind: str, time: float, text: str, start: StartRow | None) -> Row:
     time : float
     text : str
     start : StartRow or None
-        Of its run.
+        Start row of its run.
 
     Raises
     ------

@@ -23,7 +23,7 @@ class Guarded(H11Protocol):
     Parameters
     ----------
     config, server_state, app_state, _loop
-        Of uvicorn.
+        As for uvicorn.
     """
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:

@@ -38,9 +38,9 @@ class Json(JSONResponse):
     Parameters
     ----------
     content : object
-        Of `write_json`.
+        As for `write_json`.
     status_code, headers, media_type, background
-        Of the response.
+        As for the response.
     """
 
     def render(self, content: Any) -> bytes:

@@ -134,9 +134,9 @@ def arguments(
     ----------
     line : Line
     variables : Variables
-        Of the level that calls.
+        Variables of the calling level.
     integers : {'whole', 'least', 'refuse'}
-        What a length without a decimal point is.
+        Meaning of a length without a decimal point.
     least : float
         In the unit in force.
 

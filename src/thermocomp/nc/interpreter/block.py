@@ -40,7 +40,7 @@ class Modal:
     system_told : bool
         The program has said which; else it is taken for G54.
     rotation : float
-        Of the program's coordinates about Z, stored or by G68 [deg].
+        Rotation of the program coordinates about Z, stored or by G68 [deg].
     rotation_told : bool
         Program or setup say it; else one that is stored in the controller may be in force.
     origin_told : bool
@@ -108,7 +108,7 @@ class Move:
     feed : float
         Along the path [mm/min], 0 for rapids and inverse time; degrees per minute if only rotary axes move.
     seconds : float or None
-        How long it takes, where the program says so (G93) or the spindle does (G95, G33, taps).
+        Duration, where the program gives it (G93) or the spindle does (G95, G33, taps).
     rotary : float
         Way of the rotary axes [deg].
     """
@@ -139,7 +139,7 @@ class Block:
     values : dict of str to float
         Their values, expressions evaluated, in the program's units.
     start, end : tuple of float
-        Where the tool is before and after it, in the coordinates an absolute word would have at that time [mm].
+        Position of the tool before and after it, in the coordinates an absolute word would have at that time [mm].
     known : tuple of bool
         Per axis: `end` is certain, and was reached in work coordinates: an absolute word of that axis with the value of
         `end` would not move it. False at the start of the program, after G53, G28, G30, M6 and stops, after a
@@ -191,7 +191,7 @@ class Setup:
     Parameters
     ----------
     controller : {'linuxcnc', 'fanuc'}
-        Whose habits the program has.
+        Controller whose NC dialect the program uses.
     inch : bool or None
         Unit in force when the program starts; None: unknown, and the program has to say it before the first length.
     startup : str
@@ -204,13 +204,13 @@ class Setup:
     tools : dict of int to float
         Lengths of the tools [mm]; the same holds for them.
     home : tuple of float or None
-        Where G28 goes, in machine coordinates [mm]; None: not stated.
+        Position approached by G28, in machine coordinates [mm]; None: not given.
     rotations : dict of int to float
         Rotations of work coordinate systems about Z that are stored in the controller [deg], as far as they are stated.
     no_shift : bool
         It is stated that no G92 or G52 is in force when the program starts.
     rotary : dict of str to {'head', 'table'}
-        What the rotary axes A, B, C turn, as far as it is stated: the spindle or the workpiece.
+        Part that the rotary axes A, B, C turn, as far as given: the spindle or the workpiece.
     integers : {'whole', 'least', 'refuse'}
         What a length without a decimal point is: whole millimetres or inches, the least increment, or a reason to
         refuse.

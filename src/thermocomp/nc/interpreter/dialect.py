@@ -84,11 +84,11 @@ class Judgement:
     linuxcnc, fanuc : Place or None
         The first sign of each.
     hint : Place or None
-        Of LinuxCNC.
+        Hint of LinuxCNC.
     open : dict of str to Place
         The first word of each kind that is read in two ways: its readings, and what to write instead.
     count : dict of str to int
-        How many lines have one.
+        Number of lines with one.
     fault : Place or None
         The first such word on a line that neither can read, and why: a slip of the pen has made it.
     """

@@ -63,7 +63,7 @@ class InForce:
     across : bool
         Holes are drilled in another plane than XY (G18, G19).
     kept : bool or None
-        What `absolute` was when the cycle's words were written; None if they are not.
+        State of `absolute` when the cycle's words were written; None if they are not.
     unit : str
         With a blank before it; empty if it is not known.
     per_turn : bool

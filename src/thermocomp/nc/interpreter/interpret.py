@@ -32,7 +32,7 @@ def follow_program(lines: Iterable[Line], setup: Setup) -> Iterator[Block]:
     ----------
     lines : iterable of Line
     setup : Setup
-        What stands at the controller and not in the program.
+        Settings of the controller that are not in the program.
 
     Yields
     ------

@@ -40,9 +40,9 @@ class ProgramReading:
     home : str
         Folder of the runs: all in it may be read and written.
     folders : iterable of str
-        Of the program and of its subprograms: what is in them may be read.
+        Folders of the program and of its subprograms: files in them may be read.
     lines : int
-        Of the program.
+        Number of lines of the program.
     where : callable
         Gives the line in execution, and whether it is one of the program itself.
     """

@@ -84,7 +84,7 @@ class HalFiles:
     functions : list of str
         In the order in which the servo thread calls them.
     unread : list of str
-        What cannot be seen through.
+        Files that cannot be analysed.
     read : set of Path
         Files that were read.
     """

@@ -73,7 +73,7 @@ class ProgramFrame:
     system : int
         Work coordinate system in force, 1 to 9.
     origin, shift, length : tuple of float
-        Of the system, of G92, of the tool, X to W [mm, deg].
+        Offsets of the system, of G92, of the tool, X to W [mm, deg].
     rotation : float
         About Z [deg].
     """
@@ -177,7 +177,7 @@ def read(
     ----------
     path : Path
     stored : Stored, optional
-        What is stored in the controller; nothing if not given.
+        Values stored in the controller. Default: none.
     inch : bool
         The controller stands in G20 when the program starts.
     block_delete : bool
@@ -185,7 +185,7 @@ def read(
     subroutines : sequence of Path
         Folders of subprograms, at most 8; the program's own folder comes first anyway.
     task : bool
-        What ``#<_task>`` tells: that the program is run, not previewed.
+        Value of ``#<_task>``: the program is run, not previewed.
     seconds : int
         Processor time the interpreter may take [s]: a program can have an endless loop.
     left : dict, optional

@@ -163,9 +163,9 @@ class Parameters:
     Parameters
     ----------
     controller : {'linuxcnc', 'fanuc'}
-        Whose rules expressions follow.
+        Controller whose rules apply to expressions.
     values : mapping of int or str to float, optional
-        What is known before the program starts; names without ``#<`` and ``>``.
+        Values known before the program starts; names without ``#<`` and ``>``.
     """
 
     def __init__(

@@ -26,7 +26,7 @@ class Corners:
     speeds, accelerations : tuple of float
         Most of each axis [mm/s, mm/s2].
     cycle : float
-        Of the interpolation [s].
+        Interpolation cycle [s].
     """
 
     def __init__(self, speeds: Vector, accelerations: Vector, cycle: float) -> None:
@@ -40,7 +40,7 @@ class Corners:
         before, after : Segment
             Changed in place.
         tolerance : float or None
-            How far the path may leave the corner [mm]; 0: as far as the moves allow; None: not at all.
+            Largest deviation of the path from the corner [mm]; 0: as far as the moves allow; None: none.
 
         Returns
         -------
@@ -162,7 +162,7 @@ def find_overlap_speeds(
     b : float
         Its acceleration [mm/s2].
     share : float
-        Of their lengths that is there for sure.
+        Fraction of their lengths that is certainly available.
     """
     tolerance, cos = overlap
     first = min(math.sqrt(a * before.length * share), before.speed)

@@ -31,7 +31,7 @@ class Segment:
         [mm/s2]
     rapid, rotary : bool
     radius : float
-        Of an arc, 0: a line [mm].
+        Radius of an arc, 0: a line [mm].
     bend : float
         The radius that its acceleration is counted with [mm].
     sweep : float
@@ -94,7 +94,7 @@ class Segment:
         Parameters
         ----------
         cycle : float
-            Of the interpolation [s].
+            Interpolation cycle [s].
         last : bool
             Nothing follows: LinuxCNC keeps back half of the acceleration for what may still come.
         """

@@ -69,11 +69,11 @@ class MotionLimits:
     tool_change : float
         From the last move before a tool change to the first one after it [s].
     stop : float
-        How long M0, M1 and M60 take [s]: the operator decides.
+        Duration of M0, M1 and M60 [s]: the operator decides.
     spindle : float
-        How long a change of the spindle speed holds up the program [s].
+        Delay of the program by a change of the spindle speed [s].
     cycle : float
-        Of the controller's interpolation [s].
+        Interpolation cycle of the controller [s].
 
     Raises
     ------

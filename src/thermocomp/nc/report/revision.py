@@ -30,9 +30,9 @@ def draw(run: Run, bounds: Sequence[Bound], tool_changes: Sequence[float], title
     ----------
     run : Run
     bounds : sequence of Bound
-        Of the axes that have a model.
+        Bounds of the axes that have a model.
     tool_changes : sequence of float
-        When [s].
+        Times of the tool changes [s].
     title : str
 
     Returns

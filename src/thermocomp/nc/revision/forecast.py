@@ -28,7 +28,7 @@ class Forecast:
         By channel name, such as ``t3_C``: times since the start of the program [s], and values; empty cells are left
         out.
     left_out : tuple of str
-        Why a column was not read.
+        Reasons why columns were not read.
     """
 
     source: str

@@ -23,7 +23,7 @@ def count_lines(models: Sequence[str], taken: Sequence[str], states: str, *, by_
     Parameters
     ----------
     models, taken : sequence of str
-        What is told of models, and of those who take unproven ones.
+        Descriptions of the models, and of the persons who approved unproven ones.
     states : str
         In which states of the controller it will be proved; empty: it will not be.
     by_position : bool

@@ -79,14 +79,14 @@ class Job:
         That of the revision.
     models : sequence of str
     taken : sequence of str
-        Who takes unproven ones of them, and why.
+        Persons who approved unproven ones of them, and the reasons.
     start, zero, method : str
         For the header: which models, from what state, what the drift counts from, in what way.
     when : date
     unproved : bool
         It is written though no interpreter has judged it.
     diameters : dict of int to float, optional
-        Of the tools, for the expansion [mm].
+        Tool diameters for the expansion [mm].
     subroutines : sequence of Path
         Folders of subprograms, for the expansion.
     travel : Travel, optional

@@ -49,7 +49,7 @@ def loads(text: str, source: str = "state of a job") -> SavedJob:
     ----------
     text : str
     source : str
-        What to call it in an error.
+        Name of the source in an error.
 
     Raises
     ------

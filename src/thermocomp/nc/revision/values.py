@@ -26,7 +26,7 @@ def read_value(text: str, quantity: str, option: str, example: str) -> float:
     option : str
         Its name.
     example : str
-        Of what is wanted.
+        Example of a valid value.
 
     Returns
     -------
@@ -58,7 +58,7 @@ def read_positive(text: str, quantity: str, option: str, example: str) -> float:
     option : str
         Its name.
     example : str
-        Of what is wanted.
+        Example of a valid value.
 
     Returns
     -------
@@ -148,7 +148,7 @@ def point_of(text: str, said: str) -> Point:
     text : str
         As it was given.
     said : str
-        What the message begins with.
+        Start of the message.
 
     Returns
     -------
@@ -174,7 +174,7 @@ def startup_of(text: str, controller: Controller) -> str:
     text : str
         As it was given.
     controller : str
-        Whose.
+        Name of the controller.
 
     Returns
     -------
@@ -200,7 +200,7 @@ def m_code_of(text: str, controller: Controller) -> int:
     text : str
         As it was given.
     controller : str
-        Whose.
+        Name of the controller.
 
     Returns
     -------
@@ -231,7 +231,7 @@ def tool_of(text: str, option: str, example: str) -> tuple[int, float]:
     option : str
         Its name.
     example : str
-        Of what is wanted.
+        Example of a valid value.
 
     Returns
     -------

@@ -123,7 +123,7 @@ class Left:
     most : list of float
         Per axis, largest magnitude in the cuts [um].
     line : list of int
-        Where.
+        Line of each.
     without : list of float
         The same without correction.
     """

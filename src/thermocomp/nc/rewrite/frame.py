@@ -20,7 +20,7 @@ class Frame:
     scale : tuple of float
         Program units per um, of X, Y and Z.
     cosine, sine : float
-        Of the work coordinate system's rotation about Z.
+        Cosine and sine of the work coordinate system's rotation about Z.
     digits : int
         Decimals.
     """

@@ -34,9 +34,9 @@ def fill(facts: Sequence[str], ending: str, lines: int = LINES, *, upper: bool =
     facts : sequence of str
         At most ``lines - 1``; what does not fit into a comment is cut or replaced.
     ending : str
-        Of its lines.
+        Line ending.
     lines : int
-        How many it has.
+        Number of lines.
     upper : bool
         In capitals: old controls have no small letters.
 

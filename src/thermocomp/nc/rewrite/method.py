@@ -66,7 +66,7 @@ class CorrectionMethod(ABC):
         ----------
         block : Block
         demand : tuple of float
-            What the axes should carry at its end [um, machine axes].
+            Demanded corrections of the axes at its end [um, machine axes].
 
         Returns
         -------

@@ -79,9 +79,9 @@ class Revision:
     Attributes
     ----------
     left : Left
-        What the correction leaves of the drift in the cuts.
+        Residual of the drift after the correction in the cuts.
     elsewhere : Elsewhere
-        What another work offset would cost, where the drift depends on the place.
+        Cost of another work offset, where the drift depends on the position.
     taken_system : bool
         The tool cut before the program said in which work coordinate system: G54 was taken.
     corrected : bool
@@ -89,13 +89,13 @@ class Revision:
     lines, changed : int
         Lines read, and how many of them are not as they were.
     seconds : float
-        How long the program runs [s].
+        Duration of the program [s].
     tool_changes : list of float
-        When [s].
+        Times of the tool changes [s].
     slowest, fastest : float
         Spindle speeds met [1/min].
     held : dict of str to (float, int)
-        What kept a correction from following the drift in a cut, what was left there at most [um], and in which line.
+        Reason why a correction could not follow the drift in a cut, the largest residual there [um], and its line.
     standing : int
         First line that cuts while the spindle is stopped; 0: none does.
     idle : int

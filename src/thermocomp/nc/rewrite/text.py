@@ -23,7 +23,7 @@ class Digits:
     Parameters
     ----------
     mm, inch : int
-        What a correction is rounded to: all of it is in these decimals, so that no word is rounded twice.
+        Decimals to which a correction is rounded: all of it is in these decimals, so that no word is rounded twice.
     """
 
     mm: int = 4

@@ -61,7 +61,7 @@ class Drift:
     time : float
         Since the start of the program, up to the last step of the models [s].
     assumed : tuple of str
-        What the start has made of one measurement for several stations.
+        Assumptions made at the start about one measurement for several stations.
     beyond : dict of str to float
         Per axis, how far the positions asked for were beyond its outermost station, at most [mm].
 

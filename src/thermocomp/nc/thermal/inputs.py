@@ -137,7 +137,7 @@ def constants(texts: Sequence[str], models: Sequence[ErrorModel]) -> dict[str, I
     texts : sequence of str
         Such as ``t3=21.5degC``: an input, with or without its unit at the end (``t3_C``), and its value with a unit.
     models : sequence of ErrorModel
-        Whose inputs they are.
+        Models that have these inputs.
 
     Returns
     -------

@@ -13,20 +13,20 @@ class StationState:
     Parameters
     ----------
     station : str
-        Which one, such as ``Z at Z 200 mm``.
+        Name of the station, such as ``Z at Z 200 mm``.
     target : str
-        Of its model.
+        Target of its model.
     model : str
-        Which numbers the model is made of: a hash.
+        Hash of the numbers of the model.
     reference : tuple of float
-        What counts as zero, per input.
+        Zero of each input.
     memory : tuple of float
     deviation : float
         Last deviation given [um].
     zero : float
         Deviation that counts as zero [um].
     doubt : float
-        What the bound was widened by because the model had left its trained range [um].
+        Widening of the bound because the model had left its training range [um].
     """
 
     station: str

@@ -200,7 +200,7 @@ def hand_over_state(
     ----------
     stations : sequence of Station
     states : sequence of State
-        Of their models.
+        States of their models.
     zeros, doubts : sequence of float
         Per station, see `StationState` [um].
     zero_known : bool

@@ -108,7 +108,7 @@ def judge(learned: LearnedVolume, seed: int) -> Volume:
     ----------
     learned : LearnedVolume
     seed : int
-        Of weather, noise, points and rows; another one than what was learned from.
+        Random seed of weather, noise, points and rows; different from that of the training data.
 
     Returns
     -------

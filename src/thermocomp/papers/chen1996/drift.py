@@ -67,7 +67,7 @@ class LearnedDrift:
     nets : sequence of LearnedNet
         9-20-3, each from another start.
     others : mapping of str to sequence of LearnedNet
-        What the paper tried and rejected (C-26, C-28, C-30).
+        Methods that the paper tried and rejected (C-26, C-28, C-30).
     """
 
     samples: Samples
@@ -128,7 +128,7 @@ def learn(seed: int, told: Callable[[float], None]) -> LearnedDrift:
     Parameters
     ----------
     seed : int
-        Of weather and noise; the nets' own starts are the same for every seed.
+        Random seed of weather and noise; the nets' own starts are the same for every seed.
     told : callable
         Is told the share done (0..1).
 

@@ -67,7 +67,7 @@ def beside(what: str, equation: str, ours: Mapping[str, float], paper: Mapping[s
     Parameters
     ----------
     what : str
-        What the coefficients are of, and their unit.
+        Quantity that the coefficients describe, and their unit.
     equation : str
         The paper's, such as ``Eq. 5``.
     ours, paper : mapping of str to float
@@ -111,9 +111,9 @@ def figure(number: int, text: str, axes: tuple[str, str], curves: Sequence[PlotC
     ----------
     number : int
     text : str
-        Of the caption.
+        Text of the caption.
     axes : tuple of str
-        What stands at x and y.
+        Labels of x and y.
     curves : sequence of PlotCurve
 
     Returns

@@ -44,7 +44,7 @@ class LearnedPositioning:
     pitch : Profiles
         EAY, measured with the former.
     fits : mapping of str to PositionFit
-        Of `learned`, one of each method; of the nets the one with the median error after training.
+        Fits of `learned`, one of each method; of the nets the one with the median error after training.
     nets : sequence of PositionFit
         5-8-1, each from another start.
     linear : PositionFit
@@ -107,7 +107,7 @@ def learn(seed: int, other_seed: int) -> LearnedPositioning:
     Parameters
     ----------
     seed, other_seed : int
-        Of weather and noise on the two days.
+        Random seeds of weather and noise on the two days.
 
     Returns
     -------

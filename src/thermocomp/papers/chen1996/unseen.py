@@ -263,7 +263,7 @@ def noise(found: Unseen, law: Literal["uniform", "normal"]) -> dict[str, float]:
     Returns
     -------
     dict of str to float
-        Of the nets the median.
+        Median of the nets.
     """
     noisy = [found.left("z", common.with_noise(found.tests[0], NOISE, law, k)) for k in range(DRAWS)]
     return {m: float(np.mean([left[m] for left in noisy])) for m in found.models}

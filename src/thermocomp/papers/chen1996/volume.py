@@ -53,7 +53,7 @@ def learn(seed: int) -> LearnedVolume:
     Parameters
     ----------
     seed : int
-        Of weather and noise.
+        Random seed of weather and noise.
 
     Returns
     -------

@@ -88,7 +88,7 @@ def polynomial(samples: Samples, names: Sequence[str], degree: int) -> PaperFit:
     ----------
     samples : Samples
     names : sequence of str
-        Of the temperatures.
+        Names of the temperatures.
     degree : int
         Highest power; there are no products.
 
@@ -136,7 +136,7 @@ class Computed:
     shaken : dict of (str, float) to dict of str to Sensitivity
         R2 under random sensor error, by its law and size [degC].
     dynamic : ndarray of shape (n_new,)
-        What `dynamic` leaves of the new tests [um].
+        Residuals of `dynamic` in the new tests [um].
     """
 
     fit: Samples

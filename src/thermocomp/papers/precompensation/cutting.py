@@ -76,7 +76,7 @@ class Changing(Climate):
         ----------
         state : ndarray of shape (2, 3)
         start : float
-            When the first step begins, since the start of the test [s].
+            Start of the first step, since the start of the test [s].
         step : float
             [s]
         n_steps : int
@@ -100,7 +100,7 @@ class Surfaces:
     Parameters
     ----------
     depth : ndarray of shape (n_tests, n_positions)
-        How far the mean of the second surface lies above that of the first [um].
+        Height of the mean of the second surface above that of the first [um].
     unevenness : ndarray of shape (n_tests, 2, n_positions)
         From the lowest to the highest place within a surface [um].
     """
@@ -140,7 +140,7 @@ class Milled:
     turning : float
         Share of the time in which the programs have the spindle speed of the recorded tests.
     lines : int
-        Of the first program.
+        Number of lines of the first program.
     first : dict of str to list of (Face, ndarray)
         Of the first test, cold: faces, and where their surfaces lie [um]; by the way of revising, with the net.
     """
@@ -187,7 +187,7 @@ def compute(models: Mapping[str, Sequence[ErrorModel]], seed: int, progress: Pro
     models : mapping of str to sequence of ErrorModel
         One per position.
     seed : int
-        Of the first test; the others have the next ones.
+        Random seed of the first test; the others have the next ones.
     progress : callable
 
     Returns

@@ -221,7 +221,7 @@ class FacedSurface:
     number : int
         1 is milled cold, 2 after the hour.
     position : float
-        Of Z, in the drawing [mm].
+        Position of Z, in the drawing [mm].
     time : ndarray of shape (n,)
         [s]
     z : ndarray of shape (n,)
@@ -239,7 +239,7 @@ class FacedSurface:
         Parameters
         ----------
         drift : Recording
-            What the machine deviates by at each of `POSITIONS`.
+            Deviation of the machine at each of `POSITIONS`.
         """
         columns = [drift.table[f"z_at_{p}_um"].to_numpy(dtype=np.float64) for p in POSITIONS]
         there = np.column_stack([np.interp(self.time, drift.time, column) for column in columns])

@@ -70,7 +70,7 @@ class Warm:
     hours, drift : ndarray of shape (n_rows,)
         Since the job began [h], and the drift since then [um].
     cold, carried : ndarray of shape (n_rows,)
-        What is left of it [um] if the model begins cold, and if it carries its state over.
+        Residual [um] if the model starts cold, and if its state is carried over.
     """
 
     hours: FloatArray

@@ -147,7 +147,7 @@ def render(studies: Sequence[Study], *, seed: int) -> str:
     ----------
     studies : sequence of Study
     seed : int
-        Of the (first) run.
+        Random seed of the (first) run.
 
     Returns
     -------

@@ -59,7 +59,7 @@ class Thinned:
     ----------
     rows : int
     effective : float
-        How many independent rows the residual stands for.
+        Number of independent rows equivalent to the residual.
     first : float
         R2 that a first variable needs to enter.
     names : tuple of str

@@ -39,12 +39,12 @@ class Selection:
     Parameters
     ----------
     psi, larger : MaximalCorrelations
-        Of the sets of at most three, and of all larger ones.
+        Correlations of the sets of at most three, and of all larger ones.
     small, holm, converged : Equivalents
         Comparison of the sets of at most three: without correction for their number, by Holm's rule, and with sweeps to
         the limit.
     rows : sequence of int
-        Of the data sets.
+        Rows of the data sets.
     seconds : float
         All models took [s].
     """

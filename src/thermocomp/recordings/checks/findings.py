@@ -33,9 +33,9 @@ class Finding:
     rows : ndarray of int, optional
         The rows it concerns, where the others are sound; None if it concerns the whole channel or recording.
     row : int, optional
-        Where a lasting trouble begins, or a gap: a place for a mark in a figure.
+        Row where a lasting trouble begins, or a gap: a position for a mark in a figure.
     remedy : Remedy, optional
-        What of a mapping would mend it, with the recording's names of channels and its times; None: nothing of it.
+        Mapping entry that would repair it, with the recording's names of channels and its times; None: there is none.
     """
 
     severity: Severity
@@ -128,7 +128,7 @@ def cut_out(severity: Severity, channel: Channel, kind: str, text: str, rows: In
     severity, channel, kind, text, rows
         See `Finding`.
     time : ndarray of shape (n_rows,)
-        Of all rows [s].
+        Times of all rows [s].
     """
     remedy = cut(channel.name, rows, time, kind)
     return Finding(severity=severity, channel=channel.name, kind=kind, text=text, rows=rows, remedy=remedy)

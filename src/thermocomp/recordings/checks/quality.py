@@ -83,7 +83,7 @@ def troubled_rows(recording: Recording, findings: Sequence[Finding] | None = Non
     ----------
     recording : Recording
     findings : sequence of Finding, optional
-        Of `check`; it is called if they are not given.
+        Findings of `check`; it is called if they are not given.
 
     Returns
     -------

@@ -17,7 +17,7 @@ def drop_unsound(samples: Samples, recordings: Sequence[Recording]) -> Samples:
     ----------
     samples : Samples
     recordings : sequence of Recording
-        What they were stacked of, in their order; the files that they continue from are looked at, too.
+        Recordings from which they were stacked, in their order; the files that they continue from are checked, too.
 
     Returns
     -------

@@ -25,7 +25,7 @@ def stuck(signal: Signal, time: FloatArray) -> Iterator[Finding]:
     Parameters
     ----------
     signal : Signal
-        Of 5 good rows or more, not constant.
+        Signal with 5 good rows or more, not constant.
     time : ndarray of shape (n_rows,)
         [s]
     """

@@ -31,7 +31,7 @@ def columns_of(recording: Recording, code: str) -> tuple[dict[str, float], tuple
     ----------
     recording : Recording
     code : str
-        Of the component.
+        Code of the component.
 
     Returns
     -------

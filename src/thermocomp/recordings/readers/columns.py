@@ -36,7 +36,7 @@ class PlannedColumn:
         Position in the file.
     channel : Channel
     unit : Unit
-        Of the scaled value.
+        Unit of the scaled value.
     rule : ColumnMap
         Scale, zero and missing-value codes.
     """

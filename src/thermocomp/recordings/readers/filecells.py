@@ -65,7 +65,7 @@ class FileCells:
         ----------
         row : int
         text : str
-            What is wrong, and what to do.
+            Fault, and what to do.
         column : int, optional
             The time without it.
         skip : bool

@@ -47,7 +47,7 @@ def guess(table: FileTable, mapping: Mapping) -> tuple[Remedy, ...]:
     ----------
     table : FileTable
     mapping : Mapping
-        What is known already.
+        Part of the mapping that is known already.
 
     Returns
     -------

@@ -134,7 +134,7 @@ def tell_layout(numbers: Sequence[int], layout: FileLayout, word: str) -> tuple[
         Places of the rows in the file, from 1.
     layout : FileLayout
     word : str
-        What a row is called there.
+        Name of a row in such a file.
     """
     found = []
     above = [numbers[k] for k in range(layout.heading) if k != layout.units]

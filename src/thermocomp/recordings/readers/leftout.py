@@ -14,7 +14,7 @@ def refuse_nameless(headings: Sequence[str], source: str) -> None:
     Parameters
     ----------
     headings : sequence of str
-        Of columns of numbers that would be left out.
+        Headings of columns of numbers that would be left out.
     source : str
 
     Raises

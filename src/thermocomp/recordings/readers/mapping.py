@@ -49,7 +49,7 @@ class TimeColumn:
     unit : str
         A unit of time, or ``timestamp`` for dates with a time of day; empty: from the heading and the cells.
     format : str
-        How timestamps are written, in the letters of `datetime.strptime`; empty: ISO 8601.
+        Format of timestamps, in the letters of `datetime.strptime`; empty: ISO 8601.
     start : str
         ISO timestamp of the first row, for files that hold only relative times: it tells the days, and which
         file continues from another.
@@ -80,7 +80,7 @@ class ColumnMap:
     unit : str
         Unit of the scaled value; empty: the house unit of the role, or the unit in the heading.
     role : str, optional
-        What it measures, or ``cycle`` (labels of thermal cycles), or ``ignore``; without it the unit decides.
+        Measured quantity, or ``cycle`` (labels of thermal cycles), or ``ignore``; without it the unit decides.
     scale : float
         Factor from the number in the file to `unit`.
     zero : float or 'first'
@@ -88,7 +88,7 @@ class ColumnMap:
     missing : tuple of float
         Numbers in the file that stand for a missing value.
     place : str
-        Where the sensor sits, in words.
+        Location of the sensor, in words.
     valid : tuple of float, optional
         Lowest and highest value that the channel can have, in `unit` after `scale` and `zero`; others are missing.
     """
@@ -133,7 +133,7 @@ class ReadOptions:
     skip : tuple of int or pair of int
         Lines or rows that are passed over, from 1, as errors name them; a pair is a stretch, both ends included.
     sheet : str
-        Of a workbook; empty: the only one, or the only one that holds a table with a time.
+        Sheet of a workbook; empty: the only one, or the only one that holds a table with a time.
     """
 
     delimiter: str = ""
@@ -180,7 +180,7 @@ class Mapping:
     read : ReadOptions
     cycles : CycleRule
     clean : tuple of Step
-        What is changed in the values that were read, in this order; see `thermocomp.recordings.cleaning`.
+        Changes of the values that were read, in this order; see `thermocomp.recordings.cleaning`.
     limits : FileLimits
     compensation : {'', 'off', 'known', 'unknown'}
         Whether a correction was in force at the machine; see `thermocomp.recordings.compensated`.

@@ -45,11 +45,11 @@ class Question:
     Parameters
     ----------
     text : str
-        What was found.
+        Finding.
     options : tuple of Remedy
         Parts of a mapping, the likeliest first.
     severity : {'error', 'column', 'trouble', 'warning', 'info'}
-        What it is about: the file cannot be read, a column is left out, or something that `check` finds.
+        Subject: the file cannot be read, a column is left out, or something that `check` finds.
     may_guess : bool
         False: how long the recording took depends on the answer.
     """
@@ -226,7 +226,7 @@ def located(finding: Finding, recording: Recording, mapping: Mapping, headings: 
     mapping : Mapping
         That the recording was read by.
     headings : sequence of str
-        Of the file.
+        Headings of the file.
 
     Returns
     -------

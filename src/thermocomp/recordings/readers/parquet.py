@@ -47,7 +47,7 @@ class ParquetTable:
     ----------
     path : Path
     names : tuple of str
-        Of the columns, as the file has them.
+        Names of the columns, as in the file.
     headings : tuple of str
     texts : tuple of str
         Names of the columns that hold texts.

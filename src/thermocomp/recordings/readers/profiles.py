@@ -103,9 +103,9 @@ def read(
     path : str or Path
         See `thermocomp.recordings.readers.recordings.read`.
     options : ProfileOptions or str
-        What they are of; a text is the code of the component.
+        Options of the profiles; a text is the code of the component.
     mapping : Mapping, optional
-        What the columns are, where their headings do not say.
+        Roles and units of columns whose headings do not give them.
     layout : {'wide', 'long'}, optional
         A row per thermal state and a column per position, or a row per position; found out if not given.
 
@@ -181,7 +181,7 @@ def from_recording(recording: Recording, options: ProfileOptions | str) -> Profi
     recording : Recording
         A row per thermal state.
     options : ProfileOptions or str
-        What they are of; a text is the code of the component.
+        Options of the profiles; a text is the code of the component.
 
     Returns
     -------

@@ -124,7 +124,7 @@ def first_is_number(cells: "pd.Series[Any]", *, empty: bool) -> bool:
     ----------
     cells : Series
     empty : bool
-        What to return if there is none.
+        Value to return if there is none.
     """
     filled = (str(cell) for cell in cells.dropna())
     first = next((cell for cell in filled if not is_filler(cell)), None)
@@ -222,7 +222,7 @@ def refuse_cell(table: FileTable, row: int, column: int, cell: object) -> NoRetu
     row, column : int
         Position of the cell in `table`.
     cell : object
-        What it holds.
+        Content of the cell.
 
     Raises
     ------
@@ -250,7 +250,7 @@ def decide(signs: Signs, stated: str, delimiter: str, path: Path) -> Notation:
     signs : Signs
     stated, delimiter : str
     path : Path
-        Of the file, for the message.
+        Path of the file, for the message.
 
     Raises
     ------
@@ -314,7 +314,7 @@ def convert(
     values : ndarray of shape (n_rows,)
         nan where a word stands for a missing number.
     notes : tuple of str
-        Which words, and where.
+        Words found, and their locations.
 
     Raises
     ------

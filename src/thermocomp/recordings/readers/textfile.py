@@ -56,7 +56,7 @@ class CsvTable:
         Decimal sign, if it is known beforehand.
     encoding : str
     errors : {'strict', 'replace'}
-        What is done about bytes that are none of that encoding.
+        Handling of bytes that are invalid in that encoding.
     skipped : tuple of int
         Lines that are no rows (headings, comments, blank ones), from 0.
     n_rows : int
@@ -173,7 +173,7 @@ def open_csv(path: Path, options: ReadOptions, limits: FileLimits) -> CsvTable:
     ----------
     path : Path
     options : ReadOptions
-        What is known beforehand.
+        Options known beforehand.
     limits : FileLimits
 
     Raises

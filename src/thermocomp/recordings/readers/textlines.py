@@ -188,9 +188,9 @@ def describe_ragged(path: Path, number: int, cells: int, width: int, line: bytes
     ----------
     path : Path
     number : int
-        Of the line, from 1.
+        Number of the line, from 1.
     cells, width : int
-        How many cells it has, and how many the headings have.
+        Number of its cells, and number of headings.
     line : bytes
     delimiter : str
     """

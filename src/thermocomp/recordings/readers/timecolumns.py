@@ -58,7 +58,7 @@ def find_time(table: FileTable, meanings: Sequence[Meaning | None], mapping: Map
     ----------
     table : FileTable
     meanings : sequence of Meaning or None
-        Of the headings.
+        Meanings of the headings.
     mapping : Mapping
     kinds : callable
         Tells what a column holds.
@@ -100,7 +100,7 @@ def find_position(place: Place, headings: Sequence[str], table: str, source: str
         Its heading, or its number from 1.
     headings : sequence of str
     table : str
-        Of the mapping, for messages.
+        Table of the mapping, for messages.
     source : str
         The file, for messages.
 

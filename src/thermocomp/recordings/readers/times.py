@@ -42,7 +42,7 @@ def read_times(file: FileCells, *, rising: bool) -> tuple[FloatArray, str, tuple
     start : str
         ISO timestamp of the first row; empty if it is not known.
     notes : tuple of str
-        How it was read, where that is not plain.
+        Notes on how it was read, where that is not plain.
 
     Raises
     ------

@@ -62,15 +62,15 @@ class PositionAssessment:
     Parameters
     ----------
     protocol : str
-        How they were chosen.
+        Method by which they were chosen.
     cycles : tuple of CycleErrors
     overall : CycleErrors
-        Of all of them together.
+        Errors of all of them together.
     verdict : Verdict
         Of the do-no-harm gate: beside no compensation and, if there is a thermal part, beside the cold profile alone;
         by cycles or, if files were left out, by these.
     factors : tuple of HonestError
-        Of each factor's model on the same states [unit/m^i]; verdict and reason are those of the whole.
+        Errors of each factor's model on the same states [unit/m^i]; verdict and reason are those of the whole.
     unit : {'um', 'urad'}
     """
 
@@ -104,7 +104,7 @@ class PositionStudy:
         With what was left open filled in.
     assessment : PositionAssessment
     dropped : str
-        Why the thermal part was left out, if it was: its own verdict.
+        Reason why the thermal part was dropped, if it was: its own verdict.
     """
 
     fit: PositionFit
@@ -131,7 +131,7 @@ def study(
     Parameters
     ----------
     profiles : Profiles or sequence of Profiles
-        Of one component, one per test.
+        Profiles of one component, one per test.
     options : PositionOptions
     left_open : sequence of {'slopes', 'offset', 'reference_position'}
         Settings that the profiles tell, in place of `options`; see

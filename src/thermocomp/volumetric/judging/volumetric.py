@@ -46,11 +46,11 @@ class PointCourse:
     values : ndarray of shape (n_rows, 32)
         Components at the point [um, urad].
     error : ndarray of shape (n_rows, 3)
-        Of the tool's tip, actual minus commanded [um].
+        Error of the tool tip, actual minus commanded [um].
     tilt : ndarray of shape (n_rows, 3)
-        Of the tool [urad].
+        Tilt of the tool [urad].
     sensitivity : ndarray of shape (32, 3)
-        What one um or urad of each component does to the tip [um].
+        Effect of one um or urad of each component at the tip [um].
     """
 
     point: Vector
@@ -78,9 +78,9 @@ class Moment:
     Parameters
     ----------
     label : str
-        Why it was picked: ``start``, ``largest``, ``end``, ``reference state``, or the time that was asked for.
+        Reason for the choice: ``start``, ``largest``, ``end``, ``reference state``, or the requested time.
     row : int
-        Of the course.
+        Row of the course.
     time : float
         Since the first row of the recording [s].
     field : ErrorField
@@ -89,7 +89,7 @@ class Moment:
     tool : tuple of float
         From the gauge point to the tip [mm].
     grid : ndarray of shape (..., 3)
-        Where the numbers are judged [mm].
+        Points at which the errors are judged [mm].
     """
 
     label: str
@@ -151,7 +151,7 @@ class Volumetric:
     ----------
     machine : Machine
     recording : Recording or None
-        What was replayed; None: the reference state.
+        Replayed recording; None: the reference state.
     course : PointCourse
     moments : tuple of Moment
     missing : int

@@ -70,7 +70,7 @@ class ProfileFit:
     tried : tuple of Tried
         By rising number of terms; empty if the order was given.
     rms : float
-        What the fit leaves [unit], per degree of freedom; nan if there is none.
+        Residual of the fit [unit], per degree of freedom; nan if there is none.
     noise : float
         Standard deviation of the values at one point [unit]; nan where none comes twice, or only with the same number.
     misfit : float

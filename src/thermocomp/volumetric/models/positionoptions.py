@@ -31,7 +31,7 @@ class PositionOptions:
     Parameters
     ----------
     method : str or ThermalRegressor
-        Of the slopes: any method of `thermocomp.models.methods`, or an estimator with settings of its own.
+        Method for the slopes: any of `thermocomp.models.methods`, or a custom estimator.
     inputs : sequence of str, optional
         Channels to predict the slopes from; all temperatures and the spindle speed if not given.
     slopes : int
@@ -40,18 +40,18 @@ class PositionOptions:
         Model a k_0(t) too; without it the thermal part is zero at the reference position, as Chen's.
     profile : {'polynomial', 'spline'}
     order : int, (int, int) or 'auto'
-        Of the profile; see `thermocomp.volumetric.models.geometric.fit_profile`.
+        Order of the profile; see `thermocomp.volumetric.models.geometric.fit_profile`.
     coordinates : str, optional
         Axes the profile may depend on (C-06).
     reference : int or sequence of int
         States that count as cold, in each test; of several, the mean (C-07). Temperatures are counted from them too.
     reference_position : float, optional
-        Where q is zero [mm]. If not given: the axis' zero, or the end of the measured travel that is next to it.
+        Position at which q is zero [mm]. Default: the axis' zero, or the end of the measured travel that is next to it.
     rezero : bool
         False: all tests count from one cold state, the mean of their reference states, and so does the model live:
         temperatures are absolute. For a machine whose cold profile is not the same every morning.
     support : Support
-        What the models of the slopes do outside their trained range.
+        Behaviour of the models of the slopes outside their training range.
     """
 
     method: str | ThermalRegressor = "mra"
@@ -94,9 +94,9 @@ def fill_options(
     Parameters
     ----------
     profiles : Profiles or sequence of Profiles
-        Of one component, one per test.
+        Profiles of one component, one per test.
     options : PositionOptions
-        What is not left open stays.
+        Options; those that are set stay unchanged.
     left_open : sequence of {'slopes', 'offset', 'reference_position'}
     learn : ndarray of bool of shape (n_states,), optional
         States that may be looked at; see `thermocomp.volumetric.models.position.fit_position`.
@@ -245,7 +245,7 @@ def choose_power(remainders: Mapping[int, float], thermal: float) -> int | None:
     Parameters
     ----------
     remainders : mapping of int to float
-        What powers up to m leave [unit], by m.
+        Residual after powers up to m [unit], by m.
     thermal : float
         The thermal part itself [unit].
     """

@@ -37,11 +37,11 @@ class HalSettings:
     timeout : float
         The service is lost when it says nothing for so long [s].
     hold : float
-        So long the correction then stays where it is [s].
+        Hold time of the correction after a disconnect [s].
     fade : float
-        How fast it goes to zero after that [um/s].
+        Rate at which the correction ramps to zero after the hold time [um/s].
     group : str
-        Whose members may connect; without one only the user that runs LinuxCNC may.
+        User group whose members may connect; without one only the user that runs LinuxCNC may.
     """
 
     pattern: Pattern = "offset"
@@ -86,7 +86,7 @@ def prepare(path: Path, folder: Path, settings: HalSettings) -> HalSetup:
     path : Path
         INI file of the machine.
     folder : Path
-        Where HAL file, component and socket will be.
+        Folder of the HAL file, the component and the socket.
     settings : HalSettings
 
     Raises

@@ -32,7 +32,7 @@ def chosen_system(
     Parameters
     ----------
     sides, words, refuse
-        Of the writer.
+        As for the writer.
     a, b : Canonical
         The calls ``g5x`` of both runs.
     angles : tuple of float or None
@@ -80,7 +80,7 @@ def plain_g10(sides: Sides, words: Words, refuse: Refuse, source: str) -> str:
     Parameters
     ----------
     sides, words, refuse
-        Of the writer.
+        As for the writer.
     source : str
         Line of the program.
     """
@@ -113,7 +113,7 @@ def shift(sides: Sides, words: Words, refuse: Refuse, old: tuple[Place, Place], 
     Parameters
     ----------
     sides, words, refuse
-        Of the writer; the sides have taken the offset.
+        As for the writer; the offset has been applied to the sides.
     old : tuple
         Offsets before, of both runs.
     source : str

@@ -41,7 +41,7 @@ class Writer:
     Parameters
     ----------
     first, second : Stored
-        What is stored in the controllers of the two runs.
+        Values stored in the controllers of the two runs.
     source : callable
         Text of a line of the program, by its number.
     inch : bool or None

@@ -46,7 +46,7 @@ def compare(asked: Iterator[Canonical], done: Iterator[Canonical]) -> int:
     Parameters
     ----------
     asked, done : iterator of Canonical
-        Of the program, and of what is to do the same.
+        Calls of the program, and of the one that must do the same.
 
     Returns
     -------

@@ -52,7 +52,7 @@ class Side:
     Attributes
     ----------
     program, machine : tuple of float
-        Where it stands [mm, deg].
+        Position [mm, deg].
     frame : ProgramFrame
     origins, rotations : dict by work coordinate system
         As they are stored now [mm, deg].

@@ -36,15 +36,15 @@ class Calls:
     values : array, calls x 10
         Numbers; of a curve or a tap the first one is its place in `Side.curves`.
     start, end : array, calls x 9
-        Of moves: machine coordinates [mm, deg].
+        Start and end of moves: machine coordinates [mm, deg].
     centre : array, calls x 2
-        Of arcs: machine coordinates in their plane [mm].
+        Centre of arcs: machine coordinates in their plane [mm].
     plane, turns : array of int
-        Of arcs: 17, 18, 19; positive anticlockwise.
+        Plane of arcs: 17, 18, 19; turns positive anticlockwise.
     sweep : array
-        Of arcs [rad].
+        Angle of arcs [rad].
     seconds : array
-        How long a move in feed takes [s].
+        Duration of a move in feed [s].
     """
 
     kind: Integers

@@ -58,9 +58,9 @@ def compare(
     Parameters
     ----------
     first, second : InterpreterRun
-        Of the original, and of the revised program.
+        Runs of the original and of the revised program.
     ledger : Ledger
-        What the lines of the original should be shifted by.
+        Expected shifts of the lines of the original.
     origin : LineOrigins
     progress : callable
         Told lines of the original.

@@ -77,7 +77,7 @@ def state(setup: Setup, number: int, what: frozenset[str] | set[str]) -> Control
     Parameters
     ----------
     setup : Setup
-        What is stated.
+        Given settings.
     number : int
         Its bits tell of G98 or G99, of a rotation and of a G92; so that all of them meet among eight states.
     what : set of str

@@ -106,7 +106,7 @@ def prove(
     original, revised : Path
         The programs.
     ledger : Ledger
-        What the lines of the original should be shifted by.
+        Expected shifts of the lines of the original.
     setup : Setup
         That of the revision.
     progress : callable, optional
