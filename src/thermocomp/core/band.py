@@ -37,7 +37,7 @@ class Band:
     floor : float
         Smallest half-width, used where the structures agree [unit].
     running, stopped : float
-        Factor while the spindle turns, and while it stands [-].
+        Factor while the spindle turns, and while it is stopped [-].
     speeds : tuple of int
         Inputs that state whether the spindle turns; none: the larger factor holds always.
 

@@ -206,7 +206,7 @@ def check_name(what: str, name: str, most: int = NAME) -> None:
     Raises
     ------
     SettingError
-        The message says what the name is of.
+        The value is invalid; the message contains the kind of name.
     """
     if not name.strip() or len(name) > most:
         raise SettingError(f"{what}: a name has 1 to {most} characters, found {len(name.strip())}")

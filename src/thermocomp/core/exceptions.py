@@ -9,7 +9,7 @@ Remedy = Mapping[str, Any]
 
 
 class ThermocompError(Exception):
-    """Base of all errors thermocomp raises on purpose; its text says what was found and what to do."""
+    """Base of all errors thermocomp raises on purpose; its text states what was found and what to do."""
 
 
 class InputError(ThermocompError):
@@ -45,7 +45,7 @@ class SettingError(InputError, ValueError):
 
 
 def explain_unknown(what: str, name: str, known: Iterable[str], path: tuple[str | int, ...] = ()) -> SettingError:
-    """Return the error of a name that nobody knows; it tells the nearest ones.
+    """Return the error for an unknown name, with the most similar known names.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def explain_unknown(what: str, name: str, known: Iterable[str], path: tuple[str 
 
 
 def tell_nearest(name: str, known: Iterable[str], cutoff: float = 0.4) -> str:
-    """Return in words which names are like one that nobody knows, or else which there are."""
+    """Return in words the known names that are similar to an unknown one, or else all known names."""
     known = list(known)
     near = get_close_matches(name, known, n=3, cutoff=cutoff)
     return f"the nearest are {', '.join(near)}" if near else f"there are {', '.join(known)}"
@@ -73,11 +73,11 @@ class RecordingError(InputError):
 
 
 class TwoReadingsError(RecordingError):
-    """The times of a recording can be read in several ways that differ in how long it took: nobody may guess."""
+    """The times of a recording can be read in several ways with different durations: the program must not guess."""
 
 
 class UnitError(InputError):
-    """A unit is unknown, or does not belong to the quantity it stands for."""
+    """A unit is unknown, or does not belong to its quantity."""
 
 
 class ModelFileError(InputError):

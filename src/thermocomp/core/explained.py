@@ -27,21 +27,21 @@ class SensorExplanation:
     ----------
     name, quantity, unit : str
     low, high : float
-        Trained range, from its zero where it has one of its own [unit].
+        Training range, relative to its zero where it has a separate one [unit].
     settled : float or None
         Followed in the end: per degree, or a spindle speed at the top speed of the training [unit of the model]; None:
         not known of this family.
     bound : float or None
         Most that it can add, whatever it reads [unit of the model].
     watched : bool
-        It is predicted from the others and the spindle speed; a failure is found by that, and the prediction stands in.
+        It is predicted from the others and the spindle speed; this detects a failure, and the prediction replaces it.
     jump, off, moved : float or None
         Limits: change within `pace`, difference from its prediction, change of the prediction while it reads the same
         [degC].
     pace : float or None
         [s]
     still : float or None
-        It reads the same for longer, another one changing [s]; None: time alone says nothing.
+        Longest constant reading while another one changes [s]; None: time alone is no criterion.
     unseen : float or None
         RMS error of its prediction in cycles that were left out [degC].
     undetected : float or None

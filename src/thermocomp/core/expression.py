@@ -20,7 +20,7 @@ class Constant:
 
 @dataclass(frozen=True)
 class Input:
-    """An input of the model minus its zero [its unit].
+    """Model input relative to its reference value [unit of the input].
 
     Parameters
     ----------
@@ -160,7 +160,7 @@ class Mean:
 
 @dataclass(frozen=True)
 class Recurrence:
-    """A value that is made again at every tick of a clock of its own; see `thermocomp.core.autoregressive`.
+    """A value that is updated at every tick of a separate clock; see `thermocomp.core.autoregressive`.
 
     Between ticks it goes in a straight line towards what the next would be if the inputs continued as since the last.
 
@@ -178,7 +178,7 @@ class Recurrence:
 
 @dataclass(frozen=True)
 class Named:
-    """A part that has a name of its own in the printed formula, such as ``T6-T7``."""
+    """A part that has a separate name in the printed formula, such as ``T6-T7``."""
 
     name: str
     of: "Node"

@@ -46,7 +46,7 @@ class Runs:
     moving : str
         1 where target and an input move beyond their noise around the run, else 0.
     marks : dict of str to str
-        Per channel the hash of each run, the target first; 0 where the channel says nothing there.
+        Per channel the hash of each run, the target first; 0 where the channel has no information there.
     """
 
     stride: int

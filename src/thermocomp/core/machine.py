@@ -1,4 +1,4 @@
-"""Machine, axes and channels: what stands on the shop floor."""
+"""Machine, axes and channels: the equipment on the shop floor."""
 
 import math
 from collections.abc import Mapping
@@ -130,7 +130,7 @@ class Machine:
     channels : tuple of Channel
         Its sensors.
     reference_temperature : float
-        Temperature at which its geometry is defined [degC]; ISO 1 says 20.
+        Temperature at which its geometry is defined [degC]; 20 by ISO 1.
 
     Raises
     ------

@@ -310,7 +310,7 @@ class ErrorModel(ABC):
     def _supported(
         self, before: FloatArray, deviation: FloatArray, change: FloatArray, clipped: FloatArray
     ) -> FloatArray:
-        """Return the deviation that ``hold`` or ``fade`` lets pass."""
+        """Return the deviation after ``hold`` or ``fade``."""
         far = np.zeros(change.shape[:-1]) if self.joint is None else self.joint.distance(change)
         outside = (clipped != change).any(axis=-1) | ~(far <= 1.0)
         if not outside.any():
@@ -355,7 +355,7 @@ class ErrorModel(ABC):
     def half_widths(
         self, table: Columns, time: ArrayLike | str | None = None, *, reference: ArrayLike | None = None
     ) -> FloatArray:
-        """Return the half-widths of the band about what `predict` says of the same table.
+        """Return the half-widths of the band about the result of `predict` for the same table.
 
         Parameters
         ----------
@@ -464,7 +464,7 @@ class ErrorModel(ABC):
         return self.honest_error is not None and self.honest_error.word == "accepted"
 
     def taken(self, by: str | None) -> Self:
-        """Return this model as one that somebody takes although it is unproven; as it is, if it is not.
+        """Return this model with the approval of a person if it is unproven; else unchanged.
 
         Parameters
         ----------
@@ -487,7 +487,7 @@ class ErrorModel(ABC):
         return replace(self, honest_error=replace(found, taken=f"{name.strip()}, {reason.strip()}"))
 
     def check_may_run(self) -> None:
-        """Refuse to run what the do-no-harm gate did not let pass, unless somebody takes what is unproven.
+        """Refuse to run a model that the do-no-harm gate did not accept, unless a person approved it as unproven.
 
         Raises
         ------

@@ -21,7 +21,7 @@ def find_plugins(group: Group, report: Callable[[str], object] = lambda _: None)
     ----------
     group : {'commands', 'methods', 'exporters', 'sources', 'sinks', 'pages'}
     report : callable, optional
-        Called with a line of text for each one that is skipped: this package's own name is taken.
+        Called with a line of text for each skipped one: names of this package cannot be overridden.
     """
     found: dict[str, EntryPoint] = {}
     entries = _read_entries(group, tuple(sys.path))

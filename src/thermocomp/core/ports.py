@@ -74,11 +74,11 @@ class Suspending(Protocol):
     """A sink that knows when the controller can have no correction in force, such as before homing."""
 
     def suspended(self) -> Mapping[str, str]:
-        """Return axes or targets without a correction in force, and why, as it was told last."""
+        """Return axes or targets without a correction in force, and the reason, as last reported."""
         ...
 
     def alarms(self) -> Mapping[str, str]:
-        """Return axes or targets whose correction is not in force as it shall be, and why, as it was told last."""
+        """Return axes or targets whose correction in force is not the demanded one, and why, as last reported."""
         ...
 
 

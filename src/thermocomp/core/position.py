@@ -81,7 +81,7 @@ class PositionModel:
         return tuple(m for _, m in self._by_power)
 
     def taken(self, by: str | None) -> "PositionModel":
-        """Return this model as one that somebody takes although it is unproven; see `ErrorModel.taken`."""
+        """Return this model with the approval of a person if it is unproven; see `ErrorModel.taken`."""
         offset = None if self.offset is None else self.offset.taken(by)
         return replace(self, offset=offset, slopes=tuple(m.taken(by) for m in self.slopes))
 

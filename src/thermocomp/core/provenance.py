@@ -83,7 +83,7 @@ class HonestError:
     taken : str
         Person who approved the use of an unproven model, and the reason; empty without.
     harm_margin : float or None
-        Harm in a single cycle that was let pass, as it was stated before judging; None: by rule.
+        Tolerated degradation in a single cycle, as stated before judging; None: by rule.
     lost : dict of str to float
         RMS of the residual with a sensor, or with several of them (``t1_C, t2_C``, in the order of the inputs), read
         as their zero from the start on, the watch being there to find it [unit of the model].

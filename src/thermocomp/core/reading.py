@@ -14,7 +14,7 @@ class Reading:
     time : float
         Time of the reading [s]; any clock that only moves forward.
     values : mapping of str to float
-        Channel name to value in house units: temperatures [degC], spindle speed [1/min].
+        Channel name to value in internal units: temperatures [degC], spindle speed [1/min].
     positions : mapping of str to float
         Axis letter to position [mm].
 

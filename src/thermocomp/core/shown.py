@@ -1,4 +1,4 @@
-"""Texts from outside, made fit to be read: no name of a file moves a cursor, changes colours or begins a line."""
+"""External texts, escaped for display: no name of a file moves a cursor, changes colours or begins a line."""
 
 from unicodedata import category
 
@@ -32,7 +32,7 @@ def escape(text: object, longest: int) -> str:
     ----------
     text : object
     longest : int
-        Characters of the text that are shown; dots stand for the others.
+        Number of characters of the text that are shown; dots replace the others.
 
     Returns
     -------

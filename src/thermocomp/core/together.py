@@ -21,7 +21,7 @@ class TogetherState(NamedTuple):
 
 
 class Together:
-    """Models of the same inputs and states, each with a read-out of its own; each says what it says alone.
+    """Models with the same inputs and states, each with a separate read-out; each has the same output as alone.
 
     Parameters
     ----------

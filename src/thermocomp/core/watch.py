@@ -51,7 +51,7 @@ class Watched:
     moved : float
         It is stuck when its prediction moves by more while it reads the same [degC].
     still : float
-        It is stuck when it reads the same for longer, another one changing; `GAP` where time says nothing of that [s].
+        Longest constant reading while another one changes; beyond it is stuck; `GAP` where time is no criterion [s].
     unseen : float
         Root mean square error of its prediction in cycles that were left out [degC].
     """

@@ -37,7 +37,7 @@ class Zeroing:
         The same where it turns from the first reading on, or nothing is known of it [s]: short, for what warms up must
         not get into the zero. Of a test recorded once a minute it is the first row.
     speed : str
-        Channel that tells whether the spindle is stopped [1/min]; empty if there is none.
+        Channel that shows whether the spindle is stopped [1/min]; empty if there is none.
 
     Raises
     ------
@@ -55,7 +55,7 @@ class Zeroing:
             check_name("zero", self.speed)
 
     def stands(self, speed: object) -> bool:
-        """Return whether a reading of `speed` says that the spindle is stopped; anything but a number does not."""
+        """Return whether a reading of `speed` shows that the spindle is stopped; anything but a number does not."""
         return isinstance(speed, float | int) and type(speed) is not bool and abs(speed) <= STANDS
 
 

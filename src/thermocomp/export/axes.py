@@ -82,7 +82,7 @@ def write_values(
     taken : mapping of str to Value
         For ``offset``, ``slope`` and ``position``.
     direction : float
-        1 if the controller adds what it is given to the command, -1 if it takes it off; an input that can be changed.
+        1 if the controller adds its input to the command, -1 if it subtracts it; an input that can be changed.
 
     Raises
     ------

@@ -13,7 +13,7 @@ def describe(compensator: Compensator, tables: Tables, of: str = "") -> dict[str
     tables : Tables
         Tables of the compensator.
     of : str
-        Before the names of what comes out.
+        Prefix of the names of the outputs.
     """
     slopes = any(tables.values["to_slope"])
     zeroing = compensator.models[0].zeroing

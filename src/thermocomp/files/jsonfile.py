@@ -33,7 +33,7 @@ class Format:
     Parameters
     ----------
     name : str
-        As it stands in the file.
+        Name as in the file.
     version : int
     words : str
         Name of the format in messages.
@@ -184,7 +184,7 @@ def read(kind: Format, path: str | Path) -> tuple[str, str]:
 
 
 def digest(body: list[Any], shared: dict[str, Any] | None = None) -> str:
-    """Return the SHA-256 of models as they stand in a file, with what stands once for all of them."""
+    """Return the SHA-256 of models as stored in a file, with the data common to all of them."""
     whole = [body, shared] if shared else body
     text = json.dumps(whole, sort_keys=True, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
     return hashlib.sha256(text.encode()).hexdigest()
@@ -301,6 +301,6 @@ def _tell(error: ErrorDetails, content: Any) -> str:
 
 
 def _short(text: object) -> str:
-    """Return a text or number from a file, quoted, fit to stand in an error."""
+    """Return a text or number from a file, quoted and shortened for an error."""
     shown = ascii(text) if isinstance(text, str) and not text.isprintable() else repr(text)
     return replace_unprintable(shown if len(shown) <= _REPEATED else f"{shown[:_REPEATED]}...")

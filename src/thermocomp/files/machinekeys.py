@@ -1,4 +1,4 @@
-"""The keys of a machine file: what each must be, and how it becomes house units; all that is wrong is kept."""
+"""Keys of a machine file: their types, and the conversion to internal units; all errors are collected."""
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -60,7 +60,7 @@ def each(values: Mapping[str, Any], convert: Callable[[str, Any], Any]) -> dict[
 
 
 def read_table(value: Any, known: Mapping[str, Convert], where: Keys) -> dict[str, Any]:
-    """Return a table in house units."""
+    """Return a table in internal units."""
     if not isinstance(value, dict):
         raise SettingError(f"{value!r}: must be a table", where)
 

@@ -149,7 +149,7 @@ def _axis(name: str, tables: Mapping[str, Any], structure: Structure) -> Axis:
 
 
 def _check_measured_at(axis: Axis, axes: Sequence[Axis]) -> None:
-    """Raise an error if one of the axes cannot have stood where it is said to."""
+    """Raise an error if one of the axes cannot have been at its stated position."""
     for other in axes:
         if other is axis and axis.measured_on == "tool":
             continue
@@ -176,7 +176,7 @@ def _check_counted(
 
 
 class _Sources:
-    """Reads what tells the values of components.
+    """Reader of the sources of the components' values.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Small text files, read whole: of a bounded size, no pipes and devices, UTF-8; and what is said of their errors."""
+"""Small text files, read completely: of a bounded size, no pipes and devices, UTF-8; and their error messages."""
 
 import stat
 from collections.abc import Sequence

@@ -59,7 +59,7 @@ def _depth(value: Any) -> int:
 
 
 def as_json(content: dict[str, Any]) -> str:
-    """Return the content of a TOML file as pydantic takes it strictly: a list for a tuple, but no text for a number.
+    """Return the content of a TOML file for strict validation by pydantic: a list for a tuple, no text for a number.
 
     A date, which JSON has not, becomes a list: nothing that takes a text takes it.
     """

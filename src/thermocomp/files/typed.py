@@ -43,7 +43,7 @@ def decode(kind: Any, value: Any, place: str) -> Any:
     Raises
     ------
     ValueError
-        It is none; the message says where, and what was found.
+        It is invalid; the message contains the location and the value found.
     """
     if get_origin(kind) in (Union, UnionType):
         (inner,) = (p for p in get_args(kind) if p is not NoneType)

@@ -41,7 +41,7 @@ def replay_models(
     Raises
     ------
     InputError
-        No model is of a channel, or it cannot be told how the recording begins.
+        No model is of a channel, or the initial state of the recording cannot be determined.
     """
     found: dict[str, FloatArray] = {}
     notes = []

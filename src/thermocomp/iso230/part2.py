@@ -111,7 +111,7 @@ class PositioningResult:
 
     @property
     def axis_values(self) -> dict[str, float]:
-        """Values of the axis by symbol; an arrow tells the direction. Without those that were not measured."""
+        """Values of the axis by symbol; an arrow shows the direction. Without those that were not measured."""
         values: dict[str, float] = {}
         for name, arrow in (("+", "↑"), ("-", "↓")):
             if name in self.directions:

@@ -385,7 +385,7 @@ def _load(recording: Recording, kind: Kind, start: int, stop: int) -> str:
 
 
 def _target_groups(recording: Recording) -> dict[str, list[tuple[float, Channel]]]:
-    """Return the displacements that are named after a position, by what their names begin with; at least two each."""
+    """Return the displacements that are named after a position, by the prefix of their names; at least two each."""
     groups: dict[str, list[tuple[float, Channel]]] = {}
     for c in recording.displacements:
         named = _TARGET.fullmatch(_base(c))

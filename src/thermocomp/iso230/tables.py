@@ -235,7 +235,7 @@ def _at_targets(r: PositioningResult, axis: str) -> Table:
 
 
 def thermal_content(test: ThermalTest) -> dict[str, Any]:
-    """Return a thermal test for programs; units stand in the names, times in s."""
+    """Return the JSON content of a thermal test; units are in the names, times in s."""
     positions = {c.name: float(p) for t in test.targets for c, p in zip(t.curves, t.positions, strict=True)}
     return {
         "name": test.name,

@@ -131,7 +131,7 @@ class ThermalCurve:
     values : ndarray of shape (n_rows,)
         Since the start of the test, row by row; nan where missing.
     course : AveragedCurve
-        The same averaged: what `figures` tells.
+        Averaged curve, from which `figures` are taken.
     figures : Figures
     settling : Settling or None
         Settling after the start of the drives; None if they never start.

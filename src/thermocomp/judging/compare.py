@@ -56,7 +56,7 @@ def compare(
     ----------
     samples : Samples
     methods : sequence of str or estimator
-        ``all`` stands for all of them; see `thermocomp.models.methods.expand`.
+        ``all`` denotes all of them; see `thermocomp.models.methods.expand`.
     judging : Judging
         Training and validation data.
     rules : Rules
@@ -85,7 +85,7 @@ def compare(
     ------
     InputError
         A method is unknown, or the primary one is not among them.
-        Rows stand in the samples twice and would be learned from and judged on at once.
+        Rows occur twice in the samples and would be used for training and judging at the same time.
     """
     refuse_leaks(samples, judging)
     names = expand(methods)
@@ -228,7 +228,7 @@ def n_pieces(samples: Samples, methods: Sequence[Any], judging: Judging, rules: 
 
 
 def split_by_cycle(whole: Assessment) -> list[Assessment]:
-    """Cut an assessment into its thermal cycles; what needs a replay of its own (robustness) stays with the whole."""
+    """Split an assessment into its thermal cycles; parts that need a separate replay stay with the whole."""
     found = []
     blocks = [b for b in join_short_cycles(whole.cycle, whole.test) if np.isin(whole.cycle, b).sum() >= MIN_ROWS]
     for unit, block in zip(whole.verdict.units, blocks, strict=True):

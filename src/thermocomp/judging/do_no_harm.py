@@ -59,11 +59,11 @@ class JudgedUnit:
     noise : float
         Noise of the probe: smaller errors are replaced by this value [um].
     margin : float
-        Harm that is let pass [um].
+        Tolerated degradation [um].
     moves : bool
-        The deviation changes enough to tell a model from a constant.
+        Whether the deviation changes enough to distinguish a model from a constant.
     rezeroed : tuple of (float, float) or None
-        RMS with and without the model, both counted from where the unit begins [um].
+        RMS with and without the model, both relative to the start of the unit [um].
     """
 
     name: str
@@ -122,7 +122,7 @@ class Verdict:
     names : tuple of str
         Names of the baselines.
     stated : float or None
-        Harm that is let pass, as the user stated it before judging; None: by rule.
+        Tolerated degradation as stated by the user before judging; None: by rule.
     """
 
     units: tuple[JudgedUnit, ...]
@@ -137,7 +137,7 @@ class Verdict:
 
     @cached_property
     def p_values(self) -> tuple[float, ...]:
-        """One-sided p-value beside each baseline; 1 with fewer than `MIN_UNITS` units."""
+        """One-sided p-value for each baseline; 1 with fewer than `MIN_UNITS` units."""
         if len(self.units) < MIN_UNITS:
             return (1.0,) * len(self.names)
         ratios = np.array([u.log_ratios for u in self.units])
@@ -288,9 +288,9 @@ def measure(
     unit : str
         Unit of the deviations.
     margin : float, optional
-        Harm that is let pass [um], stated before judging; see `margin_of`.
+        Tolerated degradation [um], stated before judging; see `margin_of`.
     stretch : bool
-        It continues from what was learned: compare also with both re-zeroed where it begins.
+        It continues the training data: compare also with both re-zeroed at its start.
 
     Returns
     -------
@@ -315,7 +315,7 @@ def measure(
 
 
 def join_verdicts(parts: Sequence[Verdict], about: str = "", caps: tuple[str, ...] = ()) -> Verdict:
-    """Return the verdict over the units of several: what refuses or caps one of them, refuses or caps the whole."""
+    """Return the verdict over the units of several: a refusal or cap of one of them applies to the whole."""
     return Verdict(
         units=tuple(u for v in parts for u in v.units),
         unit=parts[0].unit,
@@ -327,7 +327,7 @@ def join_verdicts(parts: Sequence[Verdict], about: str = "", caps: tuple[str, ..
 
 
 def margin_of(learned: Learned, unit: str = "um") -> float:
-    """Return the harm in a single unit that is let pass, unless the user states another [unit]."""
+    """Return the tolerated degradation in a single unit, unless the user specifies another [unit]."""
     return min(max(TIMES_NOISE * learned.noise, SHARE * learned.largest), MOST_MARGIN.get(unit, np.inf))
 
 

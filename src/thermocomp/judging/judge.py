@@ -25,7 +25,7 @@ BoolArray = NDArray[np.bool_]
 
 
 def drop_unreadable(samples: Samples, target: int, judging: Judging) -> Judging:
-    """Return a judgement without the blocks in which a target has too few readings to say anything.
+    """Return a judgement without the blocks in which a target has too few readings for a result.
 
     Parameters
     ----------

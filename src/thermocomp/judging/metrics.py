@@ -21,7 +21,7 @@ class Metric:
     best : {'low', 'high', 'zero'}
         Best value.
     unit : str
-        ``um`` stands for the unit of the deviation; ``%`` and ``1`` for themselves.
+        ``um`` denotes the unit of the deviation; ``%`` and ``1`` themselves.
     description : str
     function : callable
         (measured, predicted) -> value.

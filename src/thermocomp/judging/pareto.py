@@ -1,4 +1,4 @@
-"""Choice by the sensor budget: the fewest sensors that are enough, what each next one gains, and what stands in."""
+"""Choice by the sensor budget: the smallest sufficient set, the gain of each further sensor, and substitutes."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -26,7 +26,7 @@ def work_through(
     *,
     jobs: int,
 ) -> Iterator[_Found]:
-    """Yield what comes of each piece of work, in their order.
+    """Yield the results of the tasks, in their order.
 
     A process that dies takes the others' results with it, and nobody knows whose fault it was: what is missing is done
     again, piece by piece, until the one is found that kills its process.
@@ -37,7 +37,7 @@ def work_through(
         Takes a piece.
     pieces : sequence
     failed : callable
-        Takes a piece and why nothing came of it; gives what stands for that.
+        Called with a task and the reason of its failure; returns the replacement of the result.
     jobs : int
         Processes to share the work among; 1 is this one, -1 takes all cores. Within
         `thermocomp.judging.cluster.shared_among` it is of no account.

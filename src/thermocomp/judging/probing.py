@@ -22,7 +22,7 @@ class Probings:
     Parameters
     ----------
     every : float
-        Time between two; the first is so long after the start [s].
+        Interval of the probings; the first is one interval after the start [s].
     repeatability : float
         Repeatability of the probe, standard deviation [um].
 
@@ -117,7 +117,7 @@ class Probed:
     ----------
     plan : Probings
     at : ndarray of bool of shape (n_judged,)
-        A probing was made: what it says counts from the next row on.
+        A probing was made: it takes effect from the next row on.
     shift : ndarray of shape (n_judged,)
         Learned shift, which is included in the correction [um].
     without : ndarray of shape (n_judged,)

@@ -35,7 +35,7 @@ class Inner:
     split : Split
         Its `judge` is what was left out of some unit's training part, and that unit itself for a pair.
     scores : tuple of (int, int)
-        (left-out unit, unit to choose by) for which it tells an error.
+        (left-out unit, unit to choose by) for which it gives an error.
     """
 
     split: Split

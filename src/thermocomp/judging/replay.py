@@ -214,7 +214,7 @@ def stack_watched(
 
 
 def can_look(watch: Watch, samples: Samples) -> bool:
-    """Return whether samples have the speeds of a watch, without which it says nothing."""
+    """Return whether samples have the speeds that a watch needs."""
     names = [c.name for c in samples.inputs]
     return all(i.name in names for i in watch.inputs if i.quantity != "temperature")
 
@@ -256,12 +256,12 @@ def replay(model: ErrorModel, samples: Samples, rows: BoolArray) -> tuple[FloatA
     model : ErrorModel
     samples : Samples
     rows : ndarray of bool of shape (n_rows,)
-        Rows whose prediction is wanted.
+        Rows whose prediction is requested.
 
     Returns
     -------
     deviation : ndarray of shape (n_wanted,)
-        Predicted deviation at the wanted rows.
+        Predicted deviation at the requested rows.
     outside : ndarray of bool of shape (n_wanted,)
         An input was outside the trained range.
     """
@@ -273,7 +273,7 @@ def replay(model: ErrorModel, samples: Samples, rows: BoolArray) -> tuple[FloatA
 
 
 def walk(model: ErrorModel, samples: Samples, rows: BoolArray, disturb: Disturb | None = None) -> Iterator[State]:
-    """Step a model through the tests that hold `rows`; yield its state at each wanted row, in their order.
+    """Step a model through the tests that contain `rows`; yield its state at each requested row, in their order.
 
     The model runs without a break from the start of a test, or of the files that it continues from, as it would on the
     machine; its only inputs are those of `samples`, never a displacement. A row with a missing input is what the gate
@@ -284,7 +284,7 @@ def walk(model: ErrorModel, samples: Samples, rows: BoolArray, disturb: Disturb 
     model : ErrorModel
     samples : Samples
     rows : ndarray of bool of shape (n_rows,)
-        Rows whose state is wanted.
+        Rows whose state is requested.
     disturb : callable, optional
         Makes several variants of each reading; see `Disturb`.
 
@@ -335,7 +335,7 @@ def _begun(
     reference: FloatArray | None,
     read: Callable[[int], FloatArray],
 ) -> tuple[State, dict[int, FloatArray]]:
-    """Return the state that a test begins in, its zero being known, and the readings of that, which say its mean."""
+    """Return the initial state of a test with known zero, and the readings of the zero, which give its mean."""
     state = model.init(reference)
     if not np.isnan(state.reference).any():
         return state, {}
@@ -348,7 +348,7 @@ def _begun(
 
 
 def _window(model: ErrorModel, samples: Samples, readings: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the first of some readings: those that a zero is taken of."""
+    """Return the first of some readings: those from which a zero is averaged."""
     return readings[: first_rows(model.zeroing, samples.time[readings], samples.stands[readings])[0]]
 
 
@@ -394,7 +394,7 @@ def given_zero(samples: Samples, columns: Sequence[int], test: int) -> FloatArra
 
 
 def _needed(model: ErrorModel, usable: BoolArray, wanted: BoolArray) -> BoolArray:
-    """Return the rows of a test that have to be stepped through to know the wanted ones."""
+    """Return the rows of a test that must be stepped through to know the requested ones."""
     if model.remembers or model.support.policy == "hold" or not usable.any():
         return usable
     # A model without memory needs the wanted readings, and for a wanted row without one the reading before.

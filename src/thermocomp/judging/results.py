@@ -230,7 +230,7 @@ class Comparison:
     recommended : tuple of Recommendation
         Per target, where there was something to choose.
     starts : tuple of (str, Start)
-        Names of the recordings, and how each begins.
+        Names of the recordings, and their initial states.
     """
 
     judging: Judging

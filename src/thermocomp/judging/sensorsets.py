@@ -50,7 +50,7 @@ def choose_sets(samples: Samples, most: int, learn: BoolArray) -> SensorSets:
     samples : Samples
         The inputs are temperatures and spindle speeds.
     most : int
-        Largest set, beside that of all.
+        Largest set, in addition to that of all.
     learn : ndarray of bool of shape (n_rows,)
         Rows whose deviations may be seen.
 

@@ -195,7 +195,7 @@ class Judged:
     validity : Validity or None
         Conditions covered by the thermal cycles of these recordings.
     starts : tuple of (str, Start)
-        Names of the recordings, and how each begins.
+        Names of the recordings, and their initial states.
     """
 
     models: tuple[ErrorModel, ...]
@@ -372,7 +372,7 @@ def _assess(
     guard: Guard | None,
     looked_after: Sequence[str],
 ) -> tuple[Assessment, Judging]:
-    """Judge a model on what it has not learned from (`known` rows); on everything if there is nothing else, and say so.
+    """Judge a model on unseen rows (not `known`); on all rows if there are no others, and report this.
 
     Returns
     -------

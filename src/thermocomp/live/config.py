@@ -37,13 +37,13 @@ class Page:
     host, port : str, int
         Address of the page. Default: loopback.
     hosts : tuple of str
-        Names by which it may be called beside `host`, ``localhost`` and the addresses of this computer.
+        Host names of the page in addition to `host`, ``localhost`` and the addresses of this computer.
     token_file : str
-        File with the token that buttons want; without one the page only shows.
+        File with the token required by buttons; without one the page is read-only.
     settled : float
         A drift below this in ten minutes counts as settled [um].
     pages : tuple of str
-        Pages of other packages to serve beside, by their entry points of ``thermocomp.pages``.
+        Additional pages of other packages, by their entry points of ``thermocomp.pages``.
     """
 
     host: str = "127.0.0.1"

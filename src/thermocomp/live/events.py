@@ -39,7 +39,7 @@ class Events(deque[Event]):
         self._left_out = dict.fromkeys(LIMITED, 0)
 
     def tell(self, time_of_it: float, kind: str, text: str) -> Event | None:
-        """Add an event and return it; None if there were too many of its kind: the next one says how many.
+        """Add an event and return it; None if there were too many of its kind: the next one gives their number.
 
         Parameters
         ----------

@@ -87,7 +87,7 @@ def find_faults_now(settings: ServiceSettings, page: Page | None) -> Iterator[st
 
 
 def runs_now(settings: ServiceSettings) -> bool:
-    """Return whether the service of this configuration runs: then its port is taken.
+    """Return whether the service of this configuration is running: its port is then in use.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The latest value of each channel: of names that nothing uses only so many are kept, whatever comes in."""
+"""Latest value of each channel: the number of kept names that nothing uses is limited."""
 
 from collections.abc import Iterable, Mapping
 
@@ -34,7 +34,7 @@ class Latest(dict[str, tuple[float, float]]):
         tick : float
             Now [s].
         longest : float
-            A name that nothing uses makes room for another after so long without a value [s].
+            Time without a value after which a name that nothing uses may be replaced [s].
         """
         first, others = "", values.keys() - self.used
         if new := others - self.keys():

@@ -1,4 +1,4 @@
-"""Probings of a running service: which wait for the next reading, which were taken, and what they said."""
+"""Probings of a running service: waiting for the next reading, used ones, and their results."""
 
 from collections import deque
 from collections.abc import Callable, Mapping

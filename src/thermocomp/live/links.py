@@ -1,4 +1,4 @@
-"""Links of the service: each source and each sink in a task of its own, reconnected when it is lost.
+"""Links of the service: each source and each sink in a separate task, reconnected when it is lost.
 
 Whatever a source or a sink raises, it is this link's trouble alone: the others and the service continue.
 """

@@ -13,7 +13,7 @@ KEPT = 200
 
 
 class Checked(NamedTuple):
-    """A probing beside what was predicted for its instant."""
+    """A probing compared with the prediction for its instant."""
 
     time: float  #: of the machine, seconds since 1970
     target: str

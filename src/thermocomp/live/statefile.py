@@ -114,7 +114,7 @@ def loads(text: str, compensator: Compensator, source: str = "state") -> Saved:
 
 
 def write(state: CompensatorState, compensator: Compensator, path: str | Path, written: datetime) -> None:
-    """Write a state over the one before: a kill leaves one of them, whole.
+    """Replace the stored state: after a kill one of the two is there, complete.
 
     Parameters
     ----------

@@ -162,7 +162,7 @@ class AveragedDynamic(TimedRegressor):
     def lay_out(
         self, rows: FloatArray, step: FloatArray, folds: IntArray, speeds: Sequence[int]
     ) -> tuple[PacedFeatures, IntArray, str]:
-        """Return the features that rows have something to say about, and what of the rows is left out together.
+        """Return the features that the rows can determine, and the parts of the rows that are left out together.
 
         Parameters
         ----------

@@ -108,7 +108,7 @@ class ThermalRegressor(RegressorMixin, BaseEstimator, ABC):
 
 
 class MemorylessRegressor(ThermalRegressor):
-    """A regressor to which a row is a state of its own, whatever came before."""
+    """A regressor whose output depends only on the present row."""
 
     def predict(self, X: ArrayLike) -> FloatArray:
         """Predict the deviation.
@@ -155,10 +155,10 @@ class MemorylessRegressor(ThermalRegressor):
 
 
 class StaticRegressor(MemorylessRegressor):
-    """A memoryless regressor whose fit wants X and y and nothing else."""
+    """A memoryless regressor whose fit needs only X and y."""
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
-        """Fit; what a method refuses beside data that are none, its class tells.
+        """Fit; the class documents the additional data that a method refuses.
 
         Parameters
         ----------
@@ -196,7 +196,7 @@ class CycledRegressor(MemorylessRegressor):
     """
 
     def fit(self, X: ArrayLike, y: ArrayLike, *, cycle: ArrayLike | None = None) -> Self:
-        """Fit; what a method refuses beside data that are none, its class tells.
+        """Fit; the class documents the additional data that a method refuses.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Regressors of others: any of scikit-learn's, or a small class of one's own, judged beside the methods."""
+"""External regressors: any of scikit-learn, or a small custom class, judged with the methods."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -118,7 +118,7 @@ def adopt_estimator(estimator: Any) -> Any:
     Parameters
     ----------
     estimator : estimator
-        One of thermocomp's, one with a `freeze` of its own, a Pipeline, or any regressor of scikit-learn's manner.
+        An estimator of thermocomp, one with a custom `freeze`, a Pipeline, or any scikit-learn regressor.
 
     Returns
     -------
@@ -129,7 +129,7 @@ def adopt_estimator(estimator: Any) -> Any:
     Raises
     ------
     InputError
-        It is no regressor, or a part of it has a memory and could not be told the time.
+        It is not a regressor, or a part of it has a memory and cannot be given the time.
     """
     if isinstance(estimator, type):
         raise InputError(f"{estimator.__name__} is a class: give an instance, {estimator.__name__}()")

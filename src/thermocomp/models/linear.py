@@ -80,7 +80,7 @@ class TermRegressor(MemorylessRegressor):
         self._keep(found, self._inputs_alone(), [(i,) for i in columns], tri.total)
 
     def _inputs_alone(self) -> list[Variable]:
-        """Return each input as a variable of its own."""
+        """Return each input as a separate variable."""
         return [Variable.single(name, i) for i, name in enumerate(self._names())]
 
     def _keep(self, found: Solution, variables: Sequence[Variable], terms: Sequence[Term], total: float) -> None:
@@ -102,7 +102,7 @@ class TermRegressor(MemorylessRegressor):
         self.n_effective_ = effective_sample_size(found.residual)
 
     def _coefficient_lines(self, title: str = "", beside: Sequence[str] = ()) -> list[str]:
-        """Return a table of the coefficients as text, the constant first; `beside` is a further column of them."""
+        """Return a table of the coefficients as text, the constant first; `beside` is an additional column."""
         wide = max(len(name) for name in ("VARIABLE", *self.terms_))
         lines = [f"{'VARIABLE':<{wide}}  {'COEFFICIENT':>14}{title}"]
         if self.fit_intercept:

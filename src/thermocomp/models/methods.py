@@ -16,7 +16,7 @@ ALL_METHODS = "all"
 
 
 class NamedEstimator(str):
-    """The name of an estimator that was handed in, which it carries along: it stands where names of methods do.
+    """The name of an estimator that was passed in, with the estimator attached: it can replace names of methods.
 
     Parameters
     ----------

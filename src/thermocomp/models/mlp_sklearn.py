@@ -39,7 +39,7 @@ class SklearnNet(StaticRegressor, NetRegressor):
     Attributes
     ----------
     converged_ : bool
-        False: the solver gave up, and `caution_` says so.
+        False: the solver did not converge, as noted in `caution_`.
     n_iter_ : int
         Iterations of the solver.
     net_, input_scaling_, output_scaling_, n_parameters_, n_patterns_, n_effective_, caution_, data_min_, data_max_

@@ -60,7 +60,7 @@ class PacedFeatures:
         stopped: Sequence[float],
         running: Sequence[float],
     ) -> "PacedFeatures":
-        """Return the features that rows have something to say about.
+        """Return the features that the rows can determine.
 
         Parameters
         ----------
@@ -172,7 +172,7 @@ class PacedFeatures:
         count : int
         random_state : int
         keep : sequence of int, optional
-            Places in `temperatures` that are taken; all without it. The draw is the same.
+            Places in `temperatures` that are used; all by default. The draw is the same.
 
         Returns
         -------

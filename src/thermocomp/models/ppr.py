@@ -194,7 +194,7 @@ def _normal(u: FloatArray) -> tuple[FloatArray, NDArray[np.intp], FloatArray]:
 
 
 def _penalty(u: FloatArray, degrees: float) -> float:
-    """Return the penalty on bending that leaves a curve so many degrees of freedom."""
+    """Return the penalty on bending that leaves a curve a given number of degrees of freedom."""
     bands = _normal(u)[0]
     gram = np.diag(bands[2]) + np.diag(bands[1, 1:], 1) + np.diag(bands[1, 1:], -1)
     bending = linalg.eigh(_BENDING, gram, eigvals_only=True)

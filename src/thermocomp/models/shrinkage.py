@@ -29,7 +29,7 @@ def scaling(X: FloatArray, *, centred: bool = True) -> tuple[FloatArray, FloatAr
     -------
     centre : ndarray of shape (n_features,)
     scale : ndarray of shape (n_features,)
-        inf for a column that does not change: divided by it, it says nothing.
+        inf for a constant column: divided by it, it has no effect.
     """
     centre = X.mean(axis=0) if centred else np.zeros(X.shape[1])
     scale = np.sqrt(np.mean((X - centre) ** 2, axis=0))
@@ -155,7 +155,7 @@ class ComponentRegressor(ShrunkRegressor):
     Parameters
     ----------
     components : int, optional
-        Do not choose: so many components, or as many as can be.
+        Fixed number of components, or the largest possible number if smaller. Default: chosen by `rule`.
     max_components : int, optional
         Most to choose from; as many as inputs if not given.
     rule : {'one-standard-error', 'minimum'}

@@ -191,7 +191,7 @@ def train(
     prints : bool
         The model is kept: fingerprints of the rows go into its provenance.
     joint : bool
-        It gets its joint support; a model that only clips says the same without.
+        Whether it gets its joint support; a model that only clips gives the same output without.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Methods that no handful of numbers can stand for: compared with the others, never deployed."""
+"""Methods that cannot be reduced to a few numbers: compared with the others, never deployed."""
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
@@ -30,7 +30,7 @@ class UnfrozenRegressor(StaticRegressor):
     def unfrozen(
         self, *, inputs: Sequence[Input] | None = None, rows: FloatArray | None = None, **header: Any
     ) -> "EstimatorModel":
-        """Return the fitted estimator as a model that can be replayed and judged, and nothing else.
+        """Wrap the fitted estimator as a model for replay and validation only (cannot be saved, exported or run live).
 
         Parameters
         ----------

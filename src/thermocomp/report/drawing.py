@@ -54,7 +54,7 @@ class Drawn(str):
 
 @contextmanager
 def drawing(salt: str) -> Iterator[None]:
-    """Draw in the house's style, and no text as a formula.
+    """Draw in the style of the reports, and no text as a formula.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def drawing(salt: str) -> Iterator[None]:
 
 
 def add_legend(where: Axes | Figure, **how: Any) -> None:
-    """Add a legend of all that has a label; matplotlib's leaves out what begins with ``_``.
+    """Add a legend of all labelled items; matplotlib ignores labels that begin with ``_``.
 
     Parameters
     ----------

@@ -173,7 +173,7 @@ def draw_timeline(log: FaultLog, recording: Recording) -> Drawn:
 
 
 def draw_stand_ins(log: FaultLog) -> Drawn:
-    """Show what sensors that failed read, and the temperature that stood in.
+    """Show the readings of failed sensors, and the substitute temperature.
 
     Parameters
     ----------
@@ -210,7 +210,7 @@ def draw_stand_ins(log: FaultLog) -> Drawn:
 
 
 def _around(read: FloatArray, stood_in: FloatArray) -> tuple[float, float]:
-    """Return a range that holds what stood in and what was believed, and readings that are not far from these."""
+    """Return a range that contains the substitutes and the trusted values, and readings close to them."""
     sure = np.where(np.isfinite(stood_in), stood_in, read)
     low, high = float(np.nanmin(sure)), float(np.nanmax(sure))
     far = AROUND + (high - low)

@@ -26,7 +26,7 @@ SHOWN = ("mae", "rms", "max_abs", "peak_to_peak", "reduction")
 def summarise(
     comparison: Comparison, recordings: Sequence[Recording], samples: Samples | None = None
 ) -> dict[str, Any]:
-    """Return everything the report says in words and numbers.
+    """Return the content of the report in words and numbers.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def summarise(
     recordings : sequence of Recording
     samples : Samples, optional
         All rows of the comparison: the best method is fitted to them for its formula, as ``thermocomp fit`` does.
-        Without them the formula is that of one fold, and says so.
+        Without them the formula is that of one fold, and is marked so.
 
     Returns
     -------

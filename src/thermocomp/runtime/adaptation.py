@@ -1,4 +1,4 @@
-"""Adaptation: what probings say of a model's error, and how long that holds.
+"""Adaptation: information from probings about a model's error, and its validity over time.
 
 A Kalman filter over what may be wrong with a model: an offset of the size of its error on cycles that were left out,
 and, in a model that is the average of many structures, how much of each main direction of their differences is true. A

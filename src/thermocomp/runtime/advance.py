@@ -1,4 +1,4 @@
-"""All models of a compensator, one reading further: each group from a zero of its own."""
+"""All models of a compensator, one reading further: each group with a separate zero."""
 
 import math
 from collections.abc import Sequence

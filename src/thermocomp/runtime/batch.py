@@ -71,7 +71,7 @@ def run(
     undriven : ndarray of bool of shape (n_rows,), optional
         The correction is not driven: sensors failed that the model must not lose. It is held, then fades.
     probed : ndarray of shape (n_rows,), optional
-        Deviation that a probing says, nan where there was none: it counts from the next row on [um].
+        Deviation measured by a probing, nan where there was none: it takes effect from the next row on [um].
     repeatability : float
         Repeatability of the probe, standard deviation [um].
 

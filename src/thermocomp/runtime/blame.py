@@ -72,7 +72,7 @@ def weigh_swaps(
     evidence : ndarray of shape (..., n_pairs)
         For every two, low-passed; -inf once it spoke against them.
     x : ndarray of shape (..., n_sensors)
-        Readings, or what stands in for them, minus the reference [degC].
+        Readings, or their substitutes, minus the reference [degC].
     memory : ndarray of shape (..., n_memory)
         See `thermocomp.runtime.watch.WatchState`.
     able : ndarray of bool of shape (..., n_sensors)

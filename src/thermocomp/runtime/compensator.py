@@ -55,7 +55,7 @@ class Compensator:
     Parameters
     ----------
     models : tuple of ErrorModel
-        Models of time, stepped one by one, each from a zero of its own.
+        Models of time, stepped one by one, each with a separate zero.
     lines : dict of str to DeviationLine
         By target or axis.
     limits : Limits
@@ -65,7 +65,7 @@ class Compensator:
     Raises
     ------
     InputError
-        None of its targets may run: the do-no-harm gate refused a model, or it is unproven and nobody takes it.
+        None of its targets may run: the do-no-harm gate refused a model, or it is unproven and nobody has approved it.
     """
 
     models: tuple[ErrorModel, ...]
@@ -373,7 +373,7 @@ class Compensator:
     def _drive(
         self, state: CompensatorState, target: str, deviation: Deviation, travel: float
     ) -> tuple[Correction, Status]:
-        """Return the correction that a deviation wants, within the limits, and how the target is."""
+        """Return the correction for a deviation, within the limits, and the status of the target."""
         before, line, order = state.corrections[target], self.lines[target], state.orders.get(target)
         wanted = Correction.opposing(deviation)
         if order is not None and order.word in ("holding", "suspended"):
@@ -386,7 +386,7 @@ class Compensator:
         return after, ACTIVE
 
     def _believe(self, state: CompensatorState, reading: Reading, time: float) -> tuple[CompensatorState, Reading]:
-        """Return the reading with what stands in for temperatures that are not believed."""
+        """Return the reading with substitutes for temperatures that are not trusted."""
         values, states = reading.values, list[WatchState]()
         for lookout, before in zip(self._lookouts, state.watches, strict=True):
             seen, values = lookout.believe(before, time, values)

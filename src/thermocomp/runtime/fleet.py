@@ -29,7 +29,7 @@ class Fleet:
     Parameters
     ----------
     model : LinearDynamic
-        Accepted, or taken by somebody; each signal a single input, and readings outside the trained range clipped.
+        Accepted, or approved by a person; each signal a single input, and readings outside the training range clipped.
     zeros : array-like of shape (n_machines, n_inputs)
         Zero of the inputs at each machine.
     limits : Limits

@@ -1,4 +1,4 @@
-"""The gate: what of a reading says that a sensor, a clock or a wire is broken, and not that the machine is warm.
+"""The gate: readings that show a broken sensor, clock or wire, and not a warm machine, are rejected.
 
 It comes first, because numbers that are not numbers are treacherous further down: in Python ``max(-m, min(m, nan))`` is
 ``m``, so a dead sensor would command the full correction.
@@ -105,7 +105,7 @@ def explain_untimely(reading: Reading, now: float, limits: Limits) -> str:
 
 
 def find_plausible_range(channel: Input, zero: float) -> tuple[float, float]:
-    """Return the range outside which a value says that the sensor is broken, not that the machine is warm.
+    """Return the range outside which a value shows that the sensor is broken, not that the machine is warm.
 
     `zero` is what counts as zero now; nan while it is not known.
     """

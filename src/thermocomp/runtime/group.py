@@ -1,4 +1,4 @@
-"""Models of a compensator that go in step: what they have in common is worked out once."""
+"""Groups of models of a compensator that are stepped together: common parts are computed once."""
 
 import math
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ TOGETHER = "inputs together"
 
 
 class Group:
-    """Models with the same inputs, states and zero, each with a read-out of its own; or a single model of any family.
+    """Models with the same inputs, states and zero, each with a separate read-out; or a single model of any family.
 
     Parameters
     ----------

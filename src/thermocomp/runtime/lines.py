@@ -36,7 +36,7 @@ class Said(NamedTuple):
 
 
 def constant(said: Sequence[float]) -> Deviation:
-    """Return the deviation that one model says, the same along the axis."""
+    """Return the deviation of a single model, the same along the axis."""
     return Deviation(said[0])
 
 

@@ -25,7 +25,7 @@ class Lookout:
     def believe(
         self, state: WatchState, time: float, values: Mapping[str, float]
     ) -> tuple[WatchState, Mapping[str, float]]:
-        """Return the values with what stands in for temperatures that are not believed.
+        """Return the values with substitutes for temperatures that are not trusted.
 
         Parameters
         ----------

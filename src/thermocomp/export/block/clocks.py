@@ -1,4 +1,4 @@
-"""Values with a clock of their own, as scalars and loops: see `thermocomp.core.expression.Recurrence`."""
+"""Values with a separate clock, as scalars and loops: see `thermocomp.core.expression.Recurrence`."""
 
 import math
 

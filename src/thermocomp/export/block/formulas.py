@@ -12,7 +12,7 @@ def models_rezeroed(s: Names, w: Names, t: Names) -> None:
 
 
 def tick(s: Names, w: Names, t: Names, c: int) -> None:
-    """Work out what a value with a clock of its own is at its next tick.
+    """Compute a value with a separate clock at its next tick.
 
     Parameters
     ----------

@@ -92,7 +92,7 @@ class Formulas:
         self.functions[name] = "\n".join([f"def {name}({parameters}):", *(f"    {line}" for line in lines or ["pass"])])
 
     def _value(self, node: e.Node, clock: "_Clock | None" = None) -> str:
-        """Return the name of what a part says; a part that stands in several places is worked out once."""
+        """Return the name of a part's value; a part that occurs in several places is computed once."""
         if isinstance(node, e.Named):
             return self._value(node.of, clock)
         if isinstance(node, e.Constant):
@@ -162,7 +162,7 @@ class Formulas:
 
 
 class _Clock(Clock):
-    """A value with a clock of its own, and where in the block's arrays it keeps what was."""
+    """A value with a separate clock, and the location of its past values in the block's arrays."""
 
     def __init__(self, tick: e.Node, interval: float, before: Sequence["_Clock"]) -> None:
         super().__init__(tick, interval)

@@ -71,7 +71,7 @@ def larger(one: float, other: float) -> float:
 
 
 def follow(lag: float, value: float, paces: float) -> float:
-    """Return a first-order lag so many time constants later."""
+    """Return a first-order lag after a number of time constants."""
     return lag - math.expm1(-paces) * (value - lag)
 
 

@@ -24,7 +24,7 @@ class Function(NamedTuple):
 
     @property
     def parameters(self) -> list[str]:
-        """Those beside the variables."""
+        """Parameters other than the variables."""
         return [a.arg for a in self.tree.args.args if a.arg not in VARIABLES]
 
     @property
@@ -62,7 +62,7 @@ def functions(tables: Tables, own: Mapping[str, str] = MappingProxyType({})) -> 
     tables : Tables
         Tables of the compensator: an ``if`` that depends on one of their sizes is resolved here.
     own : mapping of str to str
-        Functions of the block that stand for those of a library, by the names of these.
+        Functions of the block that replace those of a library, by the names of these.
     """
     known = _all() | {name: _made(name, text) for name, text in tables.formulas.items()}
     known |= {name: known[of]._replace(name=name) for name, of in own.items()}
@@ -164,7 +164,7 @@ PARAMETER: dict[str, Kind] = {"int": "int", "float": "real", "bool": "bool"}
 
 
 def parameters_of(function: Function) -> dict[str, Kind]:
-    """Return the kinds of a function's parameters beside the variables."""
+    """Return the kinds of a function's parameters other than the variables."""
     return {
         a.arg: PARAMETER[ast.unparse(a.annotation)]
         for a in function.tree.args.args

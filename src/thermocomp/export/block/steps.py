@@ -194,7 +194,7 @@ def gather(s: Names, w: Names, t: Names) -> None:
 
 
 def drive(s: Names, w: Names, t: Names, k: int) -> None:
-    """Move a correction to where its models want it, as far as the limits allow at both ends of the travel.
+    """Move a correction towards the demand of its models, as far as the limits allow at both ends of the travel.
 
     Parameters
     ----------
@@ -255,7 +255,7 @@ def idle(s: Names, w: Names, t: Names, k: int) -> None:
 
 
 def limit(wanted: float, current: float, travel: float, magnitude: float, rate: float, band: float) -> float:
-    """Return a correction after a move towards where it is wanted: no further, no faster, and not for a trifle [um].
+    """Return a correction after a move towards the demand: no further, no faster, and not within the dead band [um].
 
     Parameters
     ----------

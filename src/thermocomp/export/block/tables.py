@@ -1,4 +1,4 @@
-"""The numbers of a compensator, as its block wants them: see `thermocomp.export.block.layout`."""
+"""Numbers of a compensator, in the form of its block: see `thermocomp.export.block.layout`."""
 
 from typing import Any, NamedTuple
 

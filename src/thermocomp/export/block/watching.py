@@ -1,4 +1,4 @@
-"""The watch over the temperatures as scalars and loops: see `thermocomp.runtime.watch`, which says why."""
+"""The watch over the temperatures as scalars and loops: see `thermocomp.runtime.watch` for explanations."""
 
 import math
 

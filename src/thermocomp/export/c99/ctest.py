@@ -83,7 +83,7 @@ _FAULTS = """        for (j = 0; j < SENSORS; j++) {
 
 
 def write_test(name: str, tables: Tables, readings: Readings, answers: Answers, double: float, single: float) -> str:
-    """Return a program that says whether the code does what the compensator did.
+    """Return a program that checks whether the code gives the same outputs as the compensator.
 
     Parameters
     ----------

@@ -166,7 +166,7 @@ def _within(variable: str, most: float) -> Iterator[str]:
 
 
 def _cap(limits: Limits, option: str, times: float) -> float:
-    """Return a limit [um] in the digits of a control, so many times: no larger than it was asked for."""
+    """Return a limit [um] in the digits of a control, times a factor: not larger than requested."""
     asked: float = getattr(limits, option)
     # the product in decimals: 0.1 um/s is 6 um in a minute, not a digit of double precision more
     taken = float(Decimal(shorten(in_mm(float(Decimal(repr(asked)) * Decimal(times))), cap=True)).scaleb(3))

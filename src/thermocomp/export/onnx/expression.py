@@ -37,7 +37,7 @@ class Memory:
 
 
 class Walk:
-    """Works trees out; a part that stands in several places once.
+    """Converter of trees; a part that occurs in several places is converted once.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class Walk:
         self._known: dict[e.Node, str] = {}
 
     def value(self, node: e.Node) -> str:
-        """Return the name of what a part says."""
+        """Return the name of a part's value."""
         if isinstance(node, e.Named):
             return self.value(node.of)
         if (known := self._known.get(node)) is None:
@@ -89,7 +89,7 @@ class Walk:
         return after
 
     def _clock(self, tick: e.Node, interval: float) -> str:
-        """Return a value that is made again at every tick: `thermocomp.core.autoregressive` says how."""
+        """Return a value that is updated at every tick: see `thermocomp.core.autoregressive`."""
         g, clock = self._graph, Clock(tick, interval)
         now = g.join([self.value(leaf) for leaf in clock.leaves])
         n, means = len(clock.leaves), clock.means
@@ -201,7 +201,7 @@ def arithmetic(g: Graph, node: e.Node, value: Callable[[e.Node], str]) -> str:  
 
 
 def _sum(g: Graph, terms: Sequence[e.Node], value: Callable[[e.Node], str]) -> str:
-    """Return a sum; what has a weight of its own is worked out at once."""
+    """Return a sum; terms with a separate weight are computed at once."""
     weights, weighted, others = list[float](), list[str](), list[str]()
     for term in terms:
         match term:

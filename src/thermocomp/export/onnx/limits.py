@@ -38,7 +38,7 @@ class Drive:
         return g.every(g.put("And", within, flat))
 
     def move(self, deviation: str, correction: str, slope: str, travel: str) -> tuple[str, str]:
-        """Return corrections and slopes after a move towards where the models want them.
+        """Return corrections and slopes after a move towards the demand of the models.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""A graph of ONNX while it is made: numbers and names in, the name of what was worked out of them out."""
+"""A graph of ONNX under construction: numbers and names in, the name of the result out."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -53,12 +53,12 @@ class Node:
 
 
 class Graph:
-    """Operators in order; what is the same is worked out once.
+    """Operators in order; identical ones are computed once.
 
     Parameters
     ----------
     outer : Graph, optional
-        In which this one is: it sees what was worked out there before.
+        Enclosing graph, whose values are visible.
     """
 
     def __init__(self, outer: "Graph | None" = None) -> None:
@@ -147,7 +147,7 @@ class Graph:
         Parameters
         ----------
         trips : str
-            So often, unless the body says that it is enough.
+            Number of iterations, unless the body ends the loop.
         carried : sequence of str
             Their first values.
         body : Graph

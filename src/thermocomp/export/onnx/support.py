@@ -10,7 +10,7 @@ from thermocomp.export.onnx.nodes import Graph
 
 
 def support(g: Graph, model: ErrorModel, change: str, said: str, before: str) -> str:
-    """Return the deviation that the policy of a model lets pass.
+    """Return the deviation after the support policy of a model.
 
     Parameters
     ----------

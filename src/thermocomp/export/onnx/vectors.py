@@ -75,7 +75,7 @@ def pick_zero(tables: Tables) -> FloatArray:
 
 
 def pick_readings(tables: Tables) -> Readings:
-    """Return readings for test vectors; what is too old is missing, as the caller has to say."""
+    """Return readings for test vectors; readings that are too old are missing, as the caller must mark them."""
     readings, age = make_readings(tables), tables.values["reading_age"]
     timely = (readings.age >= -CLOCK_SKEW) & (readings.age <= age)
     values = np.where(timely[:, None], readings.values, np.nan)

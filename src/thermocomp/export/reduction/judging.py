@@ -1,4 +1,4 @@
-"""Reduction: the best model of a controller's shape, judged on cycles it has not seen, beside the full one."""
+"""Reduction: the best model of a controller's form, judged on unseen cycles, next to the full one."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -68,7 +68,7 @@ def reduce_model(
     jobs: int = 1,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Reduction:
-    """Fit the best model of a shape to recordings, and judge it beside the full one.
+    """Fit the best model of a form to recordings, and judge it next to the full one.
 
     Sensors are chosen again without each unseen cycle, by cycles left out of the others. What is judged says its
     numbers in the digits that are printed, and knows no range: neither does the controller. The full model is fitted

@@ -25,7 +25,7 @@ class Shape:
     sensors : int
         At most.
     constant : bool
-        A constant may stand beside them. False: it counts from the temperature at homing.
+        A constant may be added. False: it is relative to the temperature at homing.
     axes : str
         Letters of the axes that have one.
     """
@@ -73,7 +73,7 @@ class LeftOut:
 
 @dataclass(frozen=True)
 class Reduced:
-    """A model in the shape of a controller, beside the full one.
+    """A model in the form of a controller, with the full one for comparison.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ class Reduced:
     replayed : RemainingError or None
         With the model as it is written, over all rows of the recordings that it was fitted to.
     most : float
-        Largest deviation that was said in all of this [um].
+        Largest output in all of this [um].
     """
 
     model: ErrorModel
@@ -211,7 +211,7 @@ def vectors(reduced: Reduced) -> list[tuple[float, ...]]:
 
 
 def find_axis(target: str, named: dict[str, str]) -> str:
-    """Return the letter of the axis that a target goes along, as `named` or by its name; empty if it does not say."""
+    """Return the letter of the axis of a target, as `named` or by its name; empty if neither defines it."""
     if target in named:
         return named[target]
     found = re.fullmatch(r"([xyz])([\d_].*)?", target, re.IGNORECASE)

@@ -107,7 +107,7 @@ def translate(tables: Tables, name: str, dialect: Dialect) -> list[SourceUnit]:
 
 
 def _start(tables: Tables, name: str, used: str, scl: bool) -> SourceUnit:
-    """Return the function that begins again; the corrections in force stay, and move from there."""
+    """Return the function that restarts; the corrections in force stay, and move from there."""
     mark = "#" if scl else ""
     lines = []
     for n, var in used_in("s", used).items():

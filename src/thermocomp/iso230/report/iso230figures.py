@@ -1,4 +1,4 @@
-"""Figures of ISO 230 tests, as SVG text. Each answers one question; the question stands in its docstring."""
+"""Figures of ISO 230 tests, as SVG text. Each answers one question, which is given in its docstring."""
 
 from collections.abc import Sequence
 

@@ -141,7 +141,7 @@ def make_grid(top_speed: float, hours: float) -> tuple[Trial, ...]:
     top_speed : float
         Maximum spindle speed of the machine [1/min].
     hours : float
-        Each lasts so long, after a stop of 15 min [h].
+        Duration of each, after a stop of 15 min [h].
 
     Returns
     -------

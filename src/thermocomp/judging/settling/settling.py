@@ -43,7 +43,7 @@ class Phase:
     number : int
         Number among those of its kind, from 1.
     start, end : int
-        Row of the state it begins in, and its last row.
+        Row of the initial state, and last row.
     """
 
     kind: Kind

@@ -75,7 +75,7 @@ class Running:
     phase : Phase
         The last one: a warm-up or a cool-down.
     seconds : float
-        It has lasted so long [s].
+        Duration so far [s].
     states : tuple of (str, SteadyState)
         State of each target, by name.
     """

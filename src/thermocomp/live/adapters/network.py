@@ -40,7 +40,7 @@ class OnBroker:
             raise SettingError(f"port = {self.port}: want one from 1 to 65535")
 
     def hears(self, other: "OnBroker") -> bool:
-        """Return whether what is published to another's topic comes back on this one, as far as names tell."""
+        """Return whether messages published to another's topic come back on this one, judged by the names."""
         levels, topic = self.topic.split("/"), other.topic.split("/")
         levels = levels[2:] if levels[0] == "$share" else levels
         fits = all(level in ("+", "#", found) for level, found in zip(levels, topic, strict=False))
@@ -121,7 +121,7 @@ def explain_topic(topic: str, *, published: bool) -> str:
     ----------
     topic : str
     published : bool
-        It is published to, so that wildcards stand for nothing.
+        It is published to, so that wildcards have no meaning.
     """
     return next(_faults_of_topic(topic, published=published), "")
 

@@ -243,7 +243,7 @@ def _parsed(row: Sequence[str], place: int) -> float | None:
 
 
 def find_experiment(name: str, folder: Path) -> Experiment:
-    """Return an experiment of the virtual machine: one that comes with the package, or a protocol of one's own.
+    """Return an experiment of the virtual machine: one included in the package, or a custom protocol.
 
     Raises
     ------

@@ -90,7 +90,7 @@ class Journal:
 
     @classmethod
     def open(cls, path: str | Path, limits: JournalLimits, start: StartRow) -> Self:
-        """Open a journal, to continue with it or to begin it; a disk that does not let us is told by `status`.
+        """Open a journal, existing or new; a failure of the disk is reported by `status`.
 
         A file that is damaged or no journal is kept as ``.refused``; one of a newer version stays as it is.
 
@@ -200,7 +200,7 @@ class Journal:
         connection.execute("COMMIT")
 
     def _connect(self) -> sqlite3.Connection:
-        """Continue with the newest file, or begin one."""
+        """Continue with the newest file, or create one."""
         files = numbered(self.path)
         newest = files[max(files)] if files else None
         if newest is not None:

@@ -1,4 +1,4 @@
-"""A journal becomes a recording: what was measured, what was in force at the machine, and what that says of it."""
+"""Conversion of a journal to a recording: measurements, corrections in force, and uncompensated deviations."""
 
 from array import array
 from collections.abc import Sequence

@@ -229,7 +229,7 @@ def find_version(connection: sqlite3.Connection) -> int | None:
 
 @contextmanager
 def telling(path: Path) -> Iterator[None]:
-    """Turn what SQLite says of a file into an error that names it."""
+    """Turn an SQLite error about a file into an error that names the file."""
     try:
         yield
     except sqlite3.Error as e:

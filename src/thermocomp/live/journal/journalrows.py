@@ -60,7 +60,7 @@ class DemandRow(NamedTuple):
 
 
 class ConfirmationRow(NamedTuple):
-    """The correction that is in force, as the controller says."""
+    """Correction in force, as reported by the controller."""
 
     time: float
     target: str
@@ -107,7 +107,7 @@ class MeasurementRow(NamedTuple):
 
 
 class AlarmRow(NamedTuple):
-    """Something that somebody should look at."""
+    """An alarm that needs attention."""
 
     time: float
     kind: str
@@ -151,7 +151,7 @@ _NAMES = {kind: name for name, kind in KINDS.items()}
 
 
 def measured_by(row: MeasurementRow, start: StartRow, in_force: Correction | None = None) -> float | None:
-    """Return the uncompensated deviation that a measurement tells [um].
+    """Return the uncompensated deviation from a measurement [um].
 
     At the place that is probed the tool point is where it should be: the motors stand off by minus the deviation. A
     report that includes the correction tells that as it is; one without it tells what is left of the deviation under
@@ -168,7 +168,7 @@ def measured_by(row: MeasurementRow, start: StartRow, in_force: Correction | Non
     Returns
     -------
     float or None
-        None if it cannot be known: the controller compensates by itself, or nobody knows what was in force.
+        None if it cannot be determined: the controller compensates by itself, or the correction in force is unknown.
     """
     known = row.in_force if row.in_force is not None else in_force
     if start.own_compensation != "off":

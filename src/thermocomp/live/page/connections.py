@@ -68,7 +68,7 @@ class Guarded(H11Protocol):
             self.drop()
 
     def _waits(self) -> bool:
-        """Return whether the client has to say something next: there is no request, or not all of it."""
+        """Return whether the client must send something next: there is no request, or it is incomplete."""
         return self.cycle is None or self.cycle.response_complete or self.cycle.more_body
 
     def _rank(self) -> tuple[bool, bool, bool, float]:

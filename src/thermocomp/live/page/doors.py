@@ -65,7 +65,7 @@ class Doorkeeper:
     Parameters
     ----------
     token : str
-        Empty: no orders are taken.
+        Empty: no commands are accepted.
     """
 
     def __init__(self, token: str) -> None:
@@ -102,7 +102,7 @@ class Door:
     ----------
     app : ASGI application
     names : collection of str
-        Host names that the page is called by, beside ``localhost`` and the addresses of this computer.
+        Host names of the page, in addition to ``localhost`` and the addresses of this computer.
     """
 
     def __init__(self, app: ASGIApp, names: Collection[str] = ()) -> None:

@@ -23,7 +23,7 @@ class Board:
     ----------
     service : Service
     token : str
-        That orders want; empty: none are taken.
+        Token required for commands; empty: none are accepted.
     settled : float
         A drift below this in ten minutes counts as settled [um].
     """

@@ -1,4 +1,4 @@
-"""Least squares by QR, centred and scaled; and how many independent rows a residual stands for."""
+"""Least squares by QR, centred and scaled; and the number of independent rows equivalent to a residual."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

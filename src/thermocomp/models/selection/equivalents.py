@@ -34,7 +34,7 @@ class Equivalents:
     p_values : ndarray of shape (n_displacements, n_subsets)
         P-values of the Wilcoxon test against the best.
     equivalent : ndarray of bool of shape (n_displacements, n_subsets)
-        Not told from the best by the test.
+        Not distinguishable from the best by the test.
     notes : tuple of str
         Limitations of the test with these data.
     """

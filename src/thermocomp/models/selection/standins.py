@@ -131,7 +131,7 @@ def reduce_sensors(
     noise : float
         Standard deviation of the temperatures in use [degC].
     most : int
-        Largest set, beside that of all.
+        Largest set, in addition to that of all.
     structures : int
         Structures of the model with all temperatures.
     random_state : int

@@ -143,9 +143,9 @@ def best_subsets(
     jobs : int
         Threads.
     nodes : int, optional
-        Stop after about so many sets.
+        Stop after about this number of sets.
     seconds : float, optional
-        Stop after about so long [s].
+        Time limit, approximate [s].
     route : {'dropping', 'adding'}, optional
         Do not choose.
     progress : callable, optional

@@ -91,7 +91,7 @@ class Search(ABC):
     sizes : int
         Largest size searched.
     n_best : int
-        Sets wanted of each size.
+        Sets requested of each size.
     limit : ndarray of shape (p + 1,)
         Sum of squares from which on a set is of no interest, per size; shared by all threads and falling.
     bound : ndarray of shape (p + 1,)
@@ -134,7 +134,7 @@ class Search(ABC):
 
 
 class Swapping(Search):
-    """Good sets to begin with; it ends at once."""
+    """Good initial sets; it ends at once."""
 
     def __init__(self, problem: Problem, sizes: int, n_best: int, limit: FloatArray, bound: FloatArray) -> None:
         super().__init__(problem, sizes, n_best, limit, bound)

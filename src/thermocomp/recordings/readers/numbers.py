@@ -87,7 +87,7 @@ class Signs:
         stated : str
             The decimal sign, if it is known beforehand.
         delimiter : str
-            Of the columns: where it is a comma, the decimal sign is a point unless a cell proves the opposite.
+            Delimiter of the columns: where it is a comma, the decimal sign is a point unless a cell shows the opposite.
 
         Raises
         ------

@@ -30,7 +30,7 @@ class ErrorField:
         Components that are the same in the whole volume, in the order of `thermocomp.core.components.COMPONENTS`
         [um, urad]; zero where one is in `varying`.
     varying : tuple of (int, PositionModel, sequence of float)
-        Index of each other component, its model, and what that model's models of time say.
+        Index of each other component, its model, and the outputs of that model's models of time.
     """
 
     kinematics: Kinematics

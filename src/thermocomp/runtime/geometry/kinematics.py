@@ -75,7 +75,7 @@ class Kinematics:
         return self._moving(axis) * points + (self._tool(tool) - self.reference(axis))
 
     def reference(self, axis: str) -> FloatArray:
-        """Return an axis' reference point from the gauge point while all axes stand at 0, of shape (3,) [mm]."""
+        """Return an axis' reference point from the gauge point with all axes at 0, of shape (3,) [mm]."""
         found = self.axes[axis]
         return np.asarray(self._moving(axis) * np.asarray(found.measured_at) + np.asarray(found.measured_tool))
 

@@ -27,7 +27,7 @@ class VolumetricModel:
     Parameters
     ----------
     machine : Machine
-        A component that it does not tell is zero.
+        A component that it does not define is zero.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ class VolumetricModel:
         return state, self.field(deviations)
 
     def field(self, deviations: FloatArray) -> ErrorField:
-        """Return the errors of the machine in the state that the models of time tell.
+        """Return the errors of the machine in the state given by the models of time.
 
         Parameters
         ----------

@@ -64,7 +64,7 @@ class AxisLine:
 
 
 class Server:
-    """Listens, and keeps HAL as it was told."""
+    """Socket server that sets HAL as received."""
 
     def __init__(self, options: argparse.Namespace) -> None:
         self.options = options
@@ -105,7 +105,7 @@ class Server:
     # -- the controller ------------------------------------------------------------------------------------------------
 
     def tick(self, now: float) -> None:
-        """Look at the controller, and say where the lines shall go and how fast."""
+        """Check the controller, and output the line targets and rates."""
         if self.pins["beat"] == self.sent:
             self.echoed, self.sent = now, not self.sent
             self.pins["heartbeat"] = self.sent
@@ -177,7 +177,7 @@ class Server:
     # -- the service ---------------------------------------------------------------------------------------------------
 
     def accept(self) -> None:
-        """Let the service in; another one is told that there is one."""
+        """Accept the service; a second one is told that it is occupied."""
         connection, _ = self.listener.accept()
         if self.client is not None and self.left():
             self.drop()
@@ -253,7 +253,7 @@ class Server:
 
 
 def named(k: int) -> str:
-    """Return the name of the component after so many that were killed."""
+    """Return the name of the component after a number of killed ones."""
     return f"{NAME}-{k}" if k else NAME
 
 
@@ -317,7 +317,7 @@ def ending(child: "subprocess.Popen[bytes]") -> Callable[..., None]:
 
 
 def keep(arguments: list[str]) -> None:
-    """Run the component in a process of its own, and again whenever it dies."""
+    """Run the component in a separate process, and restart it whenever it dies."""
     here = Path(__file__).resolve()
     while here.exists():
         child = subprocess.Popen([sys.executable, str(here), *arguments, "--once"])

@@ -35,7 +35,7 @@ class HalSettings:
     rate : float
         Fastest change of the correction [um/s].
     timeout : float
-        The service is lost when it says nothing for so long [s].
+        Time without a message after which the service is treated as disconnected [s].
     hold : float
         Hold time of the correction after a disconnect [s].
     fade : float
@@ -92,7 +92,7 @@ def prepare(path: Path, folder: Path, settings: HalSettings) -> HalSetup:
     Raises
     ------
     InputError
-        The machine cannot be corrected like this; it is told why, and what to do.
+        The machine cannot be corrected with these settings; the message gives the reason and the remedy.
     """
     ini = read_ini(path)
     files = read_hal(ini, HAL_NAME)
@@ -153,7 +153,7 @@ def set_up(path: Path, folder: Path, settings: HalSettings, *, overwrite: bool =
     Returns
     -------
     HalSetup
-        The INI and the machine's own HAL are left alone: what is to be done there is told.
+        The INI and the HAL files of the machine are not changed: the required changes are listed here.
 
     Raises
     ------

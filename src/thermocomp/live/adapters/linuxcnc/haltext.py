@@ -193,7 +193,7 @@ def make_offset(axis: HalAxis, files: HalFiles, micron: float) -> list[str]:
 
 
 def make_drive(axis: HalAxis, files: HalFiles) -> list[str]:
-    """Return the HAL that adds a correction to what the drive is told, and takes it off what it answers.
+    """Return the HAL that adds a correction to the command of the drive, and subtracts it from its feedback.
 
     Parameters
     ----------

@@ -120,11 +120,11 @@ class LinuxCncSink:
         return self._connection.now
 
     def suspended(self) -> dict[str, str]:
-        """Return targets that the controller has no correction in force of, and why, as it said last."""
+        """Return targets that have no correction in force at the controller, and the reason, as last reported."""
         return dict.fromkeys(self.axes, f"the controller is {self._why}") if self._why else {}
 
     def alarms(self) -> dict[str, str]:
-        """Return targets whose correction is not in force as it shall be, and why, as was said last."""
+        """Return targets whose correction in force is not the demanded one, and the reason, as last reported."""
         if self._still:
             return dict.fromkeys(self.axes, "the controller stands still")
         found = {t: self._reports[a.upper()].alarm for t, a in self.axes.items() if a.upper() in self._reports}
