@@ -79,7 +79,7 @@ def add_derived_channel(recording: Recording, channel: Channel, weights: Mapping
 def stacked(
     recordings: Sequence[Recording], targets: Sequence[str], inputs: Sequence[str] | None = None, *, rezero: bool = True
 ) -> Samples:
-    """Stack tests as the papers do: they begin with a cold machine, and their first reading is the zero.
+    """Stack tests as in the papers: they begin with a cold machine, and their first reading is the zero.
 
     Parameters
     ----------
@@ -202,7 +202,7 @@ def fit_and_freeze(
 
 
 def trained(method: str, samples: Samples, target: int = 0, support: Support = Support()) -> ErrorModel:
-    """Train a method of the house, as it comes, on all rows of the samples.
+    """Train a method of thermocomp with default settings on all rows of the samples.
 
     Parameters
     ----------

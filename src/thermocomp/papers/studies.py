@@ -50,7 +50,7 @@ def repeat(
     physics: Physics | None = None,
     jobs: int = 1,
 ) -> Study:
-    """Redo a study several times, each with a weather, a noise and lots of its own.
+    """Repeat a study several times, each with separate weather, noise and random draws.
 
     Parameters
     ----------

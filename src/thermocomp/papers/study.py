@@ -1,4 +1,4 @@
-"""A paper's study redone: its claims, its numbers beside ours, and its figures as plain numbers."""
+"""Reproduction of a paper's study: its claims, its numbers next to ours, and its figures as plain numbers."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -89,7 +89,7 @@ class Ours(NamedTuple):
 
 
 class Claims(Generic[_Found]):
-    """The claims of a study, in the order in which they are told: each with the function that makes our side of it."""
+    """The claims of a study, in their order of presentation: each with the function that computes our side of it."""
 
     def __init__(self) -> None:
         self._judges: list[Callable[[_Found], Sequence[Claim]]] = []

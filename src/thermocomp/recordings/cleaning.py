@@ -43,7 +43,7 @@ class Step:
         self.check()
 
     def check(self) -> None:
-        """Raise `InputError` if the step says nothing, or contradicts itself."""
+        """Raise `InputError` if the step is empty, or contradicts itself."""
 
     def apply(self, rows: Rows) -> Rows:
         """Return the cleaned rows, with a note of what was done."""
@@ -283,7 +283,7 @@ def clean(rows: Rows, steps: Sequence[Step]) -> Rows:
 
 
 def _step(x: FloatArray, first: int, name: str, owner: str) -> float:
-    """Return by how much a channel jumps at a row, beyond what it does beside it."""
+    """Return the jump of a channel at a row, beyond its neighbouring changes."""
     before = np.flatnonzero(np.isfinite(x[:first]))[-_BESIDE:]
     after = first + np.flatnonzero(np.isfinite(x[first:]))[:_BESIDE]
     if not before.size or not after.size:

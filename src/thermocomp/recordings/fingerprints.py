@@ -1,4 +1,4 @@
-"""Fingerprints of rows: which rows of a recording a model has learned from, whatever file they stand in.
+"""Fingerprints of rows: identification of the training rows of a model in a recording, in whatever file they are.
 
 A run is `LENGTH` differences between rows of one channel, rounded to a step: a copy with another zero has the same.
 It is hashed. Rows are known again where a run of the target and a run of an input are, at the same rows, in several
@@ -232,7 +232,7 @@ def _moving(x: FloatArray, scale: _Scale, rows: TargetRows) -> BoolArray:
 
 
 def _best(windows: dict[str, _Windows], target: str) -> list[str]:
-    """Return the inputs that say most where the target does, and moves."""
+    """Return the most informative inputs where the target is informative, and moves."""
     mine = windows[target]
     said = {}
     for name, w in windows.items():

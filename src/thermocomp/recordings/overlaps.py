@@ -1,4 +1,4 @@
-"""Rows that a model has learned from are found again, whatever file they stand in; see the decision `0019-overlap`."""
+"""Recognition of the training rows of a model, in whatever file they are; see the decision `0019-overlap`."""
 
 from collections.abc import Iterator
 

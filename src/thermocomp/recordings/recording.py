@@ -22,7 +22,7 @@ AMBIENT = re.compile(r"(?:^|[_\W])(air|ambient|room|workshop|environment|umgebun
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """One test: what the sensors and the displacement probes said, row by row.
+    """One test: the readings of the sensors and the displacement probes, row by row.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ class Recording:
 
     @property
     def ambient(self) -> Channel | None:
-        """The first temperature whose name says air, ambient, room, workshop or environment; None if none does."""
+        """The first temperature whose name contains air, ambient, room, workshop or environment; None if none does."""
         return next((c for c in self.temperatures if AMBIENT.search(c.name)), None)
 
     @property
@@ -202,7 +202,7 @@ class Recording:
         return True
 
     def values(self, channels: Sequence[Channel]) -> FloatArray:
-        """Return the columns of `channels` as an array of shape (n_rows, n_channels), in house units."""
+        """Return the columns of `channels` as an array of shape (n_rows, n_channels), in internal units."""
         return self.table[[c.name for c in channels]].to_numpy(dtype=np.float64)
 
     def with_cycles(self, cycles: Sequence[Cycle]) -> "Recording":

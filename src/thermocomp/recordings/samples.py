@@ -119,7 +119,7 @@ class Samples:
         return int(np.flatnonzero((self.test == test) & (self.cycle >= 0))[0])
 
     def change(self) -> FloatArray:
-        """Return inputs minus their reference, (n_rows, n_inputs); the rows of a zero say its mean."""
+        """Return inputs minus their reference, (n_rows, n_inputs); the rows of a zero give its mean."""
         return self._change.copy()
 
     @cached_property
@@ -229,6 +229,6 @@ class Samples:
 
 
 def usual_step(step: FloatArray) -> float:
-    """Return the median time between two rows [s]; inf where every row is a test of its own."""
+    """Return the median time between two rows [s]; inf where every row is a separate test."""
     between = step[np.isfinite(step) & (step > 0)]
     return float(np.median(between)) if between.size else float("inf")

@@ -152,7 +152,7 @@ def find_starts(
     zeroing: Zeroing = Zeroing(),
     absolute: bool = False,
 ) -> tuple[Start, ...]:
-    """Find out how tests begin.
+    """Determine the initial states of tests.
 
     A displacement that begins near zero was zeroed there. One that does not, and continues where the file before it
     (by time stamps) ended, continues that. All else cannot be told.

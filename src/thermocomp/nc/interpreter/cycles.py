@@ -15,7 +15,7 @@ MOST: Final = 100_000
 
 
 class CycleError(Exception):
-    """The cycle cannot be; the text says why."""
+    """The cycle is impossible; the text contains the reason."""
 
 
 class CycleMove(NamedTuple):

@@ -102,7 +102,7 @@ class Judgement:
 
 
 def check_dialect(lines: Iterable[str], *, whole: bool = False, startup: str = "") -> None:
-    """Raise an error if a program of which nobody has said whose it is need not be LinuxCNC's.
+    """Raise an error if the dialect of a program is not specified, and it need not be LinuxCNC's.
 
     Parameters
     ----------

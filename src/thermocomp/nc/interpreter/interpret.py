@@ -236,7 +236,7 @@ class Follower:
             state.moves_by(before)
 
     def _motion(self, words: BlockWords) -> str:
-        """Return the motion code that this line runs; empty if it makes no move of its own."""
+        """Return the motion code that this line runs; empty if it makes no move."""
         groups, values = words.groups, words.values
         told = groups.get("motion")
         once = groups.get("once")

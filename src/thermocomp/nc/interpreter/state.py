@@ -151,7 +151,7 @@ class InterpreterState:
         self.machine = self.offsets.machine(place)
 
     def renamed(self, still: Known) -> None:
-        """Be where the tool was, under new offsets; coordinates stay known where `still` says so."""
+        """Keep the tool position under new offsets; coordinates stay known as given by `still`."""
         self.place = self.offsets.program(self.machine)
         a, b, c = self.known
         self.known = (a and still[0], b and still[1], c and still[2])

@@ -37,7 +37,7 @@ MOST_IDLE = 20.0
 
 
 def load_sibling(name: str) -> Any:
-    """Return the module of a file beside this one; its folder is not one that modules are looked for in."""
+    """Return the module of a file next to this one; its folder is not on the module path."""
     spec = spec_from_file_location(name, __file__.replace("_rs274_child", name))
     assert spec is not None
     assert spec.loader is not None

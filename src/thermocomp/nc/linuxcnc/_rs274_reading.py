@@ -28,7 +28,7 @@ LOOP = re.compile(r"(?i)^[\s/N0-9.]*O.*[\]>0-9\s](WHILE|DO|REPEAT)\b")
 
 
 class RefusedError(Exception):
-    """The program wants something that is not done for it: the line, and the reason."""
+    """The program needs something that is not permitted: the line, and the reason."""
 
 
 class ProgramReading:
@@ -121,7 +121,7 @@ class ProgramReading:
         return None
 
     def find_loop(self) -> int:
-        """Return the line at which the loop begins that the watched lines are in: the outermost one."""
+        """Return the first line of the loop that contains the watched lines: the outermost one."""
         # a line that was read last; the next one is about to be
         passes = Counter(line + 1 for line, own in self.watched if own)
         if not passes:

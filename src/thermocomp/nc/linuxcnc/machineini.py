@@ -14,7 +14,7 @@ _ARROWS = ("=>", "<=", "<=>")
 
 @dataclass(frozen=True)
 class Ini:
-    """An INI file of LinuxCNC, whose keys may stand there several times.
+    """An INI file of LinuxCNC, whose keys may occur several times.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def read_hal(ini: Ini, leave: str) -> HalFiles:
 
 
 def _find(ini: Ini, name: str) -> Path:
-    """Return the path of a HAL file: beside the INI, or one that comes with LinuxCNC."""
+    """Return the path of a HAL file: next to the INI, or one included in LinuxCNC."""
     first = (name.split() or [""])[0]
     path = ini.path.parent / Path(first.removeprefix("LIB:")).expanduser()
     return LIBRARY / path.name if first.startswith("LIB:") or not path.exists() else path

@@ -1,4 +1,4 @@
-"""The canonical calls of an NC program, as LinuxCNC's own interpreter tells them.
+"""Canonical calls of an NC program, as reported by LinuxCNC's interpreter.
 
 It is what judges every program that is written here, and what takes loops and parameters apart (see `expand`). It comes
 with Debian's package linuxcnc-uspace and needs neither a machine nor a display.

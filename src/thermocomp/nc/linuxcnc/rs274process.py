@@ -130,7 +130,7 @@ class InterpreterRun:
         self._home.close()
 
     def blocks(self) -> Iterator[CallBlock]:
-        """Yield what the interpreter tells of the next job; the last record is ``done``.
+        """Yield the records of the interpreter for the next job; the last record is ``done``.
 
         Raises
         ------

@@ -179,7 +179,7 @@ class Parameters:
         return _key(key) in self._values
 
     def __getitem__(self, key: Key) -> float:
-        """Return the value; InputError tells why it is unknown."""
+        """Return the value; InputError contains the reason if it is unknown."""
         key = _key(key)
         if key in self._values:
             return self._values[key]
@@ -300,7 +300,7 @@ class _Reader:
             raise self.error("the end of the value")
 
     def expression(self) -> float:
-        """Read values and operators: of two operators beside each other the one that binds tighter goes first."""
+        """Read values and operators: of two adjacent operators the one of higher precedence goes first."""
         values = [self.value()]
         waiting: list[tuple[int, Binary]] = []
         while True:
@@ -349,7 +349,7 @@ class _Reader:
         raise self.error("a number, a parameter, a function or '['")
 
     def parameter(self) -> Key:
-        """Read what stands behind ``#``."""
+        """Read the key after ``#``."""
         marks = 0
         while self.takes("#"):
             marks += 1

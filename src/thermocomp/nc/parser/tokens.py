@@ -183,7 +183,7 @@ def read_line(text: str, number: int, controller: Controller = "linuxcnc") -> Li
 
 
 def _few_words(found: re.Match[str]) -> list[Word] | None:
-    """Return the words of a line that has no others; None if a letter stands there twice."""
+    """Return the words of a simple line; None if a letter occurs twice."""
     groups, spans = found.groups(), found.regs
     last = found.lastindex or 0
     letters = groups[0:last:2]

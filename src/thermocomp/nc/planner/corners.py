@@ -131,7 +131,7 @@ class Corners:
         return min(ax * x, ay * y, az * z), min(vx * x, vy * y, vz * z)
 
     def _overlap(self, before: Segment, after: Segment, tolerance: float, otherwise: float) -> bool:
-        """Let the second move begin while the first one brakes, if that is faster than a corner taken at a speed."""
+        """Let the second move begin while the first one brakes, if that is faster than a corner at a speed."""
         dot = 0.0
         if not before.rotary and not after.rotary:
             u, w = before.leave, after.entry

@@ -218,7 +218,7 @@ class _Plan:
             self.halt(after)
 
     def halt(self, pause: float) -> None:
-        """Come to a stop, and stay so long [s]."""
+        """Stop, and wait [s]."""
         self._unchain()
         if self.last is not None:
             self._push(self.last, self.tolerance is not None)

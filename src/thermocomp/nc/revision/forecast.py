@@ -1,4 +1,4 @@
-"""Forecasts of inputs that a program does not tell: a CSV file with a column of time and one per input."""
+"""Forecasts of inputs that do not follow from a program: a CSV file with a time column and one per input."""
 
 import csv
 import math
@@ -136,7 +136,7 @@ def _columns(headings: list[str], source: str) -> tuple[dict[int, tuple[str, Uni
 
 
 def _number(cell: str, unit: Unit, delimiter: str, where: str) -> float | None:
-    """Return a cell in the house unit; None if it is empty."""
+    """Return a cell in the internal unit; None if it is empty."""
     text = cell.strip()
     if not text:
         return None

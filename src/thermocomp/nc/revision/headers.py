@@ -58,7 +58,7 @@ def describe_bound(bounds: Sequence[Bound]) -> str:
 
 
 def describe_proof(proof: Proof | None, lines: int) -> list[str]:
-    """Return in which states of the controller it was proved, in so many lines."""
+    """Return the states of the controller in which it was proved, in a given number of lines."""
     return [UNPROVED] if proof is None else wrap_text(f"proved {proof.sentence}", lines)
 
 

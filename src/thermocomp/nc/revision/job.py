@@ -52,7 +52,7 @@ class Paths(NamedTuple):
 
     @classmethod
     def of(cls, output: Path, *, expanded: bool) -> "Paths":
-        """Return the names of the files beside a program."""
+        """Return the names of the files next to a program."""
 
         def beside(end: str) -> Path:
             return output.with_name(output.name + end)
@@ -228,7 +228,7 @@ def _rehearse(job: Job, source: Path, phase: Phase) -> None:
 def _write(
     job: Job, source: Path, folder: Path, table: Path, listeners: Sequence[Ledger | Course | Travel], tell: Tell
 ) -> tuple[str, ...]:
-    """Write program, diff and table, and return the header that still says nothing."""
+    """Write program, diff and table, and return the header, which is still blank."""
     size = max(source.stat().st_size, 1)
     axes = ["XYZ".index(axis) for axis in job.drift.axes]
     blank: tuple[str, ...] = ()

@@ -168,7 +168,7 @@ def _proof(proof: Proof) -> dict[str, Any]:
 
 
 def duration(seconds: float) -> str:
-    """Return a time as people say it."""
+    """Return a duration in words."""
     if seconds < 120:
         return f"{seconds:.3g} s"
     minutes = round(seconds / 60)

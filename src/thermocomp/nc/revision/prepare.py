@@ -121,7 +121,7 @@ def _files(stations: Sequence[Station], hashes: Mapping[str, str]) -> list[str]:
 
 
 def _check_dialect(program: Path, controller: Controller) -> None:
-    """Raise `InputError` if nobody has said whose a program is, and it need not be LinuxCNC's."""
+    """Raise `InputError` if the dialect of a program is not specified, and it need not be LinuxCNC's."""
     startup = f"{controller.startup or ''} {'G20' if controller.units == 'inch' else ''}"
     with ncprogram.open_to_read(program) as texts:
         lines = program_lines(texts)

@@ -15,7 +15,7 @@ _SYSTEM = re.compile(r"G?5([4-9])(?:\.([1-3]))?(?:\s*P(\d+))?", re.IGNORECASE)
 
 
 def read_value(text: str, quantity: str, option: str, example: str) -> float:
-    """Return the value of an option in house units.
+    """Return the value of an option in internal units.
 
     Parameters
     ----------

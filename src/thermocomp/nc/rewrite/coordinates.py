@@ -328,7 +328,7 @@ class Coordinates(CorrectionMethod):
         return out[0], out[1], out[2]
 
     def _take(self, block: Block, frame: Frame, old: Vector, new: list[float]) -> None:
-        """Carry the new words; an axis whose word has not changed does too if it stands on the line in G90."""
+        """Store the new words; an axis with an unchanged word too, if it is on the line in G90."""
         words = block.words if block.modal.absolute else {}
         taken = [n != o or letter in words for letter, n, o in zip(AXES, new, old, strict=True)]
         if frame.turned:

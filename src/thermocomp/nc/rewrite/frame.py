@@ -1,4 +1,4 @@
-"""Corrections in machine axes, and as the numbers that stand in a program."""
+"""Corrections in machine axes, and as the numbers in a program."""
 
 import math
 from dataclasses import dataclass

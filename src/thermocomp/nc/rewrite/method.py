@@ -166,7 +166,7 @@ class CorrectionMethod(ABC):
         return [i for i, letter in enumerate(AXES) if letter in block.words]
 
     def names_place(self, block: Block) -> bool:
-        """Return whether a block gives the place where the tool stands another name.
+        """Return whether a block renames the position of the tool.
 
         Raises
         ------
@@ -215,7 +215,7 @@ class CorrectionMethod(ABC):
 
 
 def refuse_probing(block: Block) -> None:
-    """Raise `ProgramError` if a block probes: what it finds holds a correction nobody knows of."""
+    """Raise `ProgramError` if a block probes: its result contains an unknown correction."""
     if block.kind == "probe":
         raise ProgramError(
             block.line.number,

@@ -325,7 +325,7 @@ class Revision:
             raise ProgramError(line, str(e)) from e
 
     def _cuts(self, block: Block) -> bool:
-        """Return whether the tool may cut in a block: it moves in feed, or stands where it has cut."""
+        """Return whether the tool may cut in a block: it moves in feed, or stays where it has cut."""
         if block.tool_change is not None or block.kind in ("machine", "home"):
             self._touching = False
         elif block.moves:

@@ -39,7 +39,7 @@ DIGITS = {"linuxcnc": Digits(), "fanuc": Digits(3, 4)}
 
 
 def format_number(value: float, digits: int) -> str:
-    """Return a number with a decimal point always, and without zeros that say nothing."""
+    """Return a number always with a decimal point, and without redundant zeros."""
     text = f"{value:.{digits}f}".rstrip("0")
     if text.endswith("."):
         text += "0"

@@ -1,4 +1,4 @@
-"""Whether a program stays where the machine can go: if it does not, it is wrong, or what was told of its origins."""
+"""Travel check: a program beyond the travels is wrong, or its given origins are."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,7 +11,7 @@ BEYOND = 1.0
 
 @dataclass
 class Travel:
-    """Follows the cuts of a program in machine coordinates, where program or setup tell origin and tool length.
+    """Checks the cuts of a program in machine coordinates, where program or setup define origin and tool length.
 
     Parameters
     ----------

@@ -238,7 +238,7 @@ class Drift:
 
     @property
     def driven(self) -> tuple[str, ...]:
-        """The axes whose models say anything: an input has an influence on them, or they are not 0 at rest."""
+        """Axes whose models have an effect: an input influences them, or they are not 0 at rest."""
         return tuple(
             a for a in AXES if any(s.axis == a and (s.model.sensors or s.model.intercept) for s in self.stations)
         )

@@ -130,7 +130,7 @@ class Wiring:
 
 
 def constants(texts: Sequence[str], models: Sequence[ErrorModel]) -> dict[str, InputSignal]:
-    """Read what the user says is constant.
+    """Read the constants given by the user.
 
     Parameters
     ----------

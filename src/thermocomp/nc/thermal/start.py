@@ -26,7 +26,7 @@ _LONG = 2 * 86400.0
 
 
 class ThermalStart(NamedTuple):
-    """State of the models when the program starts, or so long before it as the spindle is stopped."""
+    """State of the models when the program starts, or earlier by the time the spindle is stopped."""
 
     states: tuple[State, ...]  #: per station
     known: bool  #: the state is no prediction: the machine is cold or measured
@@ -97,7 +97,7 @@ def carry_over(stations: Sequence[Station], left: JobState, pause: float = 0.0) 
 
 
 def begin_measured(stations: Sequence[Station], deviations: Mapping[str, float], others: Inputs) -> ThermalStart:
-    """Return a state in which the models say what has been measured, the spindle standing still.
+    """Return a state in which the outputs of the models equal the measurement, with the spindle stopped.
 
     An autoregressive model is told its past. For another one that remembers, the machine is taken to have settled at
     that constant spindle speed, the least one in the trained range, at which the deviation is the measured one as soon
@@ -322,7 +322,7 @@ def _stopped(model: ErrorModel, wiring: Wiring, speed: float) -> State:
 
 
 def _begun(model: Ticking, wiring: Wiring, deviation: float) -> State:
-    """Return the state of an autoregressive model that is told its past."""
+    """Return the state of an autoregressive model with a given past."""
     still, reference = wiring.values(0.0, 0.0), model.init().reference
     return model.begin_at(deviation, still, np.where(np.isnan(reference), still, reference))
 

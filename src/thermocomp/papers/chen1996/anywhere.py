@@ -77,7 +77,7 @@ class Volume:
 
 
 class _Points(NamedTuple):
-    """Random points of the volume in random rows of a test: the machine there and then, and what a model tells of it.
+    """Random points of the volume in random rows of a test: the machine then, and the prediction of a model.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ def _points(learned: LearnedVolume, test: SimulatedTest, n: int, rng: np.random.
 
 
 def as_measured(truth: VolumetricTruth, now: FloatArray, start: FloatArray, points: FloatArray) -> FloatArray:
-    """Return the true components as instruments tell them: lasers set to zero at the test position, and a nest there.
+    """Return the true components as measured: lasers set to zero at the test position, and a nest there.
 
     Parameters
     ----------

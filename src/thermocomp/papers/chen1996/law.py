@@ -1,4 +1,4 @@
-"""Chen, Yuan, Ni 1996, section 3.3: do 51 profiles tell the law of the slope? Eq. 6 and 8 are planted, and sought.
+"""Chen, Yuan, Ni 1996, section 3.3: recovery of the slope law from 51 profiles. Eq. 6 and 8 are the known law.
 
 The virtual machine's own slopes follow no law in temperatures that anyone knows. So its temperatures are kept, and its
 profiles are replaced by those of a machine that obeys Eq. 6 and 8; noise is then put on all that is read. What is found

@@ -81,7 +81,7 @@ class LearnedPositioning:
         return 1e3 * (thermal @ day.position) / (day.position @ day.position)
 
     def predicted(self, fit: PositionFit, day: Profiles) -> FloatArray:
-        """Return the slope that a model tells from the readings of a day, shape (n_states,) [um/m]."""
+        """Return the slope predicted by a model from the readings of a day, shape (n_states,) [um/m]."""
         model = fit.model.slopes[0]
         samples, _ = slope_samples([day], PositionOptions(inputs=[i.name for i in model.inputs]))
         return common.predict_deviation(model, samples)
@@ -279,7 +279,7 @@ def numbers(found: LearnedPositioning) -> dict[str, float]:
 
 
 def tables(found: LearnedPositioning) -> list[StudyTable]:
-    """Return Eq. 6 and Eq. 8 beside ours, the planted law, and the error without and with compensation."""
+    """Return Eq. 6 and Eq. 8 next to ours, the known law, and the error without and with compensation."""
     learned = found.learned
     ours = dict(zip(found.regression.terms_, found.regression.coef_.tolist(), strict=True))
     # in plain mm, as the paper's

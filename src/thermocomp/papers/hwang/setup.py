@@ -119,7 +119,7 @@ def agreement(groups: Groups) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Computed:
-    """Everything the study tells.
+    """All results of the study.
 
     Parameters
     ----------

@@ -51,7 +51,7 @@ HOUSE = ("arx-free-run", "dynamic")
 
 @dataclass(frozen=True)
 class Changing(Climate):
-    """A room that gets warmer or colder while the test runs, beside what its air does anyway.
+    """A room that gets warmer or colder during the test, in addition to the usual changes of its air.
 
     Parameters
     ----------
@@ -160,7 +160,7 @@ class Milled:
 
 
 def house_models(learn: Samples) -> dict[str, list[ErrorModel]]:
-    """Fit what the house has for machines without sensors, as it comes, to the identification.
+    """Fit the default methods of thermocomp for machines without sensors to the identification.
 
     Parameters
     ----------

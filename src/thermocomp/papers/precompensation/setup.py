@@ -63,7 +63,7 @@ class CuttingTest:
 
 @dataclass(frozen=True, eq=False)
 class Warm:
-    """A job that begins on a machine that is still warm (E-P5), at one position.
+    """A job that starts on a machine that is still warm (E-P5), at one position.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class Warm:
 
 @dataclass(frozen=True, eq=False)
 class Computed:
-    """Everything the study tells.
+    """All results of the study.
 
     Parameters
     ----------

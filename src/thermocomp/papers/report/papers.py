@@ -86,7 +86,7 @@ def words(table: StudyTable) -> list[int]:
 
 
 def rows(table: StudyTable) -> list[list[str]]:
-    """Return the rows of a table; words of the first column are said once, not in every row beneath."""
+    """Return the rows of a table; repeated text in the first column is shown only once."""
     above = ["", *(row[0] for row in table.rows)] if 0 in words(table) else [""] * len(table.rows)
     return [["" if row[0] == said else row[0], *row[1:]] for row, said in zip(table.rows, above, strict=False)]
 

@@ -77,7 +77,7 @@ class Thinned:
 
 @dataclass(frozen=True, eq=False)
 class Computed:
-    """Everything the study tells.
+    """All results of the study.
 
     Parameters
     ----------

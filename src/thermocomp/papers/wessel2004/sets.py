@@ -77,7 +77,7 @@ class Selection:
         return len(self.psi.subsets) + len(self.larger.subsets)
 
     def models(self, sets: int) -> int:
-        """Return the number of models that so many sets make."""
+        """Return the number of models for a number of sets."""
         return sets * len(self.rows) * len(self.psi.psi)
 
 

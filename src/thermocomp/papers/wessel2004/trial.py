@@ -171,7 +171,7 @@ class MillingTrial:
 def stacked(
     recordings: Sequence[Recording], displacement: int, temperatures: Sequence[int], *, rezero: bool = False
 ) -> Samples:
-    """Stack recordings with one displacement and some temperatures, told by their place among the channels.
+    """Stack recordings with one displacement and some temperatures, given by their indices among the channels.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""`Finding` and `Signal`: what the checks of a recording tell, and what they look at."""
+"""`Finding` and `Signal`: results and input of the checks of a recording."""
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -140,7 +140,7 @@ def column(name: str, **keys: object) -> Remedy:
 
 
 def at_row(row: int, time: FloatArray) -> str:
-    """Return a row as it is told: its number and its time [s]."""
+    """Return a row in words: its number and its time [s]."""
     return f"row {row} ({time[row]:.10g} s)"
 
 

@@ -106,7 +106,7 @@ def lasting_trouble(findings: Sequence[Finding]) -> tuple[Finding, ...]:
 def _together(
     signals: Sequence[Signal], time: FloatArray, moved: BoolArray, speed: FloatArray | None, *, stamped: bool
 ) -> Iterator[Finding]:
-    """Yield what several channels, or a channel and the clock, tell together; a time from stamps has no unit."""
+    """Yield joint findings of several channels, or of a channel and the clock; a time from stamps has no unit."""
     of = {q: [s for s in signals if s.channel.quantity == q and s.good.any()] for q in _SENSED}
     yield from suspects.temperature_units(of["temperature"])
     yield from suspects.displacement_units(of["displacement"], of["temperature"])

@@ -1,4 +1,4 @@
-"""A value that stands still though its sensor should move, and the steps a channel moves in."""
+"""A constant value although its sensor should move, and the resolution steps of a channel."""
 
 import math
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ _CHANCE = 1e-3
 
 
 def stuck(signal: Signal, time: FloatArray) -> Iterator[Finding]:
-    """Yield stretches of 30 or more rows in which a value stands still though the sensor says it should move.
+    """Yield stretches of 30 or more rows with a constant value although the sensor should move.
 
     It should if its noise shakes it right before and after, or if it was moving fast and stops dead. A sensor that
     creeps to rest, or whose noise is finer than its resolution, may well stand still: noise of a single step makes it a

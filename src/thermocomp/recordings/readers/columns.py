@@ -61,7 +61,7 @@ class PlannedColumn:
     def convert(
         self, raw: FloatArray, missing: Sequence[float], place: Callable[[int], str]
     ) -> tuple[FloatArray, tuple[str, ...]]:
-        """Return the values in the house unit, nan where missing, and notes on what was replaced, and where."""
+        """Return the values in the internal unit, nan where missing, and notes on replaced values and their rows."""
         notes = []
         codes = np.array([*self.rule.missing, *missing])
         absent = np.isin(raw, codes) if codes.size else np.zeros(len(raw), dtype=np.bool_)

@@ -55,7 +55,7 @@ def holds_own_date(table: FileTable, number: int) -> bool:
 
 
 def check_dates(time: FloatArray, file: FileCells, others: Sequence[int] = ()) -> tuple[str, ...]:
-    """Refuse times without a date of their own that do not go with the dates of another column.
+    """Refuse times without a date that are inconsistent with the dates of another column.
 
     Parameters
     ----------

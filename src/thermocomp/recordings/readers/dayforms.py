@@ -227,5 +227,5 @@ def _read_forms(texts: "pd.Series[str]", *forms: str) -> list[IntArray]:
 
 
 def _unwrap(days: IntArray, period: int) -> IntArray:
-    """Return days that count on where a week or a year begins again."""
+    """Return days that continue to count where a week or a year begins again."""
     return np.concatenate([days[:1], days[0] + np.cumsum(np.diff(days) % period)])

@@ -19,7 +19,7 @@ _LONE_CR = re.compile(rb"\r(?![\r\n])")
 
 
 def bring_to_utf8(path: Path, limits: FileLimits) -> tuple[bytes | None, tuple[str, ...]]:
-    """Return a file as UTF-8 with line ends of its own time, and what was done, if it has neither.
+    """Return a file as UTF-8 with standard line ends, and notes on the conversion, if it has neither.
 
     Returns
     -------

@@ -199,7 +199,7 @@ def join_units(headings: Sequence[str], units: Sequence[str], rows: Sequence[Seq
 
 
 def name_stamps(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> tuple[list[str], tuple[str, ...]]:
-    """Name a first column without heading that holds dates, as the index of a data frame does, and say so."""
+    """Name a first column without heading that holds dates, as the index of a data frame has, and report this."""
     first = next((row[0].strip() for row in rows if row and row[0].strip()), "")
     if headings and not headings[0] and is_stamp(first):
         return ["timestamp", *headings[1:]], ("column 1 has no heading and holds dates: taken as the time",)
@@ -237,7 +237,7 @@ def _is_row(row: Sequence[str], columns: Sequence[int]) -> bool:
 
 
 def _is_remark(row: Sequence[str], columns: Sequence[int], width: int) -> bool:
-    """Return whether a row at the end is words or a statistic: no row of the table begins so."""
+    """Return whether a row at the end is text or a statistic: no row of the table begins like this."""
     words = [k for k, cell in enumerate(row) if cell.strip() and not _is_value(cell) and not is_filler(cell)]
     if not words or not columns:
         return False
@@ -248,7 +248,7 @@ def _is_remark(row: Sequence[str], columns: Sequence[int], width: int) -> bool:
 
 
 def _is_units(row: Sequence[str], numbers: Sequence[int]) -> bool:
-    """Return whether most of what stands over columns of numbers is a unit."""
+    """Return whether most cells above columns of numbers are units."""
     over = [row[k] for k in numbers if k < len(row)] if numbers else row
     filled = [unit for unit in map(_bare, over) if unit.casefold().rstrip(".:") not in _NO_UNIT]
     known = sum(map(is_unit, filled))

@@ -9,7 +9,7 @@ from thermocomp.recordings.headings import BRACKETS, HOUSE_SUFFIX, SUFFIXES, fin
 
 
 def refuse_nameless(headings: Sequence[str], source: str) -> None:
-    """Refuse columns of numbers whose names speak of a temperature, a displacement or a speed but say no unit.
+    """Refuse columns of numbers whose names suggest a temperature, a displacement or a speed but give no unit.
 
     Parameters
     ----------
@@ -62,6 +62,6 @@ def why_left_out(heading: str) -> str:
 
 
 def _says_unit(heading: str) -> bool:
-    """Return whether a heading says in which unit it is, even if not in one that is used here."""
+    """Return whether a heading contains a unit, even one that is not supported here."""
     found = BRACKETS.fullmatch(heading.strip())
     return found is not None and (found["square"] or found["round"] or "").strip() not in ("", "1")

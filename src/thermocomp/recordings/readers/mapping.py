@@ -1,4 +1,4 @@
-"""The small TOML that says what the columns of a foreign recording are."""
+"""Mapping file (TOML): roles and units of the columns of a foreign recording."""
 
 import codecs
 import math
@@ -214,7 +214,7 @@ class Mapping:
         _check_encoding(self.read.encoding or "utf-8")
 
     def over(self, below: "Mapping") -> "Mapping":
-        """Return this mapping with what only `below` says of time, compensation and columns added."""
+        """Return this mapping with the entries for time, compensation and columns that only `below` has."""
         time = below.time if self.time == TimeColumn() else self.time
         taken = {rule.column or name for name, rule in self.columns.items()}
         added = {name: rule for name, rule in below.columns.items() if (rule.column or name) not in taken}

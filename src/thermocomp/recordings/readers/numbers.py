@@ -114,7 +114,7 @@ class Signs:
 
 
 def is_filler(cell: str) -> bool:
-    """Return whether a cell holds what stands for a missing number."""
+    """Return whether a cell contains a placeholder for a missing number."""
     text = cell.strip().casefold()
     return text in MISSING_TEXT or is_word(text)
 

@@ -1,4 +1,4 @@
-"""Parquet files: columns are read in batches, and only after what the file says of its size has been looked at."""
+"""Parquet files: columns are read in batches, and only after the size stated in the file has been checked."""
 
 import json
 from collections.abc import Iterator, Sequence

@@ -238,7 +238,7 @@ def from_recording(recording: Recording, options: ProfileOptions | str) -> Profi
 
 
 def read_places(path: str | Path) -> dict[str, Place]:
-    """Read a TOML that says where each column of a wide table was measured.
+    """Read a TOML file with the measuring position of each column of a wide table.
 
     Returns
     -------
@@ -315,7 +315,7 @@ def _by_name(recording: Recording, quantity: str, owner: str) -> list[tuple[Chan
 
 
 def _refuse_another_axis(target: str, axis: str, found: Sequence[tuple[Channel, Place]], owner: str) -> None:
-    """Refuse columns that nobody named and that are called after an axis which has no part in the error."""
+    """Refuse columns found by name that are named after an axis without a part in the error."""
     for c, _ in found[:1]:
         called = re.match(r"([xyz])(?:\d?_)", c.name)
         if called and target in BY_CODE and called[1].upper() not in (axis, target[1]):

@@ -55,7 +55,7 @@ class FileTable(Protocol):
         """Return the first filled cells of a column, as texts; none of one that holds numbers by its type."""
 
     def load(self, numbers: Sequence[int], texts: Sequence[int]) -> tuple[pd.DataFrame, tuple[str, ...]]:
-        """Read some columns, as float64 and as they are, and say what was made of their cells.
+        """Read some columns, as float64 and as text, and report the conversions.
 
         The table's columns are named by position.
 
@@ -363,7 +363,7 @@ def read_plain(cells: "pd.Series[Any]", decimal: str) -> tuple[FloatArray, BoolA
 
 
 def tell_places(rows: Sequence[int], place: Callable[[int], str]) -> str:
-    """List where rows stand, not too many of them."""
+    """List the locations of rows, limited in number."""
     return ", ".join(place(int(k)) for k in rows[:_MOST_TOLD]) + " ..." * (len(rows) > _MOST_TOLD)
 
 

@@ -99,7 +99,7 @@ class Lines:
         return found
 
     def embedded(self) -> str:
-        """Return the description that thermocomp writes into the first line of its own files."""
+        """Return the description that thermocomp writes into the first line of its files."""
         with self.open() as f:
             line = f.readline(self.limits.line_bytes).removeprefix(_BOM)
         if not line.startswith(_OWN):
@@ -165,7 +165,7 @@ def open_lines(path: Path, data: bytes | None, options: ReadOptions, limits: Fil
 
 
 def split_line(line: str, delimiter: str) -> list[str]:
-    """Split a line into cells; a space as delimiter stands for any white space."""
+    """Split a line into cells; a space as delimiter denotes any white space."""
     if delimiter == " ":
         return re.split("[ \t]+", line.strip(" \t\r\n"))  # str.split takes more for white space than pandas
     try:

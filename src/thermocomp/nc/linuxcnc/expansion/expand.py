@@ -289,7 +289,7 @@ def _first(path: Path) -> str:
 
 
 def _told(calls: Iterator[Canonical], side: Side) -> Iterator[Canonical]:
-    """Yield the calls without the interpreter's own remarks; what stands before the first line is where it starts."""
+    """Yield the calls without the interpreter's remarks; those before the first line give the start."""
     for call in calls:
         if call.line == 0:
             side.begin(call)

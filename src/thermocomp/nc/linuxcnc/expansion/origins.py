@@ -75,7 +75,7 @@ def chosen_system(
 
 
 def plain_g10(sides: Sides, words: Words, refuse: Refuse, source: str) -> str:
-    """Return the line that sets the origin of a system that is not in force: only the source line tells which.
+    """Return the line that sets the origin of a system not in force: only the source line defines which.
 
     Parameters
     ----------

@@ -134,7 +134,7 @@ def _pairs(values: Sequence[float]) -> list[tuple[float, float]]:
 
 
 def _sweep(call: Canonical, start: Place) -> float:
-    """Return the length of an arc in its plane [mm]: end points alone do not tell a full circle from none."""
+    """Return the length of an arc in its plane [mm]: end points alone do not distinguish a full circle from none."""
     assert call.arc is not None
     i, j, _ = PLANE_AXES[call.arc.plane]
     x, y = call.arc.centre[i], call.arc.centre[j]

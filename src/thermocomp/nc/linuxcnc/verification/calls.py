@@ -186,7 +186,7 @@ class Side:
         return end, moving | bent
 
     def _bend(self, block: CallBlock, i: int, kind: Integers, values: Floats, end: Floats) -> None:
-        """Put in what is told by points: a tap, a curve."""
+        """Insert a call defined by points: a tap, a curve."""
         earlier = np.flatnonzero(self.is_kind(kind[:i], *MOVES))
         here = end[earlier[-1]] if len(earlier) else self._here
         there = self._frame.program(tuple(here.tolist()))

@@ -1,4 +1,4 @@
-"""States a controller may stand in when a program starts: what is stated is held, all else is drawn."""
+"""Possible states of a controller when a program starts: given settings are held, all others are drawn."""
 
 from collections.abc import Mapping
 from dataclasses import replace

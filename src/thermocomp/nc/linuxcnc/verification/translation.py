@@ -57,7 +57,7 @@ _AXES: Final = "XYZABC"
 
 
 class UntranslatableError(InputError):
-    """A line cannot be said in LinuxCNC's words.
+    """A line cannot be translated into LinuxCNC code.
 
     Parameters
     ----------
@@ -242,7 +242,7 @@ class Translator:
         return {"G4": f"G4 P{format_number(block.pause)}", "G92.1": once}.get(once, f"{once} {words}")
 
     def _move(self, block: Block, codes: set[str]) -> tuple[list[str], str, list[str]]:
-        """Return lines before, words on the line, and lines after it. Each move says its own motion code."""
+        """Return lines before, words on the line, and lines after it. Each move has its motion code."""
         if block.kind == "cycle":
             return self._cycle(block)
         if block.kind in ("line", "arc"):
