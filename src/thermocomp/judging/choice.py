@@ -38,24 +38,23 @@ class Settings:
     Parameters
     ----------
     threshold : float
-        Correlation above which a sensor joins a group (grouping).
+        grouping: correlation above which a sensor joins a group.
     unsigned : bool
-        Compare the magnitudes of correlations (grouping).
+        grouping: compare the magnitudes of correlations.
     reference : str
-        Temperature that is subtracted from the others (grouping).
+        grouping: temperature that is subtracted from the others.
     max_sensors : int
-        Maximum number of sensors (subsets, ace, pareto). Default: 10 for subsets, 3 for ace, 6 for pareto.
+        subsets, ace, pareto: maximum number of sensors. Default: 10 for subsets, 3 for ace, 6 for pareto.
     seconds : float
-        Time limit of the search for the best sets, approximate [s]; sets not proven optimal by then are reported
-        (subsets).
+        subsets: approximate time limit of the search for the best sets [s]; sets not proven best by then are reported.
     criterion : str
-        Criterion by which the number of sensors is chosen (subsets).
+        subsets: criterion by which the number of sensors is chosen.
     models : list of str
-        Methods that are trained on the sensors (pareto).
+        pareto: methods that are trained on the sensors.
     level : float
-        Significance level of the Wilcoxon test (ace).
+        ace: significance level of the Wilcoxon test.
     holm : bool
-        Correct the significance level for the number of tests (ace).
+        ace: correct the significance level for the number of tests.
     """
 
     threshold: float = 0.9

@@ -44,8 +44,8 @@ class PositionSettings:
     order : int
         Order of the polynomial, or number of knots of the spline. Default: chosen by leaving out points.
     reference : list of int
-        Indices of the states of each test that count as cold, from 0; their mean is the cold profile. Default: the
-        first state.
+        States of each test that count as cold, as indices from 0; their mean is the cold profile. Default: the first
+        state.
     reference_position : float
         Reference position of the slopes [mm]. Default: where the thermal part is smallest.
     split : str
