@@ -38,7 +38,7 @@ EXPERIMENTS: Mapping[str, Experiment] = _BuiltIn()
 
 
 def find_experiment(experiment: str | Path) -> Experiment:
-    """Return an experiment by its name, or from a file of one's own.
+    """Return an experiment by its name, or from a custom file.
 
     Parameters
     ----------

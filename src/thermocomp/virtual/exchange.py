@@ -1,4 +1,4 @@
-"""Heat that passes otherwise than a linear model has it: conductances that change, beside those that stay.
+"""Nonlinear heat exchange in a linear model: conductances that change, in addition to the constant ones.
 
 The model keeps its constant conductances; what the real ones differ by is put in as heat on one side and taken from the
 other. That heat depends on the temperatures at the end of the step, for which a small linear system is solved: however

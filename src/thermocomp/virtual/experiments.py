@@ -1,4 +1,4 @@
-"""Tests run on the virtual machines (X-01): from a protocol and a seed to what the instruments said."""
+"""Tests run on the virtual machines (X-01): from a protocol and a seed to the readings of the instruments."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -205,9 +205,9 @@ def run(
 def _soaked(
     machine: VirtualMachine[S], programme: Programme, weights: FloatArray, weather: np.random.Generator
 ) -> tuple[S, FloatArray, FloatArray, FloatArray]:
-    """Return the state in which a test begins, that of the weather, what is true at each instrument, and the machine's.
+    """Return the initial states of the test and of the weather, the true instrument values, and the observables.
 
-    The last are its observables.
+    The observables are those of the machine.
     """
     climate = programme.climate
     state, sky = machine.init(climate.middle), climate.init(weather)

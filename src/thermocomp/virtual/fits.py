@@ -25,7 +25,7 @@ AIR_CONDUCTIVITY, AIR_JUMP = 0.026, 0.37
 
 @dataclass(frozen=True)
 class Fit:
-    """A cylinder in a ring; friction between them holds what wants to slip along the axis.
+    """A cylinder in a ring; friction between them resists slip along the axis.
 
     Parameters
     ----------

@@ -167,7 +167,7 @@ def check(drives: Sequence[FeedDrive], air: FloatArray, dt: float) -> None:
 
 
 def stretches(drives: Sequence[FeedDrive]) -> Iterator[tuple[int, int]]:
-    """Yield where each stretch of one and the same drive begins and ends."""
+    """Yield the start and end of each stretch with a constant drive."""
     first = 0
     for k in range(1, len(drives) + 1):
         if k == len(drives) or (drives[k] is not drives[first] and drives[k] != drives[first]):

@@ -1,4 +1,4 @@
-"""The virtual machines with the physics of real joints, bearings and surfaces, beside the linear ones.
+"""The virtual machines with the physics of real joints, bearings and surfaces, in addition to the linear ones.
 
 What they differ in: films that depend on temperatures and speed (`thermocomp.virtual.convection`), joints that open
 and close (`thermocomp.virtual.fits`), preload and friction of the bearings (`thermocomp.virtual.preload`),

@@ -61,7 +61,7 @@ def positioning(axis: str, position: float) -> dict[str, float]:
 
 
 def _between(along: str, axis: str, position: float) -> dict[str, float]:
-    """Return the weights of what an axis that stands at a position contributes along an axis."""
+    """Return the weights of the contribution along an axis of an axis at a position."""
     if not 0.0 <= position <= TRAVEL[axis]:
         raise SettingError(f"{axis.upper()} = {position:g} mm is beyond the travel from 0 to {TRAVEL[axis]:g} mm")
     stations = STATIONS[axis]
@@ -101,7 +101,7 @@ def pitch(position: int) -> VirtualProbe:
 
 
 def weigh_tool_point(axis: str, point: Mapping[str, float]) -> dict[str, float]:
-    """Return the weights of the observables in the tool point's deviation along an axis, wherever the axes stand.
+    """Return the weights of the observables in the tool point's deviation along an axis, for any axis positions.
 
     What Z and X do across themselves is not in it: the machine does not tell.
 

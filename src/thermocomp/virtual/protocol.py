@@ -101,7 +101,7 @@ class RecordingSetup:
 
 @dataclass(frozen=True, kw_only=True)
 class Programme(RecordingSetup):
-    """One test that is ready to run; beside what `Setup` says of it.
+    """One test that is ready to run, with the settings of `RecordingSetup`.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ class Programme(RecordingSetup):
 
 @dataclass(frozen=True, kw_only=True)
 class PlannedTest(RecordingSetup, Stretch):
-    """One test as it is written, or several alike; beside what `Setup` and `Stretch` say of it.
+    """One test as written in a protocol, or several alike, with the settings of `RecordingSetup` and `Stretch`.
 
     Parameters
     ----------
@@ -244,7 +244,7 @@ class Experiment:
         return tuple(found)
 
     def programmes(self, seed: int = 0) -> list[Programme]:
-        """Return the tests, with all that is left open drawn by lot; each test has lots of its own."""
+        """Return the tests, with all open settings drawn at random; each test has separate draws."""
         plans = [plan for plan in self.tests for _ in range(plan.copies)]
         return [
             plan.programme(name, np.random.default_rng(make_seed(seed, name, "lots")))
@@ -259,7 +259,7 @@ def make_seed(seed: int, test: str, what: str) -> list[int]:
 
 @contextmanager
 def add_path(*path: str | int) -> Iterator[None]:
-    """Add where it stands to a `SettingError` that is raised inside."""
+    """Add the location to a `SettingError` that is raised inside."""
     try:
         yield
     except SettingError as e:

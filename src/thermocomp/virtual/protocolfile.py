@@ -188,7 +188,7 @@ def _explain(failure: ValidationError, given: Mapping[str, Any]) -> tuple[Keys, 
 
 
 def _keys(error: ErrorDetails, given: Any) -> Keys:
-    """Return the keys and positions of an error that stand in the file; the rest are kinds that pydantic tried."""
+    """Return the keys and positions of an error that are in the file; the rest are kinds that pydantic tried."""
     keys = []
     for key in error["loc"]:
         try:

@@ -186,7 +186,7 @@ class Stretch:
         return self.repeat * (max(parts) if self.order == "drawn" else sum(parts))
 
     def leaves(self, outer: Mapping[str, Any] | None = None, path: Path = ()) -> Iterator[Leaf]:
-        """Yield where each segment stands, and what holds in it."""
+        """Yield the position of each segment, and its settings."""
         given = self._given(outer or {})
         if not self.segments:
             yield path, given

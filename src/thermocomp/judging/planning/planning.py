@@ -88,7 +88,7 @@ class Covered:
         return cls(tuple(runs), tuple(ranges))
 
     def news(self, trial: Trial, top_speed: float, swing: float) -> str:
-        """Return what is new in a test: its speeds, durations and stops, each separately."""
+        """Return the new conditions in a test: its speeds, durations and stops, each separately."""
         if trial.kind == "room" and not self.rooms:
             return "no temperature of the room was recorded"
         if trial.kind == "room":

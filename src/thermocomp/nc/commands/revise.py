@@ -26,11 +26,11 @@ MANY = 1000
 
 
 _GROUPS = {
-    "The drift": Drifting,
-    "The state at the start: exactly one of cold, carried, measured": Starting,
-    "The revision": Way,
-    "The controller: what does not stand in the program": Controller,
-    "The time it takes": Timing,
+    "Drift: models and inputs": Drifting,
+    "Initial thermal state: exactly one of cold, carried, measured": Starting,
+    "Revision": Way,
+    "Controller: settings that are not in the program": Controller,
+    "Machining time": Timing,
 }
 for order, (title, group) in enumerate(_GROUPS.items(), start=1):
     Parameter(name="*", group=Group(title, sort_key=order))(group)

@@ -302,7 +302,7 @@ def _judged(tests: Sequence[Profiles], fit: PositionFit, options: PositionOption
 
 
 def _factors(one: _All, parts: Sequence[_Part], options: PositionOptions) -> tuple[FloatArray, FloatArray]:
-    """Return factors, measured and predicted, (n, n_factors): the predicted ones from what the model said everywhere.
+    """Return factors, measured and predicted, (n, n_factors): the predicted ones from the model outputs everywhere.
 
     A split may have chosen other powers; its thermal part is written in those of the whole.
     """

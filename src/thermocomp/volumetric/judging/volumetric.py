@@ -255,7 +255,7 @@ def study(
 
 
 def in_reference_state(machine: Machine) -> Machine:
-    """Return a machine whose models of time say nothing: constants and profiles alone."""
+    """Return a machine whose models of time give zero: constants and profiles alone."""
     kept: dict[str, Source] = {}
     for code, source in machine.components.items():
         if isinstance(source, PositionModel):
@@ -266,7 +266,7 @@ def in_reference_state(machine: Machine) -> Machine:
 
 
 def inputs_of(machine: Machine) -> dict[str, Input]:
-    """Return the inputs that the machine's models want, by name."""
+    """Return the inputs of the machine's models, by name."""
     return {i.name: i for source in machine.components.values() for m in models_of(source) for i in m.inputs}
 
 
@@ -288,7 +288,7 @@ def describe_source(source: Source | None) -> str:
 
 
 def middle(machine: Machine) -> Vector:
-    """Return the middle of the travels; an axis that is not there stands at 0 [mm]."""
+    """Return the middle of the travels; 0 for an axis that does not exist [mm]."""
     x, y, z = (0.5 * sum(machine.axis(a).travel) if a in machine.structure.axes else 0.0 for a in "XYZ")
     return (x, y, z)
 

@@ -83,7 +83,7 @@ def fill_options(
     *,
     learn: BoolArray | None = None,
 ) -> PositionOptions:
-    """Fill in what the profiles tell of themselves; temperatures are not looked at.
+    """Fill in the options that the profiles determine; temperatures are not used.
 
     - Reference position: the measured one where the thermal part is smallest: powers that are zero there leave least. A
       laser counts from where it was set to zero, a screw grows from its fixed bearing.

@@ -194,7 +194,7 @@ def _section(
 
 
 def _plane_named(study: Volumetric, plane: str) -> str:
-    """Return the name of a section, and where the axis across it stands."""
+    """Return the name of a section, and the position of the axis across it."""
     across = next(a for a in "XYZ" if a not in plane)
     here = f" at {across} {study.course.point['XYZ'.index(across)]:g} mm"
     return f"{plane[0]}-{plane[1]}{here if across in study.machine.structure.axes else ''}"

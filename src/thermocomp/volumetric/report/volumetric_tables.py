@@ -135,7 +135,7 @@ def volume(study: Volumetric) -> Layout:
 
 
 def listed(study: Volumetric) -> list[dict[str, Any]]:
-    """Return all 32 components: what tells their value, and the value at the point in each moment."""
+    """Return all 32 components: the source of their value, and the value at the point in each moment."""
     return [
         {
             "code": c.code,
