@@ -185,8 +185,8 @@ def plan(
     inputs, split, leave_one, absolute, starts, zero_over, mapping
         As for `compare`.
     curve : bool
-        Also compute the learning curve: error on unseen cycles against the number of training cycles. This takes most of
-        the computing time.
+        Also compute the learning curve: error on unseen cycles against the number of training cycles. This takes most
+        of the computing time.
     jobs, progress
         As for `compare`.
 

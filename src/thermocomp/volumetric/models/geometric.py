@@ -311,7 +311,7 @@ class _Polynomial:
         self.distinct = [len(np.unique(points[:, a])) for a in range(3)]
 
     def orders(self, n_places: int) -> Iterator[Order]:
-        """Give the orders that leave a third of the points to spare, and no degree that a coordinate cannot tell."""
+        """Yield the orders that leave a third of the points to spare, with degrees that each axis can determine."""
         # Least squares on equidistant positions swings between them where the degree is above 2 sqrt(n).
         n_own = self.distinct[self.own]
         highest = min(n_own - 2, int(2 * n_own**0.5), HIGHEST)
