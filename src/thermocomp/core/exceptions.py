@@ -30,7 +30,7 @@ class InputError(ThermocompError):
 class SettingError(InputError, ValueError):
     """A value of a setting cannot be used.
 
-    It is a `ValueError` too, so that pydantic, which reads settings from files, says where the value stands.
+    It is a `ValueError` too, so that pydantic, which reads settings from files, reports the location of the value.
 
     Parameters
     ----------

@@ -151,7 +151,7 @@ class Past:
 class Mean:
     """In a `Recurrence`: the mean of a value over the interval that ended some ticks ago; 0 is the one that ends now.
 
-    A reading stands for the time since the reading before it; before the first, the value is 0 but at the very start.
+    A reading is valid for the time since the previous reading; before the first, the value is 0 but at the very start.
     """
 
     of: "Node"

@@ -1,6 +1,6 @@
 """Result of a thermal test after ISO 230-3: curves, and their characteristic values.
 
-Which names are the standard's and which are ours stands in `thermocomp.iso230.part3`.
+`thermocomp.iso230.part3` documents which names are from the standard and which are ours.
 """
 
 from dataclasses import dataclass, replace

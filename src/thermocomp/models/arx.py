@@ -93,7 +93,7 @@ class ARX(ClockedRegressor):
 
     References
     ----------
-    The study of pre-compensation by revised NC programs, of which P-01 to P-07 tell in the requirements.
+    The study of pre-compensation by revised NC programs: requirements P-01 to P-07.
 
     Akaike, H.: Fitting autoregressive models for prediction. Annals of the Institute of Statistical Mathematics 21,
     1969, 243-247.

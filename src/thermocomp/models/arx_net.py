@@ -116,7 +116,7 @@ class NetARX(ClockedRegressor):
 
     References
     ----------
-    The study of pre-compensation by revised NC programs, of which P-01 to P-07 tell in the requirements.
+    The study of pre-compensation by revised NC programs: requirements P-01 to P-07.
 
     Narendra, K. S., Parthasarathy, K.: Identification and control of dynamical systems using neural networks. IEEE
     Transactions on Neural Networks 1(1), 1990, 4-27. doi:10.1109/72.80202

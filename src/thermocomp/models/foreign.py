@@ -61,7 +61,7 @@ class ForeignRegressor(UnfrozenRegressor):
 def catch_failures(what: str) -> Iterator[None]:
     """Make a `FitError` of whatever an estimator raises, so that it costs no other one its result.
 
-    Errors of thermocomp's own pass: they tell what to set otherwise.
+    Errors of thermocomp are passed on unchanged: they state the remedy.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """Cleaning: stretches that are cut, clocks that are shifted, probes that are zeroed again, rows that are resampled.
 
-Nothing is changed but by a step that somebody has written down, and each step says what it did.
+Values are changed only by steps that a user has written down, and each step reports its changes.
 """
 
 from collections.abc import Sequence

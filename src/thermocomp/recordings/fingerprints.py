@@ -79,7 +79,7 @@ def fingerprint(samples: Samples, target: int, learn: BoolArray, *, thin: bool =
     Returns
     -------
     Prints or None
-        None if no run says enough to be known again.
+        None if no run has enough information to be recognised.
     """
     rows = find_rows(samples, target)
     if len(rows.at) <= LENGTH:

@@ -76,7 +76,7 @@ class Meaning:
     Parameters
     ----------
     name : str
-        Channel name: the heading with the suffix of the house unit.
+        Channel name: the heading with the suffix of the internal unit.
     base : str
         The heading without its unit.
     unit : Unit

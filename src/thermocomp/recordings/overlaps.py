@@ -130,7 +130,7 @@ def _fill(
     *,
     own: bool,
 ) -> None:
-    """Write into `source` the rows between matches that follow each other, and those beside them that may be known."""
+    """Write into `source` the rows between consecutive matches, and those next to them that may be known."""
     learned, moving = unpack_marks(run.rows).astype(np.intp), unpack_marks(run.moving) > 0
     scale = stride / run.stride
     usual = float(np.median(np.diff(learned))) if learned.size > 1 else 0.0

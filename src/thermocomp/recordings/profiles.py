@@ -66,7 +66,7 @@ class Profiles:
     states : Recording
         The thermal states, one row each: time, temperatures, spindle speed; cycles.
     zero : ndarray of shape (n_points,), optional
-        Profile that counts as cold, in place of those of its own reference states [unit].
+        Profile that counts as cold, in place of that of the profiles' reference states [unit].
 
     Raises
     ------

@@ -49,7 +49,7 @@ class Recording:
     notes : tuple of str
         Notes of the reader for the user.
     changed : tuple of str
-        Those of the notes that say what a mapping has changed in the values.
+        Those of the notes that list changes of the values by a mapping.
     compensation : {'', 'off', 'known', 'unknown'}
         Whether a correction was in force at the machine, and known; empty: not said. See
         `thermocomp.recordings.compensated`.

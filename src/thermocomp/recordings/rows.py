@@ -34,9 +34,9 @@ class Rows:
     channels : tuple of Channel
         One per column of `table`.
     labels : list of object or None
-        Thermal cycle of each row, if the file says.
+        Thermal cycle of each row, if the file contains it.
     place : callable
-        Says where a row stands in the file, such as ``line 7``.
+        Returns the location of a row in the file, such as ``line 7``.
     extra : dict of str to list of object
         Cells of further columns that were asked for and are there.
     min_run, min_stop : float

@@ -117,7 +117,7 @@ def bridge_files(start: Start, recording: Recording) -> tuple[Start, FloatArray]
     Returns
     -------
     start : Start
-        With its gaps told.
+        Start with known gaps.
     begins : ndarray of shape (n_earlier + 1,)
         Start of each earlier file and of the recording itself, since the first of them [s].
 
@@ -171,7 +171,7 @@ def find_starts(
     Raises
     ------
     InputError
-        It cannot be told, and a model begun at zero would be wrong by it.
+        It cannot be determined, and a model started at zero would be wrong by it.
     """
     if absolute:
         return tuple(Start("known", "temperatures are taken as they are") for _ in recordings)
@@ -192,7 +192,7 @@ def find_resting_rows(recording: Recording, zeroing: Zeroing) -> BoolArray:
     ----------
     recording : Recording
     zeroing : Zeroing
-        Names the channel that tells it.
+        Defines the channel of the spindle speed.
 
     Returns
     -------

@@ -158,7 +158,7 @@ def look(
 def _made_up(watch: Watch, values: FloatArray) -> FloatArray:
     """Return the first readings; one that cannot be is as far from its training's zero as the others are on average.
 
-    What can be is what the gate of the compensator lets pass as a start.
+    Possible readings are those that the gate of the compensator accepts as a start.
     """
     zero, (low, _, width) = np.array([watch.inputs[s.input].reference for s in watch.sensors]), watch.ranges
     zero = zero + np.where([watch.inputs[s.input].rezero for s in watch.sensors], 0.0, low)  # what is absolute has none

@@ -39,7 +39,7 @@ class Face:
     lying : bool
         A cylinder with a horizontal axis, which may turn.
     wind : float
-        Forced convection at top speed by what turns beside it, with its power 2/3 [W/(m2 K)].
+        Forced convection at top speed from neighbouring rotating parts, with its power 2/3 [W/(m2 K)].
     films_turning : float
         Coefficient that the linear model adds to `films` at top speed [W/(m2 K)].
     """

@@ -80,7 +80,7 @@ def record(
     sensor_noise : float, optional
         Standard deviation of the temperature noise [degC]; the sensors' own if not given.
     faults : sequence of SensorFault
-        Befall every test, beside those of the protocol.
+        Faults in every test, in addition to those of the protocol.
     progress : callable
         Told the name of each test that is done.
 

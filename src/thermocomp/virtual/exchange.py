@@ -49,7 +49,7 @@ class Exchange:
         operators : Operators
             Operators of the step.
         watched : sequence of str
-            Places that `operators` tells of after the step.
+            Places that `operators` give after the step.
         paths : sequence of (str, str or None)
             From a place that is watched, and an input of the same name, to another one, or to the room's air.
         """

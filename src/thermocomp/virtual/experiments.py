@@ -90,9 +90,9 @@ def simulate(
         Standard deviation of the temperature noise [degC] (C-33: 0.4); the sensors' own if not given. The truth does
         not depend on it.
     faults : sequence of SensorFault
-        Befall every test, beside those of the protocol.
+        Faults in every test, in addition to those of the protocol.
     whole : bool
-        Keep all that the machine tells of itself.
+        Keep all observables of the machine.
 
     Returns
     -------
@@ -145,7 +145,7 @@ def run(
     faults : sequence of SensorFault
         Beside those of the programme.
     whole : bool
-        Keep all that the machine tells of itself.
+        Keep all observables of the machine.
 
     Returns
     -------

@@ -89,7 +89,7 @@ def find_cold_component(code: str, points: FloatArray) -> FloatArray:
     code : str
         Code of ISO 230-1, such as ``EXX``.
     points : ndarray of shape (..., 3)
-        Positions of X, Y and Z [mm]. All but EYX, which knows Z as well, depend on that of their own axis alone.
+        Positions of X, Y and Z [mm]. All except EYX, which also depends on Z, depend on that of their own axis only.
 
     Returns
     -------

@@ -65,9 +65,9 @@ class Instrument:
     cold : float
         Value in the state from which it counts [um].
     zeroed : bool
-        It counts from the state in which the test begins; False: from what the machine and the air tell at zero.
+        It is relative to the state in which the test begins; False: to the values of the machine and the air at zero.
     touches : bool
-        It says something in probing cycles only.
+        It gives readings in probing cycles only.
     """
 
     sensor: Sensor
@@ -140,7 +140,7 @@ class Touch:
     points : mapping of str to tuple of float
         Positions X, Y, Z of the axes at each point [mm].
     noise : float
-        Repeatability of the probe, one standard deviation [um]; data sheets say 1 um for two.
+        Repeatability of the probe, one standard deviation [um]; data sheets specify 1 um for two.
     resolution : float
         Resolution of the controller's reading [um].
     """

@@ -89,7 +89,7 @@ class Kit:
     observables : tuple of str
         Quantities from which probes can be made.
     outfits, nests : mapping of str to tuple of str
-        Names that stand for several places, or several probes.
+        Names that denote several places, or several probes.
     loads : mapping of str to str
         Places where further heat can be applied.
     inner : mapping of str to str
@@ -121,7 +121,7 @@ class Kit:
         Raises
         ------
         SettingError
-            There is no such place, or nobody can measure there.
+            There is no such place, or it cannot be measured.
         """
         if name in self.inner and not perfect:
             raise SettingError(f"{name!r} turns: it can only be calculated, with perfect = true")
@@ -166,7 +166,7 @@ def labelled(names: Sequence[str] | Mapping[str, T], sets: Mapping[str, tuple[st
     names : sequence of str, or mapping of str to str
         Without labels a name is its own label.
     sets : mapping of str to tuple of str
-        Names that stand for several.
+        Names that denote several.
     """
     if not isinstance(names, Mapping):
         return {n: n for given in names for n in sets.get(given, (given,))}

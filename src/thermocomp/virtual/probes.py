@@ -103,7 +103,7 @@ def pitch(position: int) -> VirtualProbe:
 def weigh_tool_point(axis: str, point: Mapping[str, float]) -> dict[str, float]:
     """Return the weights of the observables in the tool point's deviation along an axis, for any axis positions.
 
-    What Z and X do across themselves is not in it: the machine does not tell.
+    Cross-axis deviations of Z and X are not included: the machine has no such observables.
 
     Parameters
     ----------

@@ -44,7 +44,7 @@ class RecordingSetup:
     places : tuple of str, or mapping of str to str
         Places of temperature sensors, see `thermocomp.virtual.kits`; a mapping gives the channels other names.
     probes : tuple of str, or mapping of str to str or mapping of str to float
-        Displacements, in the same way; a mapping of the machine's observables to weights is a probe of one's own.
+        Displacements, in the same way; a mapping of the machine's observables to weights is a custom probe.
     perfect : bool
         Sensors without lag, bias, drift, noise and steps: a calculation, not a measurement.
     touch : Touch, optional

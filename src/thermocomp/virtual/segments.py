@@ -131,14 +131,14 @@ class Stretch:
     speed : float or Lot, optional
         Spindle speed [1/min]; 0 if not given anywhere.
     feed : Feed, optional
-        The axes stand if nobody says otherwise.
+        Feed; the axes are stopped if not given anywhere.
     stroke : Stroke, optional
     loads : mapping of str to float or Lot, optional
         Further heat, by where it is put in [W].
     cooled : bool, optional
-        The coolant loop runs; it does if nobody says otherwise.
+        Whether the coolant loop runs. Default: it does, if not given anywhere.
     powered : bool, optional
-        The machine is switched on; it is if nobody says otherwise.
+        Whether the machine is switched on. Default: it is, if not given anywhere.
     segments : tuple of Stretch
         Segments within it; none: it is a segment itself.
     repeat : int

@@ -144,7 +144,7 @@ class ReducedModel:
         dt : float
             [s]
         watched : tuple of str
-            Places whose temperatures after the step are wanted at once, below the states.
+            Places whose temperatures after the step are needed at once, below the states.
         """
         key = (theta, dt, watched)
         found = self._kept.get(key)

@@ -1,4 +1,4 @@
-"""Averages over a stated time and their uncertainty: no single noisy row decides what a curve is told to be.
+"""Averages over a stated time and their uncertainty: no single noisy row determines the result of a curve.
 
 How the noise is found: the scatter of second differences from row to row, robustly, is what is independent from row
 to row; that of third differences of means over `WINDOW` is what of it is left in a mean, however neighbouring rows hang

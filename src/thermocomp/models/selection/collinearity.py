@@ -23,7 +23,7 @@ class Spectrum:
     Parameters
     ----------
     eigenvalues : tuple of float
-        Falling [degC^2]; 0 for what cannot be told from 0.
+        Decreasing [degC^2]; 0 for values indistinguishable from 0.
     """
 
     eigenvalues: tuple[float, ...]

@@ -22,7 +22,7 @@ def drop_unsound(samples: Samples, recordings: Sequence[Recording]) -> Samples:
     Returns
     -------
     Samples
-        Values in trouble are missing (nan); trouble of a whole channel or recording stands in ``trouble``.
+        Values in trouble are missing (nan); trouble of a whole channel or recording is listed in ``trouble``.
     """
     values, deviations = samples.values.copy(), samples.deviations.copy()
     trouble: list[tuple[str, str]] = []

@@ -108,9 +108,9 @@ class ColumnPlan:
     times : TimePlan
         The columns that hold the time.
     time_unit : str
-        A unit of time, ``timestamp``, or empty if neither heading nor mapping says.
+        A unit of time, ``timestamp``, or empty if neither heading nor mapping gives one.
     beside : tuple of int
-        Positions of further columns that must hold the same times: one beside each channel.
+        Positions of further columns that must hold the same times: one next to each channel.
     cycle : int or None
         Position of the column of cycle labels.
     columns : tuple of PlannedColumn

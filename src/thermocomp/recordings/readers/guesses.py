@@ -72,7 +72,7 @@ def guess_columns(table: FileTable, mapping: Mapping) -> list[tuple[str, list[Re
     Returns
     -------
     list of (str, list of Remedy)
-        Heading with some values, and what a mapping may say of the column, the likeliest first.
+        Heading with some values, and possible mapping entries for the column, the likeliest first.
     """
     known = {rule.column or name for name, rule in mapping.columns.items()}
     known |= {mapping.time.column, mapping.time.date, mapping.cycles.column}

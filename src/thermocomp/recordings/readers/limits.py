@@ -35,7 +35,7 @@ class FileLimits:
     heading_characters : int
         Headings become names in tables, figures and messages.
     columns : int
-        Each becomes an object of its own. A machine has some hundred sensors at most.
+        Each becomes a separate object. A machine has some hundred sensors at most.
     rows : int
         Three years at one a second.
     cells : int

@@ -56,7 +56,7 @@ class TimeColumn:
     date : str or int
         Column of the dates where `column` holds the time of day alone.
     zone : str
-        Time zone of timestamps that tell none, such as ``Europe/Berlin``; ``UTC`` for a clock that is never set.
+        Time zone of timestamps that contain none, such as ``Europe/Berlin``; ``UTC`` for a clock that is never set.
     """
 
     column: Place = ""
@@ -78,7 +78,7 @@ class ColumnMap:
     column : str or int
         Its heading in the file, or its number from 1, for headings that come twice; empty: NAME itself.
     unit : str
-        Unit of the scaled value; empty: the house unit of the role, or the unit in the heading.
+        Unit of the scaled value; empty: the internal unit of the role, or the unit in the heading.
     role : str, optional
         Measured quantity, or ``cycle`` (labels of thermal cycles), or ``ignore``; without it the unit decides.
     scale : float
@@ -86,7 +86,7 @@ class ColumnMap:
     zero : float or 'first'
         Number in the file that counts as zero; ``first``: the first valid one of the column.
     missing : tuple of float
-        Numbers in the file that stand for a missing value.
+        Numbers in the file that denote a missing value.
     place : str
         Location of the sensor, in words.
     valid : tuple of float, optional
@@ -118,14 +118,14 @@ class ReadOptions:
     Parameters
     ----------
     delimiter : str
-        One character; a space stands for any white space.
+        One character; a space denotes any white space.
     decimal : {'', '.', ','}
     encoding : str
         Such as ``cp1252``; empty: UTF-8, or Latin-1 if it is not UTF-8.
     comment : str
         Lines that begin with it are passed over; empty: there are none.
     missing : tuple of float
-        Numbers that stand for a missing value in every column.
+        Numbers that denote a missing value in every column.
     only_mapped : bool
         True: columns that have no table ``[columns.NAME]`` are left out.
     heading : int

@@ -74,7 +74,7 @@ class ProfileOptions:
         Raises
         ------
         InputError
-            Neither the component tells them, nor is it said.
+            They are neither given nor defined by the component.
         """
         component = BY_CODE.get(self.target)
         axis = self.axis or (component.depends_on if component else "") or ""

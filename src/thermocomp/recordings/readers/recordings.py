@@ -52,7 +52,7 @@ def read(path: str | Path, mapping: Mapping | None = None) -> Recording:
     Returns
     -------
     Recording
-        In house units; `notes` tells what was left out or replaced.
+        Recording in internal units; `notes` lists what was left out or replaced.
 
     Raises
     ------

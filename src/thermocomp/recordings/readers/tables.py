@@ -312,7 +312,7 @@ def convert(
     Returns
     -------
     values : ndarray of shape (n_rows,)
-        nan where a word stands for a missing number.
+        nan where a word denotes a missing number.
     notes : tuple of str
         Words found, and their locations.
 

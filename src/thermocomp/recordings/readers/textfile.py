@@ -51,7 +51,7 @@ class CsvTable:
     sample : tuple of tuple of str
         Cells of the first rows.
     delimiter : str
-        One character; a space stands for any white space.
+        One character; a space denotes any white space.
     decimal : str
         Decimal sign, if it is known beforehand.
     encoding : str

@@ -176,7 +176,7 @@ def study_all(
     components : sequence of sequence of Profiles
         The tests of each.
     options, left_open, judging, jobs, progress
-        See `study`; `n_pieces` tells how often `progress` is called.
+        See `study`; `n_pieces` gives the number of calls of `progress`.
 
     Returns
     -------

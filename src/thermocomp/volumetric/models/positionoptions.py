@@ -215,7 +215,7 @@ def remainder(tests: Sequence[Profiles], options: PositionOptions, m: int) -> fl
     options : PositionOptions
         Tells whether there is an offset too, and where q is zero.
     m : int
-        0 without an offset: nothing is fitted, the thermal part itself is told.
+        0 without an offset: no fit, the thermal part itself is used.
 
     Returns
     -------

@@ -177,7 +177,7 @@ class Server:
     # -- the service ---------------------------------------------------------------------------------------------------
 
     def accept(self) -> None:
-        """Accept the service; a second one is told that it is occupied."""
+        """Accept the service; a second one gets a message that the place is occupied."""
         connection, _ = self.listener.accept()
         if self.client is not None and self.left():
             self.drop()
