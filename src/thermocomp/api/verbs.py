@@ -53,7 +53,7 @@ def compare(
     scheduler: str | None = None,
     progress: Callable[[str], None] = silent,
 ) -> Compared:
-    """Compare methods on unseen thermal cycles, and with no compensation.
+    """Compare methods with each other and with no compensation, on unseen thermal cycles.
 
     Parameters
     ----------

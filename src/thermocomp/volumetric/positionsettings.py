@@ -35,8 +35,7 @@ class PositionSettings:
     inputs : list of str
         Channels used as inputs for the slopes. Default: all temperatures and the spindle speed.
     slopes : int
-        Number of slopes, that is the highest power of the position; 0: the cold profile only. Default: as many as are
-        useful.
+        Highest power of the position; 0: the cold profile only. Default: as many powers as are useful.
     offset : bool
         Also model a shift of the whole profile. Default: only where the shift exceeds the noise.
     profile : str
