@@ -1,4 +1,4 @@
-"""What recordings hold, and what is wrong with them."""
+"""Data-quality check of recordings: contents and problems."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CheckedRecordings(Result, Paged):
-    """Recordings and what was found in them.
+    """Recordings and the findings of the data-quality check.
 
     Parameters
     ----------
     recordings : tuple of Recording
     findings : tuple of sequence of Finding
-        Of each recording, the gravest first.
+        Findings of each recording, the most serious first.
     """
 
     recordings: tuple[Recording, ...]
@@ -35,11 +35,11 @@ class CheckedRecordings(Result, Paged):
 
     @property
     def trouble(self) -> bool:
-        """Something is wrong that would spoil a model."""
+        """Whether a problem was found that would spoil a model."""
         return any(f.severity == "trouble" for found in self.findings for f in found)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all of it for a program: what ``--json`` prints."""
+        """Return all results as a dict, as printed by ``--json``."""
         from thermocomp.report import records
 
         pairs = zip(self.recordings, self.findings, strict=True)
@@ -55,12 +55,12 @@ class CheckedRecordings(Result, Paged):
         return pd.DataFrame(rows, columns=["recording", "severity", "kind", "channel", "text"])
 
     def plot(self, recording: int = 0) -> "Figure":
-        """Return every channel of a recording, with what was found marked at its rows.
+        """Return a figure of every channel of a recording, with the findings marked at their rows.
 
         Parameters
         ----------
         recording : int
-            Which, from 0.
+            Index of the recording, from 0.
         """
         from thermocomp.report import checks
 
@@ -83,14 +83,14 @@ class CheckedRecordings(Result, Paged):
 
 
 def check(recordings: Given, *, mapping: str | Path | Mapping | None = None) -> CheckedRecordings:
-    """Summarise recordings and report data-quality problems; of more than three files, a line each.
+    """Summarise recordings and report data-quality problems; more than three files get one line each.
 
     Parameters
     ----------
     recordings : Recording, path, DataFrame, or sequence of them
-        Files (CSV, XLSX, ODS or Parquet) or tables; each is one test.
+        Files (CSV, XLSX, ODS or Parquet) or tables; each one is a separate test.
     mapping : str, Path or Mapping, optional
-        TOML file that says what the columns of files are.
+        TOML mapping file: role and unit of each column.
 
     Returns
     -------
@@ -99,7 +99,7 @@ def check(recordings: Given, *, mapping: str | Path | Mapping | None = None) -> 
     Raises
     ------
     InputError
-        A recording cannot be used.
+        A recording is invalid.
 
     Examples
     --------

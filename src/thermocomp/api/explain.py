@@ -1,4 +1,4 @@
-"""What models are, in plain words."""
+"""Explanation of models in plain words."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def models_of(model: Any) -> tuple[ErrorModel, ...]:
-    """Return models, given as one, as a sequence of them, as what `fit` returned, or as the path of a model file."""
+    """Return a list of models from a model, a sequence, a result of `fit`, or the path of a model file."""
     if isinstance(model, ErrorModel):
         return (model,)
     if isinstance(model, str | Path):
@@ -23,7 +23,7 @@ def models_of(model: Any) -> tuple[ErrorModel, ...]:
 
 
 def explain(model: "ErrorModel | FittedModels | str | Path | Sequence[ErrorModel]") -> Explanation | Explanations:
-    """Say what the models of a file are made of, how good they are, and what a failure of each sensor does.
+    """Explain the models of a file: their terms, their accuracy, and the effect of a failure of each sensor.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def explain(model: "ErrorModel | FittedModels | str | Path | Sequence[ErrorModel
     Returns
     -------
     Explanation or Explanations
-        Of one model, or of several; print it to read it.
+        Explanation of one model, or of several; print it to read it.
 
     Examples
     --------

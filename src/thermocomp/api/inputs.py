@@ -1,4 +1,4 @@
-"""What is handed in: recordings, files, tables; and what is made of them before any work."""
+"""Input data: recordings, files and tables, and their preparation."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ IntArray = NDArray[np.intp]
 #: one test, or several
 Given = Recording | str | Path | pd.DataFrame | Sequence["Recording | str | Path | pd.DataFrame"]
 LeaveOne = Literal["cycle", "day", "file"]
-#: how recordings begin: all of them, each of them, or to be found out
+#: initial thermal state of all recordings or of each one; None: determined from the recordings
 Starts = Start | Sequence[Start] | None
 
 
@@ -42,7 +42,7 @@ def read(path: str | Path, mapping: str | Path | mappings.Mapping | None = None)
     path : str or Path
         A file ending in .csv, .tsv, .txt, .xlsx, .ods or .parquet.
     mapping : str, Path or Mapping, optional
-        What the columns are, where their headings do not say: a TOML file, or what was read of one.
+        TOML mapping file, or the mapping read from one: role and unit of columns whose headings do not give them.
 
     Returns
     -------
@@ -51,7 +51,7 @@ def read(path: str | Path, mapping: str | Path | mappings.Mapping | None = None)
     Raises
     ------
     RecordingError, UnitError
-        See `thermocomp.recordings.readers.recordings.read`; a note of the error offers a mapping, where one would help.
+        See `thermocomp.recordings.readers.recordings.read`; a note of the error suggests a mapping where it would help.
 
     Examples
     --------
@@ -69,14 +69,14 @@ def read(path: str | Path, mapping: str | Path | mappings.Mapping | None = None)
 
 
 def recordings_of(given: Given, mapping: str | Path | mappings.Mapping | None = None) -> list[Recording]:
-    """Return recordings, whatever they were given as.
+    """Return a list of recordings from recordings, files or tables.
 
     Parameters
     ----------
     given : Recording, str, Path, DataFrame, or sequence of them
-        A table is taken by `Recording.from_dataframe` as it is.
+        A table is converted by `Recording.from_dataframe`.
     mapping : str, Path or Mapping, optional
-        For files.
+        TOML mapping file for files: role and unit of each column.
 
     Returns
     -------
@@ -85,7 +85,7 @@ def recordings_of(given: Given, mapping: str | Path | mappings.Mapping | None = 
     Raises
     ------
     InputError
-        It is none of these, or there is none.
+        An item has another type, or the sequence is empty.
     """
     several = [given] if isinstance(given, Recording | str | Path | pd.DataFrame) else list(given)
     if not several:
@@ -104,12 +104,12 @@ def recordings_of(given: Given, mapping: str | Path | mappings.Mapping | None = 
 
 
 def starts_of(starts: Starts, recordings: Sequence[Recording]) -> tuple[Start, ...] | None:
-    """Return how each recording begins; None: to be found out.
+    """Return the initial thermal state of each recording; None: determined from the recordings.
 
     Parameters
     ----------
     starts : Start or sequence of Start, optional
-        One for all recordings, or one each.
+        One start for all recordings, or one each.
     recordings : sequence of Recording
 
     Returns
@@ -119,7 +119,8 @@ def starts_of(starts: Starts, recordings: Sequence[Recording]) -> tuple[Start, .
     Raises
     ------
     InputError
-        They are not as many as the recordings, or one continues from itself or is given to several.
+        The number of starts differs from the number of recordings, a recording continues from itself, or a start that
+        continues is given for several recordings.
     """
     if starts is None:
         return None
@@ -138,17 +139,17 @@ def starts_of(starts: Starts, recordings: Sequence[Recording]) -> tuple[Start, .
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """All that judging begins with.
+    """Prepared data for judging.
 
     Parameters
     ----------
     tests : tuple of Recording
     samples : Samples
-        Their rows, without those in which a channel is in trouble.
+        Rows of the tests, without those in which a channel is in trouble.
     judging : Judging
-        What is learned from and what is judged.
+        Training and validation rows.
     trouble : list of str
-        What is wrong with the recordings.
+        Data-quality problems of the recordings.
     """
 
     tests: tuple[Recording, ...]
@@ -172,29 +173,29 @@ def prepare(
     judged: bool = True,
     listener: Listener = SILENT,
 ) -> Prepared:
-    """Make of recordings what judging begins with.
+    """Prepare recordings for judging.
 
     Parameters
     ----------
     tests : sequence of Recording
     targets : str or sequence of str, optional
-        Displacement channels to predict; all of the first recording without it.
+        Displacement channels to predict. Default: all of the first recording.
     inputs : str or sequence of str, optional
     absolute : bool
     starts : Start or sequence of Start, optional
-        How the recordings begin, see `starts_of`.
+        Initial thermal state of the recordings; see `starts_of`.
     zero_over : float
-        Average the start over this time, while the spindle is stopped [s].
+        Duration at the start of each test, with the spindle stopped, over which the zero is averaged [s].
     tilt : sequence of str, optional
-        Tilts to predict too, see `thermocomp.recordings.tilts.with_tilts`.
+        Tilts to predict as well; see `thermocomp.recordings.tilts.with_tilts`.
     split, leave_one : str, optional
-        What is judged, see `judging_of`.
+        Data that is judged; see `judging_of`.
     jobs : int
-        Processes to share the work among.
+        Number of parallel processes.
     judged : bool
-        False: nothing is judged unless one of these says so; a single thermal cycle is enough then.
+        False: nothing is judged unless `split` or `leave_one` is given; a single thermal cycle is then enough.
     listener : Listener
-        Gets what is wrong with the recordings, before the work.
+        Receives the data-quality problems of the recordings before the work.
 
     Returns
     -------
@@ -227,15 +228,15 @@ def prepare(
 
 
 def judging_of(samples: Samples, *, split: str | None = None, leave_one: LeaveOne | None = None) -> Judging:
-    """Return what is learned from and what is judged.
+    """Return the training and the validation rows.
 
     Parameters
     ----------
     samples : Samples
     split : str, optional
-        Judge by time: shares of the rows such as ``0.75/0.25``, or hours such as ``20h/8h``.
+        Chronological train/test split: fractions of the rows such as ``0.75/0.25``, or durations such as ``20h/8h``.
     leave_one : {'cycle', 'day', 'file'}, optional
-        Judge on each thermal cycle in turn, which is done if nothing is said, on each day, or on each recording.
+        Unit left out of fitting and judged in turn: each thermal cycle (default), each day, or each recording.
 
     Returns
     -------
@@ -244,7 +245,7 @@ def judging_of(samples: Samples, *, split: str | None = None, leave_one: LeaveOn
     Raises
     ------
     InputError
-        Both were given, or there are too few cycles, days or files.
+        Both are given, or there are too few cycles, days or files.
     """
     if split is not None and leave_one is not None:
         raise InputError("split and leave_one exclude each other: choose one")
@@ -261,7 +262,7 @@ def judging_of(samples: Samples, *, split: str | None = None, leave_one: LeaveOn
 
 
 def trouble_of(recordings: Sequence[Recording]) -> list[str]:
-    """Return what is wrong with recordings, one line per trouble and per column that was left out."""
+    """Return the data-quality problems of recordings, one line per problem and per excluded column."""
     return [
         f"{r.name}: {f.channel + ' ' if f.channel else ''}{f.text}"
         f"{'' if f.severity != 'trouble' or f.rows is None else '. These rows are left out'}"
@@ -273,18 +274,18 @@ def trouble_of(recordings: Sequence[Recording]) -> list[str]:
 
 @dataclass(frozen=True, eq=False)
 class TrainingTable:
-    """Complete rows of recordings as scikit-learn takes them.
+    """Complete rows of recordings in the form scikit-learn expects.
 
     Parameters
     ----------
     X : DataFrame of shape (n_rows, n_features)
-        Inputs minus their reference; in front of them the time since the start of the test [s], if asked for.
+        Inputs minus their reference; if requested, the first column is the time since the start of the test [s].
     y : ndarray of shape (n_rows,)
         Deviation [um].
     test, cycle : ndarray of int of shape (n_rows,)
-        Which recording and which thermal cycle a row belongs to: the ``groups`` of scikit-learn.
+        Index of the recording and of the thermal cycle of each row: the ``groups`` of scikit-learn.
     dt : Series of shape (n_rows,)
-        Time since the row before [s]; inf where a test starts.
+        Time since the previous row [s]; inf where a test starts.
     """
 
     X: pd.DataFrame
@@ -307,7 +308,7 @@ def training_table(
     absolute: bool = False,
     mapping: str | Path | mappings.Mapping | None = None,
 ) -> TrainingTable:
-    """Return recordings as scikit-learn takes them, for `cross_val_score`, Pipelines and estimators of one's own.
+    """Return recordings in the form scikit-learn expects, for `cross_val_score`, Pipelines and custom estimators.
 
     Parameters
     ----------
@@ -315,13 +316,13 @@ def training_table(
     target : str
         Displacement channel to predict.
     inputs : str or sequence of str, optional
-        Channels to predict from; all temperatures and the first spindle speed without it.
+        Channels used as model inputs. Default: all temperatures and the first spindle speed.
     time : bool
-        The first column is ``time_s``, for an estimator with ``time="column"``.
+        Add ``time_s`` as the first column, for an estimator with ``time="column"``.
     absolute : bool
-        Take temperatures as they are; without it they are counted from the start of each test.
+        Use absolute temperatures. Default: temperatures relative to the start of each test.
     mapping : str, Path or Mapping, optional
-        For files.
+        TOML mapping file for files: role and unit of each column.
 
     Returns
     -------

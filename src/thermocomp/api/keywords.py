@@ -1,4 +1,4 @@
-"""What all verbs do with some of their keywords: settings of a part, and who hears how far the work is."""
+"""Keywords that several verbs share: settings and progress."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
@@ -9,16 +9,16 @@ _Settings = TypeVar("_Settings")
 
 
 def settings_of(kind: type[_Settings], given: Mapping[str, Any], verb: str) -> _Settings:
-    """Return the settings that were given to a verb.
+    """Return the settings given to a verb as keywords.
 
     Parameters
     ----------
     kind : type
-        A dataclass.
+        Dataclass of the settings.
     given : mapping
-        Keywords.
+        Keywords given.
     verb : str
-        Its name, for the error.
+        Name of the verb, for the error message.
 
     Raises
     ------
@@ -33,13 +33,13 @@ def settings_of(kind: type[_Settings], given: Mapping[str, Any], verb: str) -> _
 
 
 class Listener:
-    """What hears how far the work is: a verb's ``progress``, whatever of this it has.
+    """Receiver of progress: a verb's ``progress`` with its optional methods.
 
     Parameters
     ----------
     progress : callable
-        Called with a line of text after each piece of work; may have ``begin``, called with the number of pieces, and
-        ``warn``, called with lines of trouble before the work.
+        Called with a line of text after each task; may have ``begin``, called with the number of tasks, and ``warn``,
+        called with the data-quality problems before the work.
     """
 
     def __init__(self, progress: Callable[..., object]) -> None:
@@ -47,14 +47,14 @@ class Listener:
         self.warn: Callable[[list[str]], object] = getattr(progress, "warn", lambda _: None)
 
     def begin(self, pieces: Callable[[], int]) -> None:
-        """Say how many pieces of work there are; they are counted only for who wants to know."""
+        """Report the number of tasks; they are counted only if the receiver has ``begin``."""
         if (begin := getattr(self.tell, "begin", None)) is not None:
             begin(pieces())
 
 
 def silent(_: str, steps: int = 1) -> None:
-    """Say nothing."""
+    """Report nothing."""
 
 
-#: hears nothing
+#: ignores progress
 SILENT = Listener(silent)

@@ -1,4 +1,4 @@
-"""How much test is enough, which test next, and whether a running one may stop, in Python."""
+"""Planning of thermal tests in Python: sufficient test length, next test, and end of a running test."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -33,17 +33,17 @@ EVERY = 30.0
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Planned(Result):
-    """Which test next, and how much is enough.
+    """Plan of the next test, and learning curve.
 
     Parameters
     ----------
     plan : Plan
     curve : LearningCurve or None
-        None: there are fewer than three thermal cycles, or it was not asked for.
+        None: there are fewer than three thermal cycles, or it was not requested.
     channels : tuple of Channel
-        What has to be written down in a test.
+        Channels to be recorded in a test.
     trouble : tuple of str
-        What is wrong with the recordings.
+        Data-quality problems of the recordings.
     """
 
     plan: Plan
@@ -52,7 +52,7 @@ class Planned(Result):
     trouble: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all of it for a program: what ``--json`` prints."""
+        """Return all results as a dict, as printed by ``--json``."""
         curve = self.curve
         return {
             "trouble": list(self.trouble),
@@ -72,11 +72,11 @@ class Planned(Result):
 
     @property
     def next(self) -> Candidate:
-        """The test that would bring most."""
+        """Test with the largest expected benefit."""
         return self.plan.candidates[0]
 
     def to_frame(self) -> pd.DataFrame:
-        """Return the tests that could be run next, a row each, the one that would bring most first."""
+        """Return the candidate tests, a row each, ranked by expected benefit."""
         return pd.DataFrame(
             {
                 "test": [c.trial.words for c in self.plan.candidates],
@@ -90,7 +90,7 @@ class Planned(Result):
         )
 
     def plot(self) -> "Figure":
-        """Return the figure of the gap that the next test fills, of all tests, and of the learning curve."""
+        """Return a figure of the gap that the next test fills, of all tests, and of the learning curve."""
         from thermocomp.report import plans
 
         return plans.draw(self.plan, self.curve).figure
@@ -98,26 +98,26 @@ class Planned(Result):
     def write(
         self, path: str | Path, *, dialect: Dialect = "linuxcnc", every: float = EVERY, overwrite: bool = False
     ) -> Path:
-        """Write the next test as an NC program, and beside it the sheet for what is measured, and the figure (.png).
+        """Write the next test as an NC program, with a measurement sheet (.csv) and the figure (.png) next to it.
 
         Parameters
         ----------
         path : str or Path
-            Of the program.
+            Path of the program.
         dialect : {'linuxcnc', 'fanuc'}
         every : float
-            Time between two measurements with a touch probe [min]; 0: a logger measures all the time.
+            Time between two measurements with a touch probe [min]; 0: a logger measures continuously.
         overwrite : bool
 
         Returns
         -------
         Path
-            Of the sheet.
+            Path of the sheet.
 
         Raises
         ------
         InputError
-            A file is there already, or cannot be there.
+            A file exists already, or cannot be written.
         """
         from thermocomp.report.drawing import png
 
@@ -170,23 +170,23 @@ def plan(
     jobs: int = -1,
     progress: Callable[..., Any] = silent,
 ) -> Planned:
-    """Say how much test is enough, and write the test that would teach most next as an NC program.
+    """Determine how much testing is sufficient, and write the most informative next test as an NC program.
 
     Parameters
     ----------
     recordings, targets
         As for `compare`.
     top_speed : float, optional
-        The machine's highest spindle speed [1/min]; the highest recorded one if not given.
+        Maximum spindle speed of the machine [1/min]. Default: the highest recorded speed.
     hours : float
-        Length of the next test [h].
+        Duration of the next test [h].
     swing : float
-        How far the room's temperature may change within that time, where the machine stands [degC]; 0: never.
+        Largest change of the ambient temperature at the machine within that time [degC]; 0: none.
     inputs, split, leave_one, absolute, starts, zero_over, mapping
         As for `compare`.
     curve : bool
-        Also find out how the error on unseen cycles falls with the number of cycles learned from, which takes most of
-        the time.
+        Also compute the learning curve: error on unseen cycles against the number of training cycles. This takes most
+        of the computing time.
     jobs, progress
         As for `compare`.
 
@@ -197,7 +197,7 @@ def plan(
     Raises
     ------
     InputError
-        A recording, channel or setting cannot be used.
+        A recording, channel or setting is invalid.
 
     Examples
     --------
@@ -235,7 +235,7 @@ def plan(
 
 
 def _units(ready: Prepared) -> Judging:
-    """Return the blocks of a learning curve: what was asked for, or the thermal cycles; none if there is only one."""
+    """Return the blocks of a learning curve: as requested, or the thermal cycles; none if there is only one."""
     if ready.judging.splits:
         return ready.judging
     return judging_of(ready.samples) if len(ready.samples.cycle_names) > 1 else Judging("", ())
@@ -248,16 +248,16 @@ def may_stop(
     mapping: str | Path | Mapping | None = None,
     progress: Callable[..., Any] = silent,
 ) -> Running:
-    """Judge whether the running part of a test may end: its steady state is known.
+    """Check whether the spindle-running phase of a test can be stopped because its steady state can be predicted.
 
     Parameters
     ----------
     recordings : Recording, path or DataFrame
-        The test up to now, one recording.
+        Recording of the test up to now.
     targets : str or sequence of str, optional
-        Displacement channels; all of them without it.
+        Displacement channels to check. Default: all of them.
     mapping : str, Path or Mapping, optional
-        For a file.
+        TOML mapping file for a file: role and unit of each column.
     progress : callable
         As for `plan`.
 
@@ -268,7 +268,7 @@ def may_stop(
     Raises
     ------
     InputError
-        There is more than one recording, no such channel, or the spindle has not started.
+        There is more than one recording, a channel does not exist, or the spindle has not started.
 
     Examples
     --------

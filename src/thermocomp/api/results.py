@@ -1,4 +1,4 @@
-"""What comes of the work, for a notebook: tables, figures, and one sentence."""
+"""Results for notebooks: tables, figures, and one sentence."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -29,19 +29,19 @@ FloatArray = NDArray[np.float64]
 
 
 class Result(ABC):
-    """What all results can do."""
+    """Protocol of all results."""
 
     @abstractmethod
     def to_frame(self) -> pd.DataFrame:
-        """Return the figures as a table, a row for each of what was judged, fitted or chosen."""
+        """Return the values as a table, a row for each judged, fitted or selected item."""
 
     @abstractmethod
     def to_dict(self) -> dict[str, Any]:
-        """Return all of it for a program: what ``--json`` prints."""
+        """Return all results as a dict, as printed by ``--json``."""
 
     @abstractmethod
     def plot(self) -> "Figure":
-        """Return the figure that says most."""
+        """Return the most informative figure."""
 
     @abstractmethod
     def __str__(self) -> str:
@@ -57,11 +57,11 @@ class Result(ABC):
 
 
 class Paged(ABC):
-    """A result that has a page."""
+    """A result with an HTML page."""
 
     @abstractmethod
     def page(self) -> str:
-        """Return the page as one HTML text that needs no network."""
+        """Return the page as a single HTML text that needs no network."""
 
     def report(self, path: str | Path, *, overwrite: bool = False) -> Path:
         """Write the page; return its path."""
@@ -69,7 +69,7 @@ class Paged(ABC):
 
 
 def starts_content(begins: Sequence[tuple[str, Start]]) -> list[dict[str, object]]:
-    """Return how recordings begin, for a program."""
+    """Return the initial thermal states of recordings for the JSON output."""
     return [start.content(name) for name, start in begins]
 
 
@@ -83,7 +83,7 @@ def frame_of(assessments: Sequence[Assessment]) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        A row for each; errors, half-widths of bands and what was measured in um; nan where a model has no band.
+        A row per assessment; errors, half-widths of bands and measured values in um; nan where a model has no band.
     """
     return pd.DataFrame(
         {
@@ -107,16 +107,16 @@ def frame_of(assessments: Sequence[Assessment]) -> pd.DataFrame:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Compared(Result, Paged):
-    """Methods judged on what they had not seen.
+    """Validation results of several methods on unseen data.
 
     Parameters
     ----------
     comparison : Comparison
     recordings : tuple of Recording
     trouble : tuple of str
-        What is wrong with the recordings.
+        Data-quality problems of the recordings.
     samples : Samples, optional
-        The rows that were judged, for figures of the inputs.
+        Judged rows, for figures of the inputs.
     """
 
     comparison: Comparison
@@ -125,7 +125,7 @@ class Compared(Result, Paged):
     samples: Samples | None = None
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all of it for a program: what ``--json`` prints."""
+        """Return all results as a dict, as printed by ``--json``."""
         from thermocomp.report import records, summary
 
         found = self.comparison
@@ -152,13 +152,13 @@ class Compared(Result, Paged):
 
     @property
     def best(self) -> dict[str, str | None]:
-        """The accepted model with the smallest error that can be deployed, by target; None if there is none."""
+        """Accepted, deployable model with the smallest error, by target; None if there is none."""
         targets = dict.fromkeys(a.target for a in self.comparison.assessments)
         found = {t: self.comparison.best(t) for t in targets}
         return {t: None if a is None else str(a.model) for t, a in found.items()}
 
     def to_frame(self, *, blocks: bool = False) -> pd.DataFrame:
-        """Return a row per target and model, the best first; with `blocks` one per unseen block too.
+        """Return a row per target and model, the best first; with `blocks` also a row per unseen block.
 
         Parameters
         ----------
@@ -178,12 +178,12 @@ class Compared(Result, Paged):
         )
 
     def plot(self, target: str | None = None, model: str | None = None) -> "Figure":
-        """Return the errors of all models; or, for a target and a model, its run through the unseen blocks.
+        """Return a figure of the errors of all models; or, for a target and a model, its course over the unseen blocks.
 
         Parameters
         ----------
         target, model : str, optional
-            Both or none.
+            Give both or neither.
 
         Returns
         -------
@@ -209,7 +209,7 @@ class Compared(Result, Paged):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FittedModels(Result):
-    """A method fitted to everything, with its error on what it had not seen.
+    """A method fitted to all data, with its error on unseen data.
 
     Parameters
     ----------
@@ -223,7 +223,7 @@ class FittedModels(Result):
     trouble: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all of it for a program: what ``--json`` prints."""
+        """Return all results as a dict, as printed by ``--json``."""
         from thermocomp.report import records
 
         found, overall = self.fitted, self.fitted.comparison.overall()
@@ -238,17 +238,17 @@ class FittedModels(Result):
 
     @property
     def models(self) -> dict[str, ErrorModel]:
-        """The frozen models, by target."""
+        """Frozen models, by target."""
         return {m.target: m for m in self.fitted.models}
 
     @property
     def model(self) -> ErrorModel:
-        """The frozen model, if there is one target.
+        """Frozen model, if there is a single target.
 
         Raises
         ------
         InputError
-            There are several.
+            There are several targets.
         """
         if len(self.fitted.models) > 1:
             raise InputError(f"there are models of {', '.join(self.models)}: take one of .models")
@@ -256,7 +256,7 @@ class FittedModels(Result):
 
     @property
     def coverage(self) -> dict[str, float]:
-        """Share of the unseen rows that the band held, by target; nan without a band."""
+        """Fraction of the unseen rows inside the band, by target; nan without a band."""
         return {a.target: a.coverage for a in self.fitted.comparison.overall()}
 
     @property
@@ -265,11 +265,11 @@ class FittedModels(Result):
         return {a.target: a.half_width for a in self.fitted.comparison.overall()}
 
     def explain(self) -> Explanations:
-        """Return what the models are, how good they are, and what a failure of each sensor does: print it."""
+        """Return an explanation to print: the models, their accuracy, and the effect of a failure of each sensor."""
         return explain_all(self.fitted.models)
 
     def predict(self, table: Columns, time: ArrayLike | str | None = None) -> pd.DataFrame:
-        """Replay all models through a table; see `thermocomp.core.model.ErrorModel.predict`.
+        """Replay a table through all models; see `thermocomp.core.model.ErrorModel.predict`.
 
         Parameters
         ----------
@@ -284,7 +284,7 @@ class FittedModels(Result):
         return pd.DataFrame({m.target: m.predict(table, time) for m in self.fitted.models})
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write the model file that the compensator, ``assess`` and ``revise`` read; return its path."""
+        """Write the model file for the compensator, ``assess`` and ``revise``; return its path."""
         from thermocomp.files import modelfile
 
         modelfile.write(self.fitted.models, Path(path), overwrite=overwrite)
@@ -299,7 +299,7 @@ class FittedModels(Result):
         return table
 
     def plot(self, target: str | None = None) -> "Figure":
-        """Return how the method ran through the unseen blocks, for the first target or another."""
+        """Return a figure of the method's course over the unseen blocks, for the first target or a given one."""
         return _run(self.fitted.comparison.assessments, self.recordings, target or self.fitted.models[0].target, None)
 
     def __str__(self) -> str:
@@ -327,7 +327,7 @@ class Assessed(Result, Paged):
     trouble: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all of it for a program: what ``--json`` prints."""
+        """Return all results as a dict, as printed by ``--json``."""
         from thermocomp.report import records
 
         judged = self.judged
@@ -346,7 +346,7 @@ class Assessed(Result, Paged):
 
     @property
     def coverage(self) -> dict[str, float]:
-        """Share of the judged rows that the band held, by target; nan without a band."""
+        """Fraction of the judged rows inside the band, by target; nan without a band."""
         return {a.target: a.coverage for a in self.judged.overall()}
 
     @property
@@ -355,11 +355,11 @@ class Assessed(Result, Paged):
         return {a.target: a.half_width for a in self.judged.overall()}
 
     def to_frame(self, *, blocks: bool = False) -> pd.DataFrame:
-        """Return a row per model; with `blocks` one per thermal cycle too."""
+        """Return a row per model; with `blocks` also a row per thermal cycle."""
         return frame_of(self.judged.assessments if blocks else self.judged.overall()).drop(columns="deployable")
 
     def plot(self, target: str | None = None) -> "Figure":
-        """Return how the model ran through the recordings, for the first target or another."""
+        """Return a figure of the model's course over the recordings, for the first target or a given one."""
         return _run(self.judged.assessments, self.recordings, target or self.judged.models[0].target, None)
 
     def page(self) -> str:
@@ -382,7 +382,7 @@ def _judged(a: Assessment) -> str:
 
 
 def told_trouble(trouble: Sequence[str]) -> list[str]:
-    """Return the trouble of recordings as a sentence; nothing if there is none."""
+    """Return the data-quality problems of recordings as a sentence; empty if there are none."""
     return [f"Trouble: {'; '.join(trouble)}."] if trouble else []
 
 

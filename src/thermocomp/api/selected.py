@@ -1,4 +1,4 @@
-"""Sensors that were chosen, for a notebook, a page and a program."""
+"""Selected sensors, as a table, a figure, a page and a dict."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Selected(Result, Paged):
-    """Sensors that were chosen.
+    """Sensors selected by a method.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ class Selected(Result, Paged):
     recordings: tuple[Recording, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all of it for a program: what ``--json`` prints."""
+        """Return all results as a dict, as printed by ``--json``."""
         return {
             "trouble": self.trouble,
             "choices": [
@@ -54,11 +54,11 @@ class Selected(Result, Paged):
 
     @property
     def sensors(self) -> dict[str, tuple[str, ...]]:
-        """Names of the chosen sensors, by target."""
+        """Names of the selected sensors, by target."""
         return {c.target: c.sensors for c in self.choices}
 
     def to_frame(self) -> pd.DataFrame:
-        """Return a row per target; the tables behind it are in ``choices[k].tables``."""
+        """Return a row per target; the underlying tables are in ``choices[k].tables``."""
         return pd.DataFrame(
             {
                 "target": [c.target for c in self.choices],
@@ -69,12 +69,12 @@ class Selected(Result, Paged):
         )
 
     def plot(self, target: str | None = None) -> "Figure":
-        """Return the figure of the first choice, or of that of a target.
+        """Return the figure of the first choice, or of the choice for a target.
 
         Raises
         ------
         InputError
-            There is no such target, or nothing was chosen from.
+            There is no such target, or there was nothing to choose from.
         """
         from thermocomp.report import selections
 

@@ -1,4 +1,4 @@
-"""A thermal test as an NC program, and the sheet on which is written down what is measured."""
+"""A thermal test as an NC program, and its measurement sheet."""
 
 import csv
 import io
@@ -14,14 +14,14 @@ from thermocomp.recordings.readers.tables import defuse
 
 Dialect = Literal["linuxcnc", "fanuc"]
 
-#: a dwell is never longer, so that the controller shows how far the test is [s]
+#: longest dwell, so that the controller shows the progress of the test [s]
 LONGEST = 1800.0
 #: of a program; no control has a slower or faster dwell in question
 _SHORTEST = 60.0
 
 
 class ProgramStretch(NamedTuple):
-    """A time in which nothing changes."""
+    """A period of a test without changes."""
 
     start: float  #: since the start of the test [s]
     duration: float  #: [s]
@@ -30,13 +30,13 @@ class ProgramStretch(NamedTuple):
 
 
 def stretches(trial: Trial, every: float = 0.0) -> Iterator[ProgramStretch]:
-    """Cut a test into stretches without a change and without a measurement.
+    """Divide a test into stretches without a change and without a measurement.
 
     Parameters
     ----------
     trial : Trial
     every : float
-        Time between two measurements [s]; 0: none, and what lasts long is cut into half hours.
+        Time between two measurements [s]; 0: none, and long stretches are divided into half hours.
 
     Yields
     ------
@@ -55,15 +55,15 @@ def stretches(trial: Trial, every: float = 0.0) -> Iterator[ProgramStretch]:
 def write_program(trial: Trial, dialect: Dialect, every: float = 0.0) -> str:
     """Return a test as an NC program.
 
-    It turns the spindle, stops it and waits; it moves no axis. Where it is to be measured the spindle is stopped, and a
-    routine is called that does nothing until it is filled in.
+    The program turns the spindle, stops it and waits; it moves no axis. For a measurement it stops the spindle and
+    calls a routine that does nothing until the user fills it in.
 
     Parameters
     ----------
     trial : Trial
     dialect : {'linuxcnc', 'fanuc'}
     every : float
-        Time between two measurements with a touch probe [s]; 0: a logger measures all the time.
+        Time between two measurements with a touch probe [s]; 0: a logger measures continuously.
 
     Returns
     -------
@@ -72,7 +72,7 @@ def write_program(trial: Trial, dialect: Dialect, every: float = 0.0) -> str:
     Raises
     ------
     InputError
-        The time between two measurements is none, or the speed is no whole number.
+        The time between two measurements is invalid, or the speed is not an integer.
     """
     if every and not _SHORTEST <= every <= LONGEST:
         raise InputError(f"a measurement every {every / 60:g} min: want 1 to {LONGEST / 60:g}, or 0 for a logger")
@@ -96,13 +96,13 @@ def write_program(trial: Trial, dialect: Dialect, every: float = 0.0) -> str:
 
 
 def write_sheet(trial: Trial, channels: Sequence[Channel], every: float = 0.0) -> str:
-    """Return the sheet of a test: when to write down what, as a CSV file that is a recording once it is filled in.
+    """Return the measurement sheet of a test: a CSV file with the times; once filled in, it is a recording.
 
     Parameters
     ----------
     trial : Trial
     channels : sequence of Channel
-        Temperatures and displacements that are to be written down.
+        Temperatures and displacements to be recorded.
     every : float
         Time between two measurements [s]; 0: half an hour.
 
@@ -139,29 +139,29 @@ def write_test(
     picture: bytes = b"",
     overwrite: bool = False,
 ) -> Path:
-    """Write a test: its NC program, and beside it the sheet, and a picture of why it is run.
+    """Write a test: its NC program, and next to it the sheet and a figure that shows why the test is run.
 
     Parameters
     ----------
     trial : Trial
     program : Path
     channels : sequence of Channel
-        Of `write_sheet`.
+        As for `write_sheet`.
     dialect, every
-        Of `write_program`.
+        As for `write_program`.
     picture : bytes
-        PNG; empty: there is none.
+        Figure as PNG; empty: none.
     overwrite : bool
 
     Returns
     -------
     Path
-        Of the sheet.
+        Path of the sheet.
 
     Raises
     ------
     InputError
-        The test cannot be written, or a file cannot be there: see `thermocomp.files.draft.drafts`.
+        The test or a file cannot be written; see `thermocomp.files.draft.drafts`.
     """
     sheet = sheet_of(program)
     contents = {
@@ -178,12 +178,12 @@ def write_test(
 
 
 def sheet_of(program: Path) -> Path:
-    """Return where the sheet of a program stands."""
+    """Return the path of the sheet of a program."""
     return program.with_suffix(".csv")
 
 
 def picture_of(program: Path) -> Path:
-    """Return where the picture of a program stands."""
+    """Return the path of the figure of a program."""
     return program.with_suffix(".png")
 
 
@@ -194,7 +194,7 @@ def clock(seconds: float) -> str:
 
 
 def _length(trial: Trial, part: ProgramStretch) -> str:
-    """Return how long it is until the speed changes."""
+    """Return the time until the speed changes."""
     end, own = 0.0, 0.0
     for _, duration in trial.steps:
         if end <= part.start + 1e-6:
@@ -222,7 +222,7 @@ def _head(trial: Trial, dialect: Dialect, every: float) -> Iterator[str]:
 
 
 def _measure(dialect: Dialect) -> list[str]:
-    """Return the lines that measure, the spindle standing."""
+    """Return the lines of a measurement with the spindle stopped."""
     return ["o<probe> call"] if dialect == "linuxcnc" else ["(FILL IN: G65 P9810 X Y Z F, YOUR PROBING CYCLE)"]
 
 

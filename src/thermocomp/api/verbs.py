@@ -1,4 +1,4 @@
-"""The main job in Python: select, compare, fit, assess. The commands' words are the keywords."""
+"""The main job in Python: select, compare, fit, assess. The keywords are the options of the commands."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
@@ -27,7 +27,7 @@ from thermocomp.recordings.readers.mapping import Mapping
 DEFAULT_MODELS = ("ols", "partial-f", "mra", "dynamic", "averaged")
 SelectionMethod = Literal["pareto", "subsets", "grouping", "partial-f", "stepwise", "ace"]
 Policy = Literal["clip", "hold", "fade"]
-#: what `select` takes beside the recordings
+#: settings of `select`, in addition to the recordings
 SelectionSettings = Settings
 
 
@@ -53,58 +53,60 @@ def compare(
     scheduler: str | None = None,
     progress: Callable[[str], None] = silent,
 ) -> Compared:
-    """Compare methods on thermal cycles they have not seen, beside no compensation.
+    """Compare methods with each other and with no compensation, on unseen thermal cycles.
 
     Parameters
     ----------
     recordings : Recording, path, DataFrame, or sequence of them
-        Files (CSV, XLSX, ODS or Parquet) or tables; each is one test.
+        Files (CSV, XLSX, ODS or Parquet) or tables; each one is a separate test.
     targets : str or sequence of str, optional
-        Displacement channels to predict; all of the first recording if not given.
+        Displacement channels to predict. Default: all of the first recording.
     models : str, estimator, or sequence of them
         Methods to compare, or all: ols, partial-f, mra, averaged, dynamic, grouping, subsets, ace, ace-monotone,
         mlp, mlp-sklearn, arx, arx-free-run, arx-net, ridge, pcr, pls, lasso, elastic-net, ppr, gp.
 
-        In Python also estimators of any kind: one of thermocomp's with settings of its own, any regressor of
-        scikit-learn, a Pipeline, a small class of one's own.
+        In Python also estimators of any kind: an estimator of thermocomp with custom settings, any regressor of
+        scikit-learn, a Pipeline, a custom class.
     inputs : str or sequence of str, optional
-        Channels to predict from; all temperatures and the first spindle speed if not given.
+        Channels used as model inputs. Default: all temperatures and the first spindle speed.
     split : str, optional
-        Judge by time: shares of the rows such as ``0.75/0.25``, or hours such as ``20h/8h``.
+        Chronological train/test split: fractions of the rows such as ``0.75/0.25``, or durations such as ``20h/8h``.
     leave_one : {'cycle', 'day', 'file'}, optional
-        Judge on each thermal cycle in turn (the default), on each day (the recordings need time
-        stamps), or on each recording.
+        Unit left out of fitting and judged in turn: each thermal cycle (default), each day (the recordings need time
+        stamps), or each recording.
     absolute : bool
-        Take temperatures as they are; without it they are counted from the start of each test.
+        Use absolute temperatures. Default: temperatures relative to the start of each test.
     starts : Start or sequence of Start, optional
-        How all recordings begin, or each of them, such as ``Start("continued", earlier=(monday,))``; found out if not
-        given. See `thermocomp.recordings.starts.Start`.
+        Initial thermal state of all recordings, or of each one, such as ``Start("continued", earlier=(monday,))``.
+        Default: determined from the recordings. See `thermocomp.recordings.starts.Start`.
     zero_over : float
-        Average the start of each test over this time, while the spindle is stopped [s]; 0: it is the first row.
+        Duration at the start of each test, with the spindle stopped, over which the zero is averaged [s]; 0: the first
+        row is the zero.
     mapping : str, Path or Mapping, optional
-        TOML file that says what the columns of files are.
+        TOML mapping file: role and unit of each column.
     support : {'clip', 'hold', 'fade'}
-        What a model does outside its trained range: clip its inputs, hold its last value, or fade to zero.
+        Behaviour of a model outside its training range: clip its inputs, hold its last value, or fade to zero.
     margin : float
-        Share of each input's trained span by which its range is widened.
+        Widening of the training range of each input, as a fraction of its span.
     robustness : bool
-        Also replay with noise and lost sensors: a model that they make worse than none is unproven. Without it, which
-        is quicker, none is accepted.
+        Also replay the models with noise and lost sensors; a model that is then worse than no compensation is unproven.
+        Without this check, which is faster, no model is accepted.
     primary : str, optional
-        Method that is named beforehand: it is judged as if it were the only one, the others are corrected for the
-        number tried. Without it that goes for the recommended one, which is chosen again without each cycle.
+        Primary method, named before judging: it is judged as if it were the only one; the results of the others are
+        corrected for the number of methods tried. Default: the recommended method, which is chosen again without each
+        cycle.
     harm_margin : float, optional
-        Tolerated degradation in a single cycle, day or file, stated before judging [um]. If not given: three times the
+        Tolerated degradation in a single cycle, day or file, stated before judging [um]. Default: three times the
         probe's noise or 5 % of the largest drift, at most 2 um.
     limits : Limits or None
-        Of the compensator that is judged with the models; None: the models alone.
+        Limits of the compensator that is judged with the models; None: the models are judged alone.
     jobs : int
-        Processes to share the work among; -1 takes all cores.
+        Number of parallel processes; -1: one per core.
     scheduler : str, optional
-        Dask scheduler whose workers do the work in place of these processes, such as ``tcp://192.168.1.20:8786``: see
+        Address of a Dask scheduler whose workers replace the local processes, such as ``tcp://192.168.1.20:8786``; see
         :doc:`/many_recordings`.
     progress : callable
-        Called with a line of text after each piece of work; see `thermocomp.api.keywords.Listener`.
+        Called with a line of text after each task; see `thermocomp.api.keywords.Listener`.
 
     Returns
     -------
@@ -113,7 +115,7 @@ def compare(
     Raises
     ------
     InputError
-        A recording, channel or model cannot be used.
+        A recording, channel or model is invalid.
 
     Examples
     --------
@@ -160,12 +162,12 @@ def compare(
 
 
 def _single(models: Any) -> bool:
-    """Return whether it is one method: a forest of scikit-learn has members to go through, too."""
+    """Return whether it is a single method: a forest of scikit-learn is iterable, too."""
     return isinstance(models, str) or hasattr(models, "fit")
 
 
 def _untried(found: Assessment) -> Assessment:
-    """Return an assessment in which nothing is accepted that was not tried with noise and lost sensors."""
+    """Return an assessment that accepts no model, because noise and lost sensors were not tested."""
     return replace(found, verdict=replace(found.verdict, caps=(do_no_harm.UNTRIED,))) if found.accepted else found
 
 
@@ -191,29 +193,30 @@ def fit(
     scheduler: str | None = None,
     progress: Callable[[str], None] = silent,
 ) -> FittedModels:
-    """Fit a model, judge it on thermal cycles it has not seen, and write it with its honest error.
+    """Fit a model, judge it on unseen thermal cycles, and write it with its honest error.
 
-    The method is first judged on unseen cycles, then fitted to everything. A refused model is written too, with the
-    refusal inside: nothing will run it. An unproven one runs in shadow only.
+    The method is first judged on unseen cycles, then fitted to all data. A refused model is written too, marked as
+    refused, so that it cannot be run. An unproven one runs in shadow only.
 
     Parameters
     ----------
     recordings, targets
         As for `compare`.
     model : str or estimator
-        A method as for ``thermocomp compare``, all but gp.
+        Method to fit: any of ``thermocomp compare`` except gp.
 
-        In Python also an estimator that can be frozen: one of thermocomp's, or a Pipeline of selectors and one of them.
+        In Python also an estimator that can be frozen: an estimator of thermocomp, or a Pipeline of selectors and such
+        an estimator.
     inputs, split, leave_one, absolute, starts, zero_over, mapping, support, margin, harm_margin
         As for `compare`.
     tilt : sequence of str, optional
-        Tilts to predict too, each of two probes and their distance, such as ``A0C=y1_um:y2_um:100mm`` (turn about X,
-        the probe at the tip first) or ``B0C=x1_um:x2_um:100mm`` (about Y).
+        Tilts to predict as well, each defined by two probes and their distance, such as ``A0C=y1_um:y2_um:100mm``
+        (rotation about X, the probe at the tip first) or ``B0C=x1_um:x2_um:100mm`` (about Y).
     limits : Limits
-        Of the compensator that is judged with the models.
+        Limits of the compensator that is judged with the models.
     accept_unproven : str, optional
         Person who approves the use of an unproven model, and the reason, such as ``"M. Weber, trial on machine 7"``.
-        Kept in the model file, shown wherever the model is. A refused one never runs.
+        Stored in the model file and shown wherever the model is used. A refused model never runs.
     jobs, scheduler, progress
         As for `compare`.
 
@@ -224,7 +227,7 @@ def fit(
     Raises
     ------
     InputError
-        A recording, channel or model cannot be used, or the model cannot be frozen.
+        A recording, channel or model is invalid, or the model cannot be frozen.
 
     Examples
     --------
@@ -278,22 +281,23 @@ def assess(
     probing: str | Probings | None = None,
     progress: Callable[[str], None] = silent,
 ) -> Assessed:
-    """Judge a model file on recordings: per cycle, with noise, with each sensor lost, outside its range.
+    """Judge a model file on recordings: per cycle, with noise, with each sensor lost, outside its training range.
 
-    Rows that a model has learned from are known again by their fingerprints, whatever file they stand in: they are left
-    out and counted.
+    Rows used to train a model are recognised by their fingerprints, in whatever file they are: they are excluded and
+    counted.
 
     Parameters
     ----------
     model : ErrorModel, FittedModels, path of a model file, or sequence of ErrorModel
-        Model file, or models.
+        Model file or models to judge.
     recordings, starts, mapping, harm_margin
         As for `compare`.
     limits : Limits
-        Of the compensator that is judged with the models.
+        Limits of the compensator that is judged with the models.
     probing : str or Probings, optional
-        The tool point is probed while it runs, such as ``every 2 h``, or ``every 30 min, 0.3 um`` with the probe's
-        repeatability (standard deviation; 0.5 um if not given): each probing corrects the models from then on.
+        Simulated probing of the tool point during operation, such as ``every 2 h``, or ``every 30 min, 0.3 um`` with
+        the repeatability of the probe (standard deviation; default 0.5 um): each probing corrects the models from then
+        on. Default: no probing.
     progress : callable
         Called with a line of text per model.
 
@@ -304,7 +308,7 @@ def assess(
     Raises
     ------
     InputError
-        There is no model, or a file or a channel the models need cannot be used.
+        There is no model, or a file or a channel that the models need is invalid.
 
     Examples
     --------
@@ -352,20 +356,20 @@ def select(
     progress: Callable[..., None] = silent,
     **settings: Any,
 ) -> Selected:
-    """Choose the few temperature sensors that a model needs.
+    """Select the few temperature sensors that a model needs.
 
     Parameters
     ----------
     recordings, targets
         As for `compare`.
     method : {'pareto', 'subsets', 'grouping', 'partial-f', 'stepwise', 'ace'}
-        How to choose (:doc:`/methods`). pareto: error on unseen cycles against the number of sensors; subsets: exact
+        Selection method (:doc:`/methods`). pareto: error on unseen cycles against the number of sensors; subsets: exact
         best subset of every size; grouping: correlation grouping (Hwang); partial-f and stepwise: by partial F
         (stepwise 2017, Chen); ace: by maximal correlation (Wessel).
     inputs, split, leave_one, absolute, starts, zero_over, mapping, jobs, scheduler, progress
         As for `compare`.
     **settings
-        Of the method, see `thermocomp.judging.choice.Settings`: ``max_sensors=5``, ``threshold=0.95``.
+        Settings of the method, see `thermocomp.judging.choice.Settings`: ``max_sensors=5``, ``threshold=0.95``.
 
     Returns
     -------
@@ -374,7 +378,7 @@ def select(
     Raises
     ------
     InputError
-        A recording, channel, method or setting cannot be used.
+        A recording, channel, method or setting is invalid.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The command line's door: one app, one place where errors become messages and exit codes."""
+"""Entry point of the command line: the app, and the conversion of errors to messages and exit codes."""
 
 import sys
 import time
@@ -32,7 +32,7 @@ def _skip(message: str) -> None:
     make_console(stderr=True).print(f"[bold yellow]trouble[/] {words(message)}", soft_wrap=True)
 
 
-#: by name; what one does is imported when it is called
+#: commands by name; a command is imported when it is called
 COMMANDS = find_plugins("commands", _skip)
 for command, entry in COMMANDS.items():
     if (summary := read_summary(entry)) is None:
@@ -55,7 +55,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 done, 1 judged bad, 2 unusable input, 3 a fault of the program, 130 stopped by the keyboard.
+        0 done, 1 judged bad, 2 unusable input, 3 internal error, 130 interrupted from the keyboard.
     """
     given = sys.argv[1:] if arguments is None else list(arguments)
     jsonoutput.called_with = given

@@ -14,13 +14,13 @@ def assess(found: Assessed, face: CommandFace) -> int:
     Parameters
     ----------
     output : Path
-        Report to write (.html): also which sensors failed, what stood in, and what it cost.
+        Output report (.html), including failed sensors, their substitutes, and the loss of accuracy.
 
     Returns
     -------
     int
-        0 no model refused, 1 one was refused here or when it was fitted, or has learned from all there is to judge it
-        on, 2 unusable input.
+        0 no model refused, 1 a model was refused here or when it was fitted, or was trained on all rows given to judge
+        it, 2 unusable input.
     """
     face.write(found.report)
     face.show_items(found.to_dict, printed.assess(found.judged, found.recordings), "Report")

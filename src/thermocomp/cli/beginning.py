@@ -18,21 +18,21 @@ if TYPE_CHECKING:
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class Beginning:
-    """How the recordings begin; found out if nothing is said.
+    """Initial thermal state of the recordings. Default: determined from the recordings.
 
     Parameters
     ----------
     start : str
-        cold: zeroed at rest at its start; continued: continues from the files of --continues; rezeroed: counts from its
-        start, on a machine that may be warm; known: counts from the temperatures of --zero.
+        Initial state. cold: zeroed at rest at the start; continued: continued from the files of --continues; rezeroed:
+        relative to the start, on a machine that may be warm; known: relative to the temperatures of --zero.
     continues : list of Path
-        Files of the same test before the recording, in the order of time. With --start rezeroed the state of the
-        machine is known from them, and all is counted from the start of the recording.
+        Earlier files of the same test, in chronological order. With --start rezeroed they give the state of the
+        machine, and all values are relative to the start of the recording.
     gap : float
-        From the end of each of these to the start of what follows [s]; by time stamps, or one sampling interval, if not
-        given.
+        Time from the end of each of these files to the start of the following one [s]. Default: from the time stamps,
+        else one sampling interval.
     zero : str
-        Temperatures of the known zero, such as t1_C=20.1,t2_C=20.4, or a recording at the start of which they are.
+        Temperatures of the known zero, such as t1_C=20.1,t2_C=20.4, or a recording that starts with them.
     """
 
     start: Literal["cold", "continued", "rezeroed", "known"] | None = None
@@ -41,12 +41,12 @@ class Beginning:
     zero: str | None = None
 
     def of(self, tests: "Sequence[Recording]", mapping: Path | None) -> "Start | None":
-        """Return how `tests` begin; None: to be found out.
+        """Return the initial thermal state of `tests`; None: determined from the recordings.
 
         Raises
         ------
         InputError
-            The options do not go together, or a file or a channel is not there.
+            The options exclude each other, or a file or a channel is missing.
         """
         if self.gap is not None and not self.continues:
             raise InputError("--gap is the time between two files: name the earlier one with --continues")

@@ -1,4 +1,4 @@
-"""`thermocomp check`: what recordings hold, and what is wrong with them."""
+"""`thermocomp check`: summary and data-quality problems of recordings."""
 
 from functools import partial
 
@@ -15,12 +15,12 @@ def check(found: CheckedRecordings, face: CommandFace) -> int:
     Parameters
     ----------
     output : Path
-        Page to write (.html): every channel drawn, with what was found marked at its rows.
+        Output page (.html): a plot of every channel, with the findings marked at their rows.
 
     Returns
     -------
     int
-        0 nothing wrong, 1 trouble found, 2 unusable input.
+        0 no problems, 1 trouble found, 2 unusable input.
     """
     page = None if face.output is None else str(face.output)
     face.write(found.report)

@@ -1,4 +1,4 @@
-"""What `check` prints for people."""
+"""Terminal output of `check`."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,14 +14,14 @@ from thermocomp.report import records
 from thermocomp.report.layout import Column, Layout, Toned
 
 _TONES = {"trouble": "grave", "warning": "doubtful", "info": "soft"}
-#: files beyond which each gets one line
+#: number of files above which each file gets one line
 MANY = 3
-#: findings of one kind that are printed in full; of the others the channels are named
+#: number of findings of one kind that are printed in full; of the others only the channels are listed
 _FULL = 4
 
 
 def show_check(found: CheckedRecordings, page: Path | None, console: Console) -> None:
-    """Print what recordings hold and what is wrong with them; of more than three, one line each."""
+    """Print a summary and the problems of recordings; more than three get one line each."""
     contents = found.to_dict()["recordings"]
     if len(contents) > MANY:
         print_table(_overview(contents), console)

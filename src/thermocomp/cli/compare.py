@@ -1,4 +1,4 @@
-"""`thermocomp compare`: methods, judged beside each other."""
+"""`thermocomp compare`: comparison of methods on unseen data."""
 
 from thermocomp.api.results import Compared
 from thermocomp.cli.exits import STOPPED
@@ -13,13 +13,13 @@ def compare(found: Compared, face: CommandFace) -> int:
     Parameters
     ----------
     output : Path
-        Report to write (.html).
+        Output report (.html).
 
     Returns
     -------
     int
-        0 every target has a model that may run, 1 a target has none, 2 unusable input, 130 stopped by the keyboard
-        (what was judged until then is shown).
+        0 every target has a model that may run, 1 a target has none, 2 unusable input, 130 interrupted from the
+        keyboard (the results until then are shown).
     """
     face.write(found.report)
     face.show_items(found.to_dict, printed.comparison(found.comparison), "Report")

@@ -1,10 +1,10 @@
-"""What all commands have in common with a shell."""
+"""Exit codes and standard input, shared by all commands."""
 
 from pathlib import Path
 
-#: exit code of a fault of the program itself
+#: exit code of an internal error of the program
 FAULT = 3
-#: exit code of work that was stopped by the keyboard, as shells have it
+#: exit code of work interrupted from the keyboard, as in shells
 STOPPED = 130
-#: stands for standard input, which is ``-`` on the command line: cyclopts takes that for an option
+#: denotes standard input, which is ``-`` on the command line: cyclopts reads that as an option
 STDIN = Path("<stdin>")

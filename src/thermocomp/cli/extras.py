@@ -1,11 +1,11 @@
-"""Optional dependencies: a command whose extra is missing says what to install."""
+"""Optional dependencies: a command whose extra is missing reports the package to install."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 from thermocomp.core.exceptions import MissingExtraError
 
-#: top-level modules that each extra brings
+#: top-level modules of each extra
 EXTRAS: dict[str, tuple[str, ...]] = {
     "study": ("jinja2", "joblib", "matplotlib", "openpyxl", "pandas", "pyarrow", "scipy", "sklearn"),
     "live": ("aiomqtt", "fastapi", "jinja2", "uvicorn"),

@@ -1,4 +1,4 @@
-"""A command is made of its verb in Python: the same options, defaults and words, and what only a terminal needs."""
+"""Commands made from Python verbs: the same options, defaults and texts, with additions for the terminal."""
 
 import inspect
 import re
@@ -23,8 +23,8 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.core.outputs import refuse_existing
 from thermocomp.report.layout import Item
 
-#: how a parameter is written on a command line, where Python takes more than a line can hold; a group of options has
-#: `value`, which makes of them what the verb takes
+#: type of a parameter on the command line, where Python accepts more types than a line can express; a group of options
+#: has `value`, which converts them to the argument of the verb
 ON_A_LINE: dict[str, Any] = {
     "recordings": list[Path],
     "models": list[str],
@@ -38,28 +38,28 @@ ON_A_LINE: dict[str, Any] = {
     "starts": Beginning,
     "limits": CompensatorOptions,
 }
-#: parameters that a command line has no option for: the command itself shows what they say
+#: parameters without an option: the command itself shows their content
 SHOWN = ("progress",)
-#: files that come of an output, by the options that were given
+#: files written for an output, depending on the options given
 Writes = Callable[[Path, Mapping[str, Any]], list[Path]]
 
 
 @dataclass(frozen=True, kw_only=True)
 class CommandFace:
-    """What only a command line has.
+    """Options of the command line that the Python verbs do not have.
 
     Parameters
     ----------
     output : Path or None
-        File that was asked for.
+        Output file (--output), if given.
     overwrite : bool
-        Write over an existing one.
+        Overwrite an existing file.
     json : bool
-        Print for a program.
+        Print results as JSON.
     quiet : bool
-        Print nothing; for commands that call another one.
+        Print nothing; for commands that call another command.
     trouble : list of str
-        What was wrong with the recordings.
+        Data-quality problems of the recordings.
     """
 
     output: Path | None = None
@@ -69,23 +69,23 @@ class CommandFace:
     trouble: list[str] = field(default_factory=list)
 
     def warn(self, lines: list[str]) -> None:
-        """Say on stderr what is wrong with recordings, before the work."""
+        """Print the data-quality problems of recordings on stderr, before the work."""
         self.trouble.extend(print_trouble(lines))
 
     def refuse_existing(self, writes: str | Writes, given: Mapping[str, Any]) -> None:
-        """Make sure, before any work, that the output can be written."""
+        """Check, before any work, that the output can be written."""
         if self.output is not None:
             files = [self.output] if isinstance(writes, str) else writes(self.output, given)
             inputs = [v for v in _flat(given.values()) if isinstance(v, Path)]
             refuse_existing(files, self.overwrite, inputs, writes if isinstance(writes, str) else "")
 
     def write(self, writer: Callable[..., object]) -> None:
-        """Write the result into the file that was asked for, if one was."""
+        """Write the result to the output file, if one is given."""
         if self.output is not None:
             writer(self.output, overwrite=self.overwrite)
 
     def show(self, content: Callable[[], dict[str, Any]], printer: Callable[[], None]) -> None:
-        """Print a result for a program or for people."""
+        """Print a result as JSON or as text."""
         if self.quiet:
             return
         if self.json:
@@ -94,7 +94,7 @@ class CommandFace:
             printer()
 
     def show_items(self, content: Callable[[], dict[str, Any]], items: Iterable[Item], file: str) -> None:
-        """Print a result for a program or for people, and where the file is that was written."""
+        """Print a result as JSON or as text, and the path of the file written."""
         if self.quiet or self.json:
             self.show(content, lambda: None)
             return
@@ -104,12 +104,12 @@ class CommandFace:
 
 
 class Verb:
-    """A function of the Python interface, as a command line sees it.
+    """A function of the Python interface as a command.
 
     Parameters
     ----------
     place : str
-        Where it stands, such as ``thermocomp.api.verbs:compare``.
+        Location of the function, such as ``thermocomp.api.verbs:compare``.
     forms, words, reads
         As for `command`.
     """
@@ -126,21 +126,21 @@ class Verb:
 
     @cached_property
     def parameters(self) -> dict[str, inspect.Parameter]:
-        """Its parameters by name, without those that are shown."""
+        """Parameters of the function by name, without those in `SHOWN`."""
         return {n: p for n, p in inspect.signature(self.function).parameters.items() if n not in SHOWN}
 
     @cached_property
     def help(self) -> str:
-        """What it does, without its parameters."""
+        """Description of the function, without its parameters."""
         return plain("\n\n".join(_paragraphs(inspect.getdoc(self.function) or "")))
 
     def help_of(self, parameter: str) -> str:
-        """Return what a parameter is, looked up where its text refers to another verb.
+        """Return the description of a parameter, from another verb if the text refers to it.
 
         Raises
         ------
         LookupError
-            It is not described.
+            The parameter is not described.
         """
         text = _described(self.function)[parameter]
         if other := re.match(r"As for `(\w+)`\.?", text):
@@ -148,12 +148,12 @@ class Verb:
         return plain(text)
 
     def call(self, given: Mapping[str, Any], progress: Steps, tell_changes: bool) -> Any:
-        """Do it: recordings are read first, and groups of options made one object.
+        """Call the function: recordings are read first, and groups of options converted to objects.
 
         Parameters
         ----------
         given : mapping
-            Values of the command line by parameter; those of other verbs are left out.
+            Values of the command line by parameter; those of other verbs are ignored.
         progress : Steps
         tell_changes : bool
         """
@@ -175,7 +175,7 @@ class Verb:
         return self.function(**made)
 
     def options(self) -> list[inspect.Parameter]:
-        """Return its parameters as a command line has them."""
+        """Return the parameters of the function as options of a command."""
         found = []
         for name, p in self.parameters.items():
             form = self.forms.get(name, p.annotation)
@@ -201,30 +201,31 @@ def command(
     instead: Mapping[str, str] = {},
     tell_changes: bool = True,
 ) -> Callable[[Callable[..., int]], Callable[..., int]]:
-    """Make a command of a verb and a function that shows its result.
+    """Create a command from a verb and a function that shows its result.
 
-    The function takes the result and a `CommandFace`, and options of its own if the command has more than the verb; it
-    returns the exit code. Its docstring says what ``--output`` and its own options are, and lists the exit codes.
+    The arguments of the function are the result, a `CommandFace`, and additional options of the command that the verb
+    does not have; it returns the exit code. Its docstring describes ``--output`` and the additional options, and lists
+    the exit codes.
 
     Parameters
     ----------
     place : str
-        Where the verb stands, such as ``thermocomp.api.verbs:compare``.
+        Location of the verb, such as ``thermocomp.api.verbs:compare``.
     writes : str or callable
-        Ending of the file that ``--output`` names, or what returns all files that come of it and of the options that
-        are given; there is no such option without it.
+        Extension of the file named by ``--output``, or a function that returns all files written for it and for the
+        options given. Default: the command has no ``--output``.
     needs_output : bool
-        There is nothing to do without ``--output``.
+        Whether ``--output`` is required.
     forms : mapping
-        How parameters of this verb are written on a command line, beside `ON_A_LINE`.
+        Types of parameters of this verb on the command line, in addition to `ON_A_LINE`.
     words : sequence of str
-        Parameters that stand on the line without an option's name; those that have no default if none is named.
+        Positional parameters. Default: those without a default value.
     reads : mapping
-        What reads the files that a parameter names, where Python takes recordings; they get the verb's ``mapping``.
+        Readers of the files given for a parameter, where Python accepts recordings; they get the verb's ``mapping``.
     instead : mapping
-        Verbs that do the work instead, by the option that asks for them; they write nothing.
+        Alternative verbs, by the option that selects them; they write nothing.
     tell_changes : bool
-        Say on stderr what a mapping changes in the values; False: the result says it.
+        Report on stderr what a mapping changes in the values; False: the result reports it.
     """
 
     def made_of(show: Callable[..., int]) -> Callable[..., int]:
@@ -255,10 +256,10 @@ def command(
         none: Any = inspect.Parameter.empty if required else None
         alone = [
             _option("output", output, none, described.get("output", ""), ["--output", "-o"]),
-            _option("overwrite", bool, False, "Write over an existing file."),
+            _option("overwrite", bool, False, "Overwrite an existing file."),
         ]
         mine = [_option(p.name, p.annotation, p.default, described[p.name]) for p in own]
-        json = _option("json", bool, False, "Print results for a program instead of tables.")
+        json = _option("json", bool, False, "Print results as JSON instead of tables.")
         parameters = [*options, *mine, *(alone if writes else []), json]
         run.__name__ = run.__qualname__ = show.__name__
         run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
@@ -271,12 +272,12 @@ def command(
 
 
 def is_group(form: Any) -> bool:
-    """Return whether a form of the command line is a group of options."""
+    """Return whether a type of the command line is a group of options."""
     return isinstance(form, type) and getattr(form, "__dataclass_fields__", None) is not None
 
 
 def plain(text: str) -> str:
-    """Return a docstring's text without its marks."""
+    """Return the text of a docstring without markup."""
     text = re.sub(r":\w+:`/?([^`]*)`", r"\1", text)
     return re.sub(r"``?([^`]*)``?", r"\1", text)
 
@@ -292,7 +293,7 @@ def _paragraphs(doc: str) -> list[str]:
 
 
 def _described(function: Callable[..., Any]) -> dict[str, str]:
-    """Return what stands in a docstring about each parameter."""
+    """Return the description of each parameter in a docstring."""
     found = {}
     for p in parse(inspect.getdoc(function) or "", style=DocstringStyle.NUMPYDOC).params:
         for name in p.arg_name.split(","):

@@ -12,7 +12,7 @@ def fit(found: FittedModels, face: CommandFace) -> int:
     Parameters
     ----------
     output : Path
-        Model file to write (.json).
+        Output model file (.json).
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What the commands print for a program to read; nothing of the training wing is needed for it."""
+"""JSON output of the commands; it imports no training code."""
 
 import json
 import math
@@ -8,12 +8,12 @@ from typing import Any
 
 from thermocomp import __version__
 
-#: the command line that is being run
+#: command line that is being run
 called_with: list[str] = []
 
 
 def print_json(content: dict[str, Any]) -> None:
-    """Print what a program shall read, and by which version and settings it was made."""
+    """Print results as JSON, with the version and the settings."""
     content = {"thermocomp": __version__, "arguments": called_with, **content}
     # JSON has no nan and no infinity: what is not known is null
     text = json.dumps(_nulled(content), indent=2, ensure_ascii=False)

@@ -1,4 +1,4 @@
-"""How much stands on stderr: ``--quiet``, ``--verbose``; taken off the command line before a command sees it."""
+"""Verbosity on stderr: ``--quiet``, ``--verbose``; removed from the command line before a command parses it."""
 
 import sys
 from collections.abc import Sequence
@@ -11,22 +11,22 @@ if TYPE_CHECKING:
     from thermocomp.recordings.recording import Recording
 
 FLAGS = {
-    "--quiet": "Nothing on the error stream but errors: no progress, no trouble of recordings.",
-    "--verbose": "More on the error stream: what is read, what is worked on, how long it took; all of an unexpected "
-    "error.",
+    "--quiet": "Print only errors on the error stream: no progress, no data-quality problems of recordings.",
+    "--verbose": "Print more on the error stream: files read, current task, elapsed time; the full traceback of an "
+    "unexpected error.",
 }
 
-#: of the command line that is being run
+#: verbosity of the command line that is being run
 quiet = verbose = False
 
 
 def taken_off(words: Sequence[str]) -> list[str]:
-    """Return a command line without the flags, wherever they stand; they hold until the next one is run.
+    """Return a command line without the flags, at any position; they are in effect until the next one is run.
 
     Raises
     ------
     InputError
-        Both are there.
+        Both are given.
     """
     global quiet, verbose  # noqa: PLW0603 - one process runs one command line
     quiet, verbose = (flag in words for flag in FLAGS)
@@ -37,12 +37,12 @@ def taken_off(words: Sequence[str]) -> list[str]:
 
 
 def tell(text: str) -> None:
-    """Write a line on stderr, if more is wanted there."""
+    """Write a line on stderr, if verbose."""
     if verbose:
         print(replace_unprintable(text), file=sys.stderr, flush=True)
 
 
 def tell_read(recordings: "Sequence[Recording]") -> None:
-    """Write what was read on stderr, if more is wanted there."""
+    """Write a summary of what was read on stderr, if verbose."""
     for r in recordings:
         tell(f"read {r.source or r.name}: {len(r)} rows, {len(r.table.columns)} columns")

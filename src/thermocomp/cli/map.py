@@ -1,4 +1,4 @@
-"""`thermocomp map`: a mapping for a file, by a few questions: what its columns are, and what has to be cleaned."""
+"""`thermocomp map`: a mapping for a file, from a few questions about its columns and the cleaning needed."""
 
 import tomllib
 from collections.abc import Sequence
@@ -27,28 +27,28 @@ def map(
     overwrite: bool = False,
     json: bool = False,
 ) -> int:
-    """Write how a logger's file is to be read and cleaned, asking what cannot be seen.
+    """Write a mapping file for reading and cleaning a logger's file, asking for what cannot be determined.
 
     Parameters
     ----------
     recording : Path
-        CSV, XLSX, ODS or Parquet file.
+        Recording to map (CSV, XLSX, ODS or Parquet file).
     mapping : Path
-        TOML file to begin with, such as that of another test of the same logger; its comments stay.
+        TOML mapping file to start from, such as that of another test of the same logger; its comments are kept.
     output : Path
-        TOML file to write; without it the mapping is printed.
+        Output mapping file (.toml). Default: the mapping is printed.
     yes : bool
-        Ask nothing: take the best guess, and mend what `check` calls trouble. What changes how long a recording
-        took, as the unit of time or the order of day and month may, is not guessed but refused.
+        Ask no questions: use the best guess, and repair what `check` reports as trouble. Settings that change the
+        duration of a recording, such as the unit of time or the order of day and month, are not guessed but refused.
     overwrite : bool
-        Write over an existing file.
+        Overwrite an existing file.
     json : bool
-        Print results for a machine instead of the mapping; nothing is asked then.
+        Print results as JSON instead of the mapping; no questions are asked.
 
     Returns
     -------
     int
-        0 nothing is left to be mended, 1 `check` still finds trouble, 2 unusable input.
+        0 nothing is left to repair, 1 `check` still finds trouble, 2 unusable input.
     """
     if output is not None:
         refuse_existing(
@@ -99,7 +99,7 @@ def _content(mended: "Mended", output: Path | None, left: Sequence[str]) -> dict
 
 
 def _ask(question: "Question") -> Remedy | None:
-    """Put a question on the terminal; return the answer, or None for leaving it as it is."""
+    """Ask a question on the terminal; return the answer, or None to keep the current value."""
     from thermocomp.recordings.readers.mapping import check_content
     from thermocomp.recordings.readers.mending import to_toml
 

@@ -1,4 +1,4 @@
-"""Groups of options that several commands share, and what they stand for."""
+"""Groups of options that several commands share, and the objects made from them."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,16 +20,16 @@ OptionalOutput = Annotated[Path | None, Parameter(name=["--output", "-o"])]
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class LeaveOneOut:
-    """What is judged in turn, each on models that were fitted without it.
+    """Unit that is left out of fitting and judged in turn.
 
     Parameters
     ----------
     leave_one_cycle_out : bool
-        Judge on each thermal cycle in turn (the default).
+        Leave out each thermal cycle in turn and judge on it (default).
     leave_one_day_out : bool
-        Judge on each day in turn; the recordings need time stamps.
+        Leave out each day in turn and judge on it; the recordings need time stamps.
     leave_one_file_out : bool
-        Judge on each recording in turn.
+        Leave out each recording in turn and judge on it.
     """
 
     leave_one_cycle_out: bool = False
@@ -37,12 +37,12 @@ class LeaveOneOut:
     leave_one_file_out: bool = False
 
     def value(self) -> "LeaveOne | None":
-        """Return it as the verbs take it.
+        """Return the option as an argument of the verbs.
 
         Raises
         ------
         InputError
-            Two of them were given.
+            More than one of them is given.
         """
         units: dict[LeaveOne, bool] = {
             "cycle": self.leave_one_cycle_out,
@@ -59,7 +59,7 @@ class LeaveOneOut:
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class CompensatorOptions:
-    """What the compensator that is judged with a model may never do.
+    """Limits of the compensator that is judged with a model.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class CompensatorOptions:
     rate : float
         Fastest change of a correction [um/s].
     dead_band : float
-        Changes smaller than this are not made [um].
+        Dead band of a correction: smaller changes are not made [um].
     """
 
     magnitude: float = Limits.magnitude
@@ -76,5 +76,5 @@ class CompensatorOptions:
     dead_band: float = Limits.dead_band
 
     def value(self) -> Limits:
-        """Return them as the compensator takes them."""
+        """Return the limits as an object for the compensator."""
         return Limits(self.magnitude, self.rate, self.dead_band)

@@ -1,4 +1,4 @@
-"""`thermocomp plan`: how much test is enough, which test next, and whether a running one may stop."""
+"""`thermocomp plan`: sufficient test length, next test, and end of a running test."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ from thermocomp.report.layout import Column, Layout
 
 
 def files_of(program: Path) -> list[Path]:
-    """Return what is written beside a program, and itself."""
+    """Return the program and the files written next to it."""
     if program.suffix.lower() in ("", ".csv", ".png"):
         raise InputError(
             f"{program}: name the NC program, such as test.ngc; sheet and figure beside it end in .csv and .png"
@@ -37,19 +37,20 @@ def plan(
     Parameters
     ----------
     output : Path
-        NC program to write (.ngc, .nc ...); beside it a sheet (.csv) for what is measured, and a figure (.png).
+        Output NC program (.ngc, .nc ...); a measurement sheet (.csv) and a figure (.png) are written next to it.
     dialect : str
-        Of the NC program: linuxcnc or fanuc.
+        Dialect of the NC program: linuxcnc or fanuc.
     probe_every : float
         Time between two measurements with a touch probe, for which the program stops the spindle [min]; 0: a logger
-        measures all the time.
+        measures continuously.
     running : bool
-        The recording is that of a test that is still running: judge whether its run or stop may end.
+        Check whether the current spindle run or stop of a test that is still running may end; the recording is that of
+        the test up to now.
 
     Returns
     -------
     int
-        0 done, with --running: it may end; 1 with --running: continue; 2 unusable input.
+        0 done, with --running: it may end; 1 with --running: continue the test; 2 unusable input.
     """
     content = {"trouble": face.trouble, "expected_um": None, "candidates": [], "curve": None, "running": None}
     if isinstance(found, RunningTest):

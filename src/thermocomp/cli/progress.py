@@ -1,4 +1,4 @@
-"""How far long work is, told on stderr: a bar on a terminal, which leaves nothing behind; else a line now and then."""
+"""Progress of long work on stderr: a transient bar on a terminal, else a line at intervals."""
 
 import sys
 import time
@@ -21,27 +21,27 @@ from thermocomp.cli import loudness
 from thermocomp.cli.terminal import make_console
 from thermocomp.core.shown import replace_unprintable
 
-#: without a terminal a line is told so often; work that takes less time tells none [s]
+#: interval of the lines without a terminal; shorter work prints none [s]
 OFTEN = 10.0
 
 _console = make_console(stderr=True)
 
 
 class Share(Protocol):
-    """Tells how far the work is, as a share of it, and on what."""
+    """Callable that reports the completed fraction of the work and the current task."""
 
     def __call__(self, share: float, text: str = "", /) -> None: ...  # noqa: D102
 
 
 class Steps:
-    """Shows how many of so many steps are done, as a verb's ``progress``.
+    """Progress display of a verb: completed and total number of steps.
 
     Parameters
     ----------
     bar : Progress
     hidden : bool
     warn : callable
-        Shows lines of trouble before the work.
+        Shows the data-quality problems before the work.
     """
 
     def __init__(self, bar: Progress, hidden: bool, warn: Callable[[list[str]], object] = lambda _: None) -> None:
@@ -49,12 +49,12 @@ class Steps:
         self._task, self._done, self._total = bar.add_task("working", total=None, visible=False), 0, 0
 
     def begin(self, total: int) -> None:
-        """Say how many steps there are."""
+        """Set the total number of steps."""
         self._total = total
         self._bar.update(self._task, total=total, visible=True)
 
     def __call__(self, text: str, /, steps: int = 1) -> None:
-        """Say what is worked on, and how many steps are done since it was said last."""
+        """Report the current task, and the number of steps completed since the last call."""
         self._done += steps
         self._bar.update(self._task, description=replace_unprintable(text), advance=steps)
         done = f"{self._done} of {self._total}" if self._total else ""
@@ -66,7 +66,7 @@ class Steps:
 
 @contextmanager
 def show_progress(*, hidden: bool, warn: Callable[[list[str]], object] = lambda _: None) -> Iterator[Steps]:
-    """Show the steps of a verb; nothing if `hidden`, or if the command line wants it quiet."""
+    """Show the steps of a verb; nothing if `hidden` or with ``--quiet``."""
     hidden = hidden or loudness.quiet
     with _bar(MofNCompleteColumn(), hidden) as bar:
         yield Steps(bar, hidden, warn)
@@ -74,7 +74,7 @@ def show_progress(*, hidden: bool, warn: Callable[[list[str]], object] = lambda 
 
 @contextmanager
 def show_share(name: str, *, hidden: bool) -> Iterator[Share]:
-    """Show the percentage that is done; nothing if `hidden`, or if the command line wants it quiet."""
+    """Show the completed percentage; nothing if `hidden` or with ``--quiet``."""
     hidden = hidden or loudness.quiet
     with _bar(TaskProgressColumn(), hidden) as bar:
         task = bar.add_task(name, total=1.0)
@@ -89,14 +89,14 @@ def show_share(name: str, *, hidden: bool) -> Iterator[Share]:
 
 
 class _Lines:
-    """Tells of long work on lines of their own, where there is no terminal to draw a bar on."""
+    """Progress as separate lines, where there is no terminal for a bar."""
 
     def __init__(self, hidden: bool) -> None:
         self._silent = hidden or _console.file.isatty()
         self._begun = self._told = time.monotonic()
 
     def tell(self, text: str, done: str) -> None:
-        """Tell what is worked on and how much is done, if it is time to."""
+        """Print the current task and the completed fraction, if the interval has elapsed."""
         now = time.monotonic()
         if not self._silent and now - self._told >= OFTEN:
             self._told = now

@@ -1,4 +1,4 @@
-"""Recordings that the command line names: read, and what is wrong with them said on stderr."""
+"""Reading of recordings named on the command line, with their problems reported on stderr."""
 
 import sys
 from collections.abc import Callable, Sequence
@@ -17,7 +17,7 @@ _stderr = make_console(stderr=True)
 
 
 class RecordingReader(Protocol):
-    """Reads what a parameter of a verb takes from the files that a command line names."""
+    """Reader of the files named on the command line for a parameter of a verb."""
 
     def __call__(self, paths: Any, mapping: Path | None, /, *, tell: bool = True) -> Any: ...  # noqa: D102
 
@@ -25,7 +25,7 @@ class RecordingReader(Protocol):
 def read_recordings(paths: list[Path], mapping: Path | None, *, tell: bool = True) -> "list[Recording]":
     """Read the recordings named on the command line; ``-`` is a CSV file on standard input.
 
-    What a mapping changes in the values is told on stderr, unless `tell` is False: then it is shown elsewhere.
+    Changes of the values by a mapping are reported on stderr, unless `tell` is False: they are then shown elsewhere.
     """
     if not paths:
         raise InputError("no recording given: name at least one CSV, XLSX or Parquet file")
@@ -42,7 +42,7 @@ def read_recordings(paths: list[Path], mapping: Path | None, *, tell: bool = Tru
 
 
 def read_one(path: Path, mapping: Path | None, *, tell: bool = True) -> "Recording":
-    """Read the one recording that an option names."""
+    """Read the single recording named by an option."""
     (found,) = read_recordings([path], mapping, tell=tell)
     return found
 
@@ -59,7 +59,7 @@ def _read_all(paths: list[Path], read: "Callable[[list[Path]], list[Recording]]"
 
 
 def tell_trouble(tests: "Sequence[Recording]") -> list[str]:
-    """Say on stderr what is wrong with recordings that are about to be used, and give it back.
+    """Print the data-quality problems of recordings on stderr, and return them.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def tell_trouble(tests: "Sequence[Recording]") -> list[str]:
     Returns
     -------
     list of str
-        One line per trouble, and per column that was left out.
+        One line per problem, and per excluded column.
     """
     from thermocomp.api.inputs import trouble_of
 
@@ -76,7 +76,7 @@ def tell_trouble(tests: "Sequence[Recording]") -> list[str]:
 
 
 def print_trouble(lines: list[str]) -> list[str]:
-    """Print lines of trouble on stderr, and give them back."""
+    """Print data-quality problems on stderr, and return them."""
     for line in () if loudness.quiet else lines:
         _stderr.print(f"[bold yellow]trouble[/] {words(line)}", soft_wrap=True)
     return lines

@@ -27,13 +27,13 @@ def select(found: Selected, face: CommandFace) -> int:
     Parameters
     ----------
     output : Path
-        Page with tables and figures to write (.html).
+        Output page with tables and figures (.html).
 
     Returns
     -------
     int
-        0 done, 1 no set is better than no compensation (pareto), or nothing could be chosen for one of several targets,
-        2 unusable input.
+        0 done, 1 no set is better than no compensation (pareto), or no sensors could be selected for one of several
+        targets, 2 unusable input.
     """
     face.write(found.report)
     face.show_items(found.to_dict, printed.choices(found.choices), "Page")

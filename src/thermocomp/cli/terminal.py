@@ -1,4 +1,4 @@
-"""What a terminal shows: tables, and words that stand out."""
+"""Terminal output: tables and highlighted text."""
 
 from collections.abc import Iterable, Iterator
 from typing import Any
@@ -13,12 +13,12 @@ from thermocomp.report.layout import Item, Layout, Toned, verdict
 
 
 def make_console(**how: Any) -> Console:
-    """Return a console that adds nothing of its own to words, such as pictures for ``:names:``, and obeys none of them.
+    """Return a console that does not alter text, such as emoji for ``:names:``, and executes no control codes in it.
 
     Parameters
     ----------
     **how
-        Of `rich.console.Console`.
+        Keyword arguments passed to `rich.console.Console`.
     """
     made = Console(highlight=False, emoji=False, **how)
     made.push_render_hook(_Printable())
@@ -26,7 +26,7 @@ def make_console(**how: Any) -> Console:
 
 
 class _Printable(RenderHook):
-    """Lets nothing through that moves the cursor, whoever prints it."""
+    """Filter that removes characters that move the cursor, from all printed text."""
 
     def process_renderables(self, renderables: list[ConsoleRenderable]) -> list[ConsoleRenderable]:
         return [_Cleaned(r) for r in renderables]
@@ -42,7 +42,7 @@ class _Cleaned:
             yield part._replace(text=text)
 
 
-#: of all commands
+#: console of all commands
 console = make_console()
 
 _TONES = {
@@ -58,20 +58,20 @@ _ROWS = {"best": "bold green", "none": "dim"}
 
 
 def words(text: object) -> str:
-    """Return what people typed, or files hold, for rich: nothing in it is markup, moves the cursor or begins a line.
+    """Return external text, typed or from files, escaped for rich: without markup, cursor control and line breaks.
 
-    All of that kind that is printed goes through here; a test looks.
+    All such text passes through here before it is printed; a test checks this.
     """
     return escape(replace_unprintable(text))
 
 
 def marked(text: str) -> str:
-    """Return text for rich, in its tone if it has one."""
+    """Return text for rich, in its tone if one is given."""
     return f"[{_TONES[text.tone]}]{words(text)}[/]" if isinstance(text, Toned) else words(text)
 
 
 def mark(word: str) -> str:
-    """Return a verdict in its colour."""
+    """Return a verdict, coloured."""
     return marked(verdict(word))
 
 
@@ -92,7 +92,7 @@ def print_table(t: Layout, console: Console, **how: Any) -> None:
     t : Layout
     console : Console
     **how
-        Of `rich.table.Table`.
+        Keyword arguments passed to `rich.table.Table`.
     """
     table = Table(title=words(t.title) or None, caption=words(t.caption) or None, **how)
     for c in t.columns:

@@ -100,7 +100,7 @@ class Additive(ErrorModel):
     curves : tuple of Curve
         One per variable.
     response : Curve or None
-        What the sum goes through, such as the inverse of theta; None: nothing.
+        Curve applied to the sum, such as the inverse of theta; None: none.
     """
 
     family: Literal["additive"] = "additive"

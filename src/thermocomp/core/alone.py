@@ -10,7 +10,7 @@ from thermocomp.core.exceptions import InputError
 
 @contextmanager
 def alone(path: Path) -> Iterator[None]:
-    """Hold a lock on an empty file beside a file: the system lets it go when the process ends, however it does.
+    """Hold a lock on an empty file next to a file: the system releases it when the process ends, however it does.
 
     Parameters
     ----------

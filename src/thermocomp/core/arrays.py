@@ -1,4 +1,4 @@
-"""Arrays by what stands in them."""
+"""Arrays by their contents."""
 
 import numpy as np
 from numpy.typing import NDArray

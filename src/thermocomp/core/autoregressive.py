@@ -55,7 +55,7 @@ def companion(a: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, kw_only=True)
 class Ticking(ErrorModel):
-    """What the autoregressive families share: the clock and the memory.
+    """Common part of the autoregressive families: the clock and the memory.
 
     The runs of a batch share their clock.
 
@@ -72,7 +72,7 @@ class Ticking(ErrorModel):
     @property
     @abstractmethod
     def orders(self) -> tuple[int, int]:
-        """How many past deviations (k) and past values of each input (m) one tick is made of."""
+        """Number of past deviations (k) and past values of each input (m) used in one tick."""
 
     @abstractmethod
     def _tick(self, regressors: FloatArray) -> FloatArray:
@@ -185,14 +185,14 @@ class Ticking(ErrorModel):
         return first
 
     def _regressor_names(self) -> list[str]:
-        """Return what `_tick` takes, such as ``dz(t-1)`` and ``n(t-2)``, the time being counted in ticks."""
+        """Return the arguments of `_tick`, such as ``dz(t-1)`` and ``n(t-2)``, with the time in ticks."""
         k, m = self.orders
         return [f"dz(t-{i})" for i in range(1, k + 1)] + [
             f"{x.name}(t-{i})" if i else f"{x.name}(t)" for i in range(m + 1) for x in self.inputs
         ]
 
     def _regressors(self, change: Sequence[Node]) -> list[Node]:
-        """Return what `_tick` takes as parts of an expression."""
+        """Return the arguments of `_tick` as parts of an expression."""
         k, m = self.orders
         own: list[Node] = [Past(i) for i in range(1, k + 1)]
         return own + [Mean(x, i) for i in range(m + 1) for x in change]
@@ -284,11 +284,11 @@ class AutoregressiveNet(Ticking):
     family : str
         Its word in a file.
     k, m : int
-        How many past deviations, and how many past values of each input.
+        Number of past deviations, and of past values of each input.
     net : Perceptron
         With one output; its inputs are dz(t-h) .. dz(t-kh), all inputs at t, all inputs at t-h, ...
     input_scaling : Affine
-        Of the same, to what the net takes.
+        Scaling of the same to the inputs of the net.
     output_scaling : Affine
         From what the net gives to the deviation [unit].
     """

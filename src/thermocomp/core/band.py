@@ -35,9 +35,9 @@ class Band:
     cycles : int
         Thermal cycles it was made from, each left out in turn.
     floor : float
-        What is reckoned with where the structures agree [unit].
+        Smallest half-width, used where the structures agree [unit].
     running, stopped : float
-        Factor while the spindle turns, and while it stands [-].
+        Factor while the spindle turns, and while it is stopped [-].
     speeds : tuple of int
         Inputs that state whether the spindle turns; none: the larger factor holds always.
 
@@ -67,7 +67,7 @@ class Band:
 
     @property
     def words(self) -> str:
-        """What it is called wherever it is shown."""
+        """Name of the band wherever it is shown."""
         by = "by assumption" if self.basis == "assumption" else "conformal"
         return f"{100 * self.level:g} % band {by}, {self.cycles} cycles"
 
@@ -90,7 +90,7 @@ class Band:
         change : ndarray of shape (..., n_inputs)
             Inputs minus their reference [their units].
         spread : ndarray of shape (...,)
-            Of the structures [unit].
+            Spread of the structures [unit].
 
         Returns
         -------

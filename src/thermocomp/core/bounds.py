@@ -1,4 +1,4 @@
-"""What numbers and names a model may hold at all: stated once, and so wide that no machine comes near.
+"""Bounds of numbers and names in a model: defined once, and so wide that no machine comes near.
 
 A model is read from files that somebody may have altered. Within these bounds nothing that it computes overflows: a
 reading is clipped to the trained range, widened at most `MARGIN` times (2e15); a variable is a sum of at most `INPUTS`
@@ -95,7 +95,7 @@ def round_single(values: ArrayLike) -> FloatArray:
     Returns
     -------
     ndarray of float
-        Of the same shape. One row whose numbers rise strictly rises strictly.
+        Array of the same shape. A row that increases strictly still does.
     """
     exact = np.asarray(values, dtype=np.float64)
     size = np.abs(exact)
@@ -124,7 +124,7 @@ def check_finite(owner: str, most: float = COEFFICIENT, **numbers: Any) -> None:
     Parameters
     ----------
     owner : str
-        Whose they are.
+        Owner of the values, for messages.
     most : float
         Largest magnitude.
     **numbers : float or nested sequence of float
@@ -151,7 +151,7 @@ def check_between(owner: str, least: float, most: float, **numbers: Any) -> None
     Parameters
     ----------
     owner : str
-        Whose they are.
+        Owner of the values, for messages.
     least, most : float
     **numbers : float or nested sequence of float
         By what they are called.
@@ -177,10 +177,10 @@ def check_count(owner: str, most: int, **entries: Sequence[object]) -> None:
     Parameters
     ----------
     owner : str
-        Whose they are.
+        Owner of the values, for messages.
     most : int
     **entries : sequence
-        Of at most so many entries, by what they are called.
+        Sequences of limited length, by name.
 
     Raises
     ------
@@ -198,7 +198,7 @@ def check_name(what: str, name: str, most: int = NAME) -> None:
     Parameters
     ----------
     what : str
-        What it is the name of.
+        Kind of the named object.
     name : str
     most : int
         Characters it may have.
@@ -206,7 +206,7 @@ def check_name(what: str, name: str, most: int = NAME) -> None:
     Raises
     ------
     SettingError
-        The message says what the name is of.
+        The value is invalid; the message contains the kind of name.
     """
     if not name.strip() or len(name) > most:
         raise SettingError(f"{what}: a name has 1 to {most} characters, found {len(name.strip())}")

@@ -56,9 +56,9 @@ def read_clock(table: Columns, time: ArrayLike | str | None, owner: str, *, need
     ----------
     table : mapping of str to array-like
     time : str or array-like or None
-        Of a column, or its name; None: the column ``time_s``, if there is one.
+        Times, or the name of their column; None: the column ``time_s``, if there is one.
     owner : str
-        Who asks, for messages.
+        Caller, for messages.
     needed : bool
         There must be one.
 

@@ -21,7 +21,7 @@ class ErrorComponent:
         ISO 230-1 code where there is one (``EXX``, ``C0Y``), else the code of this house (``XOY``: shift along X of the
         reference of Y).
     group : {'axis', 'squareness', 'spindle', 'origin'}
-        Where the error lives.
+        Location of the error.
     unit : {'um', 'urad'}
         Unit of its value.
     depends_on : str or None

@@ -1,4 +1,4 @@
-"""What the answer of a paced model is made of: each input with its lags, and how much it counts."""
+"""Contributions to the output of a paced model: each input with its lags, and its gain."""
 
 from typing import NamedTuple
 
@@ -13,7 +13,7 @@ from thermocomp.core.paceddynamic import PacedDynamic
 
 
 class Gain(NamedTuple):
-    """How much an input counts: a temperature per degree, a spindle speed at the top speed of the training."""
+    """Gain of an input: of a temperature per degree, of a spindle speed at the top speed of the training."""
 
     name: str
     quantity: str
@@ -25,14 +25,14 @@ class Gain(NamedTuple):
 def contributions(
     model: ErrorModel, table: Columns, time: ArrayLike | str | None = None, *, reference: ArrayLike | None = None
 ) -> dict[str, FloatArray]:
-    """Return what each input, with its lags or states, adds to the deviation.
+    """Return the contribution of each input, with its lags or states, to the deviation.
 
     With the intercept they sum up to what the model predicts, unless it holds or fades outside its trained range.
 
     Parameters
     ----------
     model : PacedDynamic
-        Of the method `averaged`; of no other family it is known.
+        Model of the method `averaged`; for no other family it is known.
     table, time, reference
         See `thermocomp.core.model.ErrorModel.predict`.
 
@@ -61,12 +61,12 @@ def contributions(
 
 
 def gains(model: ErrorModel, step: float) -> list[Gain]:
-    """Return how much each input counts, the largest bound first.
+    """Return the gain of each input, the largest bound first.
 
     Parameters
     ----------
     model : PacedDynamic
-        Of the method `averaged`; of no other family it is known.
+        Model of the method `averaged`; for no other family it is known.
     step : float
         Time between two rows [s].
 

@@ -1,4 +1,4 @@
-"""Deviation, correction and what a correction may never do."""
+"""Deviation, correction and the limits of a correction."""
 
 import math
 from dataclasses import dataclass
@@ -24,12 +24,12 @@ class Deviation:
     slope : float
         Change of the deviation along the axis [um/m].
     reference_position : float
-        Where `offset` holds [mm].
+        Position at which `offset` is valid [mm].
 
     Raises
     ------
     InputError
-        A number is not finite.
+        A number is NaN or infinite.
 
     Examples
     --------
@@ -50,16 +50,16 @@ class Deviation:
         return self.offset + self.slope * 1e-3 * (position - self.reference_position)
 
     def less(self, other: "Deviation") -> "Deviation":
-        """Return this deviation less another one, with its own reference position."""
+        """Return this deviation minus another one, with the reference position of this one."""
         at = self.reference_position
         return Deviation(self.offset - other.at(at), self.slope - other.slope, at)
 
 
 @dataclass(frozen=True)
 class Correction:
-    """What a controller adds along one axis: minus the deviation.
+    """Correction that a controller adds along one axis: minus the deviation.
 
-    ``K(T, P) = K0(T) + tan b(T) (P - P0)`` is the form that Siemens, Beckhoff/ISG and in effect Heidenhain take.
+    ``K(T, P) = K0(T) + tan b(T) (P - P0)`` is the form that Siemens, Beckhoff/ISG and in effect Heidenhain use.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class Correction:
     Raises
     ------
     InputError
-        A number is not finite: it must never get to a controller.
+        A number is NaN or infinite: it must never reach a controller.
 
     Examples
     --------
@@ -91,7 +91,7 @@ class Correction:
 
     @classmethod
     def opposing(cls, deviation: Deviation) -> "Correction":
-        """Return the correction that cancels `deviation`: the only change of sign in the house."""
+        """Return the correction that cancels `deviation`: the only place where the sign is changed."""
         # "0.0 -" rather than a bare minus: a zero deviation must not become -0.0 in a journal or a controller
         return cls(0.0 - deviation.offset, 0.0 - deviation.slope, deviation.reference_position)
 
@@ -101,10 +101,10 @@ class Correction:
 
 
 def uncompensated(residual: _Position, correction: _Position) -> _Position:
-    """Return the deviation without the correction: what is measured under it less what it adds.
+    """Return the uncompensated deviation: the measured residual minus the correction.
 
-    The tool point is off by the residual: by the deviation, which the machine makes, and the correction, which the
-    controller adds. Both count from the same zero; this is the one place where they are parted.
+    The residual error of the tool point is the sum of the deviation of the machine and the correction added by the
+    controller. Both have the same zero; this is the only place where they are separated.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def uncompensated(residual: _Position, correction: _Position) -> _Position:
 
 @dataclass(frozen=True)
 class Limits:
-    """What a correction may never do.
+    """Limits of a correction.
 
     Parameters
     ----------
@@ -125,13 +125,13 @@ class Limits:
     rate : float
         Fastest change of the correction [um/s].
     dead_band : float
-        A new target closer than this to the correction in force changes nothing [um].
+        Dead band [um]: a new target closer than this to the correction in force is ignored.
     reading_age : float
-        A reading older than this is not used [s].
+        Maximum age of a reading; older readings are not used [s].
     hold : float
-        So long a correction stays where it is when nothing drives it any more [s].
+        Hold time of a correction without valid readings [s].
     fade : float
-        Time constant with which it goes to zero after that [s].
+        Time constant of the decay of the correction to zero after the hold time [s].
 
     Examples
     --------
@@ -156,7 +156,7 @@ class Limits:
             raise SettingError("; ".join(wrong))
 
     def in_words(self) -> str:
-        """Return what holds for corrections as text, such as ``at most 500 um, 0.1 um/s, dead band 0 um``."""
+        """Return the limits as text, such as ``at most 500 um, 0.1 um/s, dead band 0 um``."""
         return f"at most {self.magnitude:g} um, {self.rate:g} um/s, dead band {self.dead_band:g} um"
 
 

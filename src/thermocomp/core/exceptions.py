@@ -9,7 +9,7 @@ Remedy = Mapping[str, Any]
 
 
 class ThermocompError(Exception):
-    """Base of all errors thermocomp raises on purpose; its text says what was found and what to do."""
+    """Base of all errors thermocomp raises on purpose; its text states what was found and what to do."""
 
 
 class InputError(ThermocompError):
@@ -30,7 +30,7 @@ class InputError(ThermocompError):
 class SettingError(InputError, ValueError):
     """A value of a setting cannot be used.
 
-    It is a `ValueError` too, so that pydantic, which reads settings from files, says where the value stands.
+    It is a `ValueError` too, so that pydantic, which reads settings from files, reports the location of the value.
 
     Parameters
     ----------
@@ -45,24 +45,24 @@ class SettingError(InputError, ValueError):
 
 
 def explain_unknown(what: str, name: str, known: Iterable[str], path: tuple[str | int, ...] = ()) -> SettingError:
-    """Return the error of a name that nobody knows; it tells the nearest ones.
+    """Return the error for an unknown name, with the most similar known names.
 
     Parameters
     ----------
     what : str
-        What kind of thing was asked for.
+        Kind of the requested item.
     name : str
-        What was found.
+        Name found.
     known : iterable of str
-        What there is.
+        Valid names.
     path : tuple of str or int
-        Where it stands, see `SettingError`.
+        Location, see `SettingError`.
     """
     return SettingError(f"there is no {what} {name!r}; {tell_nearest(name, known)}", path)
 
 
 def tell_nearest(name: str, known: Iterable[str], cutoff: float = 0.4) -> str:
-    """Return in words which names are like one that nobody knows, or else which there are."""
+    """Return in words the known names that are similar to an unknown one, or else all known names."""
     known = list(known)
     near = get_close_matches(name, known, n=3, cutoff=cutoff)
     return f"the nearest are {', '.join(near)}" if near else f"there are {', '.join(known)}"
@@ -73,11 +73,11 @@ class RecordingError(InputError):
 
 
 class TwoReadingsError(RecordingError):
-    """The times of a recording can be read in several ways that differ in how long it took: nobody may guess."""
+    """The times of a recording can be read in several ways with different durations: the program must not guess."""
 
 
 class UnitError(InputError):
-    """A unit is unknown, or does not belong to the quantity it stands for."""
+    """A unit is unknown, or does not belong to its quantity."""
 
 
 class ModelFileError(InputError):
@@ -92,7 +92,7 @@ class ProgramError(InputError):
     line : int
         Number of the line, from 1.
     reason : str
-        What stands there, why it cannot be, and what to do.
+        Value found, why it is invalid, and what to do.
     """
 
     def __init__(self, line: int, reason: str) -> None:

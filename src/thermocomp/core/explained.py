@@ -1,4 +1,4 @@
-"""What a frozen model is, in plain words and numbers: what it is made of, how good it is, and what a failure does."""
+"""Explanation of a frozen model in plain words and numbers: its terms, its accuracy, and the effect of a failure."""
 
 import math
 from collections.abc import Sequence
@@ -27,31 +27,31 @@ class SensorExplanation:
     ----------
     name, quantity, unit : str
     low, high : float
-        Trained range, from its zero where it has one of its own [unit].
+        Training range, relative to its zero where it has a separate one [unit].
     settled : float or None
         Followed in the end: per degree, or a spindle speed at the top speed of the training [unit of the model]; None:
         not known of this family.
     bound : float or None
         Most that it can add, whatever it reads [unit of the model].
     watched : bool
-        It is predicted from the others and the spindle speed; a failure is found by that, and the prediction stands in.
+        It is predicted from the others and the spindle speed; this detects a failure, and the prediction replaces it.
     jump, off, moved : float or None
         Limits: change within `pace`, difference from its prediction, change of the prediction while it reads the same
         [degC].
     pace : float or None
         [s]
     still : float or None
-        It reads the same for longer, another one changing [s]; None: time alone says nothing.
+        Longest constant reading while another one changes [s]; None: time alone is no criterion.
     unseen : float or None
         RMS error of its prediction in cycles that were left out [degC].
     undetected : float or None
-        What a drift up to `off` does to the model's answer, once settled [unit of the model].
+        Effect of a drift up to `off` on the output of the model, once settled [unit of the model].
     lost : float or None
         RMS error on unseen cycles without it [unit of the model]; None: never judged.
     runs_on : bool
         The correction continues with the prediction in its place; otherwise it is held, then fades.
     spare : str
-        Why a spare sensor beside it is recommended; empty if none is.
+        Reason why a spare sensor for it is recommended; empty if none is.
     """
 
     name: str
@@ -76,7 +76,7 @@ class SensorExplanation:
 
 @dataclass(frozen=True)
 class Explanation:
-    """What a model is. Print it to read it.
+    """Explanation of a model. Print it to read it.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ class Explanation:
     sensors : tuple of SensorExplanation
         Inputs with an influence; those that can add most first where that is known.
     zero : str
-        What its inputs count from.
+        Reference of its inputs.
     word, reason : str
         Verdict of the do-no-harm gate, and why.
     rms, max_abs, none_rms : float or None
@@ -96,9 +96,9 @@ class Explanation:
     band : str
         In words; empty without one.
     outside : str
-        What it does outside its trained range.
+        Behaviour outside its training range.
     covered : str
-        What the judged cycles covered; empty if that is not known.
+        Conditions covered by the judged cycles; empty if unknown.
     pairs : tuple of int
         Pairs of sensors that were judged lost together, and those of them with which the correction runs on.
     """
@@ -131,7 +131,7 @@ class Explanation:
 
 @dataclass(frozen=True)
 class Explanations:
-    """What the models of several targets are. Print it to read it.
+    """Explanations of the models of several targets. Print it to read it.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ class Explanations:
 
 
 def explain(model: ErrorModel) -> Explanation:
-    """Return what a model is.
+    """Return the explanation of a model.
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ def explain(model: ErrorModel) -> Explanation:
 
 
 def explain_all(models: Sequence[ErrorModel]) -> Explanations:
-    """Return what the models of several targets are.
+    """Return the explanations of the models of several targets.
 
     Parameters
     ----------
@@ -222,7 +222,7 @@ def explain_all(models: Sequence[ErrorModel]) -> Explanations:
 
 
 def _spare(model: ErrorModel, name: str, seen: Watched | None) -> str:
-    """Say why a spare sensor beside a temperature is recommended; the empty string if none is."""
+    """Return the reason why a spare sensor for a temperature is recommended; empty if none is."""
     if seen is None:
         return "nothing predicts it"
     if not model.may_lose([name]):

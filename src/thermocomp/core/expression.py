@@ -1,4 +1,4 @@
-"""What a frozen model computes, as a small tree: the printed formula and every export walk it, and ask for no family.
+"""Expression of a frozen model as a small tree: the printed formula and all exports use it, independent of the family.
 
 The leaves are the inputs minus what counts as zero. A tree is the model within its trained range: inputs are clipped to
 that range, widened by the margin, and what `Support` adds beyond (``hold``, ``fade``) is not in the tree.
@@ -20,7 +20,7 @@ class Constant:
 
 @dataclass(frozen=True)
 class Input:
-    """An input of the model minus its zero [its unit].
+    """Model input relative to its reference value [unit of the input].
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class Sum:
 
 @dataclass(frozen=True)
 class Difference:
-    """What is left of the first when the second is taken off."""
+    """Difference of two expressions."""
 
     of: "Node"
     minus: "Node"
@@ -151,7 +151,7 @@ class Past:
 class Mean:
     """In a `Recurrence`: the mean of a value over the interval that ended some ticks ago; 0 is the one that ends now.
 
-    A reading stands for the time since the reading before it; before the first, the value is 0 but at the very start.
+    A reading is valid for the time since the previous reading; before the first, the value is 0 but at the very start.
     """
 
     of: "Node"
@@ -160,7 +160,7 @@ class Mean:
 
 @dataclass(frozen=True)
 class Recurrence:
-    """A value that is made again at every tick of a clock of its own; see `thermocomp.core.autoregressive`.
+    """A value that is updated at every tick of a separate clock; see `thermocomp.core.autoregressive`.
 
     Between ticks it goes in a straight line towards what the next would be if the inputs continued as since the last.
 
@@ -178,7 +178,7 @@ class Recurrence:
 
 @dataclass(frozen=True)
 class Named:
-    """A part that has a name of its own in the printed formula, such as ``T6-T7``."""
+    """A part that has a separate name in the printed formula, such as ``T6-T7``."""
 
     name: str
     of: "Node"

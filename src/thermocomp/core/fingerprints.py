@@ -46,7 +46,7 @@ class Runs:
     moving : str
         1 where target and an input move beyond their noise around the run, else 0.
     marks : dict of str to str
-        Per channel the hash of each run, the target first; 0 where the channel says nothing there.
+        Per channel the hash of each run, the target first; 0 where the channel has no information there.
     """
 
     stride: int
@@ -78,7 +78,7 @@ class Prints:
     learned : tuple of (int, int)
         First row, and the row after the last, of each stretch that was learned from; counted through all tests.
     steps : dict of str to float
-        What differences are rounded to, per channel, the target first [its unit].
+        Step to which differences are rounded, per channel, the target first [its unit].
     runs : tuple of Runs
         Per stride.
     """

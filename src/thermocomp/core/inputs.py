@@ -1,4 +1,4 @@
-"""What a model wants to know, in which range it was trained, and what it does beyond."""
+"""Inputs of a model, their training range, and the behaviour of the model outside it."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -17,7 +17,7 @@ class Input:
     name : str
         Channel name.
     quantity, unit : str
-        What it measures, a key of `HOUSE_UNITS`, and its house unit.
+        Measured quantity, a key of `HOUSE_UNITS`, and its internal unit.
     reference : float
         Value that counts as zero [unit].
     rezero : bool
@@ -54,7 +54,7 @@ class Input:
 
 @dataclass(frozen=True)
 class Support:
-    """What a model does outside its trained range.
+    """Behaviour of a model outside its training range.
 
     Inputs are always clipped to the trained range widened by `margin`; on top of that
 

@@ -15,7 +15,7 @@ def seconds(times: NDArray[Any]) -> FloatArray:
     Parameters
     ----------
     times : ndarray
-        Of numbers, datetimes or timedeltas, also as objects of Python or pandas.
+        Numbers, datetimes or timedeltas, also as objects of Python or pandas.
 
     Returns
     -------

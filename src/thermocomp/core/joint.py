@@ -20,7 +20,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class JointSupport:
-    """Training states that stand for all of them, as plain numbers.
+    """Representative training states, as plain numbers.
 
     Parameters
     ----------
@@ -69,11 +69,11 @@ class JointSupport:
 
     @property
     def n_inputs(self) -> int:
-        """At least so many inputs the model must have."""
+        """Minimum number of inputs of the model."""
         return 1 + max([*self.columns, *self.speeds], default=-1)
 
     def distance(self, change: FloatArray) -> FloatArray:
-        """Return how far states are from what was trained, by the limit: outside is what is not at most 1.
+        """Return the distance of states from the training data, normalised by the limit; above 1 or nan: outside.
 
         Parameters
         ----------

@@ -18,7 +18,7 @@ def advance(memory: FloatArray, signals: FloatArray, dt: float, time_constants: 
     ----------
     memory : ndarray of shape (..., n_lags)
     signals : ndarray of shape (..., n_lags)
-        What each lag follows, at the end of the step.
+        Signal followed by each lag, at the end of the step.
     dt : float
         [s]
     time_constants : ndarray of shape (n_lags,)
@@ -61,7 +61,7 @@ def run(
     time_constants : ndarray of shape (n_lags,) or (n_rows, n_lags)
         [s]; of each row where they change.
     memory : ndarray of shape (n_lags,), optional
-        Of the row before the first; at rest in the first row without it.
+        State before the first row. Default: at rest in the first row.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What the training of a model showed of its target: what it is held against when it is judged."""
+"""Training statistics of the target, used as reference when a model is judged."""
 
 from dataclasses import dataclass
 

@@ -32,9 +32,9 @@ class LinearDynamic(ErrorModel):
     direct : tuple of float
         Read-out of each signal.
     lag_signals : tuple of int
-        Which signal each lag follows.
+        Index of the signal followed by each lag.
     time_constants : tuple of float
-        Of each lag [s].
+        Time constant of each lag [s].
     lagged : tuple of float
         Read-out of each lag.
 

@@ -1,4 +1,4 @@
-"""Machine, axes and channels: what stands on the shop floor."""
+"""Machine, axes and channels: the equipment on the shop floor."""
 
 import math
 from collections.abc import Mapping
@@ -31,7 +31,7 @@ class Axis:
     travel : tuple of float
         Lowest and highest position [mm].
     reference_position : float
-        Where its squareness moves nothing [mm].
+        Position at which its squareness has no effect [mm].
     measured_at : tuple of float
         Where X, Y and Z stood while its errors were measured [mm]; its own coordinate matters only if it was measured
         on the workpiece's side.
@@ -43,9 +43,9 @@ class Axis:
         the workpiece's, such as a reflector on the table. In the second case the tool was at it with the axis at its
         own coordinate of `measured_at`, and from there the axis' own way is a lever too.
     rapid : float or None
-        How fast it goes at most [mm/min]; None: not told.
+        Maximum speed [mm/min]; None: unknown.
     acceleration : float or None
-        How hard it speeds up and slows down at most [mm/s2]; None: not told.
+        Maximum acceleration and deceleration [mm/s2]; None: unknown.
 
     Raises
     ------
@@ -96,7 +96,7 @@ class Channel:
     unit : str
         House unit of the quantity.
     place : str
-        Where the sensor sits, in words; empty if unknown.
+        Location of the sensor, in words; empty if unknown.
     """
 
     name: str
@@ -115,9 +115,9 @@ class Machine:
     Parameters
     ----------
     name : str
-        What its owners call it.
+        Name given by the owner.
     structure : Structure
-        Which axes carry the workpiece and which the tool.
+        Axes that carry the workpiece, and axes that carry the tool.
     axes : tuple of Axis
         One per axis of the structure.
     components : mapping of str to Source
@@ -130,7 +130,7 @@ class Machine:
     channels : tuple of Channel
         Its sensors.
     reference_temperature : float
-        Temperature at which its geometry is defined [degC]; ISO 1 says 20.
+        Temperature at which its geometry is defined [degC]; 20 by ISO 1.
 
     Raises
     ------

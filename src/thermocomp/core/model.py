@@ -53,25 +53,25 @@ class ErrorModel(ABC):
     Parameters
     ----------
     family : str
-        Which of the families it is: its word in a file.
+        Name of the family, as in a file.
     target : str
         Displacement channel (or error component) it predicts.
     unit : str
         Unit of the deviation it gives: um or urad; of a factor along an axis um/m, urad/m^2 and so on.
     inputs : tuple of Input
-        What it wants to know, in this order.
+        Inputs, in this order.
     intercept : float
         Deviation in the reference state [unit].
     support : Support
-        What it does outside its trained range.
+        Behaviour outside its training range.
     provenance : Provenance or None
-        Where it comes from.
+        Origin of the model.
     honest_error : HonestError or None
         Error on unseen cycles; None if it was never judged.
     validity : Validity or None
-        What these cycles covered.
+        Conditions covered by these cycles.
     joint : JointSupport or None
-        What of its inputs' space was trained; None: a range per input is all that is known.
+        Training region in the space of its inputs; None: only a range per input is known.
     zeroing : Zeroing
         Over how long a compensator averages what the inputs with ``rezero`` count from, as in its training.
     band : Band or None
@@ -141,7 +141,7 @@ class ErrorModel(ABC):
 
     @abstractmethod
     def _expression(self, change: Sequence[Node]) -> Node:
-        """Return what `_advance` gives, made of the clipped changes of the inputs."""
+        """Return the result of `_advance` as an expression of the clipped changes of the inputs."""
 
     @abstractmethod
     def coefficients_by_name(self) -> dict[str, float]:
@@ -163,7 +163,7 @@ class ErrorModel(ABC):
         return found is not None and max(left) <= found.none_rms
 
     def widening(self, names: Collection[str]) -> float:
-        """Return how many times its error on unseen cycles grows without some of its inputs; at least 1."""
+        """Return the factor by which its error on unseen cycles increases without some of its inputs; at least 1."""
         found, key = self.honest_error, ", ".join(i.name for i in self.inputs if i.name in names)
         return 1.0 if found is None or not found.rms else max(1.0, found.lost.get(key, 0.0) / found.rms)
 
@@ -191,7 +191,7 @@ class ErrorModel(ABC):
         return State(zero, None, np.zeros(()), np.zeros(len(self.inputs), dtype=np.bool_))
 
     def step(self, state: State, inputs: FloatArray, dt: float) -> tuple[State, FloatArray]:
-        """Take one reading in and give the deviation at its instant.
+        """Process one reading and return the deviation at its instant.
 
         Parameters
         ----------
@@ -240,7 +240,7 @@ class ErrorModel(ABC):
         return clipped, np.asarray(clipped != change)
 
     def distance(self, state: State, inputs: FloatArray) -> FloatArray:
-        """Return how far a reading is from what was trained, in all inputs together.
+        """Return the distance of a reading from the training data, in all inputs together.
 
         Parameters
         ----------
@@ -284,7 +284,7 @@ class ErrorModel(ABC):
         return self.band.half_width(change, spread) + kept
 
     def directions(self, state: State, inputs: FloatArray) -> FloatArray:
-        """Return what the structures differ in that the model is the average of.
+        """Return the directions in which the structures averaged by the model differ.
 
         Parameters
         ----------
@@ -310,7 +310,7 @@ class ErrorModel(ABC):
     def _supported(
         self, before: FloatArray, deviation: FloatArray, change: FloatArray, clipped: FloatArray
     ) -> FloatArray:
-        """Return the deviation that ``hold`` or ``fade`` lets pass."""
+        """Return the deviation after ``hold`` or ``fade``."""
         far = np.zeros(change.shape[:-1]) if self.joint is None else self.joint.distance(change)
         outside = (clipped != change).any(axis=-1) | ~(far <= 1.0)
         if not outside.any():
@@ -337,7 +337,7 @@ class ErrorModel(ABC):
             of its own: the mean over its start, see `Zeroing`; whether the spindle is stopped there is read from its
             column, if there is one. A model without memory does without; then the first row is the zero.
         reference : array-like of shape (n_inputs,), optional
-            What counts as zero, as in `init`.
+            Zero of the inputs, as in `init`.
 
         Returns
         -------
@@ -355,12 +355,12 @@ class ErrorModel(ABC):
     def half_widths(
         self, table: Columns, time: ArrayLike | str | None = None, *, reference: ArrayLike | None = None
     ) -> FloatArray:
-        """Return the half-widths of the band about what `predict` says of the same table.
+        """Return the half-widths of the band about the result of `predict` for the same table.
 
         Parameters
         ----------
         table, time, reference
-            Of `predict`.
+            As for `predict`.
 
         Returns
         -------
@@ -378,7 +378,7 @@ class ErrorModel(ABC):
         Parameters
         ----------
         table, time, reference
-            Of `predict`.
+            As for `predict`.
 
         Yields
         ------
@@ -444,12 +444,12 @@ class ErrorModel(ABC):
         return low.tolist(), high.tolist(), self._fade_span.tolist()
 
     def expression(self, change: Sequence[Node] | None = None) -> Node:
-        """Return what the model computes as a tree: what `step` gives with the support policy ``clip``.
+        """Return the computation of the model as a tree: that of `step` with the support policy ``clip``.
 
         Parameters
         ----------
         change : sequence of Node, optional
-            What stands for the inputs minus their zero, clipped to the trained range.
+            Expressions of the inputs minus their zero, clipped to the training range.
         """
         bounds = zip(self.inputs, *(b.tolist() for b in self._bounds), strict=True)
         return self._expression(change or [Clip(Leaf(k, i.name), low, high) for k, (i, low, high) in enumerate(bounds)])
@@ -464,12 +464,12 @@ class ErrorModel(ABC):
         return self.honest_error is not None and self.honest_error.word == "accepted"
 
     def taken(self, by: str | None) -> Self:
-        """Return this model as one that somebody takes although it is unproven; as it is, if it is not.
+        """Return this model with the approval of a person if it is unproven; else unchanged.
 
         Parameters
         ----------
         by : str or None
-            Who, and why, such as ``"M. Weber, trial on machine 7"``; None is nobody.
+            Person and reason, such as ``"M. Weber, trial on machine 7"``; None: not approved.
 
         Raises
         ------
@@ -487,7 +487,7 @@ class ErrorModel(ABC):
         return replace(self, honest_error=replace(found, taken=f"{name.strip()}, {reason.strip()}"))
 
     def check_may_run(self) -> None:
-        """Refuse to run what the do-no-harm gate did not let pass, unless somebody takes what is unproven.
+        """Refuse to run a model that the do-no-harm gate did not accept, unless a person approved it as unproven.
 
         Raises
         ------

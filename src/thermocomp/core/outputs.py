@@ -1,4 +1,4 @@
-"""Where an output may be written: looked at before any work is done, and again when it is."""
+"""Check of output paths: before any work is done, and again on writing."""
 
 import errno
 import os
@@ -22,9 +22,9 @@ def refuse_existing(paths: Sequence[Path], overwrite: bool, inputs: Sequence[Pat
     overwrite : bool
         Existing files may be replaced.
     inputs : sequence of Path
-        What is read: never to be replaced.
+        Input files: never overwritten.
     ending : str
-        Of the names of such files, such as ``.html``.
+        Extension of such files, such as ``.html``.
 
     Raises
     ------
@@ -42,7 +42,7 @@ def refuse_existing(paths: Sequence[Path], overwrite: bool, inputs: Sequence[Pat
 
 
 def find_place(target: Path) -> Path:
-    """Return where a file is really written: links are followed, the last one even if it leads to nothing.
+    """Return the real path of a file: links are followed, the last one even if its target does not exist.
 
     Returns
     -------
@@ -75,7 +75,7 @@ def find_place(target: Path) -> Path:
 
 
 def cannot_be_written(target: Path, error: OSError) -> InputError:
-    """Return what a user must know of an error of the disk."""
+    """Return the message for the user about an error of the disk."""
     hint = f"; a file must be allowed beside it, in {target.parent}" if error.errno in _NOT_ALLOWED else ""
     why = os.strerror(error.errno) if error.errno else error
     return InputError(f"{target}: cannot be written: {why}{hint}; what was there is as it was")

@@ -12,7 +12,7 @@ IntArray = NDArray[np.intp]
 
 
 class Bank(NamedTuple):
-    """What the states of a `PacedDynamic` follow, and how fast."""
+    """Inputs and time constants of the states of a `PacedDynamic`."""
 
     temperatures: IntArray  #: (n_temperatures,), inputs that are temperatures
     taus: int  #: lags of each
@@ -23,7 +23,7 @@ class Bank(NamedTuple):
     top: float  #: [1/min]
 
     def signals(self, change: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return what the states follow, (..., n_memory), and the share of top speed of each speed state."""
+        """Return the inputs of the states, (..., n_memory), and the fraction of top speed of each speed state."""
         share = np.abs(change.take(self.speeds, axis=-1)) / self.top
         temperatures = change.take(self.temperatures, axis=-1)
         return np.concatenate((*(temperatures,) * self.taus, share**self.powers), axis=-1), share

@@ -42,7 +42,7 @@ class SpeedState:
     input : int
         Index into the inputs of the model.
     power : float
-        Of the speed's share of the top speed.
+        Exponent of the fraction of the top speed.
     stopped, running : float
         Time constant at rest and at top speed [s]; its reciprocal is linear in the speed.
     weight : float
@@ -69,7 +69,7 @@ class PacedDynamic(ErrorModel):
     family : str
         Its word in a file.
     time_constants : tuple of float
-        Of the lags, the same for all temperatures [s].
+        Time constants of the lags, the same for all temperatures [s].
     temperatures : tuple of LaggedInput
     top_speed : float
         n_top [1/min].
@@ -145,7 +145,7 @@ class PacedDynamic(ErrorModel):
 
     @cached_property
     def bank(self) -> Bank:
-        """What its states follow; models with the same one can share them."""
+        """Bank of its states; models with the same bank can share them."""
         taus, states = self.time_constants, self.states
         stopped = [1 / s.stopped for s in states]
         lags = [1 / tau for tau in taus for _ in self.temperatures]

@@ -21,7 +21,7 @@ def find_plugins(group: Group, report: Callable[[str], object] = lambda _: None)
     ----------
     group : {'commands', 'methods', 'exporters', 'sources', 'sinks', 'pages'}
     report : callable, optional
-        Called with a line of text for each one that is skipped: this package's own name is taken.
+        Called with a line of text for each skipped one: names of this package cannot be overridden.
     """
     found: dict[str, EntryPoint] = {}
     entries = _read_entries(group, tuple(sys.path))
@@ -36,12 +36,12 @@ def find_plugins(group: Group, report: Callable[[str], object] = lambda _: None)
 
 @cache
 def _read_entries(group: Group, _path: tuple[str, ...]) -> EntryPoints:
-    """Return what is installed on a path: reading it takes a file of every package."""
+    """Return the entry points installed on a path: this reads a file of every package."""
     return entry_points(group=f"thermocomp.{group}")
 
 
 def describe_plugin(entry: EntryPoint) -> str:
-    """Return what names a plug-in in messages."""
+    """Return the name of a plug-in for messages."""
     package = f" of the package {entry.dist.name}" if entry.dist is not None else ""
     return f"plug-in {entry.name} ({entry.group}){package}"
 

@@ -11,7 +11,7 @@ from thermocomp.core.reading import Measurement, Reading
 
 
 class LinkStatus(NamedTuple):
-    """How a connection is."""
+    """Status of a connection."""
 
     state: Literal["closed", "connecting", "connected", "failed"]
     reason: str = ""  #: why it failed
@@ -20,7 +20,7 @@ class LinkStatus(NamedTuple):
 
 @runtime_checkable
 class Source(Protocol):
-    """Where readings come from."""
+    """Source of readings."""
 
     async def connect(self, timeout: float) -> None:
         """Connect, or raise `ThermocompError` with the reason after `timeout` seconds."""
@@ -41,7 +41,7 @@ class Source(Protocol):
 
 @runtime_checkable
 class Probe(Protocol):
-    """Where measurements of the tool point come from while the machine runs."""
+    """Source of measurements of the tool point while the machine runs."""
 
     async def connect(self, timeout: float) -> None:
         """Connect, or raise `ThermocompError` with the reason after `timeout` seconds."""
@@ -74,17 +74,17 @@ class Suspending(Protocol):
     """A sink that knows when the controller can have no correction in force, such as before homing."""
 
     def suspended(self) -> Mapping[str, str]:
-        """Return axes or targets without a correction in force, and why, as it was told last."""
+        """Return axes or targets without a correction in force, and the reason, as last reported."""
         ...
 
     def alarms(self) -> Mapping[str, str]:
-        """Return axes or targets whose correction is not in force as it shall be, and why, as it was told last."""
+        """Return axes or targets whose correction in force is not the demanded one, and why, as last reported."""
         ...
 
 
 @runtime_checkable
 class Sink(Protocol):
-    """Where corrections go."""
+    """Receiver of corrections."""
 
     async def connect(self, timeout: float) -> None:
         """Connect, or raise `ThermocompError` with the reason after `timeout` seconds."""

@@ -30,11 +30,11 @@ class PositionModel:
         Component it models, such as ``EYY``.
     unit : {'um', 'urad'}
     axis : {'X', 'Y', 'Z'}
-        Whose position p is.
+        Axis of the position p.
     travel : tuple of float
         From where to where the slopes were measured [mm]; beyond, the value at the end holds.
     reference_position : float
-        Where q is zero [mm].
+        Position at which q is zero [mm].
     profile : Profile or None
         f_g, in the reference state; None: zero.
     offset : ErrorModel or None
@@ -81,7 +81,7 @@ class PositionModel:
         return tuple(m for _, m in self._by_power)
 
     def taken(self, by: str | None) -> "PositionModel":
-        """Return this model as one that somebody takes although it is unproven; see `ErrorModel.taken`."""
+        """Return this model with the approval of a person if it is unproven; see `ErrorModel.taken`."""
         offset = None if self.offset is None else self.offset.taken(by)
         return replace(self, offset=offset, slopes=tuple(m.taken(by) for m in self.slopes))
 
@@ -91,7 +91,7 @@ class PositionModel:
         return tuple(k for k, _ in self._by_power)
 
     def ranges(self) -> tuple[tuple[str, str, tuple[float, float]], ...]:
-        """Return what is known of it over a range: profile or slope, along which axis, from where to where [mm]."""
+        """Return the valid ranges: profile or slope, axis, start and end [mm]."""
         profile = self.profile.ranges() if self.profile is not None else {}
         slopes = (("slope", self.axis, self.travel),) if self.slopes else ()
         return (*(("profile", name, known) for name, known in profile.items()), *slopes)
@@ -104,7 +104,7 @@ class PositionModel:
         points : ndarray of shape (..., 3)
             x, y, z [mm].
         factors : ndarray of shape (n_models,)
-            What `models` say, in their order.
+            Outputs of `models`, in their order.
 
         Returns
         -------

@@ -38,11 +38,11 @@ class PolynomialProfile:
     exponents : tuple of (int, int, int)
         i, j, k of each term.
     coefficients : tuple of float
-        Of each term [unit of the error].
+        Coefficient of each term [unit of the error].
     centre, scale : tuple of float
         For x, y, z [mm]; a polynomial in mm has centre 0 and scale 1.
     low, high : tuple of float
-        Where it was measured, x, y, z [mm]; beyond, the value at the border holds.
+        Measured range, x, y, z [mm]; beyond, the value at the border holds.
     """
 
     kind: Literal["polynomial"] = "polynomial"

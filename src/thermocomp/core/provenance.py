@@ -1,4 +1,4 @@
-"""What stands beside the numbers of a model: where it comes from, and how it was judged."""
+"""Metadata of a model: its origin, and the results of judging."""
 
 from dataclasses import dataclass, field
 from statistics import median
@@ -11,7 +11,7 @@ from thermocomp.core.learned import Learned
 
 @dataclass(frozen=True)
 class Provenance:
-    """Where a model comes from.
+    """Origin of a model.
 
     Parameters
     ----------
@@ -30,11 +30,11 @@ class Provenance:
     source : str
         A publication, for models taken from one.
     learned : Learned or None
-        What those rows showed of the target.
+        Training statistics of the target in those rows.
     prints : Prints or None
         Fingerprints of the rows it was fitted to: they are known again in another file.
     starts : tuple of str
-        How each of the recordings began: cold, continued, rezeroed or known; in the order of `data_sha256`.
+        Initial state of each recording: cold, continued, rezeroed or known; in the order of `data_sha256`.
     """
 
     method: str
@@ -63,17 +63,17 @@ class HonestError:
     Parameters
     ----------
     protocol : str
-        How the unseen cycles were chosen.
+        Method by which the unseen cycles were chosen.
     mae, rms, max_abs : float
-        Of the residual over all unseen cycles [unit of the model].
+        Figures of the residual over all unseen cycles [unit of the model].
     none_mae, none_rms : float
         The same without compensation.
     cycles : dict of str to float
         RMS of the residual per unseen cycle.
     verdict : {'accepted', 'unproven', 'refused'}
-        Of the do-no-harm gate.
+        Verdict of the do-no-harm gate.
     reason : str
-        Why, in words.
+        Reason, in words.
     units : int
         Independent cycles or files it was judged on.
     tried : int
@@ -83,7 +83,7 @@ class HonestError:
     taken : str
         Person who approved the use of an unproven model, and the reason; empty without.
     harm_margin : float or None
-        Harm in a single cycle that was let pass, as it was stated before judging; None: by rule.
+        Tolerated degradation in a single cycle, as stated before judging; None: by rule.
     lost : dict of str to float
         RMS of the residual with a sensor, or with several of them (``t1_C, t2_C``, in the order of the inputs), read
         as their zero from the start on, the watch being there to find it [unit of the model].

@@ -1,4 +1,4 @@
-"""What the shop floor says at one instant."""
+"""Readings of the machine at one instant."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,9 +12,9 @@ class Reading:
     Parameters
     ----------
     time : float
-        When it was taken [s]; any clock that only moves forward.
+        Time of the reading [s]; any clock that only moves forward.
     values : mapping of str to float
-        Channel name to value in house units: temperatures [degC], spindle speed [1/min].
+        Channel name to value in internal units: temperatures [degC], spindle speed [1/min].
     positions : mapping of str to float
         Axis letter to position [mm].
 

@@ -1,4 +1,4 @@
-"""Texts from outside, made fit to be read: no name of a file moves a cursor, changes colours or begins a line."""
+"""External texts, escaped for display: no name of a file moves a cursor, changes colours or begins a line."""
 
 from unicodedata import category
 
@@ -32,7 +32,7 @@ def escape(text: object, longest: int) -> str:
     ----------
     text : object
     longest : int
-        Characters of the text that are shown; dots stand for the others.
+        Number of characters of the text that are shown; dots replace the others.
 
     Returns
     -------
@@ -44,7 +44,7 @@ def escape(text: object, longest: int) -> str:
 
 
 def explain_unfit(text: str, longest: int = 200) -> str:
-    """Say why a text of others cannot be a name; the empty string if it can.
+    """Return the reason why an external text cannot be a name; empty if it can.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def explain_unfit(text: str, longest: int = 200) -> str:
     Returns
     -------
     str
-        What is wrong, with the text escaped.
+        Fault, with the text escaped.
     """
     if len(text) > longest:
         return f"{text[:40]!a}... has {len(text):,} characters; at most {longest:,}"

@@ -11,7 +11,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Size:
-    """How large an error is over some points.
+    """Magnitude of an error over some points.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ Tap = tuple[Input, float, float]
 
 
 class StackState(NamedTuple):
-    """All that a stack remembers between two steps; leading axes, if any, are a batch of independent runs."""
+    """State of a stack between two steps; leading axes, if any, are a batch of independent runs."""
 
     reference: FloatArray  #: (..., n_taps), what counts as zero
     memory: FloatArray | None  #: (..., n_lags); None before the first reading
@@ -33,7 +33,7 @@ class StackState(NamedTuple):
 
 
 class Stack:
-    """Several models behind one `init` and one `step`; each says what it says alone, to rounding.
+    """Several models behind one `init` and one `step`; each has the same output as alone, to rounding.
 
     A `Polynomial` is a `LinearDynamic` without lags: models of the two families share one table of terms, one bank of
     lags and one read-out, in which an input, variable or term that several of them use is evaluated once. Each
@@ -86,7 +86,7 @@ class Stack:
         return np.array([self.inputs.index(i.name) for i in model.inputs], dtype=np.intp)
 
     def _lay(self, linear: Sequence[tuple[int, Polynomial | LinearDynamic]]) -> None:
-        """Lay the models of the two linear families beside each other."""
+        """Arrange the models of the two linear families side by side."""
         # what is in one of these dicts already is not laid again: it gets the place that it has
         taps: dict[Tap, int] = {}
         variables: dict[tuple[tuple[int, float], ...], int] = {}
@@ -149,7 +149,7 @@ class Stack:
         )
 
     def step(self, state: StackState, values: FloatArray, dt: float) -> tuple[StackState, FloatArray]:
-        """Take one reading in and give the deviations at its instant.
+        """Process one reading and return the deviations at its instant.
 
         Parameters
         ----------

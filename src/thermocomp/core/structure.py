@@ -90,7 +90,7 @@ class Structure:
 
     @property
     def code(self) -> str:
-        """The code of ISO 10791; rotary axes stand nearest to workpiece and tool, wherever they were."""
+        """Code of ISO 10791; rotary axes are nearest to workpiece and tool, wherever they were."""
         table = [f"{a}'" for a, side in self.rotary.items() if side == "table"]
         head = [a for a, side in self.rotary.items() if side == "head"]
         return " ".join(["w", *table, *(f"{a}'" for a in self.workpiece), "b", *self.tool, *head, "(C1)", "t"])
@@ -118,7 +118,7 @@ def _made(workpiece: Sequence[str], tool: Sequence[str]) -> Structure:
 
 
 def _axes(text: str, code: str, *, primed: bool) -> tuple[str, ...]:
-    """Return the letters of one side, with or without a prime as the side wants it."""
+    """Return the letters of one side, with or without a prime as the side requires."""
     side, found = ("workpiece" if primed else "tool"), []
     for word in _WORD.findall(text):
         if primed and _SPINDLE.fullmatch(word):

@@ -34,7 +34,7 @@ class Variable:
     Raises
     ------
     SettingError
-        What is not a name, no input, or a factor that is no finite number.
+        Something is not a name, not an input, or a factor is NaN or infinite.
     """
 
     name: str

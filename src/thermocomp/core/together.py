@@ -11,7 +11,7 @@ from thermocomp.core.paceddynamic import PacedDynamic
 
 
 class TogetherState(NamedTuple):
-    """All that such models remember between two steps; leading axes, if any, are a batch of independent runs."""
+    """State of such models between two steps; leading axes, if any, are a batch of independent runs."""
 
     reference: FloatArray  #: (..., n_inputs), what counts as zero
     memory: FloatArray | None  #: (..., n_memory); None before the first reading
@@ -21,12 +21,12 @@ class TogetherState(NamedTuple):
 
 
 class Together:
-    """Models of the same inputs and states, each with a read-out of its own; each says what it says alone.
+    """Models with the same inputs and states, each with a separate read-out; each has the same output as alone.
 
     Parameters
     ----------
     models : sequence of PacedDynamic
-        Of one `key`.
+        Models with the same `key`.
     """
 
     def __init__(self, models: Sequence[PacedDynamic]) -> None:
@@ -46,7 +46,7 @@ class Together:
 
     @staticmethod
     def key(model: PacedDynamic) -> tuple[object, ...] | None:
-        """Return what models have in common that can be stepped together; None for one that is stepped alone."""
+        """Return the key shared by models that can be stepped together; None for one that is stepped alone."""
         band = model.band
         if model.support.policy != "clip" or (band is not None and not band.speeds):
             return None
@@ -61,7 +61,7 @@ class Together:
         return TogetherState(zero.reference, None, np.zeros_like(zero.reference), zero.outside)
 
     def step(self, state: TogetherState, values: FloatArray, dt: float) -> tuple[TogetherState, FloatArray]:
-        """Take one reading in, as `ErrorModel.step` does, and give the deviations, (..., n_models)."""
+        """Process one reading, as `ErrorModel.step` does, and return the deviations, (..., n_models)."""
         reference = state.reference if state.memory is not None else self._first.settle(state.reference, values)
         change, outside = self._first.clip(values - reference)
         if state.memory is None:

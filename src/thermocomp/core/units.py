@@ -1,4 +1,4 @@
-"""Units at the doors: inside the house everything is mm, um, urad, degC, s, 1/min."""
+"""Units at the interfaces: internally all values are in mm, um, urad, degC, s, 1/min."""
 
 import math
 import re
@@ -11,7 +11,7 @@ from thermocomp.core.exceptions import UnitError
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit a file may use, and how it becomes the house unit of its quantity.
+    """A unit that a file may use, and its conversion to the internal unit of its quantity.
 
     ``value_in_house_unit = scale * value + shift``
 
@@ -24,9 +24,9 @@ class Unit:
     house : str
         House unit of that quantity.
     scale : float
-        [house unit per unit]
+        [internal unit per unit]
     shift : float
-        [house unit]
+        [internal unit]
     """
 
     symbol: str
@@ -224,12 +224,12 @@ def read_with_unit(text: object, quantity: str) -> float | None:
     text : object
         Such as ``"250 mm"``.
     quantity : str
-        What it must measure, a key of `HOUSE_UNITS`.
+        Required quantity, a key of `HOUSE_UNITS`.
 
     Returns
     -------
     float or None
-        In the house unit; None: it is not text of a number and a unit.
+        Value in the internal unit; None: it is not text of a number and a unit.
 
     Raises
     ------

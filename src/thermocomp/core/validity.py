@@ -1,4 +1,4 @@
-"""What the units that a model was judged on have covered."""
+"""Conditions covered by the units on which a model was judged."""
 
 from dataclasses import dataclass
 
@@ -8,14 +8,14 @@ from thermocomp.core.exceptions import SettingError
 
 @dataclass(frozen=True)
 class Validity:
-    """What the judged units covered: for these conditions the honest error speaks.
+    """Conditions covered by the judged units, for which the honest error is valid.
 
     Parameters
     ----------
     units : int
         Cycles, files or blocks that were judged.
     independent : int
-        So many of them are left when those that are alike count once.
+        Number of them when similar ones count once.
     nearest : float or None
         Distance of the two units that are most alike, in standard deviations of the inputs; None with a single unit.
         Below `thermocomp.judging.coverage.ALIKE` two units are alike.

@@ -51,7 +51,7 @@ class Watched:
     moved : float
         It is stuck when its prediction moves by more while it reads the same [degC].
     still : float
-        It is stuck when it reads the same for longer, another one changing; `GAP` where time says nothing of that [s].
+        Longest constant reading while another one changes; beyond it is stuck; `GAP` where time is no criterion [s].
     unseen : float
         Root mean square error of its prediction in cycles that were left out [degC].
     """
@@ -76,11 +76,11 @@ class Watch:
     zeroing : Zeroing
         Over how long their zero is averaged.
     time_constants : tuple of float
-        Of the lags, the same for all temperatures [s].
+        Time constants of the lags, the same for all temperatures [s].
     top_speed : float
         [1/min]
     states : tuple of (int, float, float, float)
-        Of the speed: input, power, time constants at rest and at top speed [s].
+        States of the speed: input, power, time constants at rest and at top speed [s].
     sensors : tuple of Watched
         One per temperature, in the order of the inputs.
     pace : float
@@ -136,7 +136,7 @@ class Watch:
 
     @cached_property
     def bank(self) -> Bank:
-        """What its states follow."""
+        """Bank of its states."""
         stopped = [1 / slow for _, _, slow, _ in self.states]
         lags = [1 / tau for tau in self.time_constants for _ in self.sensors]
         return Bank(
@@ -157,7 +157,7 @@ class Watch:
 
     @cached_property
     def signatures(self) -> FloatArray:
-        """What one degree in one sensor does to the differences of all, at once and in the end, (2, n, n), by row."""
+        """Effect of one degree in one sensor on the residuals of all, at once and in the end, (2, n, n), by row."""
         n = len(self.sensors)
         direct, states = self.read_out
         lagged = states[: n * len(self.time_constants)].reshape(-1, n, n).sum(axis=0)

@@ -1,4 +1,4 @@
-"""What temperatures are counted from: not one reading but the mean over the first minutes, as long as nothing turns.
+"""Reference temperatures (zero): not one reading but the mean over the first minutes, while the spindle is stopped.
 
 The same few lines decide it live, in a replay and in training: a model finds at the machine what it has learned from.
 The readings of the zero are themselves taken as their mean: the machine rests in it, and what has a memory begins
@@ -37,7 +37,7 @@ class Zeroing:
         The same where it turns from the first reading on, or nothing is known of it [s]: short, for what warms up must
         not get into the zero. Of a test recorded once a minute it is the first row.
     speed : str
-        Channel that tells whether the spindle is stopped [1/min]; empty if there is none.
+        Channel that shows whether the spindle is stopped [1/min]; empty if there is none.
 
     Raises
     ------
@@ -55,7 +55,7 @@ class Zeroing:
             check_name("zero", self.speed)
 
     def stands(self, speed: object) -> bool:
-        """Return whether a reading of `speed` says that the spindle is stopped; anything but a number does not."""
+        """Return whether a reading of `speed` shows that the spindle is stopped; anything but a number does not."""
         return isinstance(speed, float | int) and type(speed) is not bool and abs(speed) <= STANDS
 
 
@@ -91,13 +91,13 @@ class Gathered(NamedTuple):
 
 
 def first_rows(zeroing: Zeroing, time: FloatArray, resting: BoolArray) -> tuple[int, int]:
-    """Return how many readings of a test, from its first on, its zero is averaged of, and when it is known.
+    """Return the number of readings from the start of a test over which its zero is averaged, and the time it is known.
 
     Parameters
     ----------
     zeroing : Zeroing
     time : ndarray of shape (n_readings,)
-        Of the usable readings, rising [s].
+        Times of the usable readings, increasing [s].
     resting : ndarray of bool of shape (n_readings,)
         The spindle is known to be stopped.
 
@@ -146,7 +146,7 @@ def find_zero(
     ----------
     zeroing : Zeroing
     zero : ndarray of shape (n_inputs,)
-        What is known of it; nan where the first readings decide.
+        Known part of the zero; nan where the first readings decide.
     time : ndarray of shape (n_rows,)
         [s]
     values : ndarray of shape (n_rows, n_inputs)

@@ -1,4 +1,4 @@
-"""Which axis a correction goes to, and what a controller takes for it: offset, slope, and where that counts from."""
+"""Axis of each correction, and its form for a controller: offset, slope, and reference position."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -25,7 +25,7 @@ def find_drives(tables: Tables, named: Mapping[str, str]) -> list[Drive]:
     Parameters
     ----------
     tables : Tables
-        Of the compensator.
+        Tables of the compensator.
     named : mapping of str to str
         Axes by target; those of the names, such as z_um, if there are none.
 
@@ -60,7 +60,7 @@ WHOLE = 2**31 - 1
 
 
 class Value(NamedTuple):
-    """What a controller takes of an axis."""
+    """Value that a controller accepts for an axis."""
 
     name: str
     about: str
@@ -76,13 +76,13 @@ def write_values(
     Parameters
     ----------
     name : str
-        Of the block.
+        Name of the block.
     dialect : {'codesys', 'twincat', 'scl'}
     drives : list of Drive
     taken : mapping of str to Value
         For ``offset``, ``slope`` and ``position``.
     direction : float
-        1 if the controller adds what it is given to the command, -1 if it takes it off; an input that can be changed.
+        1 if the controller adds its input to the command, -1 if it subtracts it; an input that can be changed.
 
     Raises
     ------

@@ -103,6 +103,6 @@ def write_script(answers: str, name: str) -> str:
     answers : str
         `KLIPPER`, `HEIDENHAIN` or `FANUC`: how what was written is read.
     name : str
-        Of the files.
+        Name of the files.
     """
     return _SCRIPT.format(name=name, file=f"{name}.{_FILES[answers]}", answers=answers)

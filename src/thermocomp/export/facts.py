@@ -1,4 +1,4 @@
-"""What is said of an exported compensator before anything else: may it run, what it is, where it comes from."""
+"""Summary of an exported compensator: verdict, contents and origin."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -8,18 +8,18 @@ from thermocomp.runtime.compensator import Compensator
 
 @dataclass(frozen=True)
 class Facts:
-    """Where an export comes from.
+    """Origin of an export.
 
     Parameters
     ----------
     source : str
         Model file.
     sha256 : str
-        Of that file.
+        SHA-256 of that file.
     version : str
         thermocomp version that exports.
     date : str
-        Of the export.
+        Date of the export.
     left_out : mapping of str to str
         Targets of the model file that are not in the export, and why.
     """
@@ -31,7 +31,7 @@ class Facts:
     left_out: Mapping[str, str] = field(default_factory=dict)
 
     def origin(self) -> list[str]:
-        """Return where it comes from."""
+        """Return the origin."""
         return [
             f"Model: {self.source}, SHA-256 {self.sha256}",
             f"Written by thermocomp {self.version} on {self.date}; change nothing here, export again",
@@ -39,7 +39,7 @@ class Facts:
         ]
 
     def lines(self, compensator: Compensator) -> list[str]:
-        """Return what is to be known, the verdict in the first line.
+        """Return the summary, with the verdict in the first line.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""What a page says of an exported compensator, in whatever language: what goes in, what comes out, what it means."""
+"""Page of an exported compensator, for all languages: inputs, outputs, and their meaning."""
 
 from thermocomp.export.block.tables import Tables
 from thermocomp.runtime.compensator import Compensator
@@ -11,9 +11,9 @@ def describe(compensator: Compensator, tables: Tables, of: str = "") -> dict[str
     ----------
     compensator : Compensator
     tables : Tables
-        Of it.
+        Tables of the compensator.
     of : str
-        Before the names of what comes out.
+        Prefix of the names of the outputs.
     """
     slopes = any(tables.values["to_slope"])
     zeroing = compensator.models[0].zeroing

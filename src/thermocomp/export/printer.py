@@ -19,7 +19,7 @@ class Printer(ABC):
     ----------
     function : Function
     sizes : mapping of str to int
-        Of the block's tables.
+        Sizes of the block's tables.
     """
 
     #: by the type of the syntax tree
@@ -78,7 +78,7 @@ class Printer(ABC):
         return text
 
     def kind(self, node: ast.expr) -> Kind:
-        """Return what an expression gives."""
+        """Return the type of an expression."""
         return kind_of(node, self._known)
 
     def bare(self, node: ast.expr, kind: Kind | None = None) -> str:

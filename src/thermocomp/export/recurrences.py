@@ -1,4 +1,4 @@
-"""What a value with a clock of its own looks back at: see `thermocomp.core.expression.Recurrence`."""
+"""Past values used by a value with a separate clock: see `thermocomp.core.expression.Recurrence`."""
 
 from collections.abc import Iterator
 
@@ -11,7 +11,7 @@ class Clock:
     Parameters
     ----------
     tick : Node
-        What it becomes.
+        New value.
     interval : float
         From tick to tick [s].
     """

@@ -24,7 +24,7 @@ _Model = TypeVar("_Model", bound=ErrorModel | PositionModel)
 
 @dataclass(frozen=True, kw_only=True)
 class ExportOrder:
-    """What is to be written.
+    """Export to be written.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class ExportOrder:
     target : Target
     limits : Limits
     name : str
-        Of the files.
+        Name of the files.
     facts : Facts
     options : ReductionOptions
     """
@@ -47,7 +47,7 @@ class ExportOrder:
 
 
 class Outcome(NamedTuple):
-    """What comes of an export."""
+    """Result of an export."""
 
     files: dict[str, bytes]  #: by their names
     refused: dict[str, str]  #: targets that may not be written, and why
@@ -71,9 +71,9 @@ def export_reduced(
     recordings : sequence of Recording
         That they are reduced on.
     starts : Start or sequence of Start, optional
-        How the recordings begin.
+        Initial state of the recordings.
     accept_unproven : str or None
-        Who takes an unproven model, and why.
+        Person who approves use of an unproven model, and reason.
     listener : Listener
 
     Raises

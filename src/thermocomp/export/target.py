@@ -1,4 +1,4 @@
-"""What an export is: a writer, and what its controller takes."""
+"""Export target: a writer, and the options of its controller."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ class Target:
         Returns the files by their names, the page how to use them the last. Gets a compensator, a name and `Facts`;
         with `shape` reduced models, limits, a name, `Facts` and ``figure``.
     shape : Shape or None
-        What the controller holds, if that is less than a model: the best reduced one is fitted to recordings.
+        Form supported by the controller, if simpler than a model: the best reduced one is fitted to recordings.
     axes : bool
         `write` takes ``axes``, letters by target.
     corrected : str

@@ -29,7 +29,7 @@ STATUS = ("restarting", "active", "holding", "fading", "shadow")
 
 
 class Readings(NamedTuple):
-    """What a block is called with."""
+    """Readings passed to a block."""
 
     values: FloatArray  #: (n_calls, n_channels), in the order of `Tables.channels`
     age: FloatArray  #: (n_calls,), of the values [s]
@@ -37,7 +37,7 @@ class Readings(NamedTuple):
 
 
 class Answers(NamedTuple):
-    """What it says."""
+    """Outputs of a block."""
 
     correction: FloatArray  #: (n_calls, n_targets), at the reference position [um]
     slope: FloatArray  #: (n_calls, n_targets) [um/m]
@@ -55,18 +55,18 @@ def replay(
     *,
     rounded: Callable[[FloatArray], FloatArray] | None = None,
 ) -> Answers:
-    """Return what a compensator says of readings, from its start.
+    """Replay readings through a compensator from its initial state and return its outputs.
 
     Parameters
     ----------
     compensator : Compensator
     tables : Tables
-        Of it.
+        Tables of the compensator.
     readings : Readings
     start : CompensatorState, optional
         Another one than that of `Compensator.start`.
     rounded : callable, optional
-        What becomes of all numbers that are kept between two calls.
+        Rounding of all numbers that are kept between two calls.
     """
     names, targets = [c.name for c in tables.channels], tables.targets
     state, clock, begun, rows = start or compensator.start(), 0.0, False, []
@@ -124,12 +124,12 @@ def round_all(value: Any, rounded: Callable[[FloatArray], FloatArray]) -> Any:
 
 
 def find_tolerance(tables: Tables) -> float:
-    """Return how far another code of double precision may be off: what feeds itself makes more of rounding.
+    """Return the tolerance for other code in double precision: feedback amplifies rounding errors.
 
     Parameters
     ----------
     tables : Tables
-        Of the compensator.
+        Tables of the compensator.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Models as code for another controller, in Python."""
+"""Export of models as code for other controllers, in Python."""
 
 import math
 import re
@@ -37,16 +37,16 @@ Models = Sequence[ErrorModel | PositionModel]
 
 @dataclass(frozen=True, eq=False)
 class ExportedCode:
-    """Code for a controller.
+    """Exported code for a controller.
 
     Parameters
     ----------
     files : mapping of str to bytes
-        By their names, the page how to use them the last; none if nothing may be written.
+        Contents by file name, the page of instructions last; empty if nothing may be written.
     refused : mapping of str to str
-        Targets that may not be written, and why.
+        Targets that are refused, with the reason.
     elsewhere : mapping of str to str
-        Targets that the controller does not correct, and why.
+        Targets that the controller does not correct, with the reason.
     """
 
     files: Mapping[str, bytes]
@@ -55,15 +55,15 @@ class ExportedCode:
 
     @property
     def verdict(self) -> str:
-        """May it run: the first line of the page how to use it."""
+        """Verdict on the model: first line of the page of instructions."""
         return self.files[list(self.files)[-1]].decode().split("  \n", 1)[0] if self.files else ""
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all of it for a program: what ``--json`` prints."""
+        """Return all results as a dict, as printed by ``--json``."""
         return {"files": list(self.files), "refused": {**self.refused, **self.elsewhere}}
 
     def save(self, folder: str | Path, *, overwrite: bool = False) -> Path:
-        """Write the files into a folder, all of them or none; return its path."""
+        """Write all files into a folder, or none on an error; return its path."""
         output = Path(folder)
         if output.exists() and not output.is_dir():
             raise InputError(f"{output}: is not a directory")
@@ -91,44 +91,45 @@ def export(
     progress: Callable[..., None] = silent,
     **settings: Any,
 ) -> ExportedCode:
-    """Write the models of a file as code for another controller, with test vectors and how to use it.
+    """Export the models of a file as code for another controller, with test vectors and instructions.
 
-    The code does what ``thermocomp serve`` does: it averages the zero, turns away what is not plausible, replaces a
-    sensor that failed, holds and fades in time, and keeps the limits; as ONNX it takes the zero from its caller and
-    replaces no sensor. A refused model is left out; of an unproven one the correction stays zero.
+    The code works like ``thermocomp serve``: it averages the zero, rejects implausible readings, replaces a failed
+    sensor, holds and fades the correction in time, and applies the limits; the ONNX graph gets the zero from its caller
+    and replaces no sensor. A refused model is not exported; the correction of an unproven one stays zero.
 
-    klipper, heidenhain and fanuc hold less than a model: the best one of what they hold is fitted to recordings, judged
-    on unseen cycles beside the full one, and written with what is lost.
+    klipper, heidenhain and fanuc support simpler models only: the best one of these is fitted to recordings, judged on
+    unseen cycles next to the full model, and written with the loss of accuracy.
 
     Parameters
     ----------
     model : str or Path
-        Model file from ``thermocomp fit``, or of ``thermocomp position``.
+        Model file from ``thermocomp fit`` or ``thermocomp position``.
     to : {'c99', 'st', 'siemens', 'beckhoff', 'linuxcnc', 'onnx', 'klipper', 'heidenhain', 'fanuc'}
-        What to write: c99 is one header and one source of C99, for a DSP, a PLC or a computer; st a function block in
-        structured text, IEC 61131-3; siemens and beckhoff the same and what their temperature compensation takes;
-        linuxcnc the C99 as a component of HAL, and HAL that moves X, Y and Z; onnx one step as a graph, for a computer
-        with a runtime of ONNX; klipper its z_thermal_adjust; heidenhain a formula; fanuc a macro.
+        Output format. c99: a header and a source file in C99, for a DSP, a PLC or a computer; st: a function block in
+        structured text, IEC 61131-3; siemens, beckhoff: the same with the parameters of their temperature compensation;
+        linuxcnc: the C99 as a HAL component, and a HAL file that moves X, Y and Z; onnx: one step as a graph, for a
+        computer with an ONNX runtime; klipper: its z_thermal_adjust; heidenhain: a formula; fanuc: a macro.
     recordings : Recording, path, DataFrame, or sequence of them, optional
-        For klipper, heidenhain and fanuc: CSV, XLSX or Parquet files to reduce the model on; each is one test.
+        CSV, XLSX or Parquet files on which the model is reduced, for klipper, heidenhain and fanuc; each one is a
+        separate test.
     name : str
-        Of the files and functions, behind tc_.
+        Name of the files and functions, after the prefix tc_.
     dialect : {'codesys', 'twincat', 'scl'}, optional
-        Of structured text; codesys if not given.
+        Dialect of structured text. Default: codesys.
     limits : Limits
-        Of the correction.
+        Limits of the correction.
     starts : Start or sequence of Start, optional
         As for `compare`.
     mapping : str, Path or Mapping, optional
-        TOML file that says what the columns of the recordings are.
+        TOML mapping file: role and unit of each column of the recordings.
     accept_unproven : str, optional
         Person who approves the use of an unproven model, and the reason: "NAME, REASON".
     date : str, optional
-        For the first lines, such as 2026-01-31; today if not given.
+        Date written into the file headers, such as 2026-01-31. Default: today.
     progress : callable
         Called with a line of text per reduced model.
     **settings
-        Of the reduction, see `thermocomp.export.reduction.options.ReductionOptions`: ``axes=["ch5_um=Z"]``.
+        Settings of the reduction, see `thermocomp.export.reduction.options.ReductionOptions`: ``axes=["ch5_um=Z"]``.
 
     Returns
     -------
@@ -137,7 +138,7 @@ def export(
     Raises
     ------
     InputError
-        A file or setting cannot be used, or the controller does not take what is asked for.
+        A file or setting is invalid, or the controller does not support a requested setting.
 
     Examples
     --------
@@ -184,7 +185,7 @@ def _read(
     mapping: "str | Path | Columns | None",
     listener: Listener,
 ) -> "list[Recording]":
-    """Return the recordings to reduce a model on; without any nothing of the training side is loaded."""
+    """Return the recordings to reduce a model on; without any, no training code is imported."""
     if recordings is None:
         return []
     from thermocomp.api.inputs import recordings_of, trouble_of
@@ -209,7 +210,7 @@ def _facts(model: Path, date: str | None, left_out: Mapping[str, str]) -> Facts:
 
 
 def _export_whole(order: ExportOrder, models: Models, dialect: Dialect | None) -> Outcome:
-    """Make the files of an export to a target that holds all of a model."""
+    """Create the files for a target that supports the full model."""
     target, options, elsewhere = order.target, order.options, dict[str, str]()
     writer = _writer(target, models, dialect, options.named())
     if target.corrected:
@@ -221,7 +222,7 @@ def _export_whole(order: ExportOrder, models: Models, dialect: Dialect | None) -
 
 
 def _check(to: str, target: Target, name: str, date: str | None, limits: Limits) -> None:
-    """Refuse what would make no file, or one that no controller takes."""
+    """Reject settings that yield no file, or a file that no controller supports."""
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
         raise InputError(f"--name {name!r}: want letters, digits and _, a letter first, such as mill_3")
     most = {"magnitude": target.magnitude, "rate": RANGE, "hold": GAP, "fade": GAP, "reading_age": GAP}
@@ -253,7 +254,7 @@ def _check_options(to: str, target: Target, found: ReductionOptions, dialect: Di
 def _writer(
     target: Target, models: Models, dialect: Dialect | None, named: Mapping[str, str]
 ) -> Callable[..., dict[str, bytes]]:
-    """Return the writer of a target, with what it takes beside the compensator."""
+    """Return the writer of a target, with its arguments other than the compensator."""
     if target.axes and not target.corrected:
         along = {m.target: m.axis for m in models if isinstance(m, PositionModel)}
         for name, axis in named.items():
@@ -264,14 +265,14 @@ def _writer(
 
 
 def _constant(models: Models, to: str) -> list[ErrorModel]:
-    """Return models that say the same at every position."""
+    """Return models with the same output at every position."""
     if along := [m.target for m in models if isinstance(m, PositionModel)]:
         raise InputError(f"{to} supports position-independent corrections only, unlike {along[0]} does")
     return [m for m in models if isinstance(m, ErrorModel)]
 
 
 def _refusal(model: ErrorModel | PositionModel) -> str:
-    """Return why a model must not run at all; nothing if it may, or may once it is taken."""
+    """Return the reason why a model must never run; empty if it may run, or may run once it is approved."""
     parts = model.models if isinstance(model, PositionModel) else (model,)
     verdicts = [m.honest_error for m in parts if m.honest_error is not None]
     return next((v.reason for v in verdicts if v.word == "refused"), "")

@@ -20,7 +20,7 @@ class Warming:
     Parameters
     ----------
     tables : Tables
-        Of the compensator.
+        Tables of the compensator.
     """
 
     def __init__(self, tables: Tables) -> None:
@@ -40,9 +40,9 @@ class Warming:
         Parameters
         ----------
         share : float
-            Of the top speed.
+            Fraction of the top speed.
         dt : float
-            So long [s].
+            Duration [s].
         """
         goal = self.rest + share * (self.high - self.rest)
         slow = self._now + -np.expm1(-_PACE * dt) * (goal - self._now)

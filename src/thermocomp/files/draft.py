@@ -1,4 +1,4 @@
-"""The one way in which anything becomes a file: written whole beside it, put on the disk, and moved to its name.
+"""Writing of files: each is written completely next to its target, flushed to the disk, and renamed.
 
 Whatever fails, or kills the run, leaves the old file or the new one: never half of one, never none where there was one.
 
@@ -33,7 +33,7 @@ class Drafts(dict[Path, Path]):
     ----------
     drafts : dict of Path to Path
     places : dict of Path to Path
-        Where each target really is, links followed.
+        Real path of each target, with links followed.
     overwrite : bool
     """
 
@@ -84,7 +84,7 @@ class _Move(NamedTuple):
 
     @property
     def old(self) -> Path:
-        """Where the old file is kept until all is done."""
+        """Path at which the old file is kept until all is done."""
         return self.path.with_name(f"{self.path.name}-old")
 
     def seal(self) -> None:
@@ -134,7 +134,7 @@ class _Move(NamedTuple):
                 raise
 
     def undo(self) -> None:
-        """Put back what was there, unless somebody else has put something there meanwhile."""
+        """Restore the previous files, unless another program has written new ones meanwhile."""
         if self.old.exists():
             self.old.replace(self.place)
         elif not self.path.exists() or (self.place.exists() and self.place.samefile(self.path)):
@@ -189,7 +189,7 @@ def draft(target: Path, *, overwrite: bool) -> Iterator[Path]:
     Yields
     ------
     Path
-        Of a file that does not exist yet.
+        Path of a file that does not exist yet.
 
     Raises
     ------
@@ -229,7 +229,7 @@ def _status(path: Path) -> os.stat_result | None:
 
 @contextmanager
 def _telling(places: dict[Path, Path]) -> Iterator[None]:
-    """Turn what the disk says about drafts into an error that names the file; errors of other files pass."""
+    """Turn errors of the disk about drafts into an error that names the file; errors of other files pass."""
     try:
         yield
     except OSError as e:

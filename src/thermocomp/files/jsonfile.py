@@ -1,4 +1,4 @@
-"""What the files of models share: JSON with a format, a version and a checksum."""
+"""Common part of the model files: JSON with a format, a version and a checksum."""
 
 import hashlib
 import json
@@ -33,14 +33,14 @@ class Format:
     Parameters
     ----------
     name : str
-        As it stands in the file.
+        Name as in the file.
     version : int
     words : str
-        What to call it.
+        Name of the format in messages.
     command : str
-        What writes it.
+        Command that writes it.
     shared : tuple of str
-        What may stand once for all of its models.
+        Keys that are stored once for all of its models.
     """
 
     name: str
@@ -65,7 +65,7 @@ def pack(kind: Format, body: list[Any], shared: dict[str, Any] | None = None) ->
     body : list
         The models.
     shared : dict, optional
-        What stands once in the file, for all of them.
+        Data stored once in the file, for all of them.
 
     Raises
     ------
@@ -94,19 +94,19 @@ def _lay_out(value: Any, depth: int = 1) -> str:
 
 
 def unpack(kind: Format, entry: Any, text: str, source: str, **shared: Any) -> Any:
-    """Return what is in the text of a file: its ``models``, and what stands once for all of them.
+    """Return the content of a file's text: its ``models``, and the data common to all of them.
 
     Parameters
     ----------
     kind : Format
-        What it must be.
+        Expected format.
     entry : type
-        What each of the models must be.
+        Expected type of each model.
     text : str
     source : str
-        What to call it in an error.
+        Name of the source in an error.
     **shared : type
-        What may stand once for all of them.
+        Types of data stored once for all of them.
 
     Raises
     ------
@@ -136,7 +136,7 @@ def unpack(kind: Format, entry: Any, text: str, source: str, **shared: Any) -> A
 
 @cache
 def _reader_of(entry: Any, **shared: Any) -> SchemaValidator:
-    """Return what reads the models of a file, each of the type `entry`, and what may stand once for all of them.
+    """Return the reader of the models of a file, each of the type `entry`, and of the data common to all of them.
 
     Strict: a number in quotes, a missing or an unknown key is damage, not something to guess at. Of a list of numbers
     the first wrong one is enough: the errors of a million would take a gigabyte.
@@ -184,7 +184,7 @@ def read(kind: Format, path: str | Path) -> tuple[str, str]:
 
 
 def digest(body: list[Any], shared: dict[str, Any] | None = None) -> str:
-    """Return the SHA-256 of models as they stand in a file, with what stands once for all of them."""
+    """Return the SHA-256 of models as stored in a file, with the data common to all of them."""
     whole = [body, shared] if shared else body
     text = json.dumps(whole, sort_keys=True, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
     return hashlib.sha256(text.encode()).hexdigest()
@@ -213,7 +213,7 @@ def _parse(text: str, no: str, source: str, command: str) -> Any:
 
 
 def _found(text: str) -> str:
-    """Return what a text is that is no JSON."""
+    """Return a description of a text that is not JSON."""
     line = next((line.strip() for line in text.splitlines() if line.strip()), "")
     if not line:
         return "it is empty"
@@ -301,6 +301,6 @@ def _tell(error: ErrorDetails, content: Any) -> str:
 
 
 def _short(text: object) -> str:
-    """Return a text or number from a file, quoted, fit to stand in an error."""
+    """Return a text or number from a file, quoted and shortened for an error."""
     shown = ascii(text) if isinstance(text, str) and not text.isprintable() else repr(text)
     return replace_unprintable(shown if len(shown) <= _REPEATED else f"{shown[:_REPEATED]}...")

@@ -1,4 +1,4 @@
-"""The keys of a machine file: what each must be, and how it becomes house units; all that is wrong is kept."""
+"""Keys of a machine file: their types, and the conversion to internal units; all errors are collected."""
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -27,7 +27,7 @@ QUANTITY = {"um": "displacement", "urad": "angle"}
 
 
 class ManyError(SettingError):
-    """All that is wrong, and what was found beside it."""
+    """Collected errors, and the other findings."""
 
     def __init__(self, errors: Sequence[SettingError], found: dict[str, Any]) -> None:
         super().__init__(str(errors[0]))
@@ -44,7 +44,7 @@ def kept(errors: list[SettingError]) -> Iterator[None]:
 
 
 def each(values: Mapping[str, Any], convert: Callable[[str, Any], Any]) -> dict[str, Any]:
-    """Return what becomes of each value; if some cannot be used, `ManyError` with all of them."""
+    """Return the converted values; if some are invalid, raise `ManyError` with all of them."""
     errors: list[SettingError] = []
     found = {}
     for key, value in values.items():
@@ -60,7 +60,7 @@ def each(values: Mapping[str, Any], convert: Callable[[str, Any], Any]) -> dict[
 
 
 def read_table(value: Any, known: Mapping[str, Convert], where: Keys) -> dict[str, Any]:
-    """Return a table in house units."""
+    """Return a table in internal units."""
     if not isinstance(value, dict):
         raise SettingError(f"{value!r}: must be a table", where)
 
@@ -73,7 +73,7 @@ def read_table(value: Any, known: Mapping[str, Convert], where: Keys) -> dict[st
 
 
 def measure(quantity: str) -> Convert:
-    """Return what reads a text with a number and a unit."""
+    """Return a reader of texts with a number and a unit."""
     what, example = _SAID[quantity]
 
     def convert(value: Any, where: Keys) -> float:
@@ -94,7 +94,7 @@ def measure(quantity: str) -> Convert:
 
 
 def _several(convert: Convert, n: int, example: str) -> Convert:
-    """Return what reads a list of n values."""
+    """Return a reader of lists of n values."""
 
     def converted(value: Any, where: Keys) -> tuple[Any, ...]:
         if not isinstance(value, list) or len(value) != n:

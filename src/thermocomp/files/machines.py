@@ -149,7 +149,7 @@ def _axis(name: str, tables: Mapping[str, Any], structure: Structure) -> Axis:
 
 
 def _check_measured_at(axis: Axis, axes: Sequence[Axis]) -> None:
-    """Raise an error if one of the axes cannot have stood where it is said to."""
+    """Raise an error if one of the axes cannot have been at its stated position."""
     for other in axes:
         if other is axis and axis.measured_on == "tool":
             continue
@@ -176,12 +176,12 @@ def _check_counted(
 
 
 class _Sources:
-    """Reads what tells the values of components.
+    """Reader of the sources of the components' values.
 
     Parameters
     ----------
     folder : Path
-        Where the files of models are.
+        Folder of the model files.
     structure : Structure
     axes : mapping of str to Axis
         Those of it that could be read.
@@ -192,7 +192,7 @@ class _Sources:
         self._files: dict[Path, Sequence[ErrorModel | PositionModel]] = {}
 
     def read(self, code: str, value: Any) -> Source:
-        """Return what stands under ``components.CODE``."""
+        """Return the content of ``components.CODE``."""
         where: Keys = ("components", code)
         if code not in BY_CODE:
             raise explain_unknown("component", code, BY_CODE, where)

@@ -55,7 +55,7 @@ def loads(text: str, source: str = "model") -> tuple[ErrorModel, ...]:
     ----------
     text : str
     source : str
-        What to call it in an error.
+        Name of the source in an error.
 
     Raises
     ------
@@ -93,7 +93,7 @@ def read(path: str | Path) -> tuple[ErrorModel, ...]:
 
 
 def entry_of(model: ErrorModel) -> dict[str, Any]:
-    """Return a model as it stands in a file.
+    """Return a model as stored in a file.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Small text files, read whole: of a bounded size, no pipes and devices, UTF-8; and what is said of their errors."""
+"""Small text files, read completely: of a bounded size, no pipes and devices, UTF-8; and their error messages."""
 
 import stat
 from collections.abc import Sequence
@@ -20,11 +20,11 @@ def read_text(path: str | Path, what: str, most: int, failure: type[InputError] 
     ----------
     path : str or Path
     what : str
-        What to call it, such as ``machine file``.
+        Name of the kind of file, such as ``machine file``.
     most : int
         Bytes it may have.
     failure : type of InputError
-        What is raised.
+        Exception type to raise.
 
     Returns
     -------

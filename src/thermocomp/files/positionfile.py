@@ -18,7 +18,7 @@ FORMAT = jsonfile.POSITION_MODELS.name
 
 @dataclass(frozen=True, kw_only=True)
 class _Entry(PositionModel):
-    """A position model as it stands in a file: no key may be missing, and its parts say themselves what they are."""
+    """A position model as stored in a file: no key may be missing, and its parts state their types."""
 
     reference_position: float = field()
     profile: Annotated[Profile, Discriminator("kind")] | None = field()
@@ -50,7 +50,7 @@ def loads(text: str, source: str = "position model") -> tuple[PositionModel, ...
     ----------
     text : str
     source : str
-        What to call it in an error.
+        Name of the source in an error.
 
     Raises
     ------

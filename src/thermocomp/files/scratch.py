@@ -33,7 +33,7 @@ def scratch(folder: Path | None = None) -> Iterator[Path]:
     Yields
     ------
     Path
-        Of a folder that holds nothing but its lock.
+        Path of a folder that contains only its lock.
     """
     folder = folder or Path(gettempdir())
     _clear(folder)

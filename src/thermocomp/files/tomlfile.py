@@ -1,4 +1,4 @@
-"""What the files of settings share: TOML, and what is said if it is none."""
+"""Common part of the settings files: TOML, and its error messages."""
 
 import json
 import re
@@ -24,7 +24,7 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
     ----------
     path : str or Path
     what : str
-        What to call it, such as ``machine file``.
+        Name of the kind of file, such as ``machine file``.
 
     Returns
     -------
@@ -59,7 +59,7 @@ def _depth(value: Any) -> int:
 
 
 def as_json(content: dict[str, Any]) -> str:
-    """Return the content of a TOML file as pydantic takes it strictly: a list for a tuple, but no text for a number.
+    """Return the content of a TOML file for strict validation by pydantic: a list for a tuple, no text for a number.
 
     A date, which JSON has not, becomes a list: nothing that takes a text takes it.
     """

@@ -36,14 +36,14 @@ def decode(kind: Any, value: Any, place: str) -> Any:
     kind : type
         Made of named tuples, dataclasses, tuples, dicts, arrays, plain values and ``None``.
     value : Any
-        What `encode` made of it.
+        Result of `encode`.
     place : str
-        What to call it in an error.
+        Name of the source in an error.
 
     Raises
     ------
     ValueError
-        It is none; the message says where, and what was found.
+        It is invalid; the message contains the location and the value found.
     """
     if get_origin(kind) in (Union, UnionType):
         (inner,) = (p for p in get_args(kind) if p is not NoneType)
@@ -68,9 +68,9 @@ def want(right: bool, value: Any, place: str, what: str) -> None:
     ----------
     right : bool
     value : Any
-        What was found; None is not repeated.
+        Value found; None is not repeated.
     place, what : str
-        Where, and what is wanted.
+        Location, and expected value.
     """
     if not right:
         raise ValueError(f"{place}: want {what}" + ("" if value is None else f", found {value!r:.40}"))

@@ -1,4 +1,4 @@
-"""What models leave in a thermal test of ISO 230-3."""
+"""Residuals of models in a thermal test of ISO 230-3."""
 
 from collections.abc import Sequence
 
@@ -27,21 +27,21 @@ def replay_models(
     recording : Recording
     models : sequence of ErrorModel
     start : Start or None
-        How the recording begins; found out if not given.
+        Initial state of the recording. Default: determined from the recording.
     limits : Limits
-        Of the compensator.
+        Limits of the compensator.
 
     Returns
     -------
     residuals : dict of str to ndarray of shape (n_rows,)
-        What each model leaves of its channel, by channel [its unit].
+        Residual of each model in its channel, by channel [its unit].
     notes : list of str
-        What must be said of the models.
+        Notes on the models.
 
     Raises
     ------
     InputError
-        No model is of a channel, or it cannot be told how the recording begins.
+        No model is of a channel, or the initial state of the recording cannot be determined.
     """
     found: dict[str, FloatArray] = {}
     notes = []

@@ -85,9 +85,9 @@ class PositioningResult:
     repeatability : ndarray of shape (n_targets,) or None
         Bidirectional R of each target.
     A, E, M, R, B, B_mean : float
-        Of the axis.
+        Characteristic values of the axis.
     notes : tuple of str
-        Where the test falls short of what the standard wants.
+        Deviations of the test from the requirements of the standard.
     """
 
     test: Positioning
@@ -111,7 +111,7 @@ class PositioningResult:
 
     @property
     def axis_values(self) -> dict[str, float]:
-        """Values of the axis by symbol; an arrow tells the direction. Without those that were not measured."""
+        """Values of the axis by symbol; an arrow shows the direction. Without those that were not measured."""
         values: dict[str, float] = {}
         for name, arrow in (("+", "↑"), ("-", "↓")):
             if name in self.directions:

@@ -37,7 +37,7 @@ _TARGET = re.compile(r"(([xyz])(?:_[a-z]+)*)_(-?\d+(?:\.\d+)?)", re.IGNORECASE)
 
 
 def detect(recording: Recording) -> Kind:
-    """Return which test a recording holds: its spindle turns, else an axis feeds, else neither: ETVE."""
+    """Return the type of test of a recording: spindle if it turns, else axis if one feeds, else ETVE."""
     turns = any(np.nan_to_num(recording.table[c.name]).any() for c in recording.of_quantity("spindle_speed"))
     feeds = any(np.nan_to_num(recording.table[c.name]).any() for c in recording.of_quantity("feed"))
     return "spindle" if turns else "axis" if feeds else "etve"
@@ -108,9 +108,9 @@ def assess(
         Of displacements or angles of the recording: what they leave is told beside each quantity. They are replayed
         reading by reading from the start of the recording, as a compensator would run them.
     start : Start, optional
-        How the recording begins; found out if not given.
+        Initial state of the recording. Default: determined from the recording.
     limits : Limits
-        Of the compensator.
+        Limits of the compensator.
 
     Returns
     -------
@@ -266,7 +266,7 @@ def _lengths(
 
 
 def _about_curves(kind: Kind, curves: Sequence[ThermalCurve], targets: Sequence[Targets]) -> list[str]:
-    """Return which curves do not move, how calm a spindle test ended, and what grows with a model."""
+    """Return notes on constant curves, the settling of a spindle test, and ranges that increase with a model."""
     notes = []
     still = [c.name for c in curves if np.isfinite(c.values).any() and not c.course.noise.moves]
     if still:
@@ -281,7 +281,7 @@ def _about_curves(kind: Kind, curves: Sequence[ThermalCurve], targets: Sequence[
 
 
 def _about(recording: Recording, kind: Kind, pairs: Sequence[Pair], air: Channel | None) -> list[str]:
-    """Return what is missing of what the standard wants to be told, and what does not go with the kind of the test."""
+    """Return notes on data that the standard requires but are missing, or that do not match the kind of test."""
     notes = []
     runs = detect(recording)
     if kind == "etve" and not (recording.speed or recording.of_quantity("feed")):
@@ -308,7 +308,7 @@ def _about(recording: Recording, kind: Kind, pairs: Sequence[Pair], air: Channel
 
 
 def _probes(recording: Recording) -> list[Channel]:
-    """Return what a thermal test is told of: displacements and angles, without stations of error profiles."""
+    """Return the curves evaluated in a thermal test: displacements and angles, without stations of error profiles."""
     stations = find_stations(recording)
     return [c for c in recording.channels if c.quantity in ("displacement", "angle") and c.name not in stations]
 
@@ -323,7 +323,7 @@ def _stations_words(stations: dict[str, str]) -> str:
 
 
 def _about_the_end(curves: Sequence[ThermalCurve]) -> list[str]:
-    """Return how calm a spindle test was when it ended: what the standard lets it end by."""
+    """Return the settling of a spindle test at its end, compared with the criterion of the standard."""
     shares = {c.name: c.figures.range_last / c.figures.range_60 for c in curves if c.figures.range_60 > 0}
     told = [f"{name} {100 * share:.0f} %" for name, share in shares.items() if np.isfinite(share)]
     if not told:
@@ -337,13 +337,13 @@ def _about_the_end(curves: Sequence[ThermalCurve]) -> list[str]:
 
 
 def _lead(recording: Recording, earliest: int, start: int) -> int:
-    """Return how many rows before the start of a test tell what it starts from."""
+    """Return the number of rows before the start of a test that define its initial state."""
     time = recording.time
     return start - earliest - int(np.searchsorted(time[earliest:start], time[start] - WINDOW))
 
 
 def _about_rows(recording: Recording, kind: Kind, rows: tuple[int, int, int], number: int, lead: int) -> list[str]:
-    """Return what one should know of the course of a test."""
+    """Return notes on the course of a test."""
     start, stop, end = rows
     notes = []
     running = recording.time[stop] - recording.time[start]
@@ -368,7 +368,7 @@ def _about_rows(recording: Recording, kind: Kind, rows: tuple[int, int, int], nu
 
 
 def _load(recording: Recording, kind: Kind, start: int, stop: int) -> str:
-    """Say what the spindle or the axis did while it ran."""
+    """Return the load of the spindle or the axis while it ran, in words."""
     if kind == "etve":
         return "machine at rest" if recording.of_quantity("spindle_speed") else "taken as at rest"
     quantity, word = ("spindle_speed", "spindle at") if kind == "spindle" else ("feed", "feed of")
@@ -385,7 +385,7 @@ def _load(recording: Recording, kind: Kind, start: int, stop: int) -> str:
 
 
 def _target_groups(recording: Recording) -> dict[str, list[tuple[float, Channel]]]:
-    """Return the displacements that are named after a position, by what their names begin with; at least two each."""
+    """Return the displacements that are named after a position, by the prefix of their names; at least two each."""
     groups: dict[str, list[tuple[float, Channel]]] = {}
     for c in recording.displacements:
         named = _TARGET.fullmatch(_base(c))

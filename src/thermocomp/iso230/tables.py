@@ -25,7 +25,7 @@ WITH = "with model"
 
 
 def thermal_tables(test: ThermalTest) -> tuple[Table, ...]:
-    """Return what is told of a thermal test: displacements, tilts, targets and lengths, each in a table of its own.
+    """Return the results of a thermal test: displacements, tilts, targets and lengths, each in a separate table.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def time_constant_tables(settlings: Sequence[Settling]) -> tuple[Table, ...]:
     Parameters
     ----------
     settlings : sequence of Settling
-        Of one recording.
+        Settlings of one recording.
 
     Returns
     -------
@@ -235,7 +235,7 @@ def _at_targets(r: PositioningResult, axis: str) -> Table:
 
 
 def thermal_content(test: ThermalTest) -> dict[str, Any]:
-    """Return a thermal test for programs; units stand in the names, times in s."""
+    """Return the JSON content of a thermal test; units are in the names, times in s."""
     positions = {c.name: float(p) for t in test.targets for c, p in zip(t.curves, t.positions, strict=True)}
     return {
         "name": test.name,

@@ -1,6 +1,6 @@
-"""What a thermal test after ISO 230-3 comes out as: curves, and what is told of each.
+"""Result of a thermal test after ISO 230-3: curves, and their characteristic values.
 
-Which names are the standard's and which are ours stands in `thermocomp.iso230.part3`.
+`thermocomp.iso230.part3` documents which names are from the standard and which are ours.
 """
 
 from dataclasses import dataclass, replace
@@ -131,12 +131,12 @@ class ThermalCurve:
     values : ndarray of shape (n_rows,)
         Since the start of the test, row by row; nan where missing.
     course : AveragedCurve
-        The same averaged: what `figures` tells.
+        Averaged curve, from which `figures` are taken.
     figures : Figures
     settling : Settling or None
-        How fast it follows the start of the drives; None if they never start.
+        Settling after the start of the drives; None if they never start.
     after : ndarray of shape (n_rows,) or None
-        What a model leaves of it; None without a model.
+        Residual with a model; None without a model.
     after_course : AveragedCurve or None
     after_figures : Figures or None
     """
@@ -160,7 +160,7 @@ class Targets:
     Parameters
     ----------
     name : str
-        What the channels' names begin with, such as ``x_laser``.
+        Prefix of the channels' names, such as ``x_laser``.
     axis : {'X', 'Y', 'Z'}
     positions : ndarray of shape (n_targets,)
         Rising [mm].
@@ -196,9 +196,9 @@ class ThermalTest:
         Its first row, from which everything is counted, the one in which the drives stop (`end` if they do not), and
         its last one.
     load : str
-        What the spindle or the axis did, in words.
+        Load of the spindle or the axis, in words.
     curves : tuple of ThermalCurve
-        Of every displacement and angle that is not a target.
+        Curves of every displacement and angle that is not a target.
     tilts : tuple of ThermalCurve
         From paired probes [urad].
     pairs : tuple of Pair
@@ -209,7 +209,7 @@ class ThermalTest:
     ambient_range : tuple of float
         Its lowest and highest value during the test [degC]; nan if there is none.
     notes : tuple of str
-        What one should know before relying on the figures.
+        Cautions on the characteristic values.
     """
 
     kind: Kind
@@ -235,12 +235,12 @@ class ThermalTest:
 
     @property
     def running(self) -> float:
-        """How long the drives ran [s]; of an ETVE test, how long it was."""
+        """Running time of the drives [s]; for an ETVE test, its duration."""
         return float(self.time[self.stop - self.start])
 
     @property
     def described(self) -> str:
-        """What was done, in what surroundings, with what distance between the probes, in one line."""
+        """Test conditions in one line: load, surroundings, distance between the probes."""
         parts = [self.load]
         hours = [self.running / HOUR, (self.time[-1] - self.running) / HOUR]
         parts.append(f"{hours[0]:.3g} h" if self.kind == "etve" else f"{hours[0]:.3g} h, cool-down {hours[1]:.3g} h")
@@ -258,7 +258,7 @@ class ThermalTest:
 
 
 def evaluate_averaged_curve(time: FloatArray, course: AveragedCurve, rows: FloatArray, stop: int) -> Figures:
-    """Return what is told of an averaged curve, with its uncertainty.
+    """Return the characteristic values of an averaged curve, with their uncertainty.
 
     Parameters
     ----------
@@ -291,7 +291,7 @@ def evaluate_averaged_curve(time: FloatArray, course: AveragedCurve, rows: Float
 
 
 def evaluate_curve(time: FloatArray, values: FloatArray, stop: int) -> Figures:
-    """Return what is told of a curve as it stands, row by row.
+    """Return the characteristic values of a curve, from its rows without averaging.
 
     Parameters
     ----------

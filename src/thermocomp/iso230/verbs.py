@@ -29,7 +29,7 @@ Test = Literal["etve", "spindle", "axis"]
 
 @dataclass(frozen=True, eq=False)
 class Evaluated(Paged):
-    """Tests, evaluated.
+    """Evaluated tests.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class Evaluated(Paged):
         Recordings with the time constants of their channels.
     positioned : tuple of PositioningResult
     trouble : tuple of str
-        What is wrong with the recordings.
+        Data-quality problems of the recordings.
     """
 
     thermal: tuple[ThermalTest, ...]
@@ -47,7 +47,7 @@ class Evaluated(Paged):
     trouble: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all of it for a program: what ``--json`` prints."""
+        """Return all results as a dict, as printed by ``--json``."""
         return {
             "trouble": self.trouble,
             "thermal": [tables.thermal_content(t) for t in self.thermal],
@@ -86,26 +86,26 @@ def iso230(
     recordings : Recording, path, DataFrame, or sequence of them, optional
         CSV, XLSX or Parquet files of thermal tests.
     test : {'etve', 'spindle', 'axis'}, optional
-        What they are: etve (machine at rest), spindle, or axis. Found out if not given: the spindle turns, else an
-        axis moves, else neither.
+        Type of the tests: etve (machine at rest), spindle, or axis. Default: determined from the recordings: spindle if
+        the spindle turns, else axis if an axis moves, else etve.
     distance : str, optional
-        Between the probes x1 and x2, and y1 and y2, such as "100 mm"; without it no tilt is given.
+        Distance between the probes x1 and x2, and y1 and y2, such as "100 mm". Default: none, no tilt is evaluated.
     pairs : sequence of str, optional
-        Probes of other names: the one at the tip of the test bar, the one nearer to the spindle, and their distance,
+        Probe pairs with other names: probe at the tip of the test bar, probe nearer to the spindle, and their distance,
         such as x_front:x_rear:100mm.
     ambient : str, optional
-        Temperature of the surroundings; the first whose name says air, ambient or room if not given.
+        Channel of the ambient temperature. Default: the first whose name contains air, ambient or room.
     model : ErrorModel, FittedModels, path of a model file, or sequence of ErrorModel, optional
-        Model file from thermocomp fit: what it leaves of each displacement is reported beside it.
+        Model file from thermocomp fit; the residual of each displacement with this model is reported, too.
     limits : Limits
-        Of the compensator: what it would leave is reported, not what the model alone would.
+        Limits of the compensator: the residual with the compensator is reported, not that of the model alone.
     starts : Start or sequence of Start, optional
-        How the recordings begin, as for `compare`; it matters to a model.
+        Initial thermal state of the recordings, as for `compare`; used with a model only.
     positioning : sequence of str or Path
-        CSV tables of positioning tests, with the columns position_mm, deviation_um, direction (+ or -), run, and if
-        there are several, state and axis.
+        CSV tables of positioning tests, with the columns position_mm, deviation_um, direction (+ or -), run, and, if
+        there are several states or axes, state and axis.
     mapping : str, Path or Mapping, optional
-        TOML file that says what the columns of the recordings are.
+        TOML mapping file: role and unit of each column of the recordings.
     progress : callable
         Called with a line of text per recording.
 
@@ -116,7 +116,7 @@ def iso230(
     Raises
     ------
     InputError
-        Nothing is given, a file or a channel cannot be used, or a distance has no unit.
+        No input is given, a file or a channel is invalid, or a distance has no unit.
 
     Examples
     --------

@@ -37,7 +37,7 @@ class Budget:
     ----------
     targets : tuple of str
     unit : str
-        What they are counted in together, see `thermocomp.judging.sensorsets.weigh_targets`.
+        Common unit of the targets, see `thermocomp.judging.sensorsets.weigh_targets`.
     scales : ndarray of shape (n_targets,)
         One such unit, in that of each target.
     candidates : tuple of str
@@ -57,9 +57,9 @@ class Budget:
     condition : ndarray of shape (n_sizes,)
         Condition number of the correlation matrix of `sensors`.
     answer : StandInAnswer
-        Of `averaged` with all temperatures and rows, for what can stand in for what; targets in `unit`.
+        Output of `averaged` with all temperatures and rows, for the substitutes; targets in `unit`.
     failures : mapping of str to str
-        Why a model could not be judged somewhere, by model.
+        Reason why a model could not be judged somewhere, by model.
     """
 
     targets: tuple[str, ...]
@@ -93,7 +93,7 @@ class Budget:
         return np.asarray(self.none.mean(axis=1))
 
     def mean(self) -> FloatArray:
-        """Return what sets and models are compared by: mean over blocks and targets, (n_models, n_sizes) [`unit`]."""
+        """Return the mean over blocks and targets, by which sets are compared, (n_models, n_sizes) [`unit`]."""
         return np.asarray(self.of_blocks().mean(axis=2))
 
     def none_mean(self) -> float:
@@ -101,7 +101,7 @@ class Budget:
         return float(self.none_of_blocks().mean())
 
     def gains(self, model: str) -> tuple[FloatArray, FloatArray]:
-        """Return what the next sensor gains after each number but the last [`unit`].
+        """Return the gain of the next sensor after each number but the last [`unit`].
 
         Returns
         -------
@@ -142,7 +142,7 @@ class Budget:
         return None if found is None else (self.models[found[0]], found[1])
 
     def margin(self) -> tuple[float, float, float] | None:
-        """Return what the mean RMS over the blocks may be above the smallest one, and where that comes from [`unit`].
+        """Return the tolerated excess of the mean RMS over the smallest one, and its origin [`unit`].
 
         The larger of one standard error of the smallest between the blocks (Breiman 1984, Classification and Regression
         Trees, section 3.4.3), and of `WORTH`, but of no more than `SHARE` of what there is without compensation.
@@ -338,7 +338,7 @@ def _conditions(samples: Samples, sets: Sequence[Sequence[str]]) -> FloatArray:
 
 
 def _unseen_rms(samples: Samples, piece: tuple[Split, Sequence[str], str]) -> FloatArray | str:
-    """Return what a model leaves of each target, (n_targets,)."""
+    """Return the residual RMS of a model on unseen rows for each target, (n_targets,)."""
     split, sensors, name = piece
     speeds = [c.name for c in samples.inputs if c.quantity == "spindle_speed"]
     reduced = samples.only([*sensors, *speeds])

@@ -1,4 +1,4 @@
-"""What sensors are chosen from."""
+"""Candidate sensors for a selection."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ class Candidates:
 
     @classmethod
     def of(cls, samples: Samples, target: int) -> "Candidates":
-        """Take the temperatures and one target of the complete rows."""
+        """Extract the temperatures and one target of the complete rows."""
         temperatures = [j for j, c in enumerate(samples.inputs) if c.quantity == "temperature"]
         name = samples.targets[target].name
         if not temperatures:
@@ -61,7 +61,7 @@ class Candidates:
         return tuple(self.names[j] for j in columns)
 
     def repeats(self, sensors: Sequence[str]) -> Table:
-        """Return how far some of the sensors repeat each other."""
+        """Return the collinearity of some of the sensors."""
         values = self.X[list(sensors)].to_numpy()
         found = diagnose(values, self.y, tuple(sensors))
         raw = found.spectrum

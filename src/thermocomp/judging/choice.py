@@ -1,4 +1,4 @@
-"""A selection of sensors: what it can be told, and what it comes out as: the sensors, why, and the tables behind it."""
+"""Sensor selection: settings, and the result with the sensors, the reason and the underlying tables."""
 
 import math
 from dataclasses import MISSING, dataclass, field, fields
@@ -10,7 +10,7 @@ Cell = str | float | int | None
 Criterion = Literal["mse", "adjr2", "cp", "bic", "cycles"]
 
 
-#: which methods look at which of the settings
+#: methods that use each setting
 LOOKED_AT_BY = {
     "threshold": ("grouping",),
     "unsigned": ("grouping",),
@@ -25,36 +25,36 @@ LOOKED_AT_BY = {
 
 
 class Progress(Protocol):
-    """Is told what has been done."""
+    """Receiver of progress."""
 
     def __call__(self, text: str, /, steps: int = 1) -> None:
-        """Take a line of text, and how many pieces of work are done with it."""
+        """Receive a line of text, and the number of tasks completed with it."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """What the selection methods can be told; each looks at its own.
+    """Settings of the selection methods; each method uses some of them.
 
     Parameters
     ----------
     threshold : float
         grouping: correlation above which a sensor joins a group.
     unsigned : bool
-        grouping: compare magnitudes of correlations.
+        grouping: compare the magnitudes of correlations.
     reference : str
         grouping: temperature that is subtracted from the others.
     max_sensors : int
-        subsets, ace, pareto: most sensors; if not given 10 for subsets, 3 for ace, 6 for pareto.
+        subsets, ace, pareto: maximum number of sensors. Default: 10 for subsets, 3 for ace, 6 for pareto.
     seconds : float
-        subsets: stop the search for the best sets after about so long [s]; what is not proven then, is told.
+        subsets: approximate time limit of the search for the best sets [s]; sets not proven best by then are reported.
     criterion : str
-        subsets: what the number of sensors is chosen by.
+        subsets: criterion by which the number of sensors is chosen.
     models : list of str
         pareto: methods that are trained on the sensors.
     level : float
-        ace: of the Wilcoxon test.
+        ace: significance level of the Wilcoxon test.
     holm : bool
-        ace: correct the level for the number of tests.
+        ace: correct the significance level for the number of tests.
     """
 
     threshold: float = 0.9
@@ -68,12 +68,12 @@ class Settings:
     holm: bool = False
 
     def check(self, method: str) -> None:
-        """Refuse what has no meaning for a method.
+        """Reject settings that a method does not use.
 
         Raises
         ------
         InputError
-            Something was set that only other methods look at.
+            A setting was given that only other methods use.
         """
         for f in fields(self):
             default = f.default_factory() if f.default_factory is not MISSING else f.default
@@ -82,12 +82,12 @@ class Settings:
                 raise InputError(f"{option} is for --method {' or '.join(LOOKED_AT_BY[f.name])}, not for {method}")
 
     def most(self, method: str) -> int:
-        """Return the most sensors a method may choose.
+        """Return the maximum number of sensors of a method.
 
         Raises
         ------
         InputError
-            It is below 1.
+            The number is below 1.
         """
         if self.max_sensors is not None and self.max_sensors < 1:
             raise InputError(f"--max-sensors {self.max_sensors}: want at least 1")
@@ -96,7 +96,7 @@ class Settings:
 
 @dataclass(frozen=True)
 class Table:
-    """A table for people, pages and programs alike.
+    """A table for the terminal, pages and JSON.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ class Table:
         Headings; units in brackets.
     rows : tuple of tuple
     marked : int or None
-        Row of what was chosen.
+        Index of the chosen row.
     caption : str
     """
 
@@ -117,12 +117,12 @@ class Table:
 
     @property
     def words(self) -> tuple[int, ...]:
-        """Columns of words, which are set to the left."""
+        """Text columns, which are left-aligned."""
         return tuple(j for j in range(len(self.columns)) if any(isinstance(row[j], str) for row in self.rows))
 
 
 def format_cell(cell: Cell) -> str:
-    """Return a cell as text: four digits, nothing for what is not known."""
+    """Return a cell as text: four digits, empty for unknown values."""
     if cell is None or (isinstance(cell, float) and math.isnan(cell)):
         return ""
     return f"{cell:.4g}" if isinstance(cell, float) else str(cell)
@@ -130,7 +130,7 @@ def format_cell(cell: Cell) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Choice:
-    """Sensors that a method has chosen.
+    """Sensors selected by a method.
 
     Parameters
     ----------
@@ -139,14 +139,14 @@ class Choice:
         Displacement channel, or several with commas in between if the choice is for all of them.
     sensors : tuple of str
     reason : str
-        How they were chosen, in words.
+        Reason for the selection, in words.
     tables : tuple of Table
     notes : tuple of str
-        What a user should know before he relies on it.
+        Cautions for the user.
     details : object
-        The numbers behind it, for figures.
+        Underlying numbers, for figures.
     failure : str
-        Why nothing could be chosen; empty if something was.
+        Reason why no sensors could be selected; empty if some were.
     """
 
     method: str

@@ -76,7 +76,7 @@ def connect(address: str) -> Iterator["Cluster"]:
 
 @contextmanager
 def _unlogged() -> Iterator[None]:
-    """Keep Dask's tracebacks of lost connections off the error stream: one line of ours tells of them."""
+    """Keep Dask's tracebacks of lost connections off the error stream: a single line of thermocomp reports them."""
     loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
     levels = [logger.level for logger in loggers]
     for logger in loggers:
@@ -108,7 +108,7 @@ class Cluster:
     ----------
     client : Client
     address : str
-        Of the scheduler, for messages.
+        Address of the scheduler, for messages.
     """
 
     def __init__(self, client: Client, address: str) -> None:
@@ -126,12 +126,12 @@ class Cluster:
     def share(
         self, work: Callable[[Any], Any], pieces: Sequence[Any], failed: Callable[[Any, str], Any]
     ) -> Iterator[Any]:
-        """Yield what comes of the pieces, in their order; see `thermocomp.judging.pieces.work_through`.
+        """Yield the results of the tasks, in their order; see `thermocomp.judging.pieces.work_through`.
 
         Raises
         ------
         ClusterError
-            The scheduler is lost: told when its connection breaks, or within twice `ASKED` seconds if it is silent.
+            The scheduler is lost: reported when its connection breaks, or within twice `ASKED` seconds if it is silent.
             There has been no worker for `WORKERLESS` seconds.
         """
         waiting: dict[int, Any] = {}
@@ -145,7 +145,7 @@ class Cluster:
     def _results(
         self, work: Callable[[Any], Any], pieces: Sequence[Any], failed: Callable[[Any, str], Any]
     ) -> Iterator[tuple[int, Any]]:
-        """Yield numbers of pieces and what comes of them, as they are done."""
+        """Yield numbers of tasks and their results, as they are completed."""
         unsendable = {k: why for k, piece in enumerate(pieces) if (why := _unsendable(piece))}
         for k, why in unsendable.items():
             yield k, failed(pieces[k], why)
@@ -198,7 +198,7 @@ class Cluster:
                 self._client.cancel(list(futures.values()), force=True)
 
     def _next(self, done: SimpleQueue[int]) -> int:
-        """Return the next number that is done; in between, see to it that somebody works on it."""
+        """Return the next completed number; in between, ensure that a worker is processing it."""
         lonely = False
         while True:
             try:
@@ -248,7 +248,7 @@ def _do(shared: tuple[Any, Sequence[Any], Any], number: int, versions: Mapping[s
 
 
 def _unsendable(what: Any) -> str:
-    """Return why it cannot be sent to another process; empty if it can."""
+    """Return the reason why it cannot be sent to another process; empty if it can."""
     try:
         cloudpickle.dumps(what)
     except Exception as e:  # noqa: BLE001 - whatever it raises on its way

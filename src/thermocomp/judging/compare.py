@@ -56,13 +56,13 @@ def compare(
     ----------
     samples : Samples
     methods : sequence of str or estimator
-        ``all`` stands for all of them; see `thermocomp.models.methods.expand`.
+        ``all`` denotes all of them; see `thermocomp.models.methods.expand`.
     judging : Judging
-        What is learned from and what is judged.
+        Training and validation data.
     rules : Rules
-        What is stated before judging.
+        Rules stated before judging.
     support : Support
-        What the models do outside their trained range.
+        Behaviour of the models outside their training range.
     robustness : bool
         Also replay with noise and lost sensors.
     refit : bool
@@ -85,7 +85,7 @@ def compare(
     ------
     InputError
         A method is unknown, or the primary one is not among them.
-        Rows stand in the samples twice and would be learned from and judged on at once.
+        Rows occur twice in the samples and would be used for training and judging at the same time.
     """
     refuse_leaks(samples, judging)
     names = expand(methods)
@@ -133,7 +133,7 @@ def compare(
 def _guards(
     samples: Samples, by_target: Sequence[Judging], watched: Sequence[str] | None, jobs: int
 ) -> dict[str, Guard | None]:
-    """Return what a watch lets through in each block, made of what may be learned from there."""
+    """Return the readings that a watch passes in each block, trained on the training rows of the block."""
     splits = {split.name: split for own in by_target for split in own.splits}
     known = samples if watched is None else samples.only(watched)
     found = work_through(partial(_guard, known), list(splits.values()), _unwatched, jobs=jobs)
@@ -165,7 +165,7 @@ def _concluded(
     best: Recommendation | None,
     caps: tuple[str, ...],
 ) -> list[Assessment]:
-    """Return what was found for one target: each method in each block, and over all of them with its verdict."""
+    """Return the results for one target: each method in each block, and over all of them with its verdict."""
     whole = {name: do_no_harm.join_verdicts(v, caps=caps) for name, v in verdicts.items()}
     after = correct_verdicts(whole, rules.primary, best)
     found = []
@@ -176,7 +176,7 @@ def _concluded(
 
 
 def _heat(samples: Samples) -> Collinearity:
-    """Return how far the temperatures repeat each other."""
+    """Return the collinearity of the temperatures."""
     temperatures = [j for j, c in enumerate(samples.inputs) if c.quantity == "temperature"]
     values = samples.change()[samples.valid][:, temperatures]
     return collinearity(values, tuple(samples.inputs[j].name for j in temperatures))
@@ -215,7 +215,7 @@ def n_pieces(samples: Samples, methods: Sequence[Any], judging: Judging, rules: 
     Parameters
     ----------
     samples, methods, judging, rules
-        Of `compare`.
+        As for `compare`.
 
     Returns
     -------
@@ -228,7 +228,7 @@ def n_pieces(samples: Samples, methods: Sequence[Any], judging: Judging, rules: 
 
 
 def split_by_cycle(whole: Assessment) -> list[Assessment]:
-    """Cut an assessment into its thermal cycles; what needs a replay of its own (robustness) stays with the whole."""
+    """Split an assessment into its thermal cycles; parts that need a separate replay stay with the whole."""
     found = []
     blocks = [b for b in join_short_cycles(whole.cycle, whole.test) if np.isin(whole.cycle, b).sum() >= MIN_ROWS]
     for unit, block in zip(whole.verdict.units, blocks, strict=True):

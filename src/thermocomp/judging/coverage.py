@@ -1,4 +1,4 @@
-"""What the judged units covered, and how alike they are: for which conditions an honest error speaks.
+"""Conditions covered by the judged units, and their similarity: the conditions for which an honest error is valid.
 
 Alike: each unit's inputs (as recorded, so that the room counts) are averaged over `PLACES` parts of its time. The
 squared distance of two units is the mean square difference over these parts, summed over the inputs of a quantity and
@@ -31,7 +31,7 @@ _SAME_SPEED = 0.02
 
 
 def find_validity(samples: Samples, judging: Judging, recordings: Sequence[Recording] = ()) -> Validity:
-    """Return what the units of a judgement covered.
+    """Return the conditions covered by the units of a judgement.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def _curve(values: FloatArray, steps: FloatArray) -> FloatArray:
 
 
 def _groups(alike: BoolArray) -> int:
-    """Return how many groups there are if whatever is alike belongs together."""
+    """Return the number of groups if similar units belong together."""
     left, found = set(range(len(alike))), 0
     while left:
         found += 1
@@ -150,12 +150,12 @@ def _ambient(
 
 
 def table(named: dict[str, Validity]) -> Table:
-    """Return what was covered as a short table: one column for each judgement.
+    """Return the covered conditions as a short table: one column for each judgement.
 
     Parameters
     ----------
     named : dict of str to Validity
-        What each is to be called; at least one.
+        Judgements by name; at least one.
 
     Returns
     -------

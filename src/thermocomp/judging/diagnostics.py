@@ -1,4 +1,4 @@
-"""What the data can carry at all: how far the inputs repeat each other, and what they have to do with the error."""
+"""Diagnostics of the data: collinearity of the inputs, and their correlation with the error."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Collinearity:
-    """How far a set of inputs repeats itself.
+    """Collinearity of a set of inputs.
 
     Parameters
     ----------

@@ -44,26 +44,26 @@ MOVES = 0.1
 
 @dataclass(frozen=True)
 class JudgedUnit:
-    """What was found in one unseen cycle or file.
+    """Results in one unseen cycle or file.
 
     Parameters
     ----------
     name : str
     rows : int
     rms, largest : float
-        Of the residual [um].
+        Figures of the residual [um].
     baselines : tuple of float
         RMS left by each of `BASELINES` [um].
     none_largest : float
         Largest deviation without compensation [um].
     noise : float
-        Of the probe: smaller errors are taken as being of this size [um].
+        Noise of the probe: smaller errors are replaced by this value [um].
     margin : float
-        Harm that is let pass [um].
+        Tolerated degradation [um].
     moves : bool
-        The deviation changes enough to tell a model from a constant.
+        Whether the deviation changes enough to distinguish a model from a constant.
     rezeroed : tuple of (float, float) or None
-        RMS with and without the model, both counted from where the unit begins [um].
+        RMS with and without the model, both relative to the start of the unit [um].
     """
 
     name: str
@@ -108,21 +108,21 @@ class Verdict:
     ----------
     units : tuple of JudgedUnit
     unit : str
-        Of the deviations.
+        Unit of the deviations.
     caps : tuple of str
-        What keeps the model from being accepted, whatever the figures say: one stretch, trouble in the data.
+        Reasons that prevent acceptance whatever the figures: a single stretch, trouble in the data.
     refusal : str
-        What refuses it, whatever the figures say: no sensor.
+        Reason that refuses it, whatever the figures: no sensor.
     tried : int
         Methods that were tried for this target.
     p : float or None
-        Of the test, corrected for their number; that of the units if None.
+        P-value of the test, corrected for their number; that of the units if None.
     about : str
-        Why it is not corrected for that number, if it is not.
+        Reason why it is not corrected for that number, if it is not.
     names : tuple of str
-        Of the baselines.
+        Names of the baselines.
     stated : float or None
-        Harm that is let pass, as the user stated it before judging; None: by rule.
+        Tolerated degradation as stated by the user before judging; None: by rule.
     """
 
     units: tuple[JudgedUnit, ...]
@@ -137,7 +137,7 @@ class Verdict:
 
     @cached_property
     def p_values(self) -> tuple[float, ...]:
-        """One-sided p-value beside each baseline; 1 with fewer than `MIN_UNITS` units."""
+        """One-sided p-value for each baseline; 1 with fewer than `MIN_UNITS` units."""
         if len(self.units) < MIN_UNITS:
             return (1.0,) * len(self.names)
         ratios = np.array([u.log_ratios for u in self.units])
@@ -185,7 +185,7 @@ class Verdict:
 
     @property
     def reason(self) -> str:
-        """Why, in one sentence, by the unit or baseline that decided."""
+        """Reason for the verdict, in one sentence, by the unit or baseline that decided."""
         if self.refusal or not self.units:
             return self.refusal or f"fewer than {MIN_ROWS} rows of any cycle to judge on"
         stated = "" if self.stated is None else f"; the harm margin of {self.stated:g} {self.unit} was stated"
@@ -228,7 +228,7 @@ class Verdict:
 
     @property
     def advice(self) -> str:
-        """Which test would decide an unproven verdict; empty for the other words."""
+        """Test that would decide an unproven verdict; empty for the other verdicts."""
         if self.word != "unproven" or self.caps == (UNTRIED,):  # which says it itself
             return ""
         if any("not alike" in cap for cap in self.caps):
@@ -246,7 +246,7 @@ class Verdict:
         return f"about {more} cycles or files in all would decide" if more else "many more cycles would be needed"
 
     def _units_for(self, level: float) -> int | None:
-        """Return how many units of this kind would show it; None if there are over 50."""
+        """Return the number of units of this kind that would be sufficient; None if it is over 50."""
         ratios = np.array([u.log_ratios[self.worst] for u in self.units])
         effect = -ratios.mean() / max(ratios.std(ddof=1), 1e-9)
         for n in range(len(ratios) + 1, 51):
@@ -284,13 +284,13 @@ def measure(
     measured, predicted : ndarray of shape (n_rows,)
         Deviations of one unseen cycle or file [um].
     learned : Learned
-        What the training part showed.
+        Training statistics of the target.
     unit : str
-        Of the deviations.
+        Unit of the deviations.
     margin : float, optional
-        Harm that is let pass [um], stated before judging; see `margin_of`.
+        Tolerated degradation [um], stated before judging; see `margin_of`.
     stretch : bool
-        It continues from what was learned: compare also with both re-zeroed where it begins.
+        It continues the training data: compare also with both re-zeroed at its start.
 
     Returns
     -------
@@ -315,7 +315,7 @@ def measure(
 
 
 def join_verdicts(parts: Sequence[Verdict], about: str = "", caps: tuple[str, ...] = ()) -> Verdict:
-    """Return the verdict over the units of several: what refuses or caps one of them, refuses or caps the whole."""
+    """Return the verdict over the units of several: a refusal or cap of one of them applies to the whole."""
     return Verdict(
         units=tuple(u for v in parts for u in v.units),
         unit=parts[0].unit,
@@ -327,7 +327,7 @@ def join_verdicts(parts: Sequence[Verdict], about: str = "", caps: tuple[str, ..
 
 
 def margin_of(learned: Learned, unit: str = "um") -> float:
-    """Return the harm in a single unit that is let pass, unless the user states another [unit]."""
+    """Return the tolerated degradation in a single unit, unless the user specifies another [unit]."""
     return min(max(TIMES_NOISE * learned.noise, SHARE * learned.largest), MOST_MARGIN.get(unit, np.inf))
 
 
@@ -337,7 +337,7 @@ def holm(verdicts: Sequence[Verdict]) -> list[Verdict]:
     Parameters
     ----------
     verdicts : sequence of Verdict
-        Of every method that was tried for one target.
+        Verdicts on all methods tried for one target.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Which temperatures fell out in recordings, what stood in for them, and what that cost: a replay of the watch."""
+"""Failed temperature sensors in recordings, their substitutes, and the loss of accuracy: a replay of the watch."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ class Fault(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class FaultLog:
-    """What a watch found in a recording.
+    """Findings of a watch in a recording.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class FaultLog:
     fault : ndarray of int of shape (n_rows, n_sensors)
         See `thermocomp.runtime.watch.WORDS`.
     read, stood_in : ndarray of shape (n_rows, n_sensors)
-        What was recorded, and what stood in; nan where nothing was, or a sensor was believed [degC].
+        Recorded values, and substitutes; nan where there was none, or the sensor was trusted [degC].
     faults : tuple of Fault
         In the order in which they were found.
     """
@@ -70,7 +70,7 @@ class FaultLog:
 
 
 class Cost(NamedTuple):
-    """What a model left while the same of its sensors had failed."""
+    """Residual of a model while the same of its sensors had failed."""
 
     failed: tuple[str, ...]  #: of the model's sensors; none: all were good
     hours: float  #: judged rows of that, in all [h]
@@ -104,15 +104,15 @@ def find_faults(judged: Judged, recordings: Sequence[Recording]) -> tuple[FaultL
 
 
 def find_costs(model: ErrorModel, assessment: Assessment, logs: Sequence[FaultLog]) -> tuple[Cost, ...]:
-    """Return what a model left before its sensors failed and from then on, by which of them had.
+    """Return the residual of a model before and after its sensors failed, by the set of failed sensors.
 
     Parameters
     ----------
     model : ErrorModel
     assessment : Assessment
-        Of it, over all that was judged.
+        Assessment of the model, over all judged rows.
     logs : sequence of FaultLog
-        Of these recordings; those of other watches are passed over.
+        Logs of these recordings; those of other watches are ignored.
 
     Returns
     -------
@@ -194,7 +194,7 @@ def _runs(fault: IntArray) -> Iterator[tuple[int, int]]:
 
 
 def _lost(model: ErrorModel, log: FaultLog) -> list[tuple[str, ...]]:
-    """Return which of a model's sensors had failed in each row, in the order of its inputs."""
+    """Return the failed sensors of a model in each row, in the order of its inputs."""
     own = [i.name for i in model.inputs if i.name in model.sensors and i.name in log.watch.names]
     lost = log.fault[:, [log.watch.names.index(n) for n in own]] != GOOD
     cases, which = np.unique(lost, axis=0, return_inverse=True)

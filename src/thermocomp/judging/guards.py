@@ -1,4 +1,4 @@
-"""What models are given while a sensor fails and a watch is there: the readings that it lets through."""
+"""Inputs of models while a sensor fails and a watch is present: the readings that it passes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

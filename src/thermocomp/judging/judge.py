@@ -25,7 +25,7 @@ BoolArray = NDArray[np.bool_]
 
 
 def drop_unreadable(samples: Samples, target: int, judging: Judging) -> Judging:
-    """Return a judgement without the blocks in which a target has too few readings to say anything.
+    """Return a judgement without the blocks in which a target has too few readings for a result.
 
     Parameters
     ----------
@@ -68,24 +68,24 @@ def judge(
     Parameters
     ----------
     name : str
-        What to call the model.
+        Name of the model.
     model : ErrorModel
     samples : Samples
         With all of the model's inputs, and its target.
     split : Split
         Only its block is looked at.
     learned : Learned, optional
-        What the model is held against; what it learned itself if not given.
+        Reference for the model. Default: its own training statistics.
     rules : Rules
-        What was stated before judging.
+        Rules stated before judging.
     fit_s : float
         The fit took [s].
     robustness : bool
         Also replay with noise and lost sensors.
     limits : Limits or None
-        Of the compensator; None: the model alone is judged.
+        Limits of the compensator; None: the model alone is judged.
     guard : Guard, optional
-        What a watch that knows nothing of the block lets through while sensors fail; without it nothing notices.
+        Readings that a watch, trained without the block, passes while sensors fail. Default: no failure is noticed.
     probings : Probings, optional
         Made in the block.
     widening : ndarray of shape (n_rows,), optional
@@ -178,7 +178,7 @@ def _verdict(
 
 
 def _worse(both: Iterable[do_no_harm.JudgedUnit]) -> do_no_harm.JudgedUnit:
-    """Return what is worse of a unit, by what would run or by the model alone: limits make no model pass."""
+    """Return the worse result of a unit, of the compensator or of the model alone: limits make no model pass."""
     ran, alone = both
     rezeroed = max((u.rezeroed for u in (ran, alone) if u.rezeroed), default=None)
     return replace(ran, rms=max(ran.rms, alone.rms), largest=max(ran.largest, alone.largest), rezeroed=rezeroed)
@@ -196,7 +196,7 @@ def cap_alike_units(samples: Samples, judging: Judging) -> tuple[str, ...]:
 def _caps(
     split: Split, learned: Learned | None, samples: Samples, target: int, watched: Collection[str]
 ) -> tuple[str, ...]:
-    """Return what keeps a model from being accepted, whatever its errors.
+    """Return the reasons that prevent acceptance of a model, whatever its errors.
 
     What is wrong with temperatures that a watch looks after (`watched`) is judged with what stood in for them.
     """
@@ -216,12 +216,12 @@ def refuse_method(samples: Samples, name: str, target: int, split: Split, why: s
     ----------
     samples : Samples
     name : str
-        Of the method.
+        Name of the method.
     target : int
         Index into ``samples.targets``.
     split : Split
     why : str
-        What is told.
+        Reason.
 
     Returns
     -------

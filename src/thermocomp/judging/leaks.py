@@ -48,7 +48,7 @@ def find_learned_rows(model: ErrorModel, samples: Samples, target: int = 0) -> B
 
 
 def refuse_leaks(samples: Samples, judging: Judging) -> None:
-    """Refuse rows that stand in the data twice if one of them is learned from and the other judged on.
+    """Refuse rows that occur twice in the data if one of them is used for training and the other for judging.
 
     Parameters
     ----------

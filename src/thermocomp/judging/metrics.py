@@ -19,9 +19,9 @@ class Metric:
     ----------
     name : str
     best : {'low', 'high', 'zero'}
-        Which way is good.
+        Best value.
     unit : str
-        ``um`` stands for the unit of the deviation; ``%`` and ``1`` for themselves.
+        ``um`` denotes the unit of the deviation; ``%`` and ``1`` themselves.
     description : str
     function : callable
         (measured, predicted) -> value.
@@ -38,7 +38,7 @@ class Metric:
         return self.function(measured, predicted)
 
     def better(self, a: float, b: float) -> bool:
-        """Say whether the value `a` is better than the value `b`."""
+        """Return whether the value `a` is better than the value `b`."""
         if self.best == "zero":
             return abs(a) < abs(b)
         return a < b if self.best == "low" else a > b

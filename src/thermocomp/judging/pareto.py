@@ -1,4 +1,4 @@
-"""Choice by the sensor budget: the fewest sensors that are enough, what each next one gains, and what stands in."""
+"""Choice by the sensor budget: the smallest sufficient set, the gain of each further sensor, and substitutes."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -85,7 +85,7 @@ def choose(samples: Samples, judging: Judging, settings: Settings, *, jobs: int,
 
 
 def _notes(found: Budget, judging: Judging) -> list[str]:
-    """Return how the number was chosen, and what could not be judged."""
+    """Return the reason for the number of sensors, and what could not be judged."""
     notes = [_rule(found)]
     if found.failures:
         notes.append(f"Not judged with some numbers of sensors: {_failed(found)}")
@@ -96,7 +96,7 @@ def _notes(found: Budget, judging: Judging) -> list[str]:
 
 
 def _advice(found: Budget, model: str, place: int) -> list[str]:
-    """Return what speaks for and against the sensors that are recommended."""
+    """Return the advantages and drawbacks of the recommended sensors."""
     left = found.of_targets()[found.models.index(model), place]
     idle = [t for t, e, none in zip(found.targets, left, found.none_of_targets(), strict=True) if e >= none]
     none_better = f"These sensors are no better than no compensation for {', '.join(idle)}: choose for it by itself."
@@ -167,7 +167,7 @@ def _by_target(found: Budget, model: str, place: int) -> Table:
 
 
 def _next(found: Budget, model: str, place: int) -> Table:
-    """Tell what the next sensor gains after each number of them, and how far that holds from block to block."""
+    """Return the gain of the next sensor after each number of sensors, and its consistency over the blocks."""
     gains, blocks = found.gains(model)
     unit = found.unit
     return Table(
@@ -191,7 +191,7 @@ def _joins(found: Budget, place: int) -> str:
 
 
 def next_to_buy(found: Budget, model: str, place: int) -> str:
-    """Say which sensor to buy next, and whether it is worth it.
+    """Return which sensor to buy next, and whether it is worth its cost.
 
     Parameters
     ----------
@@ -246,7 +246,7 @@ def _frequency(found: Budget, place: int) -> Table:
 
 
 def _stand_ins(found: Budget, place: int) -> Table:
-    """Tell what each temperature is made up from, and what that costs."""
+    """Return the substitute of each temperature, and the loss of accuracy with it."""
     names, kept = found.candidates, [found.candidates.index(s) for s in found.sensors[place]]
     made = found.answer.stand_ins(kept)
     own = np.sqrt(np.diag(found.answer.temperatures))
@@ -288,7 +288,7 @@ def _stand_ins(found: Budget, place: int) -> Table:
 
 
 def _repeats(candidates: Sequence[Candidates], sensors: Sequence[str]) -> Table:
-    """Return how far the chosen sensors repeat each other, with the correlation to each target."""
+    """Return the collinearity of the chosen sensors, with the correlation to each target."""
     tables = [c.repeats(sensors) for c in candidates]
     if len(tables) == 1:
         return tables[0]
@@ -301,7 +301,7 @@ def _repeats(candidates: Sequence[Candidates], sensors: Sequence[str]) -> Table:
 
 
 def trade_off(found: Budget, model: str, place: int) -> str:
-    """Say what the sensors that were saved cost, beside the best of the table and beside all sensors.
+    """Return the loss of accuracy from the sensors saved, compared with the best of the table and with all sensors.
 
     Parameters
     ----------
@@ -332,7 +332,7 @@ def trade_off(found: Budget, model: str, place: int) -> str:
 
 
 def _rule(found: Budget) -> str:
-    """Say by what rule the number of sensors was chosen, in numbers."""
+    """Return the rule by which the number of sensors was chosen, with numbers."""
     margins = found.margin()
     assert margins is not None
     margin, error, least = margins

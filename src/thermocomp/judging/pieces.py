@@ -26,7 +26,7 @@ def work_through(
     *,
     jobs: int,
 ) -> Iterator[_Found]:
-    """Yield what comes of each piece of work, in their order.
+    """Yield the results of the tasks, in their order.
 
     A process that dies takes the others' results with it, and nobody knows whose fault it was: what is missing is done
     again, piece by piece, until the one is found that kills its process.
@@ -37,7 +37,7 @@ def work_through(
         Takes a piece.
     pieces : sequence
     failed : callable
-        Takes a piece and why nothing came of it; gives what stands for that.
+        Called with a task and the reason of its failure; returns the replacement of the result.
     jobs : int
         Processes to share the work among; 1 is this one, -1 takes all cores. Within
         `thermocomp.judging.cluster.shared_among` it is of no account.
@@ -67,7 +67,7 @@ def work_through(
 
 
 def attempt(work: Callable[[_Piece], _Found], piece: _Piece, failed: Callable[[_Piece, str], _Found]) -> _Found:
-    """Return what comes of one piece of work; of `failed` if anything is raised."""
+    """Return the result of one task; that of `failed` if an exception is raised."""
     try:
         return work(piece)
     except (Exception, SystemExit) as e:  # noqa: BLE001 - whatever a method raises, the others have their results
@@ -75,7 +75,7 @@ def attempt(work: Callable[[_Piece], _Found], piece: _Piece, failed: Callable[[_
 
 
 def explain(error: BaseException) -> str:
-    """Return why something failed, in one line: our own errors say it, of others the kind is said too."""
+    """Return the reason of a failure in one line; for foreign exceptions with the type."""
     if isinstance(error, ThermocompError):
         return str(error)
     if isinstance(error, BrokenProcessPool):

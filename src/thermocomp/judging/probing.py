@@ -22,9 +22,9 @@ class Probings:
     Parameters
     ----------
     every : float
-        Time between two; the first is so long after the start [s].
+        Interval of the probings; the first is one interval after the start [s].
     repeatability : float
-        Of the probe, standard deviation [um].
+        Repeatability of the probe, standard deviation [um].
 
     Raises
     ------
@@ -104,26 +104,26 @@ class Probings:
 
     @property
     def words(self) -> str:
-        """What they are called wherever they are shown."""
+        """Name of the probings wherever they are shown."""
         often = f"{self.every / 3600:g} h" if self.every >= 3600 else f"{self.every / 60:g} min"
         return f"a probing every {often}"
 
 
 @dataclass(frozen=True, eq=False)
 class Probed:
-    """What probings did, by judged row.
+    """Effect of probings, by judged row.
 
     Parameters
     ----------
     plan : Probings
     at : ndarray of bool of shape (n_judged,)
-        A probing was made: what it says counts from the next row on.
+        A probing was made: it takes effect from the next row on.
     shift : ndarray of shape (n_judged,)
-        What was learned, and is in the correction [um].
+        Learned shift, which is included in the correction [um].
     without : ndarray of shape (n_judged,)
         Minus the correction that would have been in force without any [um].
     refused : tuple of str
-        Why probings were not used.
+        Reasons why probings were not used.
     """
 
     plan: Probings
@@ -133,11 +133,11 @@ class Probed:
     refused: tuple[str, ...] = ()
 
     def take(self, rows: BoolArray) -> "Probed":
-        """Return what they did in some of the rows."""
+        """Return the effect in some of the rows."""
         return replace(self, at=self.at[rows], shift=self.shift[rows], without=self.without[rows])
 
     def held(self, measured: FloatArray, test: NDArray[np.intp]) -> FloatArray:
-        """Return what probings alone would gain: the last one, held; zero before the first of a test [um]."""
+        """Return the correction from probings alone: the last one, held; zero before the first of a test [um]."""
         rows = np.arange(len(measured))
         last = np.maximum.accumulate(np.where(self.at, rows, -1))
         before = np.concatenate([[-1], last[:-1]])[: len(rows)]  # it counts from the next row on

@@ -1,4 +1,4 @@
-"""Which method to take: chosen inside the training part of every left-out unit, so that the choosing is judged too.
+"""Recommended method: chosen inside the training part of every left-out unit, so that the choice is judged too.
 
 The error of a choice among methods is not the error of the method that comes out best: the best of twenty is partly
 luck. So the choice is made again for every left-out unit, by the error on units left out of the rest (nested
@@ -35,7 +35,7 @@ class Inner:
     split : Split
         Its `judge` is what was left out of some unit's training part, and that unit itself for a pair.
     scores : tuple of (int, int)
-        (left-out unit, unit to choose by) for which it tells an error.
+        (left-out unit, unit to choose by) for which it gives an error.
     """
 
     split: Split
@@ -83,7 +83,7 @@ def score(samples: Samples, name: str, target: int, judging: Judging, inner: Inn
     ----------
     samples : Samples
     name : str
-        Of the method.
+        Name of the method.
     target : int
         Index into ``samples.targets``.
     judging : Judging
@@ -117,7 +117,7 @@ class Recommendation:
     ----------
     target, method : str
     chosen : tuple of str
-        What was chosen without each unit.
+        Choice without each unit.
     verdict : Verdict
         On the choosing: each unit is predicted by what was chosen without it.
     """

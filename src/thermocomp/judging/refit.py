@@ -1,4 +1,4 @@
-"""What would be written: a method fitted to all rows, tried with noise and lost sensors.
+"""Model to be written: a method fitted to all rows, tested with noise and lost sensors.
 
 It has seen more than the models that were judged, and may lean on a sensor as they did not.
 """
@@ -31,7 +31,7 @@ def stress_written(judged: Assessment, model: ErrorModel, samples: Samples, guar
         Fitted to all rows.
     samples : Samples
     guard : Guard, optional
-        What a watch, made of all rows, lets through while sensors fail.
+        Readings that a watch, trained on all rows, passes while sensors fail.
 
     Returns
     -------

@@ -28,12 +28,12 @@ Disturb = Callable[[int, FloatArray, FloatArray], FloatArray]
 
 @dataclass(frozen=True, eq=False)
 class Replayed:
-    """What would have run in the rows that are judged.
+    """Outputs of the models that would have run in the judged rows.
 
     Parameters
     ----------
     deviation : ndarray of shape (n_wanted,)
-        What the model alone says: no gate but for missing values, no limits [its unit].
+        Output of the model alone: no gate except for missing values, no limits [its unit].
     compensated : ndarray of shape (n_wanted,)
         Minus the correction that the compensator had in force: gate, model, limits [its unit].
     outside : ndarray of bool of shape (n_wanted,)
@@ -45,9 +45,9 @@ class Replayed:
     limits : Limits or None
         None: they were not applied, because the model does not predict micrometres.
     half_width : ndarray of shape (n_wanted,)
-        Of the band about `deviation` [its unit]; nan where there is none.
+        Half-width of the band about `deviation` [its unit]; nan where there is none.
     probed : Probed or None
-        What probings did; None: there were none.
+        Effect of probings; None: there were none.
     """
 
     deviation: FloatArray
@@ -80,7 +80,7 @@ def replay_compensated(
     rows : ndarray of bool of shape (n_rows,)
         Rows that are judged.
     limits : Limits
-        Of the corrections [um]; a model of another unit runs without them, behind the gate.
+        Limits of the corrections [um]; a model of another unit runs without them, behind the gate.
     probings : Probings, optional
         Made in the rows that are judged, from the first of each test on: the only displacements that are used, each
         from the next row on.
@@ -202,7 +202,7 @@ def stack_watched(
         A displacement channel: samples have one.
     recordings : sequence of Recording
     starts : Start or sequence of Start or None
-        How each begins.
+        Initial state of each.
     """
     known = [i.name for i in watch.inputs if all(r.has(i.name) for r in recordings)]
     if not known:
@@ -214,7 +214,7 @@ def stack_watched(
 
 
 def can_look(watch: Watch, samples: Samples) -> bool:
-    """Return whether samples have the speeds of a watch, without which it says nothing."""
+    """Return whether samples have the speeds that a watch needs."""
     names = [c.name for c in samples.inputs]
     return all(i.name in names for i in watch.inputs if i.quantity != "temperature")
 
@@ -235,7 +235,7 @@ def look_through(watch: Watch, samples: Samples, test: int) -> Iterator[tuple[in
     state : WatchState
         After the reading.
     let : ndarray of shape (n_inputs,)
-        What it lets through, in the order of its inputs.
+        Readings passed, in the order of its inputs.
     """
     names = [c.name for c in samples.inputs]
     known = [i.name in names for i in watch.inputs]
@@ -256,12 +256,12 @@ def replay(model: ErrorModel, samples: Samples, rows: BoolArray) -> tuple[FloatA
     model : ErrorModel
     samples : Samples
     rows : ndarray of bool of shape (n_rows,)
-        Rows whose prediction is wanted.
+        Rows whose prediction is requested.
 
     Returns
     -------
     deviation : ndarray of shape (n_wanted,)
-        Predicted deviation at the wanted rows.
+        Predicted deviation at the requested rows.
     outside : ndarray of bool of shape (n_wanted,)
         An input was outside the trained range.
     """
@@ -273,7 +273,7 @@ def replay(model: ErrorModel, samples: Samples, rows: BoolArray) -> tuple[FloatA
 
 
 def walk(model: ErrorModel, samples: Samples, rows: BoolArray, disturb: Disturb | None = None) -> Iterator[State]:
-    """Step a model through the tests that hold `rows`; yield its state at each wanted row, in their order.
+    """Step a model through the tests that contain `rows`; yield its state at each requested row, in their order.
 
     The model runs without a break from the start of a test, or of the files that it continues from, as it would on the
     machine; its only inputs are those of `samples`, never a displacement. A row with a missing input is what the gate
@@ -284,7 +284,7 @@ def walk(model: ErrorModel, samples: Samples, rows: BoolArray, disturb: Disturb 
     model : ErrorModel
     samples : Samples
     rows : ndarray of bool of shape (n_rows,)
-        Rows whose state is wanted.
+        Rows whose state is requested.
     disturb : callable, optional
         Makes several variants of each reading; see `Disturb`.
 
@@ -335,7 +335,7 @@ def _begun(
     reference: FloatArray | None,
     read: Callable[[int], FloatArray],
 ) -> tuple[State, dict[int, FloatArray]]:
-    """Return the state that a test begins in, its zero being known, and the readings of that, which say its mean."""
+    """Return the initial state of a test with known zero, and the readings of the zero, which give its mean."""
     state = model.init(reference)
     if not np.isnan(state.reference).any():
         return state, {}
@@ -348,7 +348,7 @@ def _begun(
 
 
 def _window(model: ErrorModel, samples: Samples, readings: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the first of some readings: those that a zero is taken of."""
+    """Return the first of some readings: those from which a zero is averaged."""
     return readings[: first_rows(model.zeroing, samples.time[readings], samples.stands[readings])[0]]
 
 
@@ -360,22 +360,22 @@ def _columns(model: ErrorModel, samples: Samples) -> list[int]:
 def rows_until(
     samples: Samples, rows: BoolArray, test: int, zeroing: Zeroing, columns: Sequence[int]
 ) -> NDArray[np.intp]:
-    """Return the rows of a test up to the last wanted one, at least those in which its zero is known.
+    """Return the rows of a test up to the last requested one, at least up to the one where its zero is known.
 
     Parameters
     ----------
     samples : Samples
-    rows : ndarray of bool of shape (n_rows,)
-        Wanted rows, some of them in the test.
+    rows : ndarray of bool
+        Requested rows.
     test : int
+        Index of the test.
     zeroing : Zeroing
-        How the zero is averaged.
     columns : sequence of int
-        Inputs without which a row is not used.
+        Inputs that must be finite.
 
     Returns
     -------
-    ndarray of int of shape (n_mine,)
+    ndarray of int
     """
     mine = np.flatnonzero(samples.test == test)
     stop = int(np.flatnonzero(rows[mine]).max()) + 1
@@ -388,13 +388,13 @@ def rows_until(
 
 
 def given_zero(samples: Samples, columns: Sequence[int], test: int) -> FloatArray | None:
-    """Return what counts as zero in a test, if that is given; without it the first readings decide."""
+    """Return the given zero of a test, if any; without it the first readings determine the zero."""
     given = samples.zero is not None and not np.isnan(samples.zero[test]).any()
     return samples.reference()[test, columns] if given else None
 
 
 def _needed(model: ErrorModel, usable: BoolArray, wanted: BoolArray) -> BoolArray:
-    """Return the rows of a test that have to be stepped through to know the wanted ones."""
+    """Return the rows of a test that must be stepped through to know the requested ones."""
     if model.remembers or model.support.policy == "hold" or not usable.any():
         return usable
     # A model without memory needs the wanted readings, and for a wanted row without one the reading before.

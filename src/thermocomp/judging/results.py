@@ -1,4 +1,4 @@
-"""What judging needs to be told, and what it comes out as."""
+"""Rules of judging, and its results."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ IntArray = NDArray[np.intp]
 
 @dataclass(frozen=True)
 class Rules:
-    """What is stated before judging.
+    """Rules stated before judging.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class Rules:
 
 @dataclass(frozen=True, eq=False)
 class Assessment:
-    """How one model did for one target on one unseen block.
+    """Result of one model for one target on one unseen block.
 
     Parameters
     ----------
@@ -57,9 +57,9 @@ class Assessment:
     measured, predicted : ndarray of shape (n_judged,)
         Deviations [um].
     row, test, cycle : ndarray of int of shape (n_judged,)
-        Where the rows stand in their file, which file, which thermal cycle.
+        Row in the file, index of the file, and thermal cycle of each judged row.
     verdict : Verdict
-        Of the do-no-harm gate.
+        Verdict of the do-no-harm gate.
     sensors : tuple of str
         Inputs with an influence; those of all models, if several were trained.
     fit_s : float
@@ -70,9 +70,9 @@ class Assessment:
     frozen : ErrorModel or None
         The model that was replayed; None for several blocks together, or if it could not be fitted.
     failure : str
-        Why the method could not be fitted; empty if it could.
+        Reason why the method could not be fitted; empty if it could.
     caveat : str
-        Why this is no honest test, whatever the figures say; empty if it is one.
+        Reason why this is not an honest test, whatever the figures; empty if it is one.
     overall : bool
         It is the last word on this model and target: all that was judged, not one cycle of it.
     n_sensors : tuple of (int, int)
@@ -80,7 +80,7 @@ class Assessment:
     learned : int
         Rows that the model had learned from: left out, unless there are no others (see `caveat`).
     alone : ndarray of shape (n_judged,), optional
-        What the model alone predicts, without gate and limits; `predicted` is what would run, with them [um].
+        Prediction of the model alone, without gate and limits; `predicted` is the output with them [um].
     limits : Limits or None
         That `predicted` keeps to; None: there are none, and it is the model behind the gate, or alone.
     rejected : int
@@ -91,9 +91,9 @@ class Assessment:
         Of the band about what the model alone predicts, by the rows it has learned from alone; nan in rows without one
         [um].
     band : str
-        What the band is called; empty if no row has one.
+        Name of the band; empty if no row has one.
     probed : Probed or None
-        What probings did; None: there were none, the model ran on its readings alone.
+        Effect of probings; None: there were none, the model ran on its readings alone.
     """
 
     model: str
@@ -193,7 +193,7 @@ class Assessment:
 
     @property
     def _fragile(self) -> str:
-        """What noise or a lost sensor does to a model that is good without them; empty if they do no harm."""
+        """Effect of noise or a lost sensor on a model that is good without them; empty if it is harmless."""
         if self.robustness is None or self.verdict.word != "accepted":
             return ""
         margin = max(u.margin for u in self.verdict.units)  # one that was stated is for what was judged, not for this
@@ -202,7 +202,7 @@ class Assessment:
 
     @property
     def reason(self) -> str:
-        """Why, and for what is unproven which test would decide it."""
+        """Reason for the verdict, and for an unproven one the test that would decide it."""
         if self.failure:
             return f"could not be judged: {self.failure}"
         fragile = (
@@ -224,13 +224,13 @@ class Comparison:
     assessments : tuple of Assessment
         Per target, method and block; with several blocks also one for all of them together.
     collinearity : Collinearity
-        Of the temperatures.
+        Collinearity of the temperatures.
     left : int
         Pairs of method and target that were not judged, because the work was stopped.
     recommended : tuple of Recommendation
         Per target, where there was something to choose.
     starts : tuple of (str, Start)
-        Names of the recordings, and how each begins.
+        Names of the recordings, and their initial states.
     """
 
     judging: Judging

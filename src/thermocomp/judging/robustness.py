@@ -1,4 +1,4 @@
-"""What noise and a lost sensor do to a model."""
+"""Effect of noise and of a lost sensor on a model."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -61,7 +61,7 @@ class Robustness:
 
     @property
     def harm(self) -> str:
-        """What makes it worse than no compensation, and how much worse, in words; empty if nothing does."""
+        """Disturbance that makes it worse than no compensation, and by how much, in words; empty if none."""
         return self.harm_beyond(0.0)
 
     def harm_beyond(self, margin: float) -> str:
@@ -89,7 +89,7 @@ def worse(one: Robustness, other: Robustness) -> Robustness:
     Parameters
     ----------
     one, other : Robustness
-        Of the same rows.
+        Results for the same rows.
 
     Returns
     -------
@@ -189,9 +189,9 @@ def stress(
     draws : int
         Number of noise draws of each law.
     seed : int
-        Of the noise.
+        Seed of the noise.
     guard : Guard, optional
-        What is let through while sensors fail, also several at once.
+        Readings passed while sensors fail, also several at once.
 
     Returns
     -------
@@ -248,7 +248,7 @@ def stress(
 
 
 def unlike_rows(model: ErrorModel, samples: Samples, rows: BoolArray) -> BoolArray:
-    """Return which of some rows are outside the joint support of a model; rows with a missing input are not.
+    """Return a mask of the rows outside the joint support of a model; rows with a missing input are not.
 
     Parameters
     ----------

@@ -99,10 +99,10 @@ def select(
     Raises
     ------
     InputError
-        Rows stand in the samples twice and would be learned from and judged on at once (``pareto``).
+        Rows occur twice in the samples and would be used for training and judging at the same time (``pareto``).
         A cluster shall do the work of another method than ``pareto`` and ``ace``.
     Exception
-        What the method fails with, if it does for all targets.
+        Failure of the method, if it fails for all targets.
     """
     if elsewhere.get() is not None and method not in SHARED:
         raise InputError(

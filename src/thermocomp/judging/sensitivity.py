@@ -1,4 +1,4 @@
-"""What random sensor error does to the R2 of models as they are (Hwang, section 3.2.4 and Fig. 6; H-18)."""
+"""Effect of random sensor error on the R2 of unchanged models (Hwang, section 3.2.4 and Fig. 6; H-18)."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -60,7 +60,7 @@ def sensitivity(
     Parameters
     ----------
     models : mapping of str to ErrorModel
-        Of the same target.
+        Models of the same target.
     samples : Samples
         With the inputs of all models.
     rows : ndarray of bool of shape (n_rows,)
@@ -71,7 +71,7 @@ def sensitivity(
     draws : int
         At least 2; the paper made 100.
     seed : int
-        Of the error.
+        Seed of the error.
 
     Returns
     -------

@@ -29,7 +29,7 @@ def weigh_targets(samples: Samples, rows: BoolArray) -> tuple[str, FloatArray]:
     Returns
     -------
     unit : str
-        Of the targets; `PERCENT` of the error without compensation where they have several.
+        Unit of the targets; `PERCENT` of the error without compensation where they have several.
     scales : ndarray of shape (n_targets,)
         1 in the first case. A target without a number, or that does not move, counts in its own unit.
     """
@@ -50,7 +50,7 @@ def choose_sets(samples: Samples, most: int, learn: BoolArray) -> SensorSets:
     samples : Samples
         The inputs are temperatures and spindle speeds.
     most : int
-        Largest set, beside that of all.
+        Largest set, in addition to that of all.
     learn : ndarray of bool of shape (n_rows,)
         Rows whose deviations may be seen.
 

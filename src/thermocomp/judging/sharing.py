@@ -1,4 +1,4 @@
-"""Who does the work in pieces: this machine's processes, or a cluster."""
+"""Execution of tasks: by the processes of this machine, or by a cluster."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,4 +1,4 @@
-"""What is learned from and what is judged: rows, spans of time, thermal cycles, days or files, never at random."""
+"""Training and validation data: rows, spans of time, thermal cycles, days or files, never at random."""
 
 from dataclasses import dataclass
 
@@ -41,13 +41,13 @@ class Split:
 
     @property
     def name(self) -> str:
-        """What was left out, without the word for what it is."""
+        """Name of the left-out unit, without the word for its kind."""
         return self.block.partition(" ")[2]
 
 
 @dataclass(frozen=True)
 class Judging:
-    """How models are judged: one split or several.
+    """Split or splits by which models are judged.
 
     Parameters
     ----------
@@ -109,14 +109,14 @@ def by_time(samples: Samples, train_s: float, test_s: float) -> Judging:
 
 
 def join_short_cycles(cycle: IntArray, test: IntArray, least: int = MIN_ROWS) -> list[IntArray]:
-    """Return the thermal cycles to judge by: those too short to say anything join the one before them in their test.
+    """Return the thermal cycles to judge by: those that are too short join the previous one in their test.
 
     Parameters
     ----------
     cycle, test : ndarray of int of shape (n_rows,)
-        Of each row, in the order of time.
+        Cycle and test of each row, in chronological order.
     least : int
-        Rows that say something.
+        Smallest number of informative rows.
 
     Returns
     -------
@@ -189,7 +189,7 @@ def leave_one_file_out(samples: Samples) -> Judging:
 def leave_one_day_out(samples: Samples) -> Judging:
     """Judge on each day in turn, learn from all others; one with too few rows goes with the day before.
 
-    A thermal cycle belongs to the day on which it begins, unless it is longer than a day: then midnight cuts it.
+    A thermal cycle belongs to the day on which it begins, unless it is longer than a day: then midnight splits it.
 
     Raises
     ------

@@ -87,13 +87,13 @@ def fit(
         See `thermocomp.models.methods.expand`.
     judging : Judging
     rules : Rules
-        What is stated before judging.
+        Rules stated before judging.
     support : Support
         For the models.
     recordings : sequence of Recording
         The tests of `samples`, in their order: for the surroundings and the days in the models' validity.
     limits : Limits
-        Of the compensator that is judged with them.
+        Limits of the compensator that is judged with them.
     jobs : int
         Processes to share the work among; -1 takes all cores.
     progress : callable
@@ -193,9 +193,9 @@ class Judged:
     seen : tuple of str
         Names of recordings that a model was fitted to, as they are: they are not judged on if there is another.
     validity : Validity or None
-        What the thermal cycles of these recordings cover.
+        Conditions covered by the thermal cycles of these recordings.
     starts : tuple of (str, Start)
-        Names of the recordings, and how each begins.
+        Names of the recordings, and their initial states.
     """
 
     models: tuple[ErrorModel, ...]
@@ -230,11 +230,11 @@ def assess(
     recordings : sequence of Recording
         With the models' inputs and targets.
     rules : Rules
-        What is stated before judging.
+        Rules stated before judging.
     limits : Limits
-        Of the compensator that is judged with them.
+        Limits of the compensator that is judged with them.
     starts : Start or sequence of Start, optional
-        How each recording begins, or all of them; found out if not given.
+        Initial state of each recording, or of all of them. Default: determined from the recordings.
     probings : Probings, optional
         Made in the rows that are judged: see `thermocomp.runtime.adaptation`.
     progress : callable
@@ -309,7 +309,7 @@ def _known_targets(models: Sequence[ErrorModel], recordings: Sequence[Recording]
 
 
 def _stacked(model: ErrorModel, recordings: Sequence[Recording], starts: Start | Sequence[Start]) -> Samples:
-    """Return what a model needs of recordings, without rows in trouble."""
+    """Return the data of recordings that a model needs, without rows in trouble."""
     samples = stack(
         recordings,
         [model.target],
@@ -372,7 +372,7 @@ def _assess(
     guard: Guard | None,
     looked_after: Sequence[str],
 ) -> tuple[Assessment, Judging]:
-    """Judge a model on what it has not learned from (`known` rows); on everything if there is nothing else, and say so.
+    """Judge a model on unseen rows (not `known`); on all rows if there are no others, and report this.
 
     Returns
     -------
@@ -402,7 +402,7 @@ def _assess(
 
 
 def _guard(model: ErrorModel, samples: Samples, watched: Samples | None, known: list[Guard]) -> Guard | None:
-    """Return what a model's watch lets through while sensors fail; models of one file share it (`known`)."""
+    """Return the readings that a model's watch passes while sensors fail; models of one file share it (`known`)."""
     watch = model.watch
     if watch is None or watched is None or not can_look(watch, watched):
         return None

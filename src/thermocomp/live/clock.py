@@ -21,7 +21,7 @@ class ServiceClock:
         return time.time() if self.speed == 1.0 else self._epoch + self.tick()
 
     def tick(self) -> float:
-        """Return its monotone clock, which nobody sets [s]."""
+        """Return the monotonic clock, which is never set [s]."""
         return self.speed * (time.monotonic() - self._begin)
 
     def of(self, stamp: float) -> float:

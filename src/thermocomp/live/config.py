@@ -35,15 +35,15 @@ class Page:
     Parameters
     ----------
     host, port : str, int
-        Where it is served; loopback unless it is stated otherwise.
+        Address of the page. Default: loopback.
     hosts : tuple of str
-        Names by which it may be called beside `host`, ``localhost`` and the addresses of this computer.
+        Host names of the page in addition to `host`, ``localhost`` and the addresses of this computer.
     token_file : str
-        File with the token that buttons want; without one the page only shows.
+        File with the token required by buttons; without one the page is read-only.
     settled : float
         A drift below this in ten minutes counts as settled [um].
     pages : tuple of str
-        Pages of other packages to serve beside, by their entry points of ``thermocomp.pages``.
+        Additional pages of other packages, by their entry points of ``thermocomp.pages``.
     """
 
     host: str = "127.0.0.1"
@@ -76,7 +76,7 @@ class MachineOf:
     ----------
     file : str
     at : tuple of 3 float
-        Where the other axes stand while one moves [mm].
+        Positions of the other axes while one moves [mm].
     tool : tuple of 3 float or None
         From the gauge point to the tip [mm]; the machine file's own if not given.
     """
@@ -88,7 +88,7 @@ class MachineOf:
 
 @dataclass(frozen=True, kw_only=True)
 class JournalOut:
-    """Where it is written down what happens.
+    """Output of the journal.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ class JournalOut:
     size_mb : float
         A file that has become larger is followed by a new one.
     files : int
-        So many at most: the oldest is removed.
+        Maximum number of files: the oldest is removed.
     channels : dict of str to str
         Quantity of what readings hold beside the models' inputs, such as ``{t9_C = "temperature"}``: kept, too. A
         displacement that is named as a target measures what its correction leaves.
@@ -120,17 +120,17 @@ Probings = Annotated[MqttProbing | SimulatedProbing, Discriminator("kind")]
 
 @dataclass(frozen=True, kw_only=True)
 class Config:
-    """What the service runs.
+    """Configuration of the service.
 
     Parameters
     ----------
     sources, sinks : tuple
-        Where readings come from, where corrections go.
+        Sources of readings, receivers of corrections.
     models : tuple of str
         Model files, a target each model; or none, and a machine.
     machine : MachineOf or None
     probes : tuple
-        Where measurements of the tool point come from.
+        Sources of measurements of the tool point.
     state : str
         File that the state is kept in; without one every start is a cold one.
     limits : Limits
@@ -143,7 +143,7 @@ class Config:
     own_compensation : {'on', 'off', 'unknown'}
         Whether the controller compensates for temperature by itself.
     at_stop : {'hold', 'fade'}
-        When it is stopped corrections stay as they are, or go to zero first, within the limits.
+        Corrections after a stop: stay as they are, or go to zero first, within the limits.
     """
 
     sources: tuple[SourceSection, ...]
@@ -165,7 +165,7 @@ class Config:
             raise SettingError("\n".join(found))
 
     def _wrong(self) -> Iterator[str]:
-        """Say what does not fit together."""
+        """Yield the settings that are missing or exclude each other."""
         if bool(self.models) == bool(self.machine):
             yield (
                 f"models = {list(self.models)}: name at least one model file, as 'thermocomp fit' writes it, or a "
@@ -206,7 +206,7 @@ class Config:
 
 
 def _place(one: SourceSection | SinkSection | Probings) -> str:
-    """Return what two links must not share."""
+    """Return the resource that two links must not share."""
     if isinstance(one, OnBroker):
         return f"topic = {one.topic!r} of {one.host}:{one.port}"
     found = {"file": getattr(one, "file", ""), "socket": getattr(one, "socket", "")}
@@ -261,7 +261,7 @@ def read_config(path: str | Path) -> ServiceSettings:
 
 
 def _adapter(content: dict[str, Any]) -> TypeAdapter[Config]:
-    """Return what validates a configuration: with this package's sections, and those of others that it names."""
+    """Return the validator of a configuration: sections of this package, and those of plug-ins that it names."""
     fields = [(group, tuple[_section_of(group, content.get(group)), ...], ()) for group in _KINDS]  # type: ignore[misc]
     made = make_dataclass("Config", [fields[0][:2], fields[1]], bases=(Config,), frozen=True, kw_only=True)
     return TypeAdapter(with_config(ConfigDict(strict=True, extra="forbid", allow_inf_nan=False))(made))
@@ -285,7 +285,7 @@ def _load_section(entry: EntryPoint) -> type:
 
 
 def _unfit(value: Any, place: str = "") -> Iterator[str]:
-    """Say which keys and texts cannot be printed, or are longer than any topic."""
+    """Yield the keys and texts that cannot be printed, or are longer than any topic."""
     if isinstance(value, str) and (why := explain_unfit(value, 65_535)):
         yield f"{place}: {why}"
     pairs = value.items() if isinstance(value, dict) else enumerate(value, 1) if isinstance(value, list) else ()
@@ -299,7 +299,7 @@ def _unfit(value: Any, place: str = "") -> Iterator[str]:
 def _behind(
     adapter: TypeAdapter[Config], content: dict[str, Any], errors: Sequence[ErrorDetails]
 ) -> list[ErrorDetails]:
-    """Return what else is wrong in tables that have a key of a wrong type: they are not judged as a whole then."""
+    """Return the other faults in tables with a key of a wrong type: these are then not validated as a whole."""
     content = deepcopy(content)
     tables = set[tuple[int | str, ...]]()
     for error in errors:

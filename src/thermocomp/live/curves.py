@@ -1,4 +1,4 @@
-"""What the page draws over time: a row of numbers now and then."""
+"""Curves of the page over time: a row of numbers at intervals."""
 
 from collections import deque
 

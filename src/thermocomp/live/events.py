@@ -1,4 +1,4 @@
-"""What happened, to be shown: the newest events; others cannot drown them."""
+"""Recent events for display; the number of frequent kinds is limited so that they cannot displace the others."""
 
 import time
 from collections import deque
@@ -19,7 +19,7 @@ class Event:
     Parameters
     ----------
     time : float
-        Of the machine, seconds since 1970.
+        Time of the machine, seconds since 1970.
     kind : str
         ``reference``, ``state``, ``sensor``, ``probing``, ``link`` or ``service``.
     text : str
@@ -39,14 +39,14 @@ class Events(deque[Event]):
         self._left_out = dict.fromkeys(LIMITED, 0)
 
     def tell(self, time_of_it: float, kind: str, text: str) -> Event | None:
-        """Add an event and return it; None if there were too many of its kind: the next one says how many.
+        """Add an event and return it; None if there were too many of its kind: the next one gives their number.
 
         Parameters
         ----------
         time_of_it : float
-            Of the machine, seconds since 1970.
+            Time of the machine, seconds since 1970.
         kind, text : str
-            Of `Event`; what cannot be printed is shown escaped.
+            As for `Event`; unprintable characters are shown escaped.
         """
         if (lately := self._lately.get(kind)) is not None:
             now = time.monotonic()

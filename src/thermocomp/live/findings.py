@@ -1,4 +1,4 @@
-"""What a configuration names and what is there: all that would keep the service from starting, at once."""
+"""Files named in a configuration and their state: all faults that would prevent the start of the service, at once."""
 
 import os
 import re
@@ -19,7 +19,7 @@ _LONG = 255
 
 
 def find_faults(settings: ServiceSettings) -> Iterator[str]:
-    """Say which files cannot be read, and which cannot be written.
+    """Yield the files that cannot be read, and those that cannot be written.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def find_faults(settings: ServiceSettings) -> Iterator[str]:
 
 
 def find_faults_now(settings: ServiceSettings, page: Page | None) -> Iterator[str]:
-    """Say what else would keep the service from starting, or a link from working, as it is now.
+    """Yield other present faults that would prevent the start of the service, or the work of a link.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def find_faults_now(settings: ServiceSettings, page: Page | None) -> Iterator[st
 
 
 def runs_now(settings: ServiceSettings) -> bool:
-    """Return whether the service of this configuration runs: then its port is taken.
+    """Return whether the service of this configuration is running: its port is then in use.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def _unwritable(path: Path) -> str:
 
 
 def _faults_of_setup(socket: Path, axes: set[str]) -> Iterator[str]:
-    """Say what is wrong with the set-up of a LinuxCNC."""
+    """Return the faults of the set-up of a LinuxCNC."""
     hal, do = socket.with_name(HAL_NAME), "see 'thermocomp linuxcnc setup', which says where the service connects"
     if socket.exists() and not socket.is_socket():
         yield f"{socket}: is no socket; {do}"

@@ -1,4 +1,4 @@
-"""What is in force at the controller, as its sinks confirm it."""
+"""Corrections in force at the controller, as confirmed by its sinks."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -32,7 +32,7 @@ class ConfirmedCorrections:
         return sink in self._sure
 
     def confirm(self, found: Mapping[str, Correction]) -> None:
-        """Take what a controller has confirmed."""
+        """Process a confirmation of a controller."""
         self.confirmed |= {t: (c, self._clock.tick()) for t, c in found.items()}
 
     def of(self, target: str, state: CompensatorState) -> Correction | None:

@@ -37,7 +37,7 @@ class StateKeeper:
         self.not_saved = ""
 
     def begin(self) -> CompensatorState:
-        """Return the state to begin with: that of the file, or a cold one.
+        """Return the initial state: that of the file, or a cold one.
 
         Raises
         ------
@@ -74,7 +74,7 @@ class StateKeeper:
                 self._refused.replace(self._refused.with_name(f"{self._refused.name}.refused"))
 
     def save(self, state: CompensatorState) -> None:
-        """Write the state; `not_saved` says why, if that fails."""
+        """Write the state; `not_saved` contains the reason if that fails."""
         if self._path is None:
             self.not_saved = "no file is configured for it"
             return

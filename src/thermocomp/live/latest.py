@@ -1,4 +1,4 @@
-"""The latest value of each channel: of names that nothing uses only so many are kept, whatever comes in."""
+"""Latest value of each channel: the number of kept names that nothing uses is limited."""
 
 from collections.abc import Iterable, Mapping
 
@@ -22,11 +22,11 @@ class Latest(dict[str, tuple[float, float]]):
 
     @property
     def left_out(self) -> int:
-        """How many names were not kept; at `COUNTED` it may be more."""
+        """Number of names that were not kept; at `COUNTED` it may be more."""
         return len(self._left_out)
 
     def take(self, values: Mapping[str, float], tick: float, longest: float) -> str:
-        """Take values in; return a name that is not kept if none was left out before.
+        """Store values; return a name that is not kept if none was left out before.
 
         Parameters
         ----------
@@ -34,7 +34,7 @@ class Latest(dict[str, tuple[float, float]]):
         tick : float
             Now [s].
         longest : float
-            A name that nothing uses makes room for another after so long without a value [s].
+            Time without a value after which a name that nothing uses may be replaced [s].
         """
         first, others = "", values.keys() - self.used
         if new := others - self.keys():

@@ -1,4 +1,4 @@
-"""Probings of a running service: which wait for the next reading, which were taken, and what they said."""
+"""Probings of a running service: waiting for the next reading, used ones, and their results."""
 
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -15,7 +15,7 @@ from thermocomp.runtime.state import Compensated, CompensatorState
 
 
 class ProbingLedger:
-    """Takes measurements of the tool point in, and keeps what came of them.
+    """Collects probing measurements of the tool point and stores their results.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class ProbingLedger:
         self._measured = dict[str, tuple[Measurement, Correction | None]]()
 
     def measure(self, found: Measurement, state: CompensatorState, in_force: Correction | None) -> None:
-        """Take a measurement as a probing, with the next reading.
+        """Use a measurement as a probing, with the next reading.
 
         One that contains the correction (``left`` is false: LinuxCNC's ``#5063`` is a position of the motor) is the
         deviation as it is.
@@ -46,7 +46,7 @@ class ProbingLedger:
         found : Measurement
         state : CompensatorState
         in_force : Correction or None
-            When it was made; None: not known.
+            Correction at the time of the measurement; None: unknown.
         """
         probing = Probing(found.measured, found.repeatability, found.position, found.keys)
         if found.left and in_force is not None:
@@ -61,7 +61,7 @@ class ProbingLedger:
     def _refuse(
         self, found: Measurement, probing: Probing, state: CompensatorState, in_force: Correction | None
     ) -> str:
-        """Say why a measurement is not used with the next reading; the empty string if it is."""
+        """Return the reason why a measurement is not used with the next reading; empty if it is."""
         target, old = found.target, self._clock.now() - self._clock.of(found.time)
         if target not in self._compensator.lines:
             return f"no target is named {target}"
@@ -104,7 +104,7 @@ class ProbingLedger:
         state : CompensatorState
             After it.
         recorder : Recorder or None
-            Of the journal.
+            Recorder of the journal.
         """
         for target, probing in probings.items():
             if target in said.deviations:

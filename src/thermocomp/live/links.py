@@ -1,4 +1,4 @@
-"""Links of the service: each source and each sink in a task of its own, reconnected when it is lost.
+"""Links of the service: each source and each sink in a separate task, reconnected when it is lost.
 
 Whatever a source or a sink raises, it is this link's trouble alone: the others and the service continue.
 """
@@ -68,7 +68,7 @@ class Link:
             self._wait = min(2 * self._wait, LONGEST)
 
     def status(self) -> LinkStatus:
-        """Return how it is; what it was lost by stays until it is connected again."""
+        """Return the status; the reason of a loss remains until it is connected again."""
         if self.trouble:
             return LinkStatus("failed", self.trouble)
         try:
@@ -77,7 +77,7 @@ class Link:
             return LinkStatus("failed", explain(e))
 
     def news(self) -> Iterator[str]:
-        """Return what is new since the last call: it was lost, it is back, it refused messages."""
+        """Yield the events since the last call: connection lost, connected again, messages refused."""
         where = getattr(self.end, "topic", None) or getattr(self.end, "path", None)
         name = type(self.end).__name__ + (f" {where}" if where else "")
         while self._losses:
@@ -171,7 +171,7 @@ class Outlet(Link):
 
 
 def explain(error: Exception) -> str:
-    """Say in words why a link does not work.
+    """Return the reason why a link does not work, in words.
 
     Parameters
     ----------

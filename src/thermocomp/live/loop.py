@@ -36,10 +36,10 @@ class Service:
     sinks : sequence of Sink
     clock : ServiceClock
     state_path : Path or None
-        Where the state is kept.
+        Path of the saved state.
     probes : sequence of Probe
     recorder : Recorder or None
-        Of the journal.
+        Recorder of the journal.
     """
 
     compensator: Compensator
@@ -91,7 +91,7 @@ class Service:
                 self.recorder.journal.close()
 
     def take(self, reading: Reading) -> None:
-        """Take a reading of a source in: with it goes the latest of the others."""
+        """Process a reading of a source, with the latest readings of the others."""
         if self._ending:
             return
         tick, now = self.clock.tick(), self.clock.now()
@@ -135,7 +135,7 @@ class Service:
         self._dirty = True
 
     def measure(self, found: Measurement) -> None:
-        """Take a measurement of the tool point as a probing, with the next reading."""
+        """Use a measurement of the tool point as a probing, with the next reading."""
         known = found.target in self.compensator.lines
         in_force = self.in_force.of(found.target, self.state) if known else None
         self.probings.measure(found, self.state, in_force)
@@ -231,7 +231,7 @@ class Service:
         self._dirty = True
 
     def _hear(self, sink: Sink, in_force: Mapping[str, Correction]) -> None:
-        """Take what a controller says is in force, and why it has none."""
+        """Process the report of a controller on the correction in force, and the reason if there is none."""
         known = {t: c for t, c in in_force.items() if t in self.state.corrections}
         self.in_force.confirm(known)
         if self.recorder is not None:

@@ -1,4 +1,4 @@
-"""What probings of the running machine said: a chart of what the models were wrong by, with an action limit."""
+"""Results of probings on the running machine: a control chart of the model errors, with an action limit."""
 
 import math
 from typing import NamedTuple
@@ -13,7 +13,7 @@ KEPT = 200
 
 
 class Checked(NamedTuple):
-    """A probing beside what was predicted for its instant."""
+    """A probing compared with the prediction for its instant."""
 
     time: float  #: of the machine, seconds since 1970
     target: str
@@ -31,12 +31,12 @@ class Checked(NamedTuple):
 def check(
     time: float, target: str, probing: Probing, predicted: Deviation, learned: Adaptation | None, refused: str
 ) -> Checked:
-    """Return how a probing compares with what was predicted.
+    """Return the comparison of a probing with the prediction.
 
     Parameters
     ----------
     time : float
-        Of the machine [s].
+        Time of the machine [s].
     target : str
     probing : Probing
     predicted : Deviation

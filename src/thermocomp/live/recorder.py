@@ -1,4 +1,4 @@
-"""What the service writes into its journal."""
+"""Records of the service for its journal."""
 
 import math
 from collections.abc import Mapping
@@ -44,7 +44,7 @@ class Recorder:
     clock : ServiceClock
     limits : JournalLimits
     more : mapping of str to str, optional
-        Quantity of channels that are kept beside the inputs of the models.
+        Quantity of channels that are recorded in addition to the inputs of the models.
     """
 
     def __init__(
@@ -94,7 +94,7 @@ class Recorder:
         self._references = dict(references)
 
     def confirm(self, time: float, in_force: Mapping[str, Correction]) -> None:
-        """Write what a controller says is in force."""
+        """Write the correction in force as reported by a controller."""
         for target, correction in in_force.items():
             self.journal.add(ConfirmationRow(time, target, correction))
 
@@ -128,5 +128,5 @@ class Recorder:
             )
 
     def alarm(self, time: float, kind: str, text: str) -> None:
-        """Write something that somebody should look at."""
+        """Write an alarm that needs attention."""
         self.journal.add(AlarmRow(time, kind, text))

@@ -1,4 +1,4 @@
-"""How long a machine still drifts: told from the curve of the predicted deviation alone."""
+"""Remaining duration of the drift of a machine: estimated from the curve of the predicted deviation alone."""
 
 import math
 from collections.abc import Sequence
@@ -45,5 +45,5 @@ def minutes_until(times: Sequence[float], deviations: Sequence[float], below: fl
 
 
 def _at(times: Sequence[float], values: Sequence[float], time: float) -> float:
-    """Return the value that was last said at a time."""
+    """Return the last value at a time."""
     return next(v for t, v in zip(reversed(times), reversed(values), strict=True) if t <= time)

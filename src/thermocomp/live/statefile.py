@@ -52,7 +52,7 @@ class Saved:
 
 
 def fingerprint(compensator: Compensator) -> str:
-    """Return what tells the models of a compensator from others."""
+    """Return the fingerprint of the models of a compensator."""
     watches = [asdict(w) for w in compensator.watches]
     entries = [entry_of(m) for m in compensator.models]
     text = json.dumps([list(compensator.lines), entries, watches], sort_keys=True, default=str)
@@ -66,7 +66,7 @@ def dumps(state: CompensatorState, compensator: Compensator, written: datetime) 
     ----------
     state : CompensatorState
     compensator : Compensator
-        Whose state it is.
+        Compensator of the state.
     written : datetime
         Now, with its time zone.
 
@@ -92,9 +92,9 @@ def loads(text: str, compensator: Compensator, source: str = "state") -> Saved:
     ----------
     text : str
     compensator : Compensator
-        Whose state it must be.
+        Compensator expected in the file.
     source : str
-        What to call it in an error.
+        Name of the source in an error.
 
     Raises
     ------
@@ -114,7 +114,7 @@ def loads(text: str, compensator: Compensator, source: str = "state") -> Saved:
 
 
 def write(state: CompensatorState, compensator: Compensator, path: str | Path, written: datetime) -> None:
-    """Write a state over the one before: a kill leaves one of them, whole.
+    """Replace the stored state: after a kill one of the two is there, complete.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def read(path: str | Path, compensator: Compensator) -> Saved:
     ----------
     path : str or Path
     compensator : Compensator
-        Whose state it must be.
+        Compensator expected in the file.
 
     Raises
     ------

@@ -64,7 +64,7 @@ class TransformRegressor(StaticRegressor):
         return self._inverse(total)
 
     def outside(self, X: ArrayLike) -> NDArray[np.bool_]:
-        """Tell which values lie beyond the trained range, where the prediction is cropped (W-07).
+        """Return a mask of the values beyond the training range, where the prediction is cropped (W-07).
 
         Parameters
         ----------
@@ -136,7 +136,7 @@ class ACE(TransformRegressor):
         N as a share of the number of rows, instead of `half_window`: ten ranks are a lot of 199 rows but noise of
         10,000 (E-W8).
     neighbours : int
-        k of the nearest-neighbour estimate of phi and of theta^-1 (W-05). With fewer rows, all are taken.
+        k of the nearest-neighbour estimate of phi and of theta^-1 (W-05). With fewer rows, all are used.
     tolerance : float
         Sweeps end when E[(theta - sum phi)^2] fails to decrease by more than this; 0 is the paper's rule (W-03). If
         `converged`: when a sweep moves all phi together by no more than this (root mean square; theta has norm 1).

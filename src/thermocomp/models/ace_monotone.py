@@ -36,7 +36,7 @@ class MonotoneACE(TransformRegressor):
         Weight of the integrated squared second derivative, the (extended) range of each variable counting as 1. It
         takes 1 % of the height of one wide arc at 1e-4, and half of it at 0.01; at 1e-6 the curves follow every bump.
     shrinkage : float
-        Weight of the mean square of the curves' knots: decides between inputs that say the same.
+        Weight of the mean square of the curves' knots: decides between collinear inputs.
     extend : float
         Share of the trained span by which curves continue beyond it: the margin at which `Support` clips the inputs
         unless told otherwise; 0 crops peaks like the paper (W-07).

@@ -33,7 +33,7 @@ def thin(curves: Sequence[Curve], response: Curve, columns: Sequence[FloatArray]
     curves : sequence of Curve
         One per input.
     response : Curve
-        What their sum goes through.
+        Curve applied to their sum.
     columns : sequence of ndarray of shape (n_rows,)
         The fitted rows of each input.
 

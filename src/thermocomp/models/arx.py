@@ -23,7 +23,7 @@ from thermocomp.models.timed import Time
 
 @dataclass(frozen=True, eq=False)
 class _Setting:
-    """What is tried: data on one clock, orders to choose from, with an intercept or without."""
+    """Candidates to try: data on one clock, orders to choose from, with an intercept or without."""
 
     data: Clocked
     ks: tuple[int, ...]
@@ -67,7 +67,7 @@ class ARX(ClockedRegressor):
         False: no deviation without inputs, as in the paper. True: one that builds up from the start of each test, as
         what runs beside the spindle gives. None: judged in free run on cycles left out.
     time : {'column', 'routed', 'none'} or None
-        Where it finds the time, see `thermocomp.models.timed.TimedRegressor`; without it, it refuses to work.
+        Source of the time, see `thermocomp.models.timed.TimedRegressor`; without it, the estimator raises an error.
 
     Attributes
     ----------
@@ -81,19 +81,19 @@ class ARX(ClockedRegressor):
     orders_ : tuple of Order
         Table of FPE, AIC and BIC at `interval_`; empty with ``"free-run"``.
     trials_ : tuple of TriedSetting
-        What was judged in free run on cycles left out; empty if nothing was.
+        Settings judged in free run on left-out cycles; empty if none were.
     cv_rms_ : float
-        Of the choice; nan if nothing was judged.
+        RMS of the chosen setting; nan if none was judged.
     chosen_by_ : str
-        What was left out.
+        Left-out units.
     one_step_rms_, free_run_rms_ : float
         In the training data: the first is trivially small, the second is the model's [unit of y].
     caution_ : str
-        What the model cannot know (E-P6).
+        Limitation of the model (E-P6).
 
     References
     ----------
-    The study of pre-compensation by revised NC programs, of which P-01 to P-07 tell in the requirements.
+    The study of pre-compensation by revised NC programs: requirements P-01 to P-07.
 
     Akaike, H.: Fitting autoregressive models for prediction. Annals of the Institute of Statistical Mathematics 21,
     1969, 243-247.

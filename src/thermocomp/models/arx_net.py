@@ -54,7 +54,7 @@ class _Net:
         )
 
     def settled(self, inputs: FloatArray) -> FloatArray:
-        """Return where the free run is after many ticks of the same inputs."""
+        """Return the state of the free run after many ticks with the same inputs."""
         own = np.zeros((len(inputs), max(self.k, 1)))
         driven = np.tile(inputs, self.m + 1)
         for _ in range(SETTLED if self.k else 1):
@@ -93,11 +93,11 @@ class NetARX(ClockedRegressor):
     momentum : float
         Part of the previous change that is added to the next one.
     random_state : int
-        Of the initial weights and of the order of the patterns.
+        Seed of the initial weights and of the order of the patterns.
     jobs : int
         Threads that train nets.
     time : {'column', 'routed', 'none'} or None
-        Where it finds the time, see `thermocomp.models.timed.TimedRegressor`; without it, it refuses to work.
+        Source of the time, see `thermocomp.models.timed.TimedRegressor`; without it, the estimator raises an error.
 
     Attributes
     ----------
@@ -112,11 +112,11 @@ class NetARX(ClockedRegressor):
     free_run_rms_ : float
         In the training data [unit of y].
     caution_ : str
-        What the model cannot know (E-P6).
+        Limitation of the model (E-P6).
 
     References
     ----------
-    The study of pre-compensation by revised NC programs, of which P-01 to P-07 tell in the requirements.
+    The study of pre-compensation by revised NC programs: requirements P-01 to P-07.
 
     Narendra, K. S., Parthasarathy, K.: Identification and control of dynamical systems using neural networks. IEEE
     Transactions on Neural Networks 1(1), 1990, 4-27. doi:10.1109/72.80202

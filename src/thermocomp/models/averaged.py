@@ -53,16 +53,16 @@ class AveragedDynamic(TimedRegressor):
         `thermocomp.models.pacedfeatures.SHORTEST_LAG` times the time between two rows is left
         out.
     powers : sequence of float
-        Of the speed's share of the top speed.
+        Exponents of the fraction of the top speed.
     stopped, running : sequence of float
         Time constants of the speed states at rest and at top speed [s]; all pairs are taken that do not slow down as
         the spindle turns.
     structures : int
-        How many are averaged.
+        Number of averaged structures.
     random_state : int
-        Of the draw.
+        Seed of the draw.
     time : {'column', 'routed', 'none'} or None
-        Where it finds the time, see `thermocomp.models.timed.TimedRegressor`; without it, it refuses to work.
+        Source of the time, see `thermocomp.models.timed.TimedRegressor`; without it, the estimator raises an error.
 
     Attributes
     ----------
@@ -70,13 +70,13 @@ class AveragedDynamic(TimedRegressor):
         Weights of the features, see `feature_labels_`.
     feature_labels_ : tuple of str
     lags_ : tuple of float
-        Of the temperatures [s].
+        Lags of the temperatures [s].
     top_speed_ : float
         Greatest speed of the rows learned from [1/min].
     cv_rms_ : float
         Mean over what was left out of the root mean square error there [unit of y].
     chosen_by_ : str
-        What was left out.
+        Left-out units.
     left_out_ : ndarray of shape (n_rows, 2)
         Of each row that was learned from: prediction by structures that were fitted without its cycle, and their spread
         [unit of y]; nan elsewhere.
@@ -162,7 +162,7 @@ class AveragedDynamic(TimedRegressor):
     def lay_out(
         self, rows: FloatArray, step: FloatArray, folds: IntArray, speeds: Sequence[int]
     ) -> tuple[PacedFeatures, IntArray, str]:
-        """Return the features that rows have something to say about, and what of the rows is left out together.
+        """Return the features that the rows can determine, and the parts of the rows that are left out together.
 
         Parameters
         ----------

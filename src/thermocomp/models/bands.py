@@ -41,7 +41,7 @@ def find_band(
     residual : ndarray of shape (n_rows,)
         Error on rows whose cycle the model had not seen [unit].
     spread : ndarray of shape (n_rows,)
-        Of its structures there [unit].
+        Spread of its structures there [unit].
     cycle : ndarray of int of shape (n_rows,)
     turning : ndarray of bool of shape (n_rows,)
         The spindle turns.

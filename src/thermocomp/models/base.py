@@ -1,4 +1,4 @@
-"""What all estimators of the training wing share: scikit-learn's contract and `freeze`."""
+"""Common base of all estimators: the contract of scikit-learn and `freeze`."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -51,9 +51,9 @@ class ThermalRegressor(RegressorMixin, BaseEstimator, ABC):
             One per feature. Without it they are made from the training data: named like the features, without unit,
             with reference 0 and the range seen in `fit`.
         support : Support
-            What the model does outside its trained range.
+            Behaviour of the model outside its training range.
         provenance : Provenance, optional
-            Where it comes from.
+            Origin of the model.
 
         Returns
         -------
@@ -108,7 +108,7 @@ class ThermalRegressor(RegressorMixin, BaseEstimator, ABC):
 
 
 class MemorylessRegressor(ThermalRegressor):
-    """A regressor to which a row is a state of its own, whatever came before."""
+    """A regressor whose output depends only on the present row."""
 
     def predict(self, X: ArrayLike) -> FloatArray:
         """Predict the deviation.
@@ -155,10 +155,10 @@ class MemorylessRegressor(ThermalRegressor):
 
 
 class StaticRegressor(MemorylessRegressor):
-    """A memoryless regressor whose fit wants X and y and nothing else."""
+    """A memoryless regressor whose fit needs only X and y."""
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
-        """Fit; what a method refuses beside data that are none, its class tells.
+        """Fit; the class documents the additional data that a method refuses.
 
         Parameters
         ----------
@@ -192,11 +192,11 @@ class CycledRegressor(MemorylessRegressor):
     Attributes
     ----------
     chosen_by_ : str
-        What was left out to choose.
+        Units left out for the choice.
     """
 
     def fit(self, X: ArrayLike, y: ArrayLike, *, cycle: ArrayLike | None = None) -> Self:
-        """Fit; what a method refuses beside data that are none, its class tells.
+        """Fit; the class documents the additional data that a method refuses.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""What the autoregressive estimators share: their data on a clock, their inputs, and what was tried to choose."""
+"""Common part of the autoregressive estimators: their data on a clock, their inputs, and the candidates tried."""
 
 import math
 from abc import abstractmethod
@@ -112,7 +112,7 @@ class Clocked:
 
 
 class Recursion(Protocol):
-    """What an autoregressive estimator fits."""
+    """Fitted recursion of an autoregressive estimator."""
 
     def settled(self, inputs: FloatArray) -> FloatArray:
         """Return the deviation at which it would come to rest with each row's inputs."""
@@ -122,7 +122,7 @@ class Recursion(Protocol):
 
 
 class ClockedRegressor(TimedRegressor):
-    """What the autoregressive estimators share: which inputs, on which clock, chosen by which cycles."""
+    """Base of the autoregressive estimators: choice of inputs and clock, by cycles."""
 
     inputs: Sequence[str | int] | None
     interval_: float
@@ -130,7 +130,7 @@ class ClockedRegressor(TimedRegressor):
     @property
     @abstractmethod
     def _recursion(self) -> Recursion:
-        """What was fitted."""
+        """Fitted recursion."""
 
     @abstractmethod
     def _learn(self, inputs: FloatArray, deviation: FloatArray, step: FloatArray, folds: IntArray) -> None:
@@ -205,7 +205,7 @@ def rms(error: FloatArray) -> float:
 
 
 def too_few(n: int, k: int, m: int, data: Clocked) -> str:
-    """Say that there are too few rows for some orders.
+    """Return the message that there are too few rows for some orders.
 
     Parameters
     ----------

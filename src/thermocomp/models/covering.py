@@ -1,4 +1,4 @@
-"""Joint support of a training set: a few states that stand for all, and a limit calibrated on cycles left out.
+"""Joint support of a training set: a few representative states, and a limit calibrated on cycles left out.
 
 States: farthest-point cover (Gonzalez 1985, Clustering to minimize the maximum intercluster distance): each new point
 is the training state that is farthest from those there are. Limit: the distance that `SHARE` of the rows of left-out
@@ -37,7 +37,7 @@ def find_joint_support(change: FloatArray, channels: Sequence[Channel], cycle: I
     change : ndarray of shape (n_rows, n_inputs)
         Inputs minus their reference, finite [their units].
     channels : sequence of Channel
-        What they are.
+        Channels of the values.
     cycle : ndarray of int of shape (n_rows,)
         Thermal cycle of each row; with a single one its quarters are left out in turn.
 

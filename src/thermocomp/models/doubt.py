@@ -1,4 +1,4 @@
-"""What `averaged` does not know: the covariance of its weights, and what a further test would take from it."""
+"""Parameter uncertainty of `averaged`: the covariance of its weights, and its reduction by a further test."""
 
 from dataclasses import dataclass
 
@@ -17,7 +17,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Doubt:
-    """What an average of ridge regressions does not know, and how temperatures follow the speed.
+    """Uncertainty of an average of ridge regressions, and the response of temperatures to the speed.
 
     The covariance of the weights is that of the structures: they fit the rows alike and differ where these say nothing.
     A part that is left out in turn (half a thermal cycle) counts as one observation, whose error is the one left out:
@@ -29,7 +29,7 @@ class Doubt:
     columns : int
         Inputs of the recordings.
     covariance : ndarray of shape (n_targets, n_features, n_features)
-        Of the weights.
+        Covariance of the weights.
     error : ndarray of shape (n_targets,)
         Root mean square error on what was left out [unit of the target].
     part : float
@@ -60,7 +60,7 @@ class Doubt:
         dt : float
             Between two rows [s].
         room : ndarray of shape (n_rows, n_temperatures), optional
-            What the room does to each temperature [degC]. The rest is predicted from the speed.
+            Effect of the room on each temperature [degC]. The rest is predicted from the speed.
         """
         step = np.full(len(speed), dt)
         step[0] = np.inf
@@ -72,12 +72,12 @@ class Doubt:
         return np.vstack(list(self.features.tables(rows, step)))
 
     def spread(self, table: FloatArray) -> FloatArray:
-        """Return what is expected to be wrong in some rows, root mean square, (n_targets,) [unit of the target]."""
+        """Return the expected error in some rows, root mean square, (n_targets,) [unit of the target]."""
         squares = (self.covariance * (table.T @ table / len(table))).sum(axis=(1, 2))
         return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
 
     def after(self, table: FloatArray, duration: float) -> "Doubt":
-        """Return what would not be known after a test.
+        """Return the uncertainty that remains after a test.
 
         Parameters
         ----------
@@ -102,14 +102,14 @@ class Doubt:
 
 
 def find_doubt(samples: Samples, settings: AveragedDynamic | None = None) -> Doubt:
-    """Return what `averaged` does not know after some recordings.
+    """Return the uncertainty of `averaged` after some recordings.
 
     Parameters
     ----------
     samples : Samples
         With a spindle speed and at least one temperature.
     settings : AveragedDynamic, optional
-        Of the method; its own if not given.
+        Settings of the method. Default: its default settings.
 
     Returns
     -------

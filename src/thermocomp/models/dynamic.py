@@ -73,15 +73,15 @@ class DynamicRidge(TimedRegressor):
     speed_powers : sequence of int
         Powers of the speed that are lagged.
     copies : {'high-passed', 'lagged'}
-        What the ridge shrinks: the temperature minus its lagged copy, or the lagged copy itself.
+        Quantity shrunk by the ridge: the temperature minus its lagged copy, or the lagged copy itself.
     strengths : sequence of float
         Ridge strengths to choose from.
     rule : {'one-standard-error', 'minimum'}
-        How the strength is chosen.
+        Rule by which the strength is chosen.
     fit_intercept : bool
         False: the model gives zero in the reference state.
     time : {'column', 'routed', 'none'} or None
-        Where it finds the time, see `thermocomp.models.timed.TimedRegressor`; without it, it refuses to work.
+        Source of the time, see `thermocomp.models.timed.TimedRegressor`; without it, the estimator raises an error.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ class DynamicRidge(TimedRegressor):
     cv_rms_ : float
         Mean over the cycles left out of their RMS, at the choice [unit of y].
     chosen_by_ : str
-        What was left out to choose.
+        Units left out for the choice.
 
     References
     ----------

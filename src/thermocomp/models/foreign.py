@@ -1,4 +1,4 @@
-"""Regressors of others: any of scikit-learn's, or a small class of one's own, judged beside the methods."""
+"""External regressors: any of scikit-learn, or a small custom class, judged with the methods."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -61,12 +61,12 @@ class ForeignRegressor(UnfrozenRegressor):
 def catch_failures(what: str) -> Iterator[None]:
     """Make a `FitError` of whatever an estimator raises, so that it costs no other one its result.
 
-    Errors of thermocomp's own pass: they tell what to set otherwise.
+    Errors of thermocomp are passed on unchanged: they state the remedy.
 
     Parameters
     ----------
     what : str
-        What it cannot do, such as ``Ridge cannot be fitted to z_um``.
+        Failed operation, such as ``Ridge cannot be fitted to z_um``.
 
     Raises
     ------
@@ -84,14 +84,14 @@ def catch_failures(what: str) -> Iterator[None]:
 
 
 def check_numbers(predicted: Any, n_rows: int, name: str) -> FloatArray:
-    """Return what was predicted as one finite number per row.
+    """Return the predictions as one finite number per row.
 
     Parameters
     ----------
     predicted : array-like of shape (n_rows,) or (n_rows, 1)
     n_rows : int
     name : str
-        Of the method.
+        Name of the method.
 
     Returns
     -------
@@ -118,7 +118,7 @@ def adopt_estimator(estimator: Any) -> Any:
     Parameters
     ----------
     estimator : estimator
-        One of thermocomp's, one with a `freeze` of its own, a Pipeline, or any regressor of scikit-learn's manner.
+        An estimator of thermocomp, one with a custom `freeze`, a Pipeline, or any scikit-learn regressor.
 
     Returns
     -------
@@ -129,7 +129,7 @@ def adopt_estimator(estimator: Any) -> Any:
     Raises
     ------
     InputError
-        It is no regressor, or a part of it has a memory and could not be told the time.
+        It is not a regressor, or a part of it has a memory and cannot be given the time.
     """
     if isinstance(estimator, type):
         raise InputError(f"{estimator.__name__} is a class: give an instance, {estimator.__name__}()")
@@ -154,7 +154,7 @@ def adopt_estimator(estimator: Any) -> Any:
 
 
 def title(estimator: Any) -> str:
-    """Return what to call an estimator: its class, or the classes of the steps of a Pipeline."""
+    """Return the title of an estimator: its class, or the classes of the steps of a Pipeline."""
     if isinstance(estimator, ForeignRegressor):
         return title(estimator.estimator)
     if isinstance(estimator, PipelineRegressor):

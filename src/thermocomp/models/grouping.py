@@ -44,7 +44,7 @@ class CorrelationGrouping(StaticRegressor, TermRegressor):
     Attributes
     ----------
     correlation_ : ndarray of shape (n_candidates, n_candidates)
-        Of `candidates_`.
+        Correlations of `candidates_`.
     candidates_ : tuple of int
         Features that were grouped.
     left_out_ : tuple of int

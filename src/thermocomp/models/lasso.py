@@ -59,7 +59,7 @@ class Lasso(_Sparse):
     strengths : sequence of float
         To choose from, as shares of the strength at which the last input drops out.
     rule : {'one-standard-error', 'minimum'}
-        How the strength is chosen.
+        Rule by which the strength is chosen.
     fit_intercept : bool
         False: the model gives zero in the reference state.
 
@@ -118,7 +118,7 @@ class ElasticNet(_Sparse):
     strengths : sequence of float
         To choose from, as shares of the strength at which the last input drops out.
     rule : {'one-standard-error', 'minimum'}
-        How the strength is chosen, within the best share.
+        Rule by which the strength is chosen, within the best share.
     fit_intercept : bool
         False: the model gives zero in the reference state.
 

@@ -1,4 +1,4 @@
-"""What the regressions on terms share: the fit of chosen terms, how good it is, and `freeze`."""
+"""Common part of the regressions on terms: the fit of chosen terms, its accuracy, and `freeze`."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -42,7 +42,7 @@ class TermRegressor(MemorylessRegressor):
     standard_error_ : float
         Standard error of estimate, as if the rows were independent [unit of y].
     n_effective_ : float
-        How many independent rows the training rows stand for, by the autocorrelation of the residual (E-C12).
+        Number of independent rows equivalent to the training rows, by the autocorrelation of the residual (E-C12).
     data_min_, data_max_ : ndarray of shape (n_features,)
         Trained range.
     """
@@ -80,7 +80,7 @@ class TermRegressor(MemorylessRegressor):
         self._keep(found, self._inputs_alone(), [(i,) for i in columns], tri.total)
 
     def _inputs_alone(self) -> list[Variable]:
-        """Return each input as a variable of its own."""
+        """Return each input as a separate variable."""
         return [Variable.single(name, i) for i, name in enumerate(self._names())]
 
     def _keep(self, found: Solution, variables: Sequence[Variable], terms: Sequence[Term], total: float) -> None:
@@ -102,7 +102,7 @@ class TermRegressor(MemorylessRegressor):
         self.n_effective_ = effective_sample_size(found.residual)
 
     def _coefficient_lines(self, title: str = "", beside: Sequence[str] = ()) -> list[str]:
-        """Return a table of the coefficients as text, the constant first; `beside` is a further column of them."""
+        """Return a table of the coefficients as text, the constant first; `beside` is an additional column."""
         wide = max(len(name) for name in ("VARIABLE", *self.terms_))
         lines = [f"{'VARIABLE':<{wide}}  {'COEFFICIENT':>14}{title}"]
         if self.fit_intercept:

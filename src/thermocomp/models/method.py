@@ -23,7 +23,7 @@ class Method:
     speed : str
         Its parameter that takes the names of the spindle speeds; empty for a method that has no use for them.
     takes : tuple of {'dt', 'cycle'}
-        What its `fit` wants beside X and y. With ``dt`` it has a memory, and also gets the rows it may not learn from.
+        Arguments of `fit` other than X and y. With ``dt`` it has a memory, and also gets rows not used for training.
     settings : dict of str to object
         Other parameters than the estimator's own defaults.
     """

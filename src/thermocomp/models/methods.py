@@ -16,7 +16,7 @@ ALL_METHODS = "all"
 
 
 class NamedEstimator(str):
-    """The name of an estimator that was handed in, which it carries along: it stands where names of methods do.
+    """The name of an estimator that was passed in, with the estimator attached: it can replace names of methods.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def find_method(name: str) -> Method:
 
 
 def make_method(estimator: Any) -> Method:
-    """Return what an estimator with settings of its own is as a method: it takes all inputs."""
+    """Return the method for an estimator with custom settings: it uses all inputs."""
     kind = type(estimator)
     known: tuple[Literal["dt", "cycle"], ...] = ("dt", "cycle")
     takes = tuple(p for p in known if p in signature(estimator.fit).parameters)
@@ -81,13 +81,12 @@ def make_method(estimator: Any) -> Method:
 
 
 def expand(names: Sequence[Any]) -> list[str]:
-    """Return names of methods once each, ``all`` standing for all of them.
+    """Return the names of methods without duplicates; ``all`` denotes all methods.
 
     Parameters
     ----------
     names : sequence of str or estimator
-        An estimator becomes a `NamedEstimator`, called by its class; of several of one class the later ones get a
-        number.
+        An estimator becomes a `NamedEstimator`, named after its class; further ones of the same class are numbered.
 
     Returns
     -------

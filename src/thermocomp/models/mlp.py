@@ -26,7 +26,7 @@ class HiddenCount:
     ----------
     n_hidden : int
     rms : tuple of float
-        Of the residual in each cycle that was left out, over all outputs [unit of y].
+        RMS of the residual in each left-out cycle, over all outputs [unit of y].
     """
 
     n_hidden: int
@@ -62,7 +62,7 @@ class SigmoidNet(NetRegressor):
         order until two in a row bring no gain, and the smallest is taken whose mean RMS is within one standard error
         of the best.
     n_epochs : int
-        How often each pattern is seen.
+        Number of passes through the patterns.
     learning_rate, final_learning_rate : float
         In the first and in the last epoch.
     schedule : {'geometric', 'harmonic'}
@@ -70,7 +70,7 @@ class SigmoidNet(NetRegressor):
     update : {'pattern', 'batch'}
         Change the weights after every pattern, Chen's choice; or once an epoch, by the mean over all patterns (C-30).
     order : {'shuffled', 'fixed'}
-        Of the patterns, see `thermocomp.models.numerics.backprop.train_net`.
+        Order of the patterns, see `thermocomp.models.numerics.backprop.train_net`.
     momentum : float
         Part of the previous change of the weights that is added to the next; Chen has none.
     scaling : {'channel', 'common'}
@@ -82,7 +82,7 @@ class SigmoidNet(NetRegressor):
     goal : float
         Stop after the first epoch whose loss is not above this; see `loss_history_`.
     seed : int
-        Of initial weights and order.
+        Seed of the initial weights and the order.
     jobs : int
         Threads of a sweep; -1 for all cores.
 
@@ -93,9 +93,9 @@ class SigmoidNet(NetRegressor):
     loss_history_ : ndarray of shape (n_epochs run,)
         Mean of the squared errors in each epoch [scaled units], taken while the weights change.
     sweep_ : tuple of HiddenCount
-        What was tried; empty if `hidden` is one number.
+        Numbers of hidden nodes tried; empty if `hidden` is one number.
     chosen_by_ : str
-        What was left out to choose.
+        Units left out for the choice.
     net_, input_scaling_, output_scaling_, n_parameters_, n_patterns_, n_effective_, caution_, data_min_, data_max_
         See `thermocomp.models.nets.NetRegressor`.
 

@@ -25,21 +25,21 @@ class SklearnNet(StaticRegressor, NetRegressor):
     hidden : int
         Number of hidden nodes.
     activation : {'logistic', 'tanh'}
-        Of the hidden nodes.
+        Activation of the hidden nodes.
     solver : {'lbfgs', 'adam', 'sgd'}
     alpha : float
         Strength of the penalty on squared weights.
     max_iter : int
         Most iterations of the solver.
     max_patterns : int
-        Of more rows than these only so many are learned, spread evenly in time.
+        Maximum number of training rows; of more, this number is used, spread evenly in time.
     seed : int
-        Of initial weights and order.
+        Seed of the initial weights and the order.
 
     Attributes
     ----------
     converged_ : bool
-        False: the solver gave up, and `caution_` says so.
+        False: the solver did not converge, as noted in `caution_`.
     n_iter_ : int
         Iterations of the solver.
     net_, input_scaling_, output_scaling_, n_parameters_, n_patterns_, n_effective_, caution_, data_min_, data_max_

@@ -1,4 +1,4 @@
-"""What the nets share, whoever trains them: reading, scaling, the caution about too many weights, and `freeze`."""
+"""Common part of the neural nets: reading, scaling, the caution about too many weights, and `freeze`."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -31,7 +31,7 @@ class NetRegressor(MemorylessRegressor):
         How many independent rows they stand for, by the autocorrelation of the residual (E-C12); of several outputs,
         the smallest.
     caution_ : str
-        What speaks against trusting the net, above all more parameters than independent rows (C-27); else empty.
+        Reason not to trust the net, above all more parameters than independent rows (C-27); else empty.
     data_min_, data_max_ : ndarray of shape (n_features,)
         Trained range.
     """
@@ -48,7 +48,7 @@ class NetRegressor(MemorylessRegressor):
         inputs : sequence of Input, optional
             One per feature; see `thermocomp.models.base.ThermalRegressor.freeze`.
         output : int, optional
-            Column of y; must be given if y had several. Each column makes a model of its own.
+            Column of y; must be given if y has several. Each column makes a separate model.
         **header
             As in `thermocomp.models.base.ThermalRegressor.freeze`.
 
@@ -105,7 +105,7 @@ class NetRegressor(MemorylessRegressor):
         return change, deviation.reshape(len(deviation), -1)
 
     def _keep(self, net: Perceptron, into: Affine, out_of: Affine, X: FloatArray, y: FloatArray, n_rows: int) -> None:
-        """Note the net, and how it stands to the `n_rows` patterns taken from X and y."""
+        """Store the net, and its relation to the `n_rows` patterns taken from X and y."""
         self.net_, self.input_scaling_, self.output_scaling_ = net, into, out_of
         self.n_parameters_, self.n_patterns_ = net.n_parameters, n_rows
         residual = y - out_of(net.evaluate(into(X)))

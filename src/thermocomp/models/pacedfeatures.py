@@ -28,7 +28,7 @@ _CHUNK = 20_000  # rows of features held at once: bounds the memory of a fit, wh
 
 @dataclass(frozen=True)
 class PacedFeatures:
-    """What features there are, and in which order: the temperatures, their lags, lag by lag, and the speed states.
+    """Features and their order: the temperatures, their lags, lag by lag, and the speed states.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class PacedFeatures:
         stopped: Sequence[float],
         running: Sequence[float],
     ) -> "PacedFeatures":
-        """Return the features that rows have something to say about.
+        """Return the features that the rows can determine.
 
         Parameters
         ----------
@@ -73,7 +73,7 @@ class PacedFeatures:
         speeds : sequence of int
             Columns that are spindle speeds; the others are temperatures.
         lags, powers, stopped, running : sequence of float
-            Of `thermocomp.models.averaged.AveragedDynamic`.
+            As for `thermocomp.models.averaged.AveragedDynamic`.
         """
         usual = usual_step(step)
         # where the spindle was stopped in the rows learned from, it may have turned before
@@ -125,11 +125,11 @@ class PacedFeatures:
         ----------
         rows : ndarray of shape (n_rows, n_inputs)
         targets : ndarray of shape (n_rows, n_targets)
-            What is predicted.
+            Predicted quantities.
         step : ndarray of shape (n_rows,)
             [s]
         parts : ndarray of int of shape (n_rows,)
-            What is left out together; -1 is not learned from.
+            Part of each row; a part is left out together; -1 is not used for training.
         noise : float
             Standard deviation of the temperatures in use [degC].
         """
@@ -161,7 +161,7 @@ class PacedFeatures:
         return covariance
 
     def shares(self, step: FloatArray) -> FloatArray:
-        """Return how much of a jump each copy of a temperature follows within the usual step, (n_copies,)."""
+        """Return the fraction of a step that each copy of a temperature follows within the usual step, (n_copies,)."""
         return np.append(1.0, lagbank.step_response(usual_step(step), np.array(self.lags, dtype=np.float64)))
 
     def draw(self, count: int, random_state: int, keep: Sequence[int] | None = None) -> list[LagStructure]:
@@ -172,7 +172,7 @@ class PacedFeatures:
         count : int
         random_state : int
         keep : sequence of int, optional
-            Places in `temperatures` that are taken; all without it. The draw is the same.
+            Places in `temperatures` that are used; all by default. The draw is the same.
 
         Returns
         -------

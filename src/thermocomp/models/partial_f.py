@@ -69,7 +69,7 @@ class PartialF(StepwiseRegressor):
         return FThresholds(self.f_enter, self.f_delete)
 
     def _rule_text(self) -> str:
-        """Tell the thresholds, and what they amount to at this number of rows (E-T3)."""
+        """Return the thresholds in words, and their equivalents at this number of rows (E-T3)."""
         df = self.n_rows_ - int(self.fit_intercept) - 1
         alphas = " AND ".join(f"{alpha_of_f(f, df):.2g}" for f in (self.f_enter, self.f_delete))
         least = r_squared_of_f(self.f_enter, df)

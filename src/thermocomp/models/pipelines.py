@@ -191,7 +191,7 @@ def _steps(pipeline: Pipeline) -> list[Any]:
 
 
 def _passed(pipeline: Pipeline) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return which columns reach the last step, and what was taken off and divided by on the way."""
+    """Return the columns that reach the last step, and the offsets and scales applied before it."""
     *before, last = _steps(pipeline)
     n = (before or [last])[0].n_features_in_
     columns, mean, scale = np.arange(n), np.zeros(n), np.ones(n)

@@ -18,11 +18,11 @@ class PartialLeastSquares(ComponentRegressor):
     Parameters
     ----------
     components : int, optional
-        Do not choose: so many components, or as many as can be.
+        Fixed number of components, or the largest possible number if smaller. Default: chosen by `rule`.
     max_components : int, optional
         Most to choose from; as many as inputs if not given.
     rule : {'one-standard-error', 'minimum'}
-        How the number of components is chosen.
+        Rule by which the number of components is chosen.
     fit_intercept : bool
         False: the model gives zero in the reference state, and the components are those about zero.
 

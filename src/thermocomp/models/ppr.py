@@ -40,7 +40,7 @@ class ProjectionPursuit(CycledRegressor):
     degrees : sequence of float
         Degrees of freedom of each curve to choose from, above 2 (a straight line).
     rule : {'one-standard-error', 'minimum'}
-        How the number of terms is chosen, within the best degrees of freedom.
+        Rule by which the number of terms is chosen, within the best degrees of freedom.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class ProjectionPursuit(CycledRegressor):
     cv_rms_ : float
         Mean over the cycles left out of their RMS, at the choice [unit of y].
     chosen_by_ : str
-        What was left out to choose.
+        Units left out for the choice.
     data_min_, data_max_ : ndarray of shape (n_features,)
         Trained range.
 
@@ -137,7 +137,7 @@ class ProjectionPursuit(CycledRegressor):
 
 @dataclass(frozen=True)
 class _Model:
-    """What is fitted, on raw inputs."""
+    """Fitted model, on raw inputs."""
 
     intercept: float
     directions: FloatArray
@@ -194,7 +194,7 @@ def _normal(u: FloatArray) -> tuple[FloatArray, NDArray[np.intp], FloatArray]:
 
 
 def _penalty(u: FloatArray, degrees: float) -> float:
-    """Return the penalty on bending that leaves a curve so many degrees of freedom."""
+    """Return the penalty on bending that leaves a curve a given number of degrees of freedom."""
     bands = _normal(u)[0]
     gram = np.diag(bands[2]) + np.diag(bands[1, 1:], 1) + np.diag(bands[1, 1:], -1)
     bending = linalg.eigh(_BENDING, gram, eigvals_only=True)

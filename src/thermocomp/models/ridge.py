@@ -20,7 +20,7 @@ class Ridge(PenalisedRegressor):
     strengths : sequence of float
         To choose from, per row and in units of each input's variance.
     rule : {'one-standard-error', 'minimum'}
-        How the strength is chosen.
+        Rule by which the strength is chosen.
     fit_intercept : bool
         False: the model gives zero in the reference state.
 

@@ -120,7 +120,7 @@ class SensorSelector(SelectorMixin, BaseEstimator):
         return self._support
 
     def _kept(self, names: Sequence[str]) -> NDArray[np.bool_]:
-        """Return which columns are kept without being asked about."""
+        """Return a mask of the columns that are always kept."""
         mask = np.zeros(len(names), dtype=np.bool_)
         mask[:1] = self.time == "column"
         for column in self.keep:

@@ -1,4 +1,4 @@
-"""What linear regressions share that are chosen from a path of ever richer ones by leaving thermal cycles out."""
+"""Common part of linear regressions chosen from a path of increasing complexity by leaving out thermal cycles."""
 
 from abc import abstractmethod
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ Rule = Literal["one-standard-error", "minimum"]
 
 
 def scaling(X: FloatArray, *, centred: bool = True) -> tuple[FloatArray, FloatArray]:
-    """Return what to subtract from each column and what to divide it by, so that its mean square is 1.
+    """Return the offset and the scale of each column for a mean square of 1.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ def scaling(X: FloatArray, *, centred: bool = True) -> tuple[FloatArray, FloatAr
     -------
     centre : ndarray of shape (n_features,)
     scale : ndarray of shape (n_features,)
-        inf for a column that does not change: divided by it, it says nothing.
+        inf for a constant column: divided by it, it has no effect.
     """
     centre = X.mean(axis=0) if centred else np.zeros(X.shape[1])
     scale = np.sqrt(np.mean((X - centre) ** 2, axis=0))
@@ -73,7 +73,7 @@ class ShrunkRegressor(CycledRegressor, TermRegressor):
     cv_rms_ : float
         Mean over the cycles left out of their RMS, at the choice [unit of y].
     chosen_by_ : str
-        What was left out to choose.
+        Units left out for the choice.
     r_squared_, adjusted_r_squared_, standard_error_, n_effective_, condition_ : float
         See `thermocomp.models.linear.TermRegressor`; each coefficient that is not 0 counts as a parameter.
     dependent_ : tuple of str
@@ -155,11 +155,11 @@ class ComponentRegressor(ShrunkRegressor):
     Parameters
     ----------
     components : int, optional
-        Do not choose: so many components, or as many as can be.
+        Fixed number of components, or the largest possible number if smaller. Default: chosen by `rule`.
     max_components : int, optional
         Most to choose from; as many as inputs if not given.
     rule : {'one-standard-error', 'minimum'}
-        How the number of components is chosen.
+        Rule by which the number of components is chosen.
     fit_intercept : bool
         False: the model gives zero in the reference state, and the components are those about zero.
 

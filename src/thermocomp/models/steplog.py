@@ -1,4 +1,4 @@
-"""What the stepwise regressions share: the selection, and its log in the style of SYSTAT 5.0 (Chen 1996, Fig. 2)."""
+"""Common part of the stepwise regressions: selection, and its log in the style of SYSTAT 5.0 (Chen 1996, Fig. 2)."""
 
 import math
 from abc import abstractmethod

@@ -66,7 +66,7 @@ class BestSubset(TermRegressor):
         Without it ``cycles`` if `fit` is given cycles, else ``bic``. If ``cycles`` is asked for and none are given,
         five stretches of equal length take their place.
     size : int, optional
-        Do not choose: so many temperatures, or as many as can be if there are not so many.
+        Fixed number of temperatures, or the largest possible number if smaller. Default: chosen.
     max_size : int, optional
         Search up to this size only; needed beyond about 50 temperatures, and where they are as many as the rows.
     rule : {'minimum', 'one-standard-error'}
@@ -77,9 +77,9 @@ class BestSubset(TermRegressor):
     jobs : int
         Threads.
     nodes : int, optional
-        Stop each search after about so many sets.
+        Stop each search after about this number of sets.
     seconds : float, optional
-        Stop each search after about so long [s].
+        Time limit of each search, approximate [s].
     progress : callable, optional
         Called about once a second with a line of text.
 
@@ -97,7 +97,7 @@ class BestSubset(TermRegressor):
         What the size was chosen by; ``size`` if it was given. After a KeyboardInterrupt the search stops with what it
         has found, and ``bic`` takes the place of ``cycles``.
     chosen_by_ : str
-        What was left out to choose; empty if nothing was.
+        Units left out for the choice; empty if none were.
     terms_, coef_, intercept_, r_squared_, adjusted_r_squared_, standard_error_, n_effective_, condition_
         See `thermocomp.models.linear.TermRegressor`.
 

@@ -1,4 +1,4 @@
-"""Time in scikit-learn's hands: how an estimator with a memory is told it, and when it refuses.
+"""Time in scikit-learn: how an estimator with a memory gets the time, and when it refuses to work.
 
 scikit-learn takes rows as exchangeable and hands any part of them on. A model with a memory that is given a part
 without its past predicts something else and no warning comes; so it demands a declaration, and rows it can follow from
@@ -37,7 +37,7 @@ _OURS = "thermocomp.compare(..., leave_one='cycle') judges a thermal cycle from 
 
 
 class TimedRegressor(ThermalRegressor):
-    """A regressor with a memory; ``time`` says where it finds the time.
+    """A regressor with a memory; ``time`` specifies the source of the time.
 
     ``"column"``
         The first column of X is the time since the start of the row's test [s]. A row that is not later than the one
@@ -74,7 +74,7 @@ class TimedRegressor(ThermalRegressor):
         return copy
 
     def fit(self, X: ArrayLike, y: ArrayLike, *, dt: ArrayLike | None = None, cycle: ArrayLike | None = None) -> Self:
-        """Fit; what a method refuses beside data that are none, its class tells.
+        """Fit; the class documents the additional data that a method refuses.
 
         Parameters
         ----------
@@ -227,7 +227,7 @@ class TimedRegressor(ThermalRegressor):
         return super()._names()[self._hidden :]
 
     def _place(self, column: str | int, what: str) -> int:
-        """Return which input a name or an index into the columns of X means.
+        """Return the input denoted by a name or by an index into the columns of X.
 
         Raises
         ------
@@ -252,7 +252,7 @@ class TimedRegressor(ThermalRegressor):
 
 
 def _is_plain(X: ArrayLike, n_columns: int) -> TypeGuard[FloatArray]:
-    """Return True for an array that scikit-learn would let pass as it is; asking it takes as long as a free run."""
+    """Return True for an array that scikit-learn would accept unchanged; its own check takes as long as a free run."""
     if not (type(X) is np.ndarray and X.dtype == np.float64 and X.ndim == 2 and len(X) and X.shape[1] == n_columns):
         return False
     with np.errstate(over="ignore", invalid="ignore"):
@@ -267,7 +267,7 @@ def derive_steps(time: FloatArray, index: object = None, *, fitting: bool = Fals
     time : ndarray of shape (n_rows,)
         [s]; a row that is not later than the one before starts a new test.
     index : pandas.Index, optional
-        Of the rows; whole numbers show rows that were left out.
+        Index of the rows; whole numbers show rows that were left out.
     fitting : bool
         Also refuse what is too short to be learned from.
 
@@ -279,7 +279,7 @@ def derive_steps(time: FloatArray, index: object = None, *, fitting: bool = Fals
     Raises
     ------
     InputError
-        It is no time, or a test does not begin at 0, or rows are missing.
+        It is not a time, or a test does not begin at 0, or rows are missing.
     """
     step = np.diff(time, prepend=np.inf)
     step[step <= 0] = np.inf
@@ -330,7 +330,7 @@ def _routed(dt: ArrayLike | None, n_rows: int, name: str) -> FloatArray:
 
 
 def _refuse_holes(index: Any, starts: NDArray[np.bool_]) -> None:
-    """Refuse rows that are no longer beside each other; labels that are no whole numbers say nothing."""
+    """Refuse rows that are no longer adjacent; labels that are not integers are not checked."""
     labels = None if index is None or callable(index) else np.asarray(index)
     if labels is None or labels.ndim != 1 or not np.issubdtype(labels.dtype, np.integer):
         return

@@ -1,4 +1,4 @@
-"""How a method is trained on the rows it may learn from."""
+"""Training of a method on the training rows."""
 
 import time
 from collections.abc import Sequence
@@ -50,7 +50,7 @@ class Trained:
     r_squared : float
         In-sample, about the mean.
     predicted : ndarray of shape (n_rows,)
-        What the estimator says of every row; nan where an input is missing.
+        Predictions of the estimator for every row; nan where an input is missing.
     """
 
     method: str
@@ -76,7 +76,7 @@ class FittedMethod:
     seconds : float
         The fit took [s].
     predicted : ndarray of shape (n_rows,)
-        What it says of every row; nan where an input is missing.
+        Predictions for every row; nan where an input is missing.
     left_out : ndarray of shape (n_rows, 2) or None
         What it would have said of a row without that row's cycle, and the spread of its structures; nan where it has
         not learned. None: it does not tell.
@@ -185,13 +185,13 @@ def train(
     Parameters
     ----------
     name, samples, target, learn
-        Of `fit_method`.
+        As for `fit_method`.
     support : Support
         For the frozen model.
     prints : bool
         The model is kept: fingerprints of the rows go into its provenance.
     joint : bool
-        It gets its joint support; a model that only clips says the same without.
+        Whether it gets its joint support; a model that only clips gives the same output without.
 
     Returns
     -------

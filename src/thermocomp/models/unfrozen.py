@@ -1,4 +1,4 @@
-"""Methods that no handful of numbers can stand for: compared with the others, never deployed."""
+"""Methods that cannot be reduced to a few numbers: compared with the others, never deployed."""
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
@@ -25,12 +25,12 @@ class UnfrozenRegressor(StaticRegressor):
 
     @abstractmethod
     def _bulk(self) -> str:
-        """Return why it cannot be frozen, in words."""
+        """Return the reason why it cannot be frozen, in words."""
 
     def unfrozen(
         self, *, inputs: Sequence[Input] | None = None, rows: FloatArray | None = None, **header: Any
     ) -> "EstimatorModel":
-        """Return the fitted estimator as a model that can be replayed and judged, and nothing else.
+        """Wrap the fitted estimator as a model for replay and validation only (cannot be saved, exported or run live).
 
         Parameters
         ----------
@@ -114,5 +114,5 @@ class EstimatorModel(ErrorModel):
         raise InputError(f"{self.estimator.name} is no expression: it cannot be exported")
 
     def formula(self) -> str:
-        """Return what it is, as one line of text."""
+        """Return the description of the model, as one line of text."""
         return f"{self.estimator.name} of {', '.join(self.sensors)}: no formula"

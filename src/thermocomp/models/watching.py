@@ -1,4 +1,4 @@
-"""How a watch over the temperatures is trained: each predicted by the others, as `averaged` predicts a displacement."""
+"""Training of a watch over the temperatures: each predicted by the others, as `averaged` predicts a displacement."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -100,7 +100,7 @@ def find_watch(samples: Samples, learn: BoolArray) -> Watch | None:
 def _weights(
     of: PacedFeatures, change: FloatArray, step: FloatArray, heat: Sequence[int], parts: IntArray, folds: IntArray
 ) -> FloatArray:
-    """Return what predicts each temperature, by all cycles and without each, (1 + n_cycles, n_features, n_heat)."""
+    """Return the predictor of each temperature, by all cycles and without each, (1 + n_cycles, n_features, n_heat)."""
     moments = of.moments(change, change[:, list(heat)], step, parts, NOISE)
     every = np.unique(parts[parts >= 0])
     learned = (every, *(np.setdiff1d(every, parts[folds == k]) for k in range(int(folds.max()) + 1)))
@@ -168,7 +168,7 @@ def _resolution(values: FloatArray) -> float:
 
 
 def _same(values: FloatArray, predicted: FloatArray, time: FloatArray, folds: IntArray) -> tuple[float, float]:
-    """Return how long a sensor read the same at most, and how far its prediction moved meanwhile."""
+    """Return the longest time of constant readings of a sensor, and the change of its prediction meanwhile."""
     new = np.append(True, (np.diff(values) != 0) | (np.diff(folds) != 0) | (np.diff(time) <= 0))
     run = np.cumsum(new) - 1
     first = np.flatnonzero(new)

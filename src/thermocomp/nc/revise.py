@@ -14,7 +14,7 @@ from thermocomp.nc.revision.job import revise as revise_program
 from thermocomp.nc.revision.options import Controller, Drifting, Starting, Timing, Way
 from thermocomp.nc.revision.prepare import prepare_job
 
-#: groups of options of the command; their fields are the keywords here
+#: groups of options of the command; their fields are the keywords of `revise`
 GROUPS = (Drifting, Starting, Way, Controller, Timing)
 #: words of the command that name files
 _PATHS = ("model", "forecast", "carried", "machine", "subroutines")
@@ -22,18 +22,18 @@ _PATHS = ("model", "forecast", "carried", "machine", "subroutines")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RevisedProgram:
-    """An NC program that was revised, or was not because nothing was corrected.
+    """Result of a revision of an NC program.
 
     Parameters
     ----------
     path : Path
-        The program that was written.
+        Path of the revised program.
     written : bool
-        False: nothing was corrected, so there are no files.
+        Whether files were written; False: no correction was needed.
     files : tuple of Path
-        All that was written.
+        All files written.
     summary : dict
-        What ``thermocomp revise --json`` says.
+        Summary, as printed by ``thermocomp revise --json``.
     """
 
     path: Path
@@ -54,20 +54,20 @@ def revise(
     date: str | None = None,
     **words: Any,
 ) -> RevisedProgram:
-    r"""Correct an NC program by the drift it will cause, before it is run.
+    r"""Correct an NC program for the thermal drift it will cause, before it is run.
 
     Parameters
     ----------
     program : str or Path
-        NC program.
+        NC program to correct.
     model : str, Path, or sequence of them
         Model files of `fit`.
     output : str or Path
-        Program to write.
+        Output program.
     overwrite : bool
-        Write over existing files; never over the program.
+        Overwrite existing files, but never the original program.
     date : str, optional
-        For the header; today without it.
+        Date for the header. Default: today.
     **words
         The options of ``thermocomp revise`` with underscores: ``cold=True``, ``controller="fanuc"``,
         ``axis=["ch3=Z"]``.
@@ -79,7 +79,7 @@ def revise(
     Raises
     ------
     InputError
-        An option, the program or something else cannot be used.
+        An option, the program or another input is invalid.
 
     Examples
     --------
@@ -138,5 +138,5 @@ def revise(
 
 @contextmanager
 def _untold(_: str) -> Iterator[Tell]:
-    """Tell nobody."""
+    """Report no progress."""
     yield lambda *_: None

@@ -1,4 +1,4 @@
-"""What the studies share: recordings in a paper's names, models replayed over whole tests, errors and their tables."""
+"""Common part of the studies: recordings in a paper's names, replay of models over whole tests, error tables."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -79,7 +79,7 @@ def add_derived_channel(recording: Recording, channel: Channel, weights: Mapping
 def stacked(
     recordings: Sequence[Recording], targets: Sequence[str], inputs: Sequence[str] | None = None, *, rezero: bool = True
 ) -> Samples:
-    """Stack tests as the papers do: they begin with a cold machine, and their first reading is the zero.
+    """Stack tests as in the papers: they begin with a cold machine, and their first reading is the zero.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def cut_off(samples: Samples, name: str) -> Samples:
     ----------
     samples : Samples
     name : str
-        Of the input.
+        Name of the input.
 
     Returns
     -------
@@ -171,9 +171,9 @@ def fit_and_freeze(
     samples : Samples
         Its inputs are the features, see `Samples.only`.
     targets : sequence of str
-        Of several, one estimator learns them all at once: a net with as many outputs.
+        Targets; of several, one estimator learns them all at once: a net with as many outputs.
     support : Support
-        What the frozen models do outside the trained range.
+        Behaviour of the frozen models outside the training range.
     **fit
         For the estimator's ``fit``, such as ``cycle=samples.cycle`` and ``dt=samples.dt()``.
 
@@ -202,7 +202,7 @@ def fit_and_freeze(
 
 
 def trained(method: str, samples: Samples, target: int = 0, support: Support = Support()) -> ErrorModel:
-    """Train a method of the house, as it comes, on all rows of the samples.
+    """Train a method of thermocomp with default settings on all rows of the samples.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ def trained(method: str, samples: Samples, target: int = 0, support: Support = S
     target : int
         Place of the target.
     support : Support
-        What the model does outside the trained range.
+        Behaviour of the model outside the training range.
 
     Returns
     -------
@@ -231,7 +231,7 @@ def frozen(
     samples : Samples
         It was fitted to.
     columns : sequence of int
-        Of the inputs.
+        Indices of the inputs.
     coefficients : sequence of float
     intercept : float
         [unit of the target]
@@ -280,7 +280,7 @@ def take_measured(samples: Samples, target: str) -> FloatArray:
 
 
 def residual(model: ErrorModel, samples: Samples) -> FloatArray:
-    """Return what a model, replayed, leaves of its target, shape (n_rows,) [unit of the model]."""
+    """Return the residual of a replayed model for its target, shape (n_rows,) [unit of the model]."""
     return take_measured(samples, model.target) - predict_deviation(model, samples)
 
 
@@ -289,7 +289,7 @@ def residual(model: ErrorModel, samples: Samples) -> FloatArray:
 
 @dataclass(frozen=True)
 class Errors:
-    """What a residual amounts to.
+    """Error figures of a residual.
 
     Parameters
     ----------
@@ -327,7 +327,7 @@ def table(caption: str, items: Iterable[_Item], columns: Mapping[str, Callable[[
     caption : str
     items : iterable
     columns : mapping of str to callable
-        What is written of an item, by what stands above it.
+        Functions for the cells of an item, by column heading.
 
     Returns
     -------
@@ -345,7 +345,7 @@ def errors_table(caption: str, residuals: Mapping[tuple[str, str], FloatArray], 
     residuals : mapping of (str, str) to ndarray
         Residual by what is judged and by method, such as ``("z, 1250 1/min", "no compensation")``.
     unit : str
-        Of the residuals.
+        Unit of the residuals.
 
     Returns
     -------

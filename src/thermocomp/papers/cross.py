@@ -31,11 +31,11 @@ class CrossExperiment:
     Parameters
     ----------
     name : str
-        Of the experiment of the virtual machine.
+        Name of the experiment of the virtual machine.
     target : str or int
         Displacement, by name or by its place.
     unseen : int
-        How many tests at the end are unseen.
+        Number of tests at the end that are unseen.
     then : str
         Another experiment whose tests follow; the same name: the experiment is repeated on another day.
     """
@@ -80,7 +80,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Row:
-    """How one method did on one task; nan where it could not be fitted.
+    """Result of one method on one task; nan where it could not be fitted.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ class Row:
     fit_s : float
         The fits took [s].
     failure : str
-        Why it could not be fitted; empty if it could.
+        Reason why it could not be fitted; empty if it could.
     """
 
     task: str
@@ -139,7 +139,7 @@ def simulate_task(experiment: CrossExperiment, seed: int) -> Task:
 
 
 def take_task(recordings: Sequence[Recording], target: str) -> Task:
-    """Take the recordings of a machine: every thermal cycle is unseen once (X-02).
+    """Return a task from the recordings of a machine: every thermal cycle is unseen once (X-02).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What the studies draw alike: curves over the same axis, figures of one panel, tests one after the other."""
+"""Common figures of the studies: curves over the same axis, figures of one panel, tests one after the other."""
 
 from collections.abc import Mapping, Sequence
 
@@ -24,7 +24,7 @@ def curves(
     values : mapping of str to ndarray of shape (n,)
         By their label.
     style : {'line', 'dashed', 'points'}
-        Of those that are not named further on.
+        Style of the curves that are not listed below.
     dashed, points : sequence of str
         Labels of curves drawn so.
 
@@ -47,12 +47,12 @@ def single(
     key, caption : str
         See `thermocomp.papers.study.Figure`.
     axes : tuple of str
-        What stands at x and y.
+        Labels of x and y.
     curves : sequence of PlotCurve
     title : str
-        Of the panel.
+        Title of the panel.
     columns : int
-        Of 2 it fills one.
+        Number of columns out of 2 that it fills.
 
     Returns
     -------

@@ -26,11 +26,11 @@ def run(name: str, *, seed: int = 0, progress: Progress = tell_nobody, physics: 
     name : str
         One of `STUDIES`.
     seed : int
-        Of weather, noise and what is drawn by lot.
+        Random seed of weather, noise and random draws.
     progress : callable
         Told the share done and what comes next.
     physics : {'linear', 'nonlinear'}, optional
-        Of the virtual machine, in `PHYSICS`; what the experiments say if not given.
+        Physics of the virtual machine, in `PHYSICS`. Default: as defined by the experiments.
 
     Returns
     -------
@@ -50,14 +50,14 @@ def repeat(
     physics: Physics | None = None,
     jobs: int = 1,
 ) -> Study:
-    """Redo a study several times, each with a weather, a noise and lots of its own.
+    """Repeat a study several times, each with separate weather, noise and random draws.
 
     Parameters
     ----------
     name : str
         One of `STUDIES`.
     seed : int
-        Of the first run; the others take seeds `APART` further on: a study steps its own seeds by one.
+        Random seed of the first run; those of the others are `APART` further on: a study steps its own seeds by one.
     repeats : int
         Number of runs.
     progress : callable
@@ -114,7 +114,7 @@ def _joined(found: Sequence[Study], seed: int) -> Study:
 
 
 def not_redone(name: str, why: str) -> Study:
-    """Return what stands for a study that failed.
+    """Return the replacement of a study that failed.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A paper's study redone: its claims, its numbers beside ours, and its figures as plain numbers."""
+"""Reproduction of a paper's study: its claims, its numbers next to ours, and its figures as plain numbers."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ Progress = Callable[[float, str], None]
 
 
 def tell_nobody(_: float, __: str) -> None:
-    """Tell nobody."""
+    """Report no progress."""
 
 
 @dataclass(frozen=True)
@@ -27,9 +27,9 @@ class Claim:
     Parameters
     ----------
     ids : tuple of str
-        Of the requirements it covers, such as ``C-34``.
+        Identifiers of the requirements it covers, such as ``C-34``.
     text : str
-        What the paper says, as a sentence that can be true or false.
+        Statement of the paper, as a sentence that can be true or false.
     paper : str
         The paper's number, with its unit; "" where it prints none.
     ours : str
@@ -37,7 +37,7 @@ class Claim:
     holds : bool or None
         Whether the statement is true here; None: a number to look at, nothing that could be false.
     finding : str
-        Why it does not hold, or what limits it. Every claim that does not hold needs one.
+        Reason why it does not hold, or its limitation. Every claim that does not hold needs one.
     again : tuple of bool
         Whether it holds in further runs with other seeds, where the study was repeated.
     """
@@ -77,9 +77,9 @@ class Ours(NamedTuple):
     holds : bool or None
         See `Claim`.
     otherwise : str
-        Why it does not hold: told only if it does not.
+        Reason why it does not hold: shown only if it does not.
     note : str
-        What limits it: told in any case, before that.
+        Limitation: shown in any case, before that.
     """
 
     text: str
@@ -89,7 +89,7 @@ class Ours(NamedTuple):
 
 
 class Claims(Generic[_Found]):
-    """The claims of a study, in the order in which they are told: each with the function that makes our side of it."""
+    """The claims of a study, in their order of presentation: each with the function that computes our side of it."""
 
     def __init__(self) -> None:
         self._judges: list[Callable[[_Found], Sequence[Claim]]] = []
@@ -184,7 +184,7 @@ class Figure:
     key : str
         For a file name, such as ``chen1996-fig14``.
     caption : str
-        What one sees in it: a sentence or two; begins with the paper's figure number.
+        Description of the figure: a sentence or two; begins with the paper's figure number.
     panels : sequence of Panel
     columns : int
         Panels side by side.
@@ -214,7 +214,7 @@ class StudyTable:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """What one part of a study tells.
+    """Report of one part of a study.
 
     Parameters
     ----------
@@ -237,7 +237,7 @@ class Study:
     name : str
         One of `thermocomp.papers.studies.STUDIES`.
     title : str
-        Of the paper, with authors and year.
+        Title of the paper, with authors and year.
     claims : tuple of Claim
     tables : tuple of StudyTable
     figures : tuple of Figure

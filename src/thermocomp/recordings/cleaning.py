@@ -1,6 +1,6 @@
 """Cleaning: stretches that are cut, clocks that are shifted, probes that are zeroed again, rows that are resampled.
 
-Nothing is changed but by a step that somebody has written down, and each step says what it did.
+Values are changed only by steps that a user has written down, and each step reports its changes.
 """
 
 from collections.abc import Sequence
@@ -28,11 +28,11 @@ class Step:
     Parameters
     ----------
     channels : tuple of str
-        What it concerns, by channel name.
+        Channels concerned, by name.
     do : str
-        Which one.
+        Operation.
     reason : str
-        Why, in words; it is reported with the step.
+        Reason, in words; it is reported with the step.
     """
 
     channels: tuple[str, ...] = ()
@@ -43,7 +43,7 @@ class Step:
         self.check()
 
     def check(self) -> None:
-        """Raise `InputError` if the step says nothing, or contradicts itself."""
+        """Raise `InputError` if the step is empty, or contradicts itself."""
 
     def apply(self, rows: Rows) -> Rows:
         """Return the cleaned rows, with a note of what was done."""
@@ -51,7 +51,7 @@ class Step:
 
     @property
     def name(self) -> str:
-        """How the step is called in a message."""
+        """Name of the step in a message."""
         return f"[[clean]] do = {self.do!r}"
 
     def _refuse(self, found: str) -> InputError:
@@ -63,7 +63,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Cut(Step):
-    """Take out values, or whole rows where no channel is named.
+    """Remove values, or whole rows if no channel is given.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ class Shift(Step):
     Parameters
     ----------
     by_s : float
-        What is added to their time [s].
+        Offset added to their time [s].
     """
 
     by_s: float = 0.0
@@ -158,7 +158,7 @@ class Rezero(Step):
     at : float or str
         Time of the first row that is moved.
     to : float, optional
-        What the value there becomes, in the house unit; without it the channel continues as it went before.
+        New value there, in the internal unit. Default: the channel continues as it went before.
     until : float or str, optional
         Time of the first row that is not moved any more; without it the rest of the test is moved.
     """
@@ -283,7 +283,7 @@ def clean(rows: Rows, steps: Sequence[Step]) -> Rows:
 
 
 def _step(x: FloatArray, first: int, name: str, owner: str) -> float:
-    """Return by how much a channel jumps at a row, beyond what it does beside it."""
+    """Return the jump of a channel at a row, beyond its neighbouring changes."""
     before = np.flatnonzero(np.isfinite(x[:first]))[-_BESIDE:]
     after = first + np.flatnonzero(np.isfinite(x[first:]))[:_BESIDE]
     if not before.size or not after.size:

@@ -1,4 +1,4 @@
-"""Fingerprints of rows: which rows of a recording a model has learned from, whatever file they stand in.
+"""Fingerprints of rows: identification of the training rows of a model in a recording, in whatever file they are.
 
 A run is `LENGTH` differences between rows of one channel, rounded to a step: a copy with another zero has the same.
 It is hashed. Rows are known again where a run of the target and a run of an input are, at the same rows, in several
@@ -79,7 +79,7 @@ def fingerprint(samples: Samples, target: int, learn: BoolArray, *, thin: bool =
     Returns
     -------
     Prints or None
-        None if no run says enough to be known again.
+        None if no run has enough information to be recognised.
     """
     rows = find_rows(samples, target)
     if len(rows.at) <= LENGTH:
@@ -151,7 +151,7 @@ def hash_runs(x: FloatArray, step: float, stride: int, length: int = LENGTH) -> 
     ----------
     x : ndarray of shape (n_rows,)
     step : float
-        What differences are rounded to [unit of x].
+        Step to which differences are rounded [unit of x].
     stride : int
         Rows between the rows of a run.
     length : int
@@ -232,7 +232,7 @@ def _moving(x: FloatArray, scale: _Scale, rows: TargetRows) -> BoolArray:
 
 
 def _best(windows: dict[str, _Windows], target: str) -> list[str]:
-    """Return the inputs that say most where the target does, and moves."""
+    """Return the most informative inputs where the target is informative, and moves."""
     mine = windows[target]
     said = {}
     for name, w in windows.items():

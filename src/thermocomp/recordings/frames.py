@@ -1,4 +1,4 @@
-"""What a table that is in memory already means as a recording."""
+"""Conversion of a table in memory to a recording."""
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
@@ -113,7 +113,7 @@ def _time(table: pd.DataFrame, given: Any, units: Mapping[str, str], name: str) 
 
 
 def _meaning(column: str, units: Mapping[str, str]) -> Meaning | None:
-    """Return what a column is, by `units` or by its heading."""
+    """Return the meaning of a column, by `units` or by its heading."""
     if column not in units:
         return understand(column)
     meant = find_unit(units[column])

@@ -1,4 +1,4 @@
-"""What a heading says: ``t1_C``, ``drift_mm``, ``T1 [degC]`` carry the unit of their column."""
+"""Meaning of headings: ``t1_C``, ``drift_mm``, ``T1 [degC]`` carry the unit of their column."""
 
 import re
 from contextlib import suppress
@@ -71,12 +71,12 @@ _FORMAT = re.compile(r"(?i)[dtgmyjahsf]{1,4}(?:[^a-zäöü]+[dtgmyjahsfp]{1,4})+
 
 @dataclass(frozen=True)
 class Meaning:
-    """What a heading with a unit says.
+    """Meaning of a heading with a unit.
 
     Parameters
     ----------
     name : str
-        Channel name: the heading with the suffix of the house unit.
+        Channel name: the heading with the suffix of the internal unit.
     base : str
         The heading without its unit.
     unit : Unit

@@ -1,4 +1,4 @@
-"""Rows that a model has learned from are found again, whatever file they stand in; see the decision `0019-overlap`."""
+"""Recognition of the training rows of a model, in whatever file they are; see the decision `0019-overlap`."""
 
 from collections.abc import Iterator
 
@@ -21,7 +21,7 @@ def overlap(prints: Prints, samples: Samples, target: int) -> IntArray:
     Parameters
     ----------
     prints : Prints
-        Of the rows that were learned from.
+        Fingerprints of the training rows.
     samples : Samples
     target : int
         Index into ``samples.targets``; it is looked up under the target's prints whatever its name.
@@ -103,7 +103,7 @@ def _tries(prints: Prints, interval: float) -> Iterator[tuple[Runs, int]]:
 
 
 def _matches(run: Runs, marks: dict[str, Marks]) -> tuple[IntArray, IntArray]:
-    """Return where a run of the target and one of an input are those of a run that is kept, and of which."""
+    """Return the rows where a run of the target and one of an input match a stored run, and which."""
     first, *others = run.marks
     stored = {name: unpack_marks(text) for name, text in run.marks.items()}
     known, which = np.unique(stored[first], return_index=True)
@@ -130,7 +130,7 @@ def _fill(
     *,
     own: bool,
 ) -> None:
-    """Write into `source` the rows between matches that follow each other, and those beside them that may be known."""
+    """Write into `source` the rows between consecutive matches, and those next to them that may be known."""
     learned, moving = unpack_marks(run.rows).astype(np.intp), unpack_marks(run.moving) > 0
     scale = stride / run.stride
     usual = float(np.median(np.diff(learned))) if learned.size > 1 else 0.0
@@ -162,7 +162,7 @@ def _chains(here: IntArray, there: IntArray, test: IntArray, scale: float, bridg
 
 
 def _reach(prints: Prints, learned: IntArray, there: IntArray) -> tuple[int, int]:
-    """Return how many learned rows before the first match and after the last one may be known too.
+    """Return the number of training rows before the first match and after the last one that may be known too.
 
     Up to the next run that is kept, or three times as far as matches are apart, as not every run is found again; never
     beyond what was learned from.

@@ -32,7 +32,7 @@ class Slopes:
     errors : ndarray of shape (n_states, n_powers)
         Their standard errors, by what the fit leaves of its own profile [unit/m^i].
     residual : ndarray of shape (n_states, n_points)
-        What the fit leaves [unit].
+        Residual of the fit [unit].
     remainder : float
         The same of all states but the reference, RMS per degree of freedom [unit]; nan if there is none.
     shared : float
@@ -66,7 +66,7 @@ class Profiles:
     states : Recording
         The thermal states, one row each: time, temperatures, spindle speed; cycles.
     zero : ndarray of shape (n_points,), optional
-        Profile that counts as cold, in place of those of its own reference states [unit].
+        Profile that counts as cold, in place of that of the profiles' reference states [unit].
 
     Raises
     ------
@@ -175,7 +175,7 @@ class Profiles:
         Parameters
         ----------
         reference : int or sequence of int
-            Of the states, from 0; negative ones count from the last.
+            Indices of the states, from 0; negative ones count from the last.
 
         Raises
         ------
@@ -237,7 +237,7 @@ class Profiles:
         reference : int or sequence of int
             See `reference_rows`.
         reference_position : float
-            Where q is zero [mm].
+            Position at which q is zero [mm].
 
         Returns
         -------

@@ -22,12 +22,12 @@ AMBIENT = re.compile(r"(?:^|[_\W])(air|ambient|room|workshop|environment|umgebun
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """One test: what the sensors and the displacement probes said, row by row.
+    """One test: the readings of the sensors and the displacement probes, row by row.
 
     Parameters
     ----------
     name : str
-        What the test is called; mostly the file's name without its ending.
+        Name of the test; mostly the file's name without its extension.
     time : ndarray of shape (n_rows,)
         Seconds since the first row [s], strictly rising.
     table : DataFrame of shape (n_rows, n_channels)
@@ -47,9 +47,9 @@ class Recording:
     aliases : mapping of str to str
         Other names a channel answers to: the file's own heading, the name without its unit.
     notes : tuple of str
-        What the reader did that a user should know.
+        Notes of the reader for the user.
     changed : tuple of str
-        Those of the notes that say what a mapping has changed in the values.
+        Those of the notes that list changes of the values by a mapping.
     compensation : {'', 'off', 'known', 'unknown'}
         Whether a correction was in force at the machine, and known; empty: not said. See
         `thermocomp.recordings.compensated`.
@@ -119,7 +119,7 @@ class Recording:
             Name of a column, or the label of each row's thermal cycle. Without it a column ``cycle``, or the spindle
             speed tells.
         name : str
-            What the test is called.
+            Name of the test.
 
         Returns
         -------
@@ -169,7 +169,7 @@ class Recording:
 
     @property
     def ambient(self) -> Channel | None:
-        """The first temperature whose name says air, ambient, room, workshop or environment; None if none does."""
+        """The first temperature whose name contains air, ambient, room, workshop or environment; None if none does."""
         return next((c for c in self.temperatures if AMBIENT.search(c.name)), None)
 
     @property
@@ -202,7 +202,7 @@ class Recording:
         return True
 
     def values(self, channels: Sequence[Channel]) -> FloatArray:
-        """Return the columns of `channels` as an array of shape (n_rows, n_channels), in house units."""
+        """Return the columns of `channels` as an array of shape (n_rows, n_channels), in internal units."""
         return self.table[[c.name for c in channels]].to_numpy(dtype=np.float64)
 
     def with_cycles(self, cycles: Sequence[Cycle]) -> "Recording":

@@ -18,7 +18,7 @@ Instant = float | datetime | str
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """What a file holds, row by row, in house units.
+    """Content of a file, row by row, in internal units.
 
     Parameters
     ----------
@@ -34,9 +34,9 @@ class Rows:
     channels : tuple of Channel
         One per column of `table`.
     labels : list of object or None
-        Thermal cycle of each row, if the file says.
+        Thermal cycle of each row, if the file contains it.
     place : callable
-        Says where a row stands in the file, such as ``line 7``.
+        Returns the location of a row in the file, such as ``line 7``.
     extra : dict of str to list of object
         Cells of further columns that were asked for and are there.
     min_run, min_stop : float
@@ -46,9 +46,9 @@ class Rows:
     aliases : mapping of str to str
         Headings and names without unit to channel names.
     notes : tuple of str
-        What the reader did.
+        Notes of the reader.
     changed : tuple of str
-        What a mapping has changed in the values.
+        Changes of the values by a mapping.
     compensation : str
         Whether a correction was in force, see `Recording`.
     """
@@ -93,7 +93,7 @@ class Rows:
         ----------
         at : float, datetime or str
         owner : str
-            What it belongs to, for messages.
+            Owner, for messages.
 
         Raises
         ------

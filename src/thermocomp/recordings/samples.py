@@ -25,9 +25,9 @@ class Samples:
     Parameters
     ----------
     inputs : tuple of Channel
-        What models may use; never a displacement.
+        Channels that models may use; never a displacement.
     targets : tuple of Channel
-        What they shall predict.
+        Channels to be predicted.
     values : ndarray of shape (n_rows, n_inputs)
         Inputs as recorded, in house units.
     deviations : ndarray of shape (n_rows, n_targets)
@@ -50,7 +50,7 @@ class Samples:
     resting : ndarray of bool of shape (n_rows,), optional
         The spindle is known to be stopped; None: it is known nowhere.
     starts : tuple of Start
-        How each test begins; empty: cold.
+        Initial state of each test; empty: cold.
     stamps : tuple of str
         ISO timestamp of each test's first row, that of an earlier file it continues from; empty: not known.
     trouble : tuple of (str, str)
@@ -90,7 +90,7 @@ class Samples:
         return np.array([self.rezero and c.quantity == "temperature" for c in self.inputs], dtype=np.bool_)
 
     def reference(self) -> FloatArray:
-        """Return what counts as zero, (n_tests, n_inputs): the mean over each test's start; 0 for absolute inputs."""
+        """Return the reference (zero), (n_tests, n_inputs): the mean over each test's start; 0 for absolute inputs."""
         temperatures = [c.quantity == "temperature" for c in self.inputs]
         if self.zero is not None and not self.rezero:
             return np.where(temperatures, self.zero, 0.0)
@@ -119,7 +119,7 @@ class Samples:
         return int(np.flatnonzero((self.test == test) & (self.cycle >= 0))[0])
 
     def change(self) -> FloatArray:
-        """Return inputs minus their reference, (n_rows, n_inputs); the rows of a zero say its mean."""
+        """Return inputs minus their reference, (n_rows, n_inputs); the rows of a zero give its mean."""
         return self._change.copy()
 
     @cached_property
@@ -158,7 +158,7 @@ class Samples:
         return float(np.median(steps[np.isfinite(steps)])) if np.isfinite(steps).any() else 1.0
 
     def learned(self, target: int, rows: BoolArray, before: int | None = None) -> Learned:
-        """Return what some rows show of a target.
+        """Return the training statistics of a target in some rows.
 
         Parameters
         ----------
@@ -229,6 +229,6 @@ class Samples:
 
 
 def usual_step(step: FloatArray) -> float:
-    """Return the median time between two rows [s]; inf where every row is a test of its own."""
+    """Return the median time between two rows [s]; inf where every row is a separate test."""
     between = step[np.isfinite(step) & (step > 0)]
     return float(np.median(between)) if between.size else float("inf")

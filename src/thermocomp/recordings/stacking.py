@@ -50,7 +50,7 @@ def stack(
     zeroing : Zeroing, optional
         Over how long the start is averaged; as `Zeroing` says if not given, by the first recording's spindle speed.
     starts : Start or sequence of Start, optional
-        How each recording begins, or all of them; found out if not given.
+        Initial state of each recording, or of all of them. Default: determined from the recordings.
 
     Raises
     ------

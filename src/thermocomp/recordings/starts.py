@@ -1,4 +1,4 @@
-"""How a test begins: cold, continued from an earlier file, re-zeroed on a warm machine, or with a known zero."""
+"""Initial thermal state of a test: cold, continued from an earlier file, re-zeroed on a warm machine, or known zero."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -34,16 +34,16 @@ SOON = 600.0
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """How a test begins.
+    """Initial thermal state of a test.
 
     Parameters
     ----------
     word : {'cold', 'continued', 'rezeroed', 'known'}
         See `WORDS`.
     why : str
-        How that is known: stated, or found out.
+        Origin of that state: stated, or determined from the recording.
     earlier : tuple of Recording
-        What the machine went through before, in the order of time.
+        Earlier recordings of the machine, in chronological order.
     gap : float or None
         From the last row of each of them to the first row of what follows [s]; None: from their time stamps, or else
         one sampling interval.
@@ -117,9 +117,9 @@ def bridge_files(start: Start, recording: Recording) -> tuple[Start, FloatArray]
     Returns
     -------
     start : Start
-        With its gaps told.
+        Start with known gaps.
     begins : ndarray of shape (n_earlier + 1,)
-        When each earlier file and the recording itself begin, since the first of them [s].
+        Start of each earlier file and of the recording itself, since the first of them [s].
 
     Raises
     ------
@@ -152,7 +152,7 @@ def find_starts(
     zeroing: Zeroing = Zeroing(),
     absolute: bool = False,
 ) -> tuple[Start, ...]:
-    """Find out how tests begin.
+    """Determine the initial states of tests.
 
     A displacement that begins near zero was zeroed there. One that does not, and continues where the file before it
     (by time stamps) ended, continues that. All else cannot be told.
@@ -164,14 +164,14 @@ def find_starts(
     targets : sequence of Channel
         Displacements that are judged or learned from.
     zeroing : Zeroing
-        What counts as the start.
+        Definition of the zero at the start.
     absolute : bool
         Temperatures are taken as they are: their zero is known.
 
     Raises
     ------
     InputError
-        It cannot be told, and a model begun at zero would be wrong by it.
+        It cannot be determined, and a model started at zero would be wrong by it.
     """
     if absolute:
         return tuple(Start("known", "temperatures are taken as they are") for _ in recordings)
@@ -192,7 +192,7 @@ def find_resting_rows(recording: Recording, zeroing: Zeroing) -> BoolArray:
     ----------
     recording : Recording
     zeroing : Zeroing
-        Names the channel that tells it.
+        Defines the channel of the spindle speed.
 
     Returns
     -------
@@ -205,13 +205,13 @@ def find_resting_rows(recording: Recording, zeroing: Zeroing) -> BoolArray:
 
 
 def level(recording: Recording, name: str, zeroing: Zeroing, *, end: bool = False) -> float:
-    """Return what a channel begins, or ends, with.
+    """Return the level of a channel at its start or at its end.
 
     Parameters
     ----------
     recording : Recording
     name : str
-        Of the channel.
+        Name of the channel.
     zeroing : Zeroing
         Over how long the start is averaged.
     end : bool

@@ -2,5 +2,5 @@
 
 
 def split_words(*lines: str) -> frozenset[str]:
-    """Return the words of lines in which a comma and a blank stand between two."""
+    """Return the words of comma-separated lines."""
     return frozenset(word for line in lines for word in line.split(", "))

@@ -1,4 +1,4 @@
-"""How models of a file did on recordings, as one offline page.
+"""Results of a model file on recordings, as a single offline page.
 
 A section of it is a function that makes one of what was judged, and a line in `SECTIONS`.
 """

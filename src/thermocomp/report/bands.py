@@ -1,4 +1,4 @@
-"""How far models may be off, in words: their bands, and how those did where they were judged."""
+"""Uncertainty bands of models in words, and their coverage where the models were judged."""
 
 import math
 from collections.abc import Sequence
@@ -31,7 +31,7 @@ def describe_bands(models: Sequence[ErrorModel], assessments: Sequence[Assessmen
 
 
 def describe_coverage(a: Assessment) -> str:
-    """Return what share of the judged rows the band held, and how wide it was there."""
+    """Return the fraction of the judged rows inside the band, and the width of the band there."""
     share = 0.0 if a.half_widths is None else float(np.isfinite(a.half_widths).mean())
     some = f" that have one ({100 * share:.0f} %; there is none where the correction is held)" if share < 0.995 else ""
     seen = ", which the model has learned from" if a.caveat else ""

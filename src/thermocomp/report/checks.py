@@ -1,4 +1,4 @@
-"""What `check` found in recordings, as one offline page: the channels drawn, the findings marked at their rows."""
+"""Findings of `check` in recordings, as a single offline page: plots of the channels with the findings marked."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -30,7 +30,7 @@ def render(recordings: Sequence[Recording], findings: Sequence[Sequence[Finding]
     ----------
     recordings : sequence of Recording
     findings : sequence of sequence of Finding
-        Of each recording, the gravest first.
+        Findings of each recording, the most serious first.
 
     Returns
     -------
@@ -125,7 +125,7 @@ def _panel(
 def _limits(
     recording: Recording, channels: Sequence[Channel], numbers: Mapping[str, Sequence[tuple[int, Finding]]]
 ) -> tuple[float, float]:
-    """Return the range of what is sound, with a margin: beside a spike of millimetres nothing else would be seen."""
+    """Return the range of plausible values, with a margin: a spike of millimetres would hide all other values."""
     low, high = np.inf, -np.inf
     for c in channels:
         values = np.clip(recording.table[c.name].to_numpy(dtype=np.float64), -1e30, 1e30)
@@ -140,7 +140,7 @@ def _limits(
 
 
 def _first(f: Finding) -> int | None:
-    """Return the row a finding's number stands at."""
+    """Return the row at which the number of a finding is shown."""
     return int(f.rows[0]) if f.rows is not None and f.rows.size else f.row
 
 
@@ -154,7 +154,7 @@ def _mark(ax: Axes, hours: FloatArray, values: FloatArray, f: Finding, style: st
 
 
 def _label(ax: Axes, hour: float, found: Sequence[tuple[int, Finding]]) -> None:
-    """Write the numbers of the findings that begin at the same time, the gravest giving the colour."""
+    """Write the numbers of the findings that begin at the same time, the most serious one giving the colour."""
     first = min(found, key=lambda one: one[0])[1]
     ax.annotate(
         ", ".join(str(number) for number, _ in found[:4]) + (" ..." if len(found) > 4 else ""),

@@ -1,4 +1,4 @@
-"""What the answer of a paced model is made of: a figure and a table for the page."""
+"""Contributions to the output of a paced model: a figure and a table for the page."""
 
 from typing import Any, NamedTuple
 
@@ -18,7 +18,7 @@ MOST = 6
 
 
 class Answer(NamedTuple):
-    """What the answer of a model is made of."""
+    """Contributions to the output of a model."""
 
     figure: Drawn
     table: Layout
@@ -26,7 +26,7 @@ class Answer(NamedTuple):
 
 
 def explain(model: PacedDynamic, samples: Samples) -> Answer:
-    """Return what the answer of a model is made of in some recordings.
+    """Return the contributions to the output of a model in some recordings.
 
     Parameters
     ----------

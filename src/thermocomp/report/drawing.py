@@ -1,4 +1,4 @@
-"""What all figures share: the house's style, words that stay words, and how a figure becomes SVG or PNG.
+"""Shared by all figures: the style, escaping of text, and output as SVG or PNG.
 
 Words that people typed (names of channels, cycles, files, methods, places) are never read as formulas; what cannot be
 printed is replaced, and what is too long is cut, whatever draws it. So legends and names at ticks are made here, and
@@ -54,7 +54,7 @@ class Drawn(str):
 
 @contextmanager
 def drawing(salt: str) -> Iterator[None]:
-    """Draw in the house's style, and no text as a formula.
+    """Draw in the style of the reports, and no text as a formula.
 
     Parameters
     ----------
@@ -67,14 +67,14 @@ def drawing(salt: str) -> Iterator[None]:
 
 
 def add_legend(where: Axes | Figure, **how: Any) -> None:
-    """Add a legend of all that has a label; matplotlib's leaves out what begins with ``_``.
+    """Add a legend of all labelled items; matplotlib ignores labels that begin with ``_``.
 
     Parameters
     ----------
     where : Axes or Figure
         A figure's legend has each label of its axes once.
     **how
-        Of matplotlib's ``legend``.
+        Keyword arguments of matplotlib's ``legend``.
     """
     if isinstance(where, Axes):
         named = list(_labelled(where))
@@ -108,7 +108,7 @@ def name_ticks(axis: Axis, names: Sequence[str], longest: int = _NAME, **how: An
     longest : int
         Characters that find room.
     **how
-        Of the labels, such as ``fontsize``.
+        Properties of the labels, such as ``fontsize``.
     """
     axis.set_ticks(range(len(names)), [shorten(name, longest) for name in names], **how)
 

@@ -1,4 +1,4 @@
-"""Which sensors fell out in recordings, what stood in, and what it cost: figures, tables and their section."""
+"""Failed sensors in recordings, their substitutes, and the loss of accuracy: figures, tables and their section."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -31,7 +31,7 @@ TITLE = "Sensors"
 
 
 def section(judged: Judged, recordings: Sequence[Recording]) -> Section:
-    """Return what the page says of sensors that failed.
+    """Return the section of the page about failed sensors.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def draw_timeline(log: FaultLog, recording: Recording) -> Drawn:
     ----------
     log : FaultLog
     recording : Recording
-        Of it.
+        Recording of the log.
 
     Returns
     -------
@@ -173,7 +173,7 @@ def draw_timeline(log: FaultLog, recording: Recording) -> Drawn:
 
 
 def draw_stand_ins(log: FaultLog) -> Drawn:
-    """Show what sensors that failed read, and the temperature that stood in.
+    """Show the readings of failed sensors, and the substitute temperature.
 
     Parameters
     ----------
@@ -210,7 +210,7 @@ def draw_stand_ins(log: FaultLog) -> Drawn:
 
 
 def _around(read: FloatArray, stood_in: FloatArray) -> tuple[float, float]:
-    """Return a range that holds what stood in and what was believed, and readings that are not far from these."""
+    """Return a range that contains the substitutes and the trusted values, and readings close to them."""
     sure = np.where(np.isfinite(stood_in), stood_in, read)
     low, high = float(np.nanmin(sure)), float(np.nanmax(sure))
     far = AROUND + (high - low)

@@ -1,4 +1,4 @@
-"""Figures of the report, as SVG text. Each answers one question; the question stands in its docstring."""
+"""Figures of the report, as SVG text. Each answers one question, which is given in its docstring."""
 
 from collections.abc import Sequence
 

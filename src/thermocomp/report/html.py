@@ -60,7 +60,7 @@ def render(comparison: Comparison, recordings: Sequence[Recording], samples: Sam
 
 
 def draw_runs(comparison: Comparison, recordings: Sequence[Recording]) -> dict[str, tuple[str, Drawn, str]]:
-    """Return how the best model of each target ran; where nothing may be used the least bad, marked as refused.
+    """Return figures of the best model of each target; if none may be used, of the least bad, marked as refused.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def _shown(value: Any) -> Any:
 
 
 def environment() -> Environment:
-    """Return what makes the pages: the templates with their filters."""
+    """Return the template environment of the pages with its filters."""
     pages = Environment(
         loader=PackageLoader("thermocomp.report"),
         autoescape=select_autoescape(["html"]),

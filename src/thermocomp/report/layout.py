@@ -10,7 +10,7 @@ from thermocomp.judging.choice import Cell, Table, format_cell
 
 
 class Toned(str):
-    """Words that stand out where they are shown.
+    """Text that is highlighted.
 
     Parameters
     ----------
@@ -78,14 +78,14 @@ class Layout:
     ----------
     columns : sequence of Column
     rows : sequence
-        What the columns take their values from: records, tuples or results.
+        Source of the column values: records, tuples or results.
     title : str
     caption : str
-        What its numbers are; a page says it in its own words around the table.
+        Meaning of the numbers; a page explains it in its text around the table.
     note : str
         A paragraph below it.
     tones : dict of int to str
-        Rows that stand out, by place: best (what was chosen) or none (no compensation).
+        Highlighted rows, by index: best (the chosen one) or none (no compensation).
     sections : frozenset of int
         Rows above which there is a line.
     """
@@ -99,12 +99,12 @@ class Layout:
     sections: frozenset[int] = frozenset()
 
     def tone(self, row: int) -> str:
-        """Return how a row stands out; empty if it does not."""
+        """Return the highlighting of a row; empty if none."""
         return (self.tones or {}).get(row, "")
 
 
 def laid_out(t: Table) -> Layout:
-    """Return the layout of a table of results, whose title stands above it."""
+    """Return the layout of a table of results, with its title above it."""
     columns = [Column(heading, partial(_cell, j), "" if j in t.words else ">") for j, heading in enumerate(t.columns)]
     return Layout(columns, t.rows, note=t.caption, tones={} if t.marked is None else {t.marked: "best"})
 
@@ -128,7 +128,7 @@ class PrintedLine:
     ----------
     text : str
     mark : Toned or None
-        Words before it that stand out.
+        Highlighted text before it.
     whole : bool
         It is not broken where the terminal ends.
     """

@@ -1,4 +1,4 @@
-"""What the watch over the temperatures can do, and what a lost sensor costs, in words."""
+"""Capabilities of the temperature watch, and the loss of accuracy with a lost sensor, in words."""
 
 from collections.abc import Iterator, Sequence
 
@@ -12,7 +12,7 @@ def describe_losses(models: Sequence[ErrorModel]) -> Iterator[str]:
     Parameters
     ----------
     models : sequence of ErrorModel
-        Of one file.
+        Models of one file.
 
     Yields
     ------

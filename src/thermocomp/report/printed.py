@@ -1,4 +1,4 @@
-"""What a terminal shows of a result: lines and tables, in their order."""
+"""Terminal output of a result: lines and tables, in their order."""
 
 from collections.abc import Iterator, Sequence
 
@@ -184,7 +184,7 @@ def _assessment_table(assessments: Sequence[Assessment]) -> Layout:
 
 
 def _band_words(assessments: Sequence[Assessment]) -> str:
-    """Return what the columns of the bands are, if there is a band."""
+    """Return the explanation of the band columns, if there is a band."""
     names = dict.fromkeys(name for a in assessments if a.overall and a.band for name in a.band.split("; "))
     return f"; held, +-: rows within the band, its mean half-width ({'; '.join(names)})" if names else ""
 

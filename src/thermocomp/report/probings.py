@@ -1,4 +1,4 @@
-"""What probings did: in words, and the section of a page with what was learned after each."""
+"""Effect of probings: in words, and as a section of a page with the state learned after each."""
 
 from collections.abc import Iterator, Sequence
 
@@ -40,7 +40,7 @@ def describe_probings(assessments: Sequence[Assessment]) -> Iterator[str]:
 
 
 def section(judged: Judged, recordings: Sequence[Recording]) -> Section | None:
-    """Return what the page says of probings; None if there were none.
+    """Return the section of the page about probings; None if there were none.
 
     Parameters
     ----------

@@ -93,7 +93,7 @@ def stretches(rows: Sequence[int] | np.ndarray[Any, Any]) -> list[list[int]]:
 
 
 def assessment(a: Assessment) -> dict[str, Any]:
-    """Return how a model did on a target, in a block or over all."""
+    """Return the results of a model for a target, in a block or over all."""
     content: dict[str, Any] = {
         "model": a.model,
         "target": a.target,
@@ -153,7 +153,7 @@ def assessment(a: Assessment) -> dict[str, Any]:
 
 
 def _probed(a: Assessment) -> dict[str, Any]:
-    """Return what probings left, and what is left without them, or by them alone."""
+    """Return the residual with probings, without them, and with probings alone."""
     if a.probed is None:
         return {}
     errors = {"rms": "rms_um", "mae": "mae_um"}
@@ -170,7 +170,7 @@ def _probed(a: Assessment) -> dict[str, Any]:
 
 
 def _band(a: Assessment) -> dict[str, Any]:
-    """Return what the band of a model is called, what share of the judged rows it held, and how wide it was there."""
+    """Return the name of a model's band, the fraction of the judged rows inside it, and its width there."""
     return {"band": a.band or None, "coverage_pct": 100 * a.coverage, "half_width_um": a.half_width}
 
 

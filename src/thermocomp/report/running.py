@@ -1,4 +1,4 @@
-"""What was judged besides the models: the gate and the limits of the compensator, in words."""
+"""Compensator judged with the models: its gate and limits, in words."""
 
 from collections.abc import Sequence
 
@@ -9,7 +9,7 @@ MOST = 4
 
 
 def describe_running(assessments: Sequence[Assessment]) -> list[str]:
-    """Return what the compensator around the models did to the figures.
+    """Return the effect of the compensator around the models on the results.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ class Shown(NamedTuple):
 
 
 class Section(NamedTuple):
-    """What stands below a heading: a text is a paragraph."""
+    """Content below a heading: a text is a paragraph."""
 
     title: str
     parts: Sequence[str | Layout | Shown]

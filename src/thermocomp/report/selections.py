@@ -1,4 +1,4 @@
-"""Figures of a sensor selection, as SVG text. Each answers one question; the question stands in its docstring."""
+"""Figures of a sensor selection, as SVG text. Each answers one question, which is given in its docstring."""
 
 from typing import Any, cast
 
@@ -71,7 +71,7 @@ def rows(table: Table, value: int, target: str) -> Drawn:
 
 
 def grouping(g: Any, target: str) -> Drawn:
-    """Show which temperatures say the same, groups in the correlation matrix, and how many are worth having: MSE_p.
+    """Show collinear temperatures, groups in the correlation matrix, and the useful number of sensors: MSE_p.
 
     Parameters
     ----------

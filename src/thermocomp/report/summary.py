@@ -26,7 +26,7 @@ SHOWN = ("mae", "rms", "max_abs", "peak_to_peak", "reduction")
 def summarise(
     comparison: Comparison, recordings: Sequence[Recording], samples: Samples | None = None
 ) -> dict[str, Any]:
-    """Return everything the report says in words and numbers.
+    """Return the content of the report in words and numbers.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def summarise(
     recordings : sequence of Recording
     samples : Samples, optional
         All rows of the comparison: the best method is fitted to them for its formula, as ``thermocomp fit`` does.
-        Without them the formula is that of one fold, and says so.
+        Without them the formula is that of one fold, and is marked so.
 
     Returns
     -------
@@ -84,7 +84,7 @@ def verdict(comparison: Comparison) -> str:
 
 
 def cautions(comparison: Comparison) -> list[str]:
-    """Return what the verdict does not say: noise, lost sensors, readings outside the trained range."""
+    """Return cautions not covered by the verdict: noise, lost sensors, readings outside the training range."""
     best = [a for t in dict.fromkeys(a.target for a in comparison.assessments) if (a := comparison.best(t)) is not None]
     known = [(a, a.robustness) for a in best if a.robustness is not None]
     found = []
@@ -109,7 +109,7 @@ def cautions(comparison: Comparison) -> list[str]:
 
 
 def harms(comparison: Comparison) -> list[str]:
-    """Return which of the models that may run noise or a lost sensor makes worse than none, within the margin.
+    """Return the usable models that noise or a lost sensor makes worse than no compensation, within the margin.
 
     Others are unproven for it, which is their reason.
     """
@@ -122,7 +122,7 @@ def harms(comparison: Comparison) -> list[str]:
 
 
 def describe_unlike(r: Robustness) -> str:
-    """Say how many rows are outside the joint support, and the error there."""
+    """Return the number of rows outside the joint support, and the error there, in words."""
     return (
         f"{100 * r.unlike:.0f} % of the rows are unlike the training (inputs together, or a speed between trained "
         f"ones), {r.unlike_rms:.2f} um RMS there"

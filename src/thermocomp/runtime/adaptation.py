@@ -1,4 +1,4 @@
-"""Adaptation: what probings say of a model's error, and how long that holds.
+"""Adaptation: information from probings about a model's error, and its validity over time.
 
 A Kalman filter over what may be wrong with a model: an offset of the size of its error on cycles that were left out,
 and, in a model that is the average of many structures, how much of each main direction of their differences is true. A
@@ -61,7 +61,7 @@ class Probing(NamedTuple):
 
 
 class Adaptation(NamedTuple):
-    """What is known of a model's error since the last probing: the directions' shares, and last the offset."""
+    """Estimated error of a model since the last probing: the coefficients of the directions, then the offset."""
 
     mean: FloatArray  #: (n_directions + 1,)
     covariance: FloatArray  #: (n_directions + 1, n_directions + 1)
@@ -82,14 +82,14 @@ class Adaptation(NamedTuple):
         return kept * self.mean, covariance + np.eye(len(prior)) * ((1.0 - kept**2) * prior)[..., None, :]
 
     def shift(self, time: FloatArray | float, directions: FloatArray) -> FloatArray:
-        """Return what is added to the deviation at later times.
+        """Return the value added to the deviation at later times.
 
         Parameters
         ----------
         time : array of shape (...,)
             [s]
         directions : ndarray of shape (..., n_directions)
-            Of the model there, see `ErrorModel.directions` [um].
+            Directions of the model at that time, see `ErrorModel.directions` [um].
 
         Returns
         -------
@@ -100,7 +100,7 @@ class Adaptation(NamedTuple):
         return np.asarray(np.clip(found, -self.most, self.most))
 
     def narrowing(self, time: FloatArray | float, directions: FloatArray, floor: float) -> FloatArray:
-        """Return what is left of the half-width of a band, as a share of it; `floor` is that of the band [um].
+        """Return the remaining fraction of the half-width of a band; `floor` is that of the band [um].
 
         More than 1 where probings have shown that the machine is unlike what the band was judged on.
         """
@@ -117,7 +117,7 @@ class Adaptation(NamedTuple):
 
 
 def find_most(size: float, drift: float, magnitude: float) -> float:
-    """Return what a model can be wrong by at most [um].
+    """Return the largest possible error of a model [um].
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def find_most(size: float, drift: float, magnitude: float) -> float:
     drift : float
         The same without compensation: an error of a thermal model is no larger than what heat does to the machine [um].
     magnitude : float
-        What a correction may be at most [um].
+        Largest permitted correction [um].
 
     Returns
     -------
@@ -136,7 +136,7 @@ def find_most(size: float, drift: float, magnitude: float) -> float:
 
 
 def begin(size: float, n_directions: int, typical: float = np.inf, most: float = np.inf) -> Adaptation:
-    """Return what is known without a probing.
+    """Return the initial estimate, without a probing.
 
     Parameters
     ----------
@@ -164,25 +164,25 @@ def begin(size: float, n_directions: int, typical: float = np.inf, most: float =
 def take(
     before: Adaptation, directions: FloatArray, time: float, error: float, repeatability: float
 ) -> tuple[Adaptation, str]:
-    """Take a probing in.
+    """Process a probing.
 
     Parameters
     ----------
     before : Adaptation
     directions : ndarray of shape (n_directions,)
-        Of the model when it was made [um].
+        Directions of the model at the time of the probing [um].
     time : float
-        When it was made [s].
+        Time of the probing [s].
     error : float
-        What was measured, minus what the model said without any probing [um].
+        Measured error minus the output of the model without any probing [um].
     repeatability : float
-        Of the probe, standard deviation [um].
+        Repeatability of the probe, standard deviation [um].
 
     Returns
     -------
     Adaptation
     str
-        Why the probing is refused, and nothing is learned from it; empty if it is taken.
+        Reason why the probing is refused and not used; empty if it is used.
     """
     if not (np.isfinite(error) and 0.0 <= repeatability < np.inf):
         return before, f"{error} um with a repeatability of {repeatability} um: want finite numbers"

@@ -1,4 +1,4 @@
-"""All models of a compensator, one reading further: each group from a zero of its own."""
+"""All models of a compensator, one reading further: each group with a separate zero."""
 
 import math
 from collections.abc import Sequence
@@ -31,16 +31,16 @@ def advance(
     time: float,
     dt: float,
 ) -> Advanced:
-    """Take a reading that passed the gate into all models.
+    """Pass a reading that passed the gate to all models.
 
     Parameters
     ----------
     groups : sequence of Group
     states, gathered : sequence of State, Gathered
-        Of the models.
+        States of the models.
     reading : Reading
     time : float
-        When it was taken [s].
+        Time of the reading [s].
     dt : float
         Since the reading before [s].
 
@@ -78,7 +78,7 @@ def advance(
 def _zeroed(
     group: Group, states: list[State], gathered: Gathered, reading: tuple[float, FloatArray, bool]
 ) -> tuple[list[State], Gathered, bool, FloatArray]:
-    """Take a reading into the zero if it belongs there; return whether that is known now, and what the reading says.
+    """Add a reading to the zero if it belongs there; return whether the zero is now known, and the zeroed reading.
 
     Once it is, the models go through the readings before this one, as if it had been known from the first of them; all
     readings of the zero say their mean.

@@ -23,7 +23,7 @@ BoolArray = NDArray[np.bool_]
 
 
 class ModelRun(NamedTuple):
-    """What a model says in a test, and what a compensator with it does."""
+    """Outputs of a model in a test, and those of a compensator with it."""
 
     deviation: FloatArray  #: (n_rows,), of the model alone: every complete reading is used, nothing is limited
     compensated: FloatArray  #: (n_rows,), minus the correction in force: what is taken off the deviation
@@ -54,7 +54,7 @@ def run(
     Parameters
     ----------
     model : ErrorModel
-        Of any unit; refused or not: it is being judged.
+        Model of any unit; refused or not: it is being judged.
     limits : Limits or None
         None: the correction follows the model at once, as for a model that predicts another unit than that of limits.
     time : ndarray of shape (n_rows,)
@@ -62,7 +62,7 @@ def run(
     values : ndarray of shape (n_rows, n_inputs)
         In the order of the model's inputs; nan where a value is missing.
     reference : array-like of shape (n_inputs,), optional
-        What counts as zero; see `ErrorModel.init`.
+        Zero of the inputs; see `ErrorModel.init`.
     resting : ndarray of bool of shape (n_rows,), optional
         The spindle is known to be stopped; nowhere if not given.
     anew : int, optional
@@ -71,9 +71,9 @@ def run(
     undriven : ndarray of bool of shape (n_rows,), optional
         The correction is not driven: sensors failed that the model must not lose. It is held, then fades.
     probed : ndarray of shape (n_rows,), optional
-        Deviation that a probing says, nan where there was none: it counts from the next row on [um].
+        Deviation measured by a probing, nan where there was none: it takes effect from the next row on [um].
     repeatability : float
-        Of the probe, standard deviation [um].
+        Repeatability of the probe, standard deviation [um].
 
     Returns
     -------
@@ -136,7 +136,7 @@ def find_test_zero(
     values : ndarray of shape (n_rows, n_inputs)
     resting, usable : ndarray of bool of shape (n_rows,)
     reference : array-like of shape (n_inputs,), optional
-        What is known of it; see `ErrorModel.init`.
+        Known part of the zero; see `ErrorModel.init`.
 
     Returns
     -------
@@ -220,7 +220,7 @@ def _counted(
 def _said(
     model: ErrorModel, time: FloatArray, values: FloatArray, used: BoolArray, zero: FloatArray, shown: _Shown
 ) -> _Answers:
-    """Return what the model says per row; an unused reading holds it."""
+    """Return the output of the model per row; it is held at an unused reading."""
     rows = np.flatnonzero(used)
     nothing = np.full(len(time), np.nan)
     found = _Answers(np.zeros(len(time)), np.zeros(len(time), dtype=np.bool_), nothing, np.zeros((len(time), 0)))

@@ -1,4 +1,4 @@
-"""Which failure explains how readings differ from their predictions: of one sensor, or of two that are swapped."""
+"""Failure that explains the residuals of readings: of one sensor, or of two that are swapped."""
 
 from typing import NamedTuple
 
@@ -72,7 +72,7 @@ def weigh_swaps(
     evidence : ndarray of shape (..., n_pairs)
         For every two, low-passed; -inf once it spoke against them.
     x : ndarray of shape (..., n_sensors)
-        Readings, or what stands in for them, minus the reference [degC].
+        Readings, or their substitutes, minus the reference [degC].
     memory : ndarray of shape (..., n_memory)
         See `thermocomp.runtime.watch.WatchState`.
     able : ndarray of bool of shape (..., n_sensors)
@@ -120,7 +120,7 @@ def _nobody(able: BoolArray) -> Blamed:
 
 
 def _least(rest: FloatArray, worst: FloatArray, sensors: BoolArray) -> Blamed:
-    """Return which failure leaves least; `sensors` (n_failures, n_sensors), the others (..., n_failures)."""
+    """Return the failure of smallest residual; `sensors` (n_failures, n_sensors), the others (..., n_failures)."""
     place = rest.argmin(axis=-1)[..., None]
     return Blamed(
         sensors[place[..., 0]],

@@ -22,7 +22,7 @@ class Instant(NamedTuple):
 
 
 def place(state: CompensatorState, reading: Reading, now: float, tick: float, limits: Limits) -> tuple[Instant, str]:
-    """Return when a reading was taken, and why it comes at a wrong time; empty if it does not.
+    """Return the time of a reading, and the reason if the time is invalid; empty if it is valid.
 
     Parameters
     ----------
@@ -57,6 +57,6 @@ def place(state: CompensatorState, reading: Reading, now: float, tick: float, li
 
 
 def _set(state: CompensatorState, reading: Reading, passed: float) -> Instant:
-    """Return when a reading was taken, so long after the last one, whatever its stamp says."""
+    """Return the time of a reading at a given interval after the last one, regardless of its stamp."""
     time = (state.time or 0.0) + passed
     return Instant(time, reading.time - time)

@@ -55,7 +55,7 @@ class Compensator:
     Parameters
     ----------
     models : tuple of ErrorModel
-        Models of time, stepped one by one, each from a zero of its own.
+        Models of time, stepped one by one, each with a separate zero.
     lines : dict of str to DeviationLine
         By target or axis.
     limits : Limits
@@ -65,7 +65,7 @@ class Compensator:
     Raises
     ------
     InputError
-        None of its targets may run: the do-no-harm gate refused a model, or it is unproven and nobody takes it.
+        None of its targets may run: the do-no-harm gate refused a model, or it is unproven and nobody has approved it.
     """
 
     models: tuple[ErrorModel, ...]
@@ -159,7 +159,7 @@ class Compensator:
         machine : Machine
             With its components.
         at : array-like of shape (3,)
-            Where the other axes stand while one moves [mm].
+            Positions of the other axes while one moves [mm].
         tool : array-like of shape (3,), optional
             From the gauge point to the tip [mm]; the machine's own if not given.
         limits : Limits
@@ -213,7 +213,7 @@ class Compensator:
         return state._replace(models=tuple(found))
 
     def gate(self, state: CompensatorState, reading: Reading) -> str:
-        """Say why a reading must not be used, whenever it was taken; the empty string if it may.
+        """Return the reason why a reading must not be used, regardless of its time; empty if it may.
 
         A temperature is plausible while it stays within its trained range widened by the whole span of that range. The
         first readings decide what counts as zero: there the temperatures as a whole (their median) have to be within
@@ -249,7 +249,7 @@ class Compensator:
         probings: Mapping[str, Probing] | None = None,
         tick: float | None = None,
     ) -> tuple[CompensatorState, Compensated]:
-        """Take one reading in and give the corrections that are in force after it.
+        """Process one reading and return the corrections that are in force after it.
 
         Parameters
         ----------
@@ -349,7 +349,7 @@ class Compensator:
         tick : float
             The monotone clock of the process, now [s].
         why : str
-            Why there is none.
+            Reason why there is none.
 
         Returns
         -------
@@ -373,7 +373,7 @@ class Compensator:
     def _drive(
         self, state: CompensatorState, target: str, deviation: Deviation, travel: float
     ) -> tuple[Correction, Status]:
-        """Return the correction that a deviation wants, within the limits, and how the target is."""
+        """Return the correction for a deviation, within the limits, and the status of the target."""
         before, line, order = state.corrections[target], self.lines[target], state.orders.get(target)
         wanted = Correction.opposing(deviation)
         if order is not None and order.word in ("holding", "suspended"):
@@ -386,7 +386,7 @@ class Compensator:
         return after, ACTIVE
 
     def _believe(self, state: CompensatorState, reading: Reading, time: float) -> tuple[CompensatorState, Reading]:
-        """Return the reading with what stands in for temperatures that are not believed."""
+        """Return the reading with substitutes for temperatures that are not trusted."""
         values, states = reading.values, list[WatchState]()
         for lookout, before in zip(self._lookouts, state.watches, strict=True):
             seen, values = lookout.believe(before, time, values)
@@ -441,7 +441,7 @@ class _Idle(NamedTuple):
 
 
 def _unjudged(models: Sequence[ErrorModel], failed: Collection[str]) -> str:
-    """Say why models must not drive a correction without the sensors that failed; the empty string if they may."""
+    """Return the reason why models must not drive a correction without the failed sensors; empty if they may."""
     for model in models:
         lost = [n for n in failed if n in model.sensors]
         if lost and not model.may_lose(lost):
@@ -450,5 +450,5 @@ def _unjudged(models: Sequence[ErrorModel], failed: Collection[str]) -> str:
 
 
 def _apart(one: Correction, other: Correction, travel: tuple[float, float]) -> float:
-    """Return how far two corrections are apart at most along the travel [um]."""
+    """Return the largest difference of two corrections along the travel [um]."""
     return max(abs(one.at(p) - other.at(p)) for p in travel)

@@ -29,11 +29,11 @@ class Fleet:
     Parameters
     ----------
     model : LinearDynamic
-        Accepted, or taken by somebody; each signal a single input, and readings outside the trained range clipped.
+        Accepted, or approved by a person; each signal a single input, and readings outside the training range clipped.
     zeros : array-like of shape (n_machines, n_inputs)
-        What counts as zero at each machine.
+        Zero of the inputs at each machine.
     limits : Limits
-        Of all of them.
+        Limits of all of them.
     dtype : dtype
         ``float32`` is half the memory and time; it differs from ``float64`` by less than 1e-3 um.
 
@@ -86,7 +86,7 @@ class Fleet:
         self.corrections = np.zeros(n, dtype=kind)
 
     def tick(self, readings: Array, dt: float) -> NDArray[np.bool_]:
-        """Take one reading of each machine in; `corrections` are in force after it.
+        """Process one reading of each machine; `corrections` are in force after it.
 
         Parameters
         ----------
@@ -98,7 +98,7 @@ class Fleet:
         Returns
         -------
         ndarray of bool of shape (n_machines,)
-            Whose reading was used. The others stay where they are for `Limits.hold`, then fade.
+            Machines whose reading was used. The others stay where they are for `Limits.hold`, then fade.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""The gate: what of a reading says that a sensor, a clock or a wire is broken, and not that the machine is warm.
+"""The gate: readings that show a broken sensor, clock or wire, and not a warm machine, are rejected.
 
 It comes first, because numbers that are not numbers are treacherous further down: in Python ``max(-m, min(m, nan))`` is
 ``m``, so a dead sensor would command the full correction.
@@ -39,7 +39,7 @@ CLOCK_SKEW = 1.0
 
 
 def explain_implausible(model: ErrorModel, values: Sequence[object], reference: Sequence[float]) -> str:
-    """Say which value of a reading must not be used and why; the empty string if all may.
+    """Return which value of a reading must not be used and why; empty if all may.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def explain_implausible(model: ErrorModel, values: Sequence[object], reference: 
     values : sequence of shape (n_inputs,)
         As a source gave them; None is a value that is missing.
     reference : sequence of float of shape (n_inputs,)
-        What counts as zero; nan where it is not known yet.
+        Zero of the inputs; nan where it is not known yet.
 
     Returns
     -------
@@ -67,7 +67,7 @@ def explain_implausible(model: ErrorModel, values: Sequence[object], reference: 
 
 
 def _no_start(offsets: Sequence[tuple[Input, float]]) -> str:
-    """Say why temperatures, given from the zero of the training, cannot be those of a machine that starts."""
+    """Return why temperatures, relative to the zero of the training, cannot be those of a starting machine."""
     middle = median(offset for _, offset in offsets)
     for channel, offset in offsets:
         start = f"{channel.name} = {channel.reference + offset:g} {channel.unit} is not plausible as a start"
@@ -79,7 +79,7 @@ def _no_start(offsets: Sequence[tuple[Input, float]]) -> str:
 
 
 def explain_untimely(reading: Reading, now: float, limits: Limits) -> str:
-    """Say why a reading comes at a wrong time by its own clock; the empty string if it does not.
+    """Return the reason why the time stamp of a reading is invalid; empty if it is valid.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def explain_untimely(reading: Reading, now: float, limits: Limits) -> str:
 
 
 def find_plausible_range(channel: Input, zero: float) -> tuple[float, float]:
-    """Return the range outside which a value says that the sensor is broken, not that the machine is warm.
+    """Return the range outside which a value shows that the sensor is broken, not that the machine is warm.
 
     `zero` is what counts as zero now; nan while it is not known.
     """
@@ -121,7 +121,7 @@ def find_plausible_range(channel: Input, zero: float) -> tuple[float, float]:
 
 
 class Ranges:
-    """What some inputs can read, worked out once per zero: the quick way through `explain_implausible`.
+    """Plausible ranges of some inputs, computed once per zero: the fast path of `explain_implausible`.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ class Ranges:
         values : sequence of shape (n_inputs,)
             As a source gave them.
         reference : ndarray of shape (n_inputs,)
-            What counts as zero; nan where it is not known yet.
+            Zero of the inputs; nan where it is not known yet.
         """
         known, ranges = self._of
         if known is not reference:

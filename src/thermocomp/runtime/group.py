@@ -1,4 +1,4 @@
-"""Models of a compensator that go in step: what they have in common is worked out once."""
+"""Groups of models of a compensator that are stepped together: common parts are computed once."""
 
 import math
 from collections.abc import Sequence
@@ -16,14 +16,14 @@ TOGETHER = "inputs together"
 
 
 class Group:
-    """Models with the same inputs, states and zero, each with a read-out of its own; or a single model of any family.
+    """Models with the same inputs, states and zero, each with a separate read-out; or a single model of any family.
 
     Parameters
     ----------
     models : sequence of ErrorModel
-        Of a compensator.
+        Models of a compensator.
     members : sequence of int
-        Which of them.
+        Indices of the members.
     """
 
     def __init__(self, models: Sequence[ErrorModel], members: Sequence[int]) -> None:
@@ -55,7 +55,7 @@ class Group:
     def step(
         self, states: Sequence[State], values: FloatArray, dt: float
     ) -> tuple[list[State], list[float], list[float]]:
-        """Take a reading in, as `ErrorModel.step` does.
+        """Process a reading, as `ErrorModel.step` does.
 
         Returns
         -------
@@ -63,7 +63,7 @@ class Group:
         deviations : list of float
             One per model [its unit].
         half_widths : list of float
-            Of the bands about them; nan without one.
+            Half-widths of their bands; nan without one.
         """
         lead = states[0]
         if self._together is None or any(

@@ -1,4 +1,4 @@
-"""Which probing is which: one that is delivered twice is one.
+"""Identity of probings: one that is delivered twice counts once.
 
 A broker repeats a message that was not confirmed, a program repeats a command. A probing is the same as one before if
 it has the same id, or the same time, or, where it has neither, the same content. It is known for a day.
@@ -34,14 +34,14 @@ def sift(state: CompensatorState, probings: Mapping[str, Probing] | None) -> tup
 
 
 def remember(state: CompensatorState, probings: Mapping[str, Probing], time: float) -> dict[str, dict[str, float]]:
-    """Return when the keys of probings came first, with those of some more, by target or axis.
+    """Return the first arrival times of the keys of probings, with those of some more, by target or axis.
 
     Parameters
     ----------
     state : CompensatorState
     probings : mapping of str to Probing
     time : float
-        Of the state, now [s].
+        Present time of the state [s].
     """
     found = dict(state.probed)
     for target, probing in probings.items():

@@ -1,4 +1,4 @@
-"""What a correction may never do: leave its magnitude, move faster than its rate, chatter."""
+"""Limits of a correction: its magnitude, its rate, its dead band."""
 
 import math
 
@@ -11,9 +11,9 @@ def limit_offset(target: float, current: float, dt: float, limits: Limits) -> fl
     Parameters
     ----------
     target : float
-        Where the model wants it [um].
+        Correction demanded by the model [um].
     current : float
-        Where it is [um].
+        Correction in force [um].
     dt : float
         Time it has had to move [s].
     limits : Limits
@@ -44,7 +44,7 @@ def fade(current: Correction, travel: tuple[float, float], idle: float, dt: floa
     travel : tuple of float
         Ends of the travel [mm].
     idle : float
-        So long nothing has driven it [s].
+        Time without a demand [s].
     dt : float
         Time that counts in this step [s].
     limits : Limits
@@ -72,9 +72,9 @@ def limit_line(
     Parameters
     ----------
     target : Correction
-        Where the models want it.
+        Correction demanded by the models.
     current : Correction
-        Where it is.
+        Correction in force.
     travel : tuple of float
         Ends of the travel [mm].
     dt : float

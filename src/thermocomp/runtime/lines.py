@@ -1,4 +1,4 @@
-"""What some models together say of one target or axis, with what probings have taught of it."""
+"""Joint output of some models for one target or axis, adapted by probings."""
 
 import math
 from collections.abc import Callable, Collection, Sequence
@@ -17,7 +17,7 @@ from thermocomp.runtime.geometry.straight import best_line
 
 
 class DeviationLine(NamedTuple):
-    """What some models together say of one target or axis, in the form that controllers take."""
+    """Joint output of some models for one target or axis, in the form that controllers use."""
 
     models: slice  #: which they are, of the compensator's models
     travel: tuple[float, float]  #: where the axis goes [mm]: the limits hold from end to end
@@ -25,7 +25,7 @@ class DeviationLine(NamedTuple):
 
 
 class Said(NamedTuple):
-    """What a line says of one reading."""
+    """Output of a line for one reading."""
 
     deviation: Deviation  #: with what was learned from probings before
     half_width: float  #: of the band about it [um]; nan without one
@@ -36,12 +36,12 @@ class Said(NamedTuple):
 
 
 def constant(said: Sequence[float]) -> Deviation:
-    """Return the deviation that one model says, the same along the axis."""
+    """Return the deviation of a single model, the same along the axis."""
     return Deviation(said[0])
 
 
 def straight(source: PositionModel) -> Callable[[Sequence[float]], Deviation]:
-    """Return what makes the best straight line over the travel of the powers in a model."""
+    """Return a function that converts the outputs of a model to their best straight line over the travel."""
     low, high = source.travel
     positions, zero = np.linspace(low, high, 41), source.reference_position
     lines = [best_line(positions, (1e-3 * (positions - zero)) ** k, zero) for k in source.powers]
@@ -64,17 +64,17 @@ def evaluate(
     zero: Deviation,
     magnitude: float,
 ) -> Said:
-    """Return what a line says of a reading.
+    """Return the output of a line for a reading.
 
     Parameters
     ----------
     line : DeviationLine
     models : sequence of ErrorModel
-        Of the compensator.
+        Models of the compensator.
     spoken : Advanced
-        What they say.
+        Outputs of the models.
     time : float
-        Of the reading [s].
+        Time of the reading [s].
     learned : Adaptation or None
         From the probings before.
     probing : Probing or None
@@ -82,9 +82,9 @@ def evaluate(
     failed : collection of str
         Sensors that are not believed.
     zero : Deviation
-        What is taken off what the models say: where the target counts from.
+        Deviation subtracted from the outputs of the models: the zero of the target.
     magnitude : float
-        What a correction may be at most [um]: no probing moves the deviation further.
+        Largest permitted correction [um]: no probing moves the deviation further.
 
     Returns
     -------

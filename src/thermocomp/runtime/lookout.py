@@ -25,14 +25,14 @@ class Lookout:
     def believe(
         self, state: WatchState, time: float, values: Mapping[str, float]
     ) -> tuple[WatchState, Mapping[str, float]]:
-        """Return the values with what stands in for temperatures that are not believed.
+        """Return the values with substitutes for temperatures that are not trusted.
 
         Parameters
         ----------
         state : WatchState
             Before the reading.
         time : float
-            When it was taken [s].
+            Time of the reading [s].
         values : mapping of str to float
             As a source gave them, by channel.
         """

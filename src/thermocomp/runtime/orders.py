@@ -1,4 +1,4 @@
-"""What somebody, or the controller, has a compensator do: take a target out, count again, let all corrections go."""
+"""Commands to a compensator, from a person or the controller: suspend a target, reset its zero, release corrections."""
 
 from dataclasses import replace
 
@@ -28,7 +28,7 @@ def withdraw(compensator: Compensator, state: CompensatorState, passed: float) -
 
 
 def order(compensator: Compensator, state: CompensatorState, target: str, status: Status | None) -> CompensatorState:
-    """Take a target or axis out, or let it run again.
+    """Suspend a target or axis, or resume it.
 
     Parameters
     ----------
@@ -84,12 +84,12 @@ def rezero(
     why : str
         For the ledger, such as ``homing`` or ``work offset, by M. Weber``.
     in_force : Correction, optional
-        What the controller says is in force now; the last one without it.
+        Correction now in force as reported by the controller. Default: the last one.
 
     Returns
     -------
     CompensatorState
-        What was learned from probings is gone: it counted from the zero before.
+        State without the results of probings, which were relative to the previous zero.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What a compensator remembers between two readings, and what it says of one."""
+"""State of a compensator between two readings, and its output for a reading."""
 
 import math
 from collections.abc import Mapping
@@ -18,7 +18,7 @@ FORGOTTEN = 24 * 3600.0
 
 
 class Status(NamedTuple):
-    """How a target or axis is: a word of `Word`, and the reason."""
+    """Status of a target or axis: a word of `Word`, and the reason."""
 
     word: Word
     reason: str = ""
@@ -37,7 +37,7 @@ class Reference(NamedTuple):
 
 
 class CompensatorState(NamedTuple):
-    """All that a compensator remembers between two readings. Its times are stamps of the readings less `origin`."""
+    """State of a compensator between two readings. Its times are stamps of the readings minus `origin`."""
 
     models: tuple[State, ...]  #: one per model
     corrections: dict[str, Correction]  #: in force, by target or axis
@@ -58,7 +58,7 @@ class CompensatorState(NamedTuple):
 
 
 class Compensated(NamedTuple):
-    """What a compensator says of one reading."""
+    """Output of a compensator for one reading."""
 
     corrections: dict[str, Correction]  #: in force after this reading, by target or axis
     rejected: str  #: why the gate turned the reading away; empty if it passed
@@ -77,7 +77,7 @@ class Compensated(NamedTuple):
 
 
 def silence(state: CompensatorState, tick: float) -> float:
-    """Return how long ago the last reading passed the gate, restarts included; 0 before the first [s].
+    """Return the time since the last reading that passed the gate, restarts included; 0 before the first [s].
 
     Parameters
     ----------
@@ -107,11 +107,11 @@ def resume(
     state : CompensatorState
         As it was saved.
     cold : CompensatorState
-        Of a compensator that starts.
+        State of a compensator that starts.
     age : float
         Since the last reading in it [s].
     in_force : mapping of str to Correction, optional
-        What the controller says is in force; what was saved without it.
+        Correction in force as reported by the controller. Default: the saved one.
     tick : float, optional
         The monotone clock of the process, now: what goes by until the first reading is part of the outage, too [s].
 

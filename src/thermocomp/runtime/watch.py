@@ -41,7 +41,7 @@ HEATS = 2.0
 
 
 class WatchState(NamedTuple):
-    """All that the watch remembers between two readings; arrays are (..., n_sensors) where nothing else is said."""
+    """State of the watch between two readings; arrays are (..., n_sensors) unless noted otherwise."""
 
     reference: FloatArray  #: (..., n_inputs), what counts as zero; nan until it is known
     gathered: Gathered  #: readings that it is averaged of
@@ -72,7 +72,7 @@ def begin(watch: Watch, reference: FloatArray | None = None, runs: tuple[int, ..
     ----------
     watch : Watch
     reference : ndarray of shape (n_inputs,), optional
-        What counts as zero; without it the first readings decide for inputs with ``rezero``.
+        Zero of the inputs; without it the first readings decide for inputs with ``rezero``.
     runs : tuple of int
         Shape of a batch of runs.
     """
@@ -115,7 +115,7 @@ def is_quiet(state: WatchState, time: float) -> bool:
 def look(
     watch: Watch, state: WatchState, time: float, values: FloatArray, *, resting: bool = False
 ) -> tuple[WatchState, FloatArray]:
-    """Take a reading in and give what is to be believed of it.
+    """Process a reading and return the values to be used for it.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def look(
     state : WatchState
         From `begin` or the previous `look`.
     time : float
-        Of the reading, later than the last [s].
+        Time of the reading, later than the last [s].
     values : ndarray of shape (..., n_inputs)
         In the order of the watch's inputs; nan where a value is missing. Without its speeds nothing is predicted: it
         is passed on as it is.
@@ -158,7 +158,7 @@ def look(
 def _made_up(watch: Watch, values: FloatArray) -> FloatArray:
     """Return the first readings; one that cannot be is as far from its training's zero as the others are on average.
 
-    What can be is what the gate of the compensator lets pass as a start.
+    Possible readings are those that the gate of the compensator accepts as a start.
     """
     zero, (low, _, width) = np.array([watch.inputs[s.input].reference for s in watch.sensors]), watch.ranges
     zero = zero + np.where([watch.inputs[s.input].rezero for s in watch.sensors], 0.0, low)  # what is absolute has none
@@ -173,7 +173,7 @@ def _made_up(watch: Watch, values: FloatArray) -> FloatArray:
 
 
 def _start(watch: Watch, state: WatchState, time: float, values: FloatArray, resting: bool) -> WatchState:
-    """Take a reading into the zero, if it is not known; begin where it is, at rest in it or in the first reading."""
+    """Add a reading to the zero if it is not known; start in its state, at rest in it or in the first reading."""
     gathered, heat = state.gathered, watch.bank.temperatures
     unknown = bool(np.isnan(state.reference).any())
     if unknown and gathered.belongs(watch.zeroing, time, resting):
@@ -199,7 +199,7 @@ def _start(watch: Watch, state: WatchState, time: float, values: FloatArray, res
 
 
 def _plausible(watch: Watch, change: FloatArray, values: FloatArray) -> BoolArray:
-    """Return which temperatures are numbers that a machine can have: as the gate of the compensator sees it."""
+    """Return a mask of the temperatures that are plausible, by the same rules as the gate of the compensator."""
     low, high, width = watch.ranges
     span = np.maximum(width, MIN_SPAN)
     least, most = PLAUSIBLE["temperature"]
@@ -208,7 +208,7 @@ def _plausible(watch: Watch, change: FloatArray, values: FloatArray) -> BoolArra
 
 
 def _stand_in(state: WatchState, time: float) -> FloatArray:
-    """Return what stands in for a sensor, minus the reference."""
+    """Return the substitute value of a sensor, minus the reference."""
     gone = np.fmax(time - state.since, 0.0)  # 0 where it has not failed
     return state.predicted + state.bridge * np.exp(-gone / FADE)
 
@@ -310,7 +310,7 @@ def _blame(
     dt: float,
     found: tuple[BoolArray, BoolArray, BoolArray],
 ) -> WatchState:
-    """Take out of use what failed: two that are swapped if that explains all, and better than one; or each alone."""
+    """Exclude failed sensors: two that are swapped if that explains all, and better than one; or each alone."""
     stepped, stuck, lasting = found
     counts = np.where(s.time - s.fast[..., None] > REST, dt, 0.0)
     evidence, both = weigh_swaps(watch, s.evidence, x, s.memory, able, counts)
@@ -331,7 +331,7 @@ def _blame(
 
 
 def _fast(watch: Watch, s: WatchState, change: FloatArray) -> FloatArray:
-    """Return when the spindle last turned faster than in the training: what is predicted then is not known to hold."""
+    """Return the last time the spindle turned faster than in the training: predictions then are not validated."""
     faster = (np.abs(change[..., watch.speeds]) > FASTER * watch.top_speed).any(axis=-1)
     return np.where(faster, s.time, s.fast)
 
@@ -353,7 +353,7 @@ def _returns(watch: Watch, s: WatchState, difference: FloatArray) -> WatchState:
 
 
 def _fail(watch: Watch, s: WatchState, found: BoolArray, fault: int, bridge: FloatArray) -> WatchState:
-    """Take sensors out of use; what their last readings did to the predictions is taken back."""
+    """Exclude sensors; the effect of their last readings on the predictions is removed."""
     if not found.any():
         return s
     n, lags = len(watch.sensors), len(watch.time_constants)

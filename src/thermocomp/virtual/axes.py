@@ -1,4 +1,4 @@
-"""What finite elements, heat and instruments must agree on: the linear axes of the virtual machining centre."""
+"""Linear axes of the virtual machining centre, shared by finite elements, heat and instruments."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray

@@ -26,16 +26,16 @@ _FRICTION = ("front_bearing", "rear_bearing", "coolant")
 
 @dataclass(frozen=True, eq=False)
 class CentreState:
-    """All that the machine remembers.
+    """State of the machine.
 
     Parameters
     ----------
     field : ndarray of shape (n_states,)
-        Of the reduced model.
+        State of the reduced model.
     chilling : bool
         The chiller runs.
     slid : float
-        How far the column's foot has slid on the bed [um].
+        Displacement of the column's foot on the bed [um].
     """
 
     field: FloatArray
@@ -55,7 +55,7 @@ class MachiningCentre:
     Parameters
     ----------
     model : ReducedModel
-        Of spindle, column, bed and screws by finite elements, and of the other parts as lumps.
+        Model of spindle, column, bed and screws by finite elements, and of the other parts as lumps.
     heat : HeatSources
     joints : Joints
     longest_step : float
@@ -190,7 +190,7 @@ class MachiningCentre:
         return self.heat.front.heat(ratio, front, shaft - seat), self.heat.rear.heat(ratio, rear, 0.0)
 
     def _correction(self, _operators: Operators, _drive: FeedDrive) -> Correction | None:
-        """Return what changes the state after a step beside the reduced model: nothing."""
+        """Return a change of the state after a step, in addition to the reduced model: none here."""
         return None
 
     def _shaft(self, place: Mapping[str, FloatArray], ratio: FloatArray) -> FloatArray:
@@ -198,7 +198,7 @@ class MachiningCentre:
         return self.joints.shaft(place["shaft"] - place["front_seat"], ratio)
 
     def _theta(self, drive: FeedDrive) -> tuple[float, ...]:
-        """Return what decides the conductances, in steps of a 64th: nobody knows them better."""
+        """Return the parameters of the conductances, in steps of 1/64: they are not known more accurately."""
         shares = {"rotation": self.heat.rotation(drive.speed), "flow": float(drive.cooled and drive.powered)}
         shares |= {f"feed_{a}": self.heat.moving(f) for a, f in zip("xyz", drive.feed, strict=True)}
         return tuple(round(64.0 * shares[name]) / 64.0 for name in self.model.theta)

@@ -15,7 +15,7 @@ DAY = 86400.0
 
 @dataclass(frozen=True)
 class Climate:
-    """What the air does over the days; plausible values of a workshop that is heated but not air-conditioned.
+    """Air temperature over the days; plausible values of a workshop that is heated but not air-conditioned.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Climate:
         return Air(self.mean, self.layers)
 
     def init(self, rng: np.random.Generator) -> FloatArray:
-        """Return what wanders before the first step: the state that `air` takes and gives back."""
+        """Return the initial state of the random fluctuations, which `air` updates."""
         first, second = rng.standard_normal((2, 3))
         return np.array([math.sqrt(2.0) * first, first / math.sqrt(2.0) + second / math.sqrt(2.0)])
 
@@ -75,12 +75,12 @@ class Climate:
         state : ndarray of shape (2, 3)
             From `init`, or from the steps before.
         start : float
-            When the first step begins, since the start of the test [s].
+            Start of the first step, since the start of the test [s].
         step : float
             [s]
         n_steps : int
         rng : Generator
-            Of the weather.
+            Generator of the weather.
 
         Returns
         -------

@@ -1,4 +1,4 @@
-"""What surfaces lose to the air, as it depends on temperature and speed: free and rotating convection, radiation.
+"""Heat loss of surfaces to the air, depending on temperature and speed: free and rotating convection, radiation.
 
 References
 ----------
@@ -32,16 +32,16 @@ class Face:
     length : float
         Its height, or the diameter of a cylinder that lies [m].
     films : float
-        What the linear model has in its place [W/(m2 K)].
+        Coefficient that the linear model uses instead [W/(m2 K)].
     emissivity : float
     curvature : float
         Length over diameter of a cylinder that stands; 0: flat.
     lying : bool
         A cylinder with a horizontal axis, which may turn.
     wind : float
-        Forced convection at top speed by what turns beside it, with its power 2/3 [W/(m2 K)].
+        Forced convection at top speed from neighbouring rotating parts, with its power 2/3 [W/(m2 K)].
     films_turning : float
-        What the linear model adds to `films` at top speed [W/(m2 K)].
+        Coefficient that the linear model adds to `films` at top speed [W/(m2 K)].
     """
 
     area: float
@@ -86,7 +86,7 @@ class Faces:
         surface, air : ndarray of shape (n,)
             Temperatures [degC].
         speed : float
-            Of what lies and turns [1/min].
+            Speed of the horizontal rotating part [1/min].
         wind : float
             Share of `Face.wind` in force.
         """

@@ -38,7 +38,7 @@ EXPERIMENTS: Mapping[str, Experiment] = _BuiltIn()
 
 
 def find_experiment(experiment: str | Path) -> Experiment:
-    """Return an experiment by its name, or from a file of one's own.
+    """Return an experiment by its name, or from a custom file.
 
     Parameters
     ----------
@@ -74,13 +74,13 @@ def record(
     experiment : str, Path or Experiment
         See `find_experiment`.
     physics : {'linear', 'nonlinear'}, optional
-        Of the machine; what the experiment says if not given. See :doc:`/virtual_machine`.
+        Physics of the machine. Default: as defined by the experiment. See :doc:`/virtual_machine`.
     seed : int
-        Of weather, noise, and what is drawn by lot; the machine and its sensors stay the same ones.
+        Random seed of weather, noise and random draws; the machine and its sensors stay the same.
     sensor_noise : float, optional
         Standard deviation of the temperature noise [degC]; the sensors' own if not given.
     faults : sequence of SensorFault
-        Befall every test, beside those of the protocol.
+        Faults in every test, in addition to those of the protocol.
     progress : callable
         Told the name of each test that is done.
 

@@ -1,4 +1,4 @@
-"""Heat that passes otherwise than a linear model has it: conductances that change, beside those that stay.
+"""Nonlinear heat exchange in a linear model: conductances that change, in addition to the constant ones.
 
 The model keeps its constant conductances; what the real ones differ by is put in as heat on one side and taken from the
 other. That heat depends on the temperatures at the end of the step, for which a small linear system is solved: however
@@ -23,13 +23,13 @@ class Exchange:
     Parameters
     ----------
     into : ndarray of shape (n_states + n_watched, n_paths)
-        What a watt along each path does in a step.
+        Effect of a watt along each path in a step.
     difference : ndarray of shape (n_paths, n_watched)
         First side minus second one; the air is no place.
     to_air : ndarray of shape (n_paths, 3)
         Air on the second side.
     mutual : ndarray of shape (n_paths, n_paths)
-        What a watt along each path does to the difference at each.
+        Effect of a watt along each path on the difference at each.
     """
 
     into: FloatArray
@@ -47,9 +47,9 @@ class Exchange:
         ----------
         model : ReducedModel
         operators : Operators
-            Of the step.
+            Operators of the step.
         watched : sequence of str
-            Places that `operators` tells of after the step.
+            Places that `operators` give after the step.
         paths : sequence of (str, str or None)
             From a place that is watched, and an input of the same name, to another one, or to the room's air.
         """
@@ -74,7 +74,7 @@ class Exchange:
         after : ndarray of shape (n_states + n_watched,)
             State after the step without it; is changed.
         extra : ndarray of shape (n_paths,)
-            What each conductance is more than that of the model [W/K].
+            Difference of each conductance from that of the model [W/K].
         air : ndarray of shape (3,)
         """
         apart = self.difference @ after[-self.difference.shape[1] :] - self.to_air @ air

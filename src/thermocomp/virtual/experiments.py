@@ -1,4 +1,4 @@
-"""Tests run on the virtual machines (X-01): from a protocol and a seed to what the instruments said."""
+"""Tests run on the virtual machines (X-01): from a protocol and a seed to the readings of the instruments."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -50,7 +50,7 @@ class SimulatedTest:
         Temperatures [degC]; displacements [um]; spindle speed [1/min], if there is a spindle; feed [mm/min], where axes
         move.
     values : ndarray of shape (n_rows, n_channels)
-        What sensors and probes said; displacements are zero at the start but for the probes' noise.
+        Readings of sensors and probes; displacements are zero at the start but for the probes' noise.
     truth : ndarray of shape (n_rows, n_displacements)
         The displacements without noise and faults, in the order of their channels [um].
     observables : ndarray of shape (n_rows, n_observables) or None
@@ -85,14 +85,14 @@ def simulate(
     ----------
     experiment : Experiment
     seed : int
-        Of weather, noise, and what is drawn by lot; the machine and its sensors stay the same ones.
+        Random seed of weather, noise and random draws; the machine and its sensors stay the same.
     sensor_noise : float, optional
         Standard deviation of the temperature noise [degC] (C-33: 0.4); the sensors' own if not given. The truth does
         not depend on it.
     faults : sequence of SensorFault
-        Befall every test, beside those of the protocol.
+        Faults in every test, in addition to those of the protocol.
     whole : bool
-        Keep all that the machine tells of itself.
+        Keep all observables of the machine.
 
     Returns
     -------
@@ -135,17 +135,17 @@ def run(
     ----------
     machine : VirtualMachine
     kit : Kit
-        What is mounted on it.
+        Equipment mounted on it.
     programme : Programme
-        What is done and what is recorded.
+        Programme of the test, and recorded channels.
     weather, noise : numpy.random.Generator
-        Of the air round the machine, and of sensors and probes.
+        Generators of the ambient air, and of sensors and probes.
     sensor_noise : float, optional
         Standard deviation of the temperature noise [degC]; the sensors' own if not given.
     faults : sequence of SensorFault
         Beside those of the programme.
     whole : bool
-        Keep all that the machine tells of itself.
+        Keep all observables of the machine.
 
     Returns
     -------
@@ -205,9 +205,9 @@ def run(
 def _soaked(
     machine: VirtualMachine[S], programme: Programme, weights: FloatArray, weather: np.random.Generator
 ) -> tuple[S, FloatArray, FloatArray, FloatArray]:
-    """Return the state in which a test begins, that of the weather, what is true at each instrument, and the machine's.
+    """Return the initial states of the test and of the weather, the true instrument values, and the observables.
 
-    The last are its observables.
+    The observables are those of the machine.
     """
     climate = programme.climate
     state, sky = machine.init(climate.middle), climate.init(weather)
@@ -226,7 +226,7 @@ def _soaked(
 
 
 def _weights(machine: VirtualMachine[S], instruments: Sequence[Instrument]) -> FloatArray:
-    """Return what each instrument reads of temperatures, observables and air, of shape (n_values, n_instruments)."""
+    """Return the weights of temperatures, observables and air per instrument, of shape (n_values, n_instruments)."""
     names = {n: k for k, n in enumerate([*machine.places, *machine.observables])}
     weights = np.zeros((len(names) + 3, len(instruments)))
     for k, instrument in enumerate(instruments):
@@ -244,7 +244,7 @@ def _values(truth: Truth, air: FloatArray, weights: FloatArray) -> FloatArray:
 
 
 def _driven(programme: Programme, kit: Kit) -> tuple[list[Channel], FloatArray]:
-    """Return what is recorded of the drive; a row tells the one that led to it."""
+    """Return the recorded channels of the drive; a row has the command that led to it."""
     segments = programme.segments
     lengths = [1, *(round(s.duration / programme.sampling) for s in segments)]
     channels, columns = [], []

@@ -25,30 +25,30 @@ AIR_CONDUCTIVITY, AIR_JUMP = 0.026, 0.37
 
 @dataclass(frozen=True)
 class Fit:
-    """A cylinder in a ring; friction between them holds what wants to slip along the axis.
+    """A cylinder in a ring; friction between them resists slip along the axis.
 
     Parameters
     ----------
     radius, bore, outside : float
-        Of the joint, of the inner part's bore (0: solid) and of the outer part [mm].
+        Radii of the joint, of the inner part's bore (0: solid) and of the outer part [mm].
     length : float
-        Of the joint [mm].
+        Length of the joint [mm].
     squeeze : float
         By how much the inner part's radius is too large at 20 degC; negative: a gap [um].
     linear : float
         Conductance that the linear model has in its place [W/(m2 K)].
     expansion : tuple of float
-        Of inner and outer part [um/(m K)].
+        Thermal expansion of inner and outer part [um/(m K)].
     modulus, poisson : tuple of float
-        Of inner and outer part [MPa].
+        Young's modulus [MPa] and Poisson's ratio of inner and outer part.
     behind : float
         Conductance in series, such as that of an oil film behind a sleeve [W/(m2 K)].
     friction : float
         Coulomb's coefficient, dry steel: 0.1 to 0.2; an engineering value.
     roughness, slope : float
-        Of both surfaces together, ground to Ra 0.4: rms height [um], mean slope; engineering values.
+        Roughness of both surfaces together, ground to Ra 0.4: rms height [um], mean slope; engineering values.
     hardness : float
-        Of the softer surface, 60 HRC [MPa].
+        Hardness of the softer surface, 60 HRC [MPa].
     conductivity : float
         Harmonic mean of both parts [W/(m K)].
     """
@@ -76,7 +76,7 @@ class Fit:
 
     @property
     def compliances(self) -> tuple[float, float]:
-        """How far the joint's radius yields to a pressure, of the inner and of the outer part (Lame) [um/MPa]."""
+        """Radial compliance of the inner and of the outer part of the joint to pressure (Lame) [um/MPa]."""
         r, b, o = self.radius**2, self.bore**2, self.outside**2
         inner = ((r + b) / (r - b) - self.poisson[0]) / self.modulus[0]
         outer = ((o + r) / (o - r) + self.poisson[1]) / self.modulus[1]
@@ -104,12 +104,12 @@ class Fit:
         return self.area / (1.0 / (spots + air) + 1.0 / self.behind)
 
     def wish(self, inner: ArrayLike, outer: ArrayLike) -> FloatArray:
-        """How far the inner part's end would stay behind the outer one's if nothing held it [um]."""
+        """Free displacement of the inner part's end relative to the outer one's, without friction [um]."""
         own, other = (np.asarray(t) - REFERENCE_TEMPERATURE for t in (inner, outer))
         return np.asarray(5e-4 * self.length * (self.expansion[1] * other - self.expansion[0] * own))
 
     def hold(self, pressure: ArrayLike) -> FloatArray:
-        """How far it may wish that before friction has given way over the whole length [um]."""
+        """Free displacement at which friction has given way over the whole length [um]."""
         sections = (self.radius**2 - self.bore**2, self.outside**2 - self.radius**2)
         stretch = 1.0 / sum(1.0 / (e * math.pi * s) for e, s in zip(self.modulus, sections, strict=True))
         drag = 2.0 * math.pi * self.radius * self.friction * np.asarray(pressure)

@@ -33,9 +33,9 @@ class Wave:
     slope, curvature, cubic : float
         Factors of u, u^2, u^3; u runs from about -1 to 1 over the travel: 300 mm are one [um, urad].
     amplitude : float
-        Of the wave [um, urad].
+        Amplitude of the wave [um, urad].
     length : float
-        Of the wave [mm].
+        Length of the wave [mm].
     """
 
     slope: float = 0.0
@@ -87,9 +87,9 @@ def find_cold_component(code: str, points: FloatArray) -> FloatArray:
     Parameters
     ----------
     code : str
-        Of ISO 230-1, such as ``EXX``.
+        Code of ISO 230-1, such as ``EXX``.
     points : ndarray of shape (..., 3)
-        Positions of X, Y and Z [mm]. All but EYX, which knows Z as well, depend on that of their own axis alone.
+        Positions of X, Y and Z [mm]. All except EYX, which also depends on Z, depend on that of their own axis only.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Where the heat of the virtual machining centre comes from; plausible engineering values, not a certain machine's."""
+"""Heat sources of the virtual machining centre; plausible engineering values, not those of a real machine."""
 
 import math
 from dataclasses import dataclass
@@ -44,7 +44,7 @@ class HeatSources:
     Parameters
     ----------
     top_speed : float
-        Of the spindle [1/min].
+        Maximum spindle speed [1/min].
     front, rear : BearingFriction
     motor_on, motor_top : float
         Loss of the running spindle motor: magnetising; iron and windage at top speed, with its square [W].
@@ -55,9 +55,9 @@ class HeatSources:
     cabinet, cabinet_share : float
         Conducted into the column's rear right by the electric cabinet: always [W], and per watt of motor loss.
     rotor_share : float
-        Of the motor's loss that arises in the rotor; the rest in the stator.
+        Fraction of the motor's loss that arises in the rotor; the rest in the stator.
     screw_share : float
-        Of the nut's friction that goes into the screw.
+        Fraction of the nut's friction that goes into the screw.
     top_feed : float
         Feed rate at which a screw has all its extra convection [mm/min].
     hydraulics : float
@@ -138,7 +138,7 @@ class HeatSources:
 
 
 def swept(stroke: tuple[float, float], travel: float) -> list[float]:
-    """Return how an even movement over a stroke spreads over the hat functions along a travel.
+    """Return the distribution of an even movement over a stroke on the hat functions along a travel.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What instruments make of the truth; plausible values of their data sheets.
+"""Instruments applied to the true values; plausible values of their data sheets.
 
 Whatever an instrument reads is a weighted sum of what the machine tells (temperatures of places, displacements) and of
 the air: so all of them together are one matrix.
@@ -23,7 +23,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Mounting:
-    """How the temperature sensor at a place is fixed: the same in every test, whatever its seed.
+    """Mounting of the temperature sensor at a place: the same in every test, whatever its seed.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class Mounting:
     contact : float
         Weight of the part's temperature in what it feels; the rest is the air round it.
     drift : float
-        Of its zero [degC per day].
+        Drift of its zero [degC per day].
     """
 
     lag: float
@@ -44,7 +44,7 @@ class Mounting:
 
 
 def mounting(place: str) -> Mounting:
-    """Return how the sensor at a place is mounted."""
+    """Return the mounting of the sensor at a place."""
     rng = np.random.default_rng([*place.encode()])
     low, high = (20.0, -0.15, 0.88, -0.03), (60.0, 0.15, 0.97, 0.03)
     lag, bias, contact, drift = (float(v) for v in rng.uniform(low, high))
@@ -61,13 +61,13 @@ class Instrument:
     reads : mapping of str to float
         Weights by the machine's names of places and observables.
     air : tuple of float
-        Of `Air.values`.
+        Values of `Air.values`.
     cold : float
         Value in the state from which it counts [um].
     zeroed : bool
-        It counts from the state in which the test begins; False: from what the machine and the air tell at zero.
+        It is relative to the state in which the test begins; False: to the values of the machine and the air at zero.
     touches : bool
-        It says something in probing cycles only.
+        It gives readings in probing cycles only.
     """
 
     sensor: Sensor
@@ -84,7 +84,7 @@ def thermometer(kit: Kit, label: str, place: str, *, perfect: bool, noise: float
     Parameters
     ----------
     kit : Kit
-        Of the machine.
+        Equipment of the machine.
     label : str
         Its channel is ``t_LABEL_C``.
     place : str
@@ -140,9 +140,9 @@ class Touch:
     points : mapping of str to tuple of float
         Positions X, Y, Z of the axes at each point [mm].
     noise : float
-        Repeatability of the probe, one standard deviation [um]; data sheets say 1 um for two.
+        Repeatability of the probe, one standard deviation [um]; data sheets specify 1 um for two.
     resolution : float
-        Of the controller's reading [um].
+        Resolution of the controller's reading [um].
     """
 
     every: float

@@ -1,4 +1,4 @@
-"""Where the virtual machining centre is not linear: preload, spinning shaft, sliding foot; engineering values."""
+"""Nonlinear parts of the virtual machining centre: preload, spinning shaft, sliding foot; engineering values."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Joints:
-    """How the joints yield, beside the linear thermo-elastic displacements.
+    """Displacements of the joints, in addition to the linear thermo-elastic displacements.
 
     Parameters
     ----------
@@ -20,7 +20,7 @@ class Joints:
     centrifugal, lift : float
         Shift of the shaft along Z and Y at top speed by centrifugal forces, with the square of speed [um].
     stiction : float
-        How far the column's foot may want to slide on the bed before it does [um].
+        Free displacement of the column's foot on the bed at which it starts to slide [um].
     share : float
         Of what the foot does not slide, the share that moves the tool: the column is located midway between carriages.
     """
@@ -46,16 +46,16 @@ class Joints:
 
 
 def slide_with_friction(slid: float, wish: FloatArray, stiction: float | FloatArray) -> FloatArray:
-    """Return how far a part has slid that follows its wish, but for the friction that holds it.
+    """Return the sliding of a part that follows its free displacement against friction.
 
     Parameters
     ----------
     slid : float
         Before the first step [um].
     wish : ndarray of shape (n_steps,)
-        Where it would be if nothing held it [um].
+        Free displacement without friction [um].
     stiction : float, or ndarray of shape (n_steps,)
-        How far it may want to slide before it does [um].
+        Free displacement at which it starts to slide [um].
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What can be mounted on the virtual machines, and done to them: places, probes, lasers, loads."""
+"""Equipment of the virtual machines, and their loads: places, probes, lasers, loads."""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -77,7 +77,7 @@ USUAL_PLACES = (
 
 @dataclass(frozen=True)
 class Kit:
-    """What can be mounted on one of the virtual machines, and done to it.
+    """Equipment of one of the virtual machines, and its loads.
 
     Parameters
     ----------
@@ -87,15 +87,15 @@ class Kit:
         Height above the floor of those `places` that are in the air [m].
     probes : mapping of str to VirtualProbe
     observables : tuple of str
-        What probes can be made of.
+        Quantities from which probes can be made.
     outfits, nests : mapping of str to tuple of str
-        Names that stand for several places, or several probes.
+        Names that denote several places, or several probes.
     loads : mapping of str to str
-        Where further heat can be put in.
+        Places where further heat can be applied.
     inner : mapping of str to str
         Places that only a calculation can read: they turn.
     top_speed : float
-        Of the spindle [1/min]; 0: there is none.
+        Maximum spindle speed [1/min]; 0: there is none.
     """
 
     places: Mapping[str, str]
@@ -109,19 +109,19 @@ class Kit:
     top_speed: float = 0.0
 
     def place(self, name: str, *, perfect: bool) -> str:
-        """Return where a temperature is, in words.
+        """Return the place of a temperature in words.
 
         Parameters
         ----------
         name : str
-            Of the place.
+            Name of the place.
         perfect : bool
             It is calculated, not measured.
 
         Raises
         ------
         SettingError
-            There is no such place, or nobody can measure there.
+            There is no such place, or it cannot be measured.
         """
         if name in self.inner and not perfect:
             raise SettingError(f"{name!r} turns: it can only be calculated, with perfect = true")
@@ -159,14 +159,14 @@ class Kit:
 
 
 def labelled(names: Sequence[str] | Mapping[str, T], sets: Mapping[str, tuple[str, ...]]) -> dict[str, str | T]:
-    """Return what is mounted by the label that it gets in its channel's name.
+    """Return the mounted instruments by the label used in their channel names.
 
     Parameters
     ----------
     names : sequence of str, or mapping of str to str
         Without labels a name is its own label.
     sets : mapping of str to tuple of str
-        Names that stand for several.
+        Names that denote several.
     """
     if not isinstance(names, Mapping):
         return {n: n for given in names for n in sets.get(given, (given,))}

@@ -48,7 +48,7 @@ class Air:
 
 @dataclass(frozen=True)
 class FeedDrive:
-    """What is done to the machine during one step.
+    """Commands to the machine during one step.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ class FeedDrive:
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """What the machine really does, before any sensor: one row per step.
+    """True behaviour of the machine, before any sensor: one row per step.
 
     Parameters
     ----------
@@ -113,12 +113,12 @@ class VirtualMachine(Protocol[S]):
 
     @property
     def places(self) -> tuple[str, ...]:
-        """Where temperatures are known, as names."""
+        """Names of the places with known temperatures."""
         ...
 
     @property
     def observables(self) -> tuple[str, ...]:
-        """What deviates, as names."""
+        """Names of the observed deviations."""
         ...
 
     def init(self, air: Air) -> S:
@@ -167,7 +167,7 @@ def check(drives: Sequence[FeedDrive], air: FloatArray, dt: float) -> None:
 
 
 def stretches(drives: Sequence[FeedDrive]) -> Iterator[tuple[int, int]]:
-    """Yield where each stretch of one and the same drive begins and ends."""
+    """Yield the start and end of each stretch with a constant drive."""
     first = 0
     for k in range(1, len(drives) + 1):
         if k == len(drives) or (drives[k] is not drives[first] and drives[k] != drives[first]):

@@ -1,4 +1,4 @@
-"""The virtual machines with the physics of real joints, bearings and surfaces, beside the linear ones.
+"""The virtual machines with the physics of real joints, bearings and surfaces, in addition to the linear ones.
 
 What they differ in: films that depend on temperatures and speed (`thermocomp.virtual.convection`), joints that open
 and close (`thermocomp.virtual.fits`), preload and friction of the bearings (`thermocomp.virtual.preload`),
@@ -92,7 +92,7 @@ class NonlinearTool(RestingTool):
     expansion_grows : float
         [1/K]
     stiction, convection, usual_rise
-        Of the linear tool; not used here.
+        Settings of the linear tool; not used here.
     """
 
     model: ReducedModel = field(default_factory=lambda: ReducedModel.load("tool_joints"))
@@ -138,7 +138,7 @@ class NonlinearTool(RestingTool):
         return observables, float(behind[-1])
 
     def _slip(self, fields: FloatArray, slipped: float) -> FloatArray:
-        """How far the shank stays behind the front of the chuck, which grows more than it [um]."""
+        """Displacement of the shank behind the front of the chuck, which expands more than it [um]."""
         if self.grip is None:
             return np.zeros(len(fields))
         chuck, tool = self.model.rows(("grip_a", "grip_b")) @ fields.T
@@ -161,7 +161,7 @@ class NonlinearCentre(MachiningCentre):
     front, rear : AngularContact or None
         None: friction and thermal preload of the linear machine.
     expansion_grows : float
-        Of spindle and test bar [1/K].
+        Temperature coefficient of the expansion of spindle and test bar [1/K].
     """
 
     model: ReducedModel = field(default_factory=lambda: ReducedModel.load("centre_joints"))
@@ -233,12 +233,12 @@ _SIDES = ("balls_a", "balls_b", "seat_a", "seat_b", "taper_a", "taper_b")
 
 
 def _more(fit: Fit | None, inner: float, outer: float) -> float:
-    """Return what a joint conducts beside its conductance in the linear model [W/K]."""
+    """Return the conductance of a joint in addition to that in the linear model [W/K]."""
     return fit.conductance(inner, outer) - fit.linear * fit.area if fit else 0.0
 
 
 def _squared(model: ReducedModel, fields: FloatArray) -> dict[str, FloatArray]:
-    """Return what some observables would be of the squared temperatures [um K], by their names."""
+    """Return the response of some observables to the squared temperatures [um K], by their names."""
     rise = fields - REFERENCE_TEMPERATURE * model.one
     if model.squares is None or model.squared is None:
         return {}

@@ -58,7 +58,7 @@ class AngularContact:
     pair : int
         Bearings in tandem against one.
     angle : float
-        Of contact [degrees].
+        Contact angle [degrees].
     spread : float
         Length of rings between the two sides; a longer inner one loosens a set that is back to back [mm].
     sprung : bool
@@ -114,7 +114,7 @@ class AngularContact:
         return self.preload * math.pow(approach / self.mounted, 1.5)
 
     def shift(self, approach: ArrayLike) -> FloatArray:
-        """How far the shaft is pushed out since 20 degC: the pair yields less than the single bearing [um]."""
+        """Displacement of the shaft since 20 degC: the pair yields less than the single bearing [um]."""
         lean = (self._unlike - 1.0) / (self._unlike + 1.0) / math.sin(math.radians(self.angle))
         return np.asarray(lean * (np.asarray(approach) - self.mounted))
 
@@ -126,7 +126,7 @@ class AngularContact:
         speed : float
             [1/min]
         temperature : float
-            Of the grease [degC].
+            Temperature of the grease [degC].
         approach : float
             See `approach` [um].
         """

@@ -1,4 +1,4 @@
-"""What probes and lasers read of the virtual machining centre, as weights of what it tells of itself."""
+"""Readings of probes and lasers on the virtual machining centre, as weights of its observables."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -61,7 +61,7 @@ def positioning(axis: str, position: float) -> dict[str, float]:
 
 
 def _between(along: str, axis: str, position: float) -> dict[str, float]:
-    """Return the weights of what an axis that stands at a position contributes along an axis."""
+    """Return the weights of the contribution along an axis of an axis at a position."""
     if not 0.0 <= position <= TRAVEL[axis]:
         raise SettingError(f"{axis.upper()} = {position:g} mm is beyond the travel from 0 to {TRAVEL[axis]:g} mm")
     stations = STATIONS[axis]
@@ -101,9 +101,9 @@ def pitch(position: int) -> VirtualProbe:
 
 
 def weigh_tool_point(axis: str, point: Mapping[str, float]) -> dict[str, float]:
-    """Return the weights of the observables in the tool point's deviation along an axis, wherever the axes stand.
+    """Return the weights of the observables in the tool point's deviation along an axis, for any axis positions.
 
-    What Z and X do across themselves is not in it: the machine does not tell.
+    Cross-axis deviations of Z and X are not included: the machine has no such observables.
 
     Parameters
     ----------
@@ -162,9 +162,9 @@ def component(code: str, position: float, z: float = TEST_POSITION["z"]) -> Virt
     Parameters
     ----------
     code : str
-        Of ISO 230-1, such as ``EYX``.
+        Code of ISO 230-1, such as ``EYX``.
     position : float
-        Of its axis [mm].
+        Position of its axis [mm].
     z : float
         Where Z stands instead [mm]; the bed gives way under the column. Only X can be measured so: what its turns do by
         the lever is read too.
@@ -211,7 +211,7 @@ def _at_station(code: str, position: int) -> dict[str, float]:
 
 
 def swing(along: str, way: FloatArray) -> list[tuple[str, float]]:
-    """Return which turns move the end of a way along an axis, and by how much: turn x way.
+    """Return the rotations that move the end of a lever along an axis, with their effect: turn x way.
 
     Parameters
     ----------

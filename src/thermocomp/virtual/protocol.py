@@ -34,7 +34,7 @@ MOST_ROWS, MOST_COPIES = 10_000_000, 10_000
 
 @dataclass(frozen=True, kw_only=True)
 class RecordingSetup:
-    """What is recorded of a test, and where it stands.
+    """Recorded channels of a test, and their places.
 
     Parameters
     ----------
@@ -42,9 +42,9 @@ class RecordingSetup:
         Time between two rows [s].
     climate : Climate
     places : tuple of str, or mapping of str to str
-        Where temperatures are measured, see `thermocomp.virtual.kits`; a mapping gives the channels other names.
+        Places of temperature sensors, see `thermocomp.virtual.kits`; a mapping gives the channels other names.
     probes : tuple of str, or mapping of str to str or mapping of str to float
-        Displacements, in the same way; a mapping of the machine's observables to weights is a probe of one's own.
+        Displacements, in the same way; a mapping of the machine's observables to weights is a custom probe.
     perfect : bool
         Sensors without lag, bias, drift, noise and steps: a calculation, not a measurement.
     touch : Touch, optional
@@ -67,12 +67,12 @@ class RecordingSetup:
             raise SettingError("nothing is recorded: name a place or a probe", ("places",))
 
     def instruments(self, kit: Kit, noise: float | None = None) -> list[Instrument]:
-        """Return what is mounted: temperatures, displacements, the points that are touched.
+        """Return the mounted instruments: temperatures, displacements, probed points.
 
         Parameters
         ----------
         kit : Kit
-            Of the machine.
+            Equipment of the machine.
         noise : float, optional
             Standard deviation of the temperature noise [degC]; the sensors' own if not given.
 
@@ -101,7 +101,7 @@ class RecordingSetup:
 
 @dataclass(frozen=True, kw_only=True)
 class Programme(RecordingSetup):
-    """One test that is ready to run; beside what `Setup` says of it.
+    """One test that is ready to run, with the settings of `RecordingSetup`.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ class Programme(RecordingSetup):
     segments : tuple of SteadySegment
         Each lasts a whole number of samplings.
     soak : tuple of SteadySegment
-        What was done before, from a machine that was off for long; the test begins in the state it leads to.
+        Segments before the test, from a machine that was off for a long time; the test begins in the resulting state.
     """
 
     name: str
@@ -124,14 +124,14 @@ class Programme(RecordingSetup):
 
 @dataclass(frozen=True, kw_only=True)
 class PlannedTest(RecordingSetup, Stretch):
-    """One test as it is written, or several alike; beside what `Setup` and `Stretch` say of it.
+    """One test as written in a protocol, or several alike, with the settings of `RecordingSetup` and `Stretch`.
 
     Parameters
     ----------
     name : str
         Appended to the experiment's; empty: its number, if there are several tests.
     copies : int
-        So many tests, each with lots of its own.
+        Number of tests, each with separate random draws.
     soak : Stretch
         What was done before, from a machine that was off for long; the test begins in the state it leads to. What the
         test says of speed, coolant ... does not hold in it.
@@ -230,7 +230,7 @@ class Experiment:
 
     @property
     def kit(self) -> Kit:
-        """What can be mounted on its machine."""
+        """Equipment of its machine."""
         return KITS[self.machine]
 
     @property
@@ -244,7 +244,7 @@ class Experiment:
         return tuple(found)
 
     def programmes(self, seed: int = 0) -> list[Programme]:
-        """Return the tests, with all that is left open drawn by lot; each test has lots of its own."""
+        """Return the tests, with all open settings drawn at random; each test has separate draws."""
         plans = [plan for plan in self.tests for _ in range(plan.copies)]
         return [
             plan.programme(name, np.random.default_rng(make_seed(seed, name, "lots")))
@@ -259,7 +259,7 @@ def make_seed(seed: int, test: str, what: str) -> list[int]:
 
 @contextmanager
 def add_path(*path: str | int) -> Iterator[None]:
-    """Add where it stands to a `SettingError` that is raised inside."""
+    """Add the location to a `SettingError` that is raised inside."""
     try:
         yield
     except SettingError as e:

@@ -135,7 +135,7 @@ def _table(table: Mapping[str, Any], path: Keys) -> dict[str, Any]:
 
 
 def _value(key: str, value: Any, path: Keys) -> Any:
-    """Return what a key holds in house units, and in full where a name stands for it."""
+    """Return the value of a key in internal units, with names expanded."""
     if key in TIMES:
         return _seconds(value, path)
     if isinstance(value, str) and key in _SHORT:
@@ -169,7 +169,7 @@ def _seconds(value: Any, path: Keys) -> Any:
 
 
 def _explain(failure: ValidationError, given: Mapping[str, Any]) -> tuple[Keys, str]:
-    """Return where pydantic's first error stands and what to do; of the kinds a value can be, the nearest counts."""
+    """Return the location of pydantic's first error and the remedy; of a union the nearest type counts."""
     errors = failure.errors()
     first = _keys(errors[0], given)
     error = max(
@@ -188,7 +188,7 @@ def _explain(failure: ValidationError, given: Mapping[str, Any]) -> tuple[Keys, 
 
 
 def _keys(error: ErrorDetails, given: Any) -> Keys:
-    """Return the keys and positions of an error that stand in the file; the rest are kinds that pydantic tried."""
+    """Return the keys and positions of an error that are in the file; the rest are kinds that pydantic tried."""
     keys = []
     for key in error["loc"]:
         try:
@@ -200,7 +200,7 @@ def _keys(error: ErrorDetails, given: Any) -> Keys:
 
 
 def _where(keys: Keys, content: Mapping[str, Any]) -> str:
-    """Say in which table a key is, and what was found there."""
+    """Return the table of a key, and the value found there."""
     if keys[:1] == ("tests",) and len(keys) > 2 and _found(keys[:3], content) is None:
         keys = keys[2:]  # what all tests share stands above them
     said = []

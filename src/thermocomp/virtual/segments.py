@@ -1,4 +1,4 @@
-"""What a test is made of: segments, and what a seed draws by lot."""
+"""Components of a test: segments, and the values drawn at random by a seed."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -69,7 +69,7 @@ class Lot:
 
     @property
     def values(self) -> tuple[float, ...]:
-        """All that can be drawn."""
+        """All values that can be drawn."""
         if self.between is None or self.step is None:
             return self.one_of
         return tuple(self.between[0] + k * self.step for k in range(round(self._steps) + 1))
@@ -129,24 +129,24 @@ class Stretch:
     duration : float or Lot, optional
         [s]
     speed : float or Lot, optional
-        Of the spindle [1/min]; it stands if nobody says otherwise.
+        Spindle speed [1/min]; 0 if not given anywhere.
     feed : Feed, optional
-        The axes stand if nobody says otherwise.
+        Feed; the axes are stopped if not given anywhere.
     stroke : Stroke, optional
     loads : mapping of str to float or Lot, optional
         Further heat, by where it is put in [W].
     cooled : bool, optional
-        The coolant loop runs; it does if nobody says otherwise.
+        Whether the coolant loop runs. Default: it does, if not given anywhere.
     powered : bool, optional
-        The machine is switched on; it is if nobody says otherwise.
+        Whether the machine is switched on. Default: it is, if not given anywhere.
     segments : tuple of Stretch
-        What happens within it; none: it is a segment itself.
+        Segments within it; none: it is a segment itself.
     repeat : int
         So often its `segments` are done; or so many draws.
     order : {'given', 'shuffled', 'drawn'}
         One after the other; all of them (`repeat` times each) in random order; or each time one of them drawn by lot.
     weight : float
-        How likely this one is where the outer order is ``drawn``, against the others beside it.
+        Probability weight of this one relative to its neighbours where the outer order is ``drawn``.
     """
 
     duration: Number | None = None
@@ -175,7 +175,7 @@ class Stretch:
 
     @property
     def longest(self) -> float:
-        """How long it may last, whatever is drawn [s]."""
+        """Longest possible duration, for any draw [s]."""
         return self._longest(0.0)
 
     def _longest(self, outer: float) -> float:
@@ -186,7 +186,7 @@ class Stretch:
         return self.repeat * (max(parts) if self.order == "drawn" else sum(parts))
 
     def leaves(self, outer: Mapping[str, Any] | None = None, path: Path = ()) -> Iterator[Leaf]:
-        """Yield where each segment stands, and what holds in it."""
+        """Yield the position of each segment, and its settings."""
         given = self._given(outer or {})
         if not self.segments:
             yield path, given

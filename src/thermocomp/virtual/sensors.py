@@ -1,4 +1,4 @@
-"""What the sensors make of the truth: lag, bias, noise, steps; and what they do when they fail."""
+"""Sensor models: lag, bias, noise, quantisation; and their behaviour in a failure."""
 
 import math
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ FaultKind = Literal["stuck", "lost", "drift", "spike"]
 
 @dataclass(frozen=True)
 class Sensor:
-    """How one channel differs from the truth; the default is a perfect sensor.
+    """Difference of one channel from the true value; the default is a perfect sensor.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class Sensor:
     bias : float
         In the channel's unit.
     drift : float
-        Of the zero, in the channel's unit per day.
+        Drift of the zero, in the channel's unit per day.
     """
 
     channel: Channel
@@ -45,14 +45,14 @@ class Sensor:
 
 
 def apply_lags(lags: FloatArray, felt: FloatArray, before: FloatArray, true: FloatArray, dt: float) -> FloatArray:
-    """Return what sensors feel that lag behind the truth.
+    """Return the values at sensors with a lag.
 
     Parameters
     ----------
     lags : ndarray of shape (n_sensors,)
         Time constants [s]; 0: no lag.
     felt, before : ndarray of shape (n_sensors,)
-        What they felt, and what was true, before the first step.
+        Sensor values, and true values, before the first step.
     true : ndarray of shape (n_steps, n_sensors)
         At the end of each step.
     dt : float
@@ -75,7 +75,7 @@ def apply_lags(lags: FloatArray, felt: FloatArray, before: FloatArray, true: Flo
 
 
 def read(sensors: Sequence[Sensor], felt: FloatArray, time: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """Return what the sensors say: what they feel with bias, drift of the zero, noise, and in steps.
+    """Return the readings of the sensors: with bias, drift of the zero, noise and quantisation.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def read(sensors: Sequence[Sensor], felt: FloatArray, time: FloatArray, rng: np.
     time : ndarray of shape (n_rows,)
         [s]
     rng : Generator
-        Of the noise.
+        Generator of the noise.
 
     Returns
     -------
@@ -110,9 +110,9 @@ class SensorFault:
     kind : {'stuck', 'lost', 'drift', 'spike'}
         It keeps its last value; gives no value (nan); runs away; or jumps.
     start : float
-        When it begins [s].
+        Start time [s].
     end : float or None
-        When it is over [s]; None: never, but a spike after one row.
+        End time [s]; None: never, but a spike after one row.
     size : float
         Drift per hour, or height of the spike, in the channel's unit.
     """

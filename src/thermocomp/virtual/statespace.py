@@ -19,7 +19,7 @@ REFERENCE_TEMPERATURE = 20.0
 
 @dataclass(frozen=True, eq=False)
 class Operators:
-    """What one step does while conductances and heat stay the same: ``[z, w]+ = state z + heat u + air a``.
+    """Operators of one step with constant conductances and heat: ``[z, w]+ = state z + heat u + air a``.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ class ReducedModel:
         dt : float
             [s]
         watched : tuple of str
-            Places whose temperatures after the step are wanted at once, below the states.
+            Places whose temperatures after the step are needed at once, below the states.
         """
         key = (theta, dt, watched)
         found = self._kept.get(key)

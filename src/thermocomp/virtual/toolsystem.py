@@ -19,14 +19,14 @@ LOADS = ("heater", "tip")
 
 @dataclass(frozen=True, eq=False)
 class ToolState:
-    """All that the tool remembers.
+    """State of the tool.
 
     Parameters
     ----------
     field : ndarray of shape (n_states,)
-        Of the reduced model.
+        State of the reduced model.
     slipped : float
-        How far the shank has slipped in the chuck [um].
+        Slip of the shank in the chuck [um].
     """
 
     field: FloatArray
@@ -44,7 +44,7 @@ class RestingTool:
     ----------
     model : ReducedModel
     stiction : float
-        How far the shank may want to slip in the chuck before it does [um]; an engineering value.
+        Free displacement of the shank in the chuck at which it starts to slip [um]; an engineering value.
     convection : float
         Conductance by free convection that is in the model, at `usual_rise` [W/K]: half of what its films amount to.
     usual_rise : float

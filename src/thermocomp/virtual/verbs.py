@@ -22,19 +22,19 @@ def simulate(
     Parameters
     ----------
     experiment : str or Path
-        A protocol of your own, as a path that ends in .toml, or one of: chen1996, chen1996-law, chen1996-new,
+        A custom protocol, as a path that ends in .toml, or one of: chen1996, chen1996-law, chen1996-new,
         chen1996-slope, demo, etve, hwang, iso230-axis, iso230-spindle, precompensation, precompensation-cut, probing,
         random, stepwise2017, stepwise2017-online, volumetric, volumetric-new, wessel-fem, wessel-milling, wessel-sets,
         wessel-tool.
     physics : {'linear', 'nonlinear'}, optional
-        Of the machine: joints, bearings and films by constant conductances, or as they depend on temperature and speed.
-        What the experiment says if not given.
+        Physics of the machine: joints, bearings and films with constant conductances (linear), or depending on
+        temperature and speed (nonlinear). Default: as defined by the experiment.
     seed : int
-        Of weather, noise, and what is drawn by lot.
+        Random seed of weather, noise and random draws.
     noise : float, optional
-        Standard deviation of the temperature noise [degC]; the sensor's own if not given.
+        Standard deviation of the temperature noise [degC]. Default: that of the sensor.
     progress : callable
-        Called with the name of each test that is done.
+        Called with the name of each completed test.
 
     Returns
     -------
@@ -59,5 +59,5 @@ def simulate(
 
 
 def experiments() -> list[Experiment]:
-    """Return the experiments that come with the package."""
+    """Return the experiments included in the package."""
     return [datasets.find_experiment(name) for name in datasets.EXPERIMENTS]

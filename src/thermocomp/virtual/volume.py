@@ -1,4 +1,4 @@
-"""What the virtual machining centre does wrong anywhere in its work volume: the truth a compensation is judged by.
+"""Errors of the virtual machining centre in its work volume: the truth by which a compensation is judged.
 
 It knows how this machine is built, ``w X' b Z Y (C1) t``, and nothing of the package's own kinematics: turns are
 composed as matrices, from the tool back to the workpiece.

@@ -1,4 +1,4 @@
-"""What a user should know of a machine before its errors are added up: what may be counted twice, what is only held."""
+"""Notes for the user on a machine before its errors are added: possible double counting, values that are only held."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ _NEAR = 1e-3
 
 
 def notes(machine: Machine) -> tuple[str, ...]:
-    """Return what is to be said of a machine, in sentences: `untilted`, `counted_twice`, `held`."""
+    """Return the notes on a machine, in sentences: `untilted`, `counted_twice`, `held`."""
     return (*note_untilted(machine), *note_counted_twice(machine), *note_short_profiles(machine))
 
 
@@ -95,7 +95,7 @@ def note_short_profiles(machine: Machine) -> tuple[str, ...]:
 
 
 def _static(source: Source | None, point: np.ndarray[tuple[int], np.dtype[np.float64]]) -> float:
-    """Return what a component is at a point in the reference state."""
+    """Return the value of a component at a point in the reference state."""
     if isinstance(source, PositionModel):
         return float(source.at(point, np.zeros(len(source.models))))
     return float(source) if isinstance(source, float | int) else 0.0

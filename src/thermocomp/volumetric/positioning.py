@@ -21,11 +21,11 @@ class Positioning:
     state : str
         Thermal state, such as ``cold`` or ``after 4 h``; empty if there is only one.
     unit : {'um', 'urad'}
-        Of the deviations.
+        Unit of the deviations.
     positions : ndarray of shape (n_targets,)
         Target positions, rising [mm].
     up : ndarray of shape (n_runs, n_targets)
-        Deviations, actual minus target, approached in the positive direction [unit]. One run tells no repeatability.
+        Deviations, actual minus target, approached in the positive direction [unit]. One run gives no repeatability.
     down : ndarray of shape (n_runs, n_targets) or None
         The same in the negative direction; None for a unidirectional test. A unidirectional test in the negative
         direction has `up` None.

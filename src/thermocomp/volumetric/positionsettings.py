@@ -1,4 +1,4 @@
-"""How position-dependent errors are fitted and judged, for Python and the command line alike."""
+"""Settings for fitting and judging position-dependent errors, for Python and the command line."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,53 +9,55 @@ from thermocomp.core.exceptions import InputError
 if TYPE_CHECKING:
     from thermocomp.api.inputs import LeaveOne
 
-#: with so many recordings each is left out in turn, else each thermal cycle
+#: from this number of recordings each recording is left out in turn, else each thermal cycle
 MANY = 3
 
 
 @dataclass(frozen=True, kw_only=True)
 class PositionSettings:
-    """How profiles are read, fitted and judged; what is not given is found out from them.
+    """Settings for reading, fitting and judging profiles; the defaults are determined from the profiles.
 
     Parameters
     ----------
     columns : str
-        Names of the columns of one component, * standing for the position in mm, such as 'y_laser_*'; of a long table
-        the column of the error. Without it those that are called after the component, such as EYY_250_um, or else
-        those that end in a position and the unit, such as y_laser_250_um.
+        Column names of one component, with * for the position in mm, such as 'y_laser_*'; in a long table the column of
+        the error. Default: columns named after the component, such as EYY_250_um, else those that end in a position and
+        the unit, such as y_laser_250_um.
     positions : Path
-        TOML file that says where each column was measured, for columns that have no position in their name.
+        TOML file with the measuring position of each column, for columns without a position in their name.
     layout : str
-        wide: a row per thermal state, a column per position; long: a row per position. Found out if not given.
+        Table layout. wide: a row per thermal state, a column per position; long: a row per position. Default:
+        determined from the file.
     mapping : Path
-        TOML file that says what the columns are.
+        TOML mapping file: role and unit of each column.
     model : str
-        Method for the slopes, as in ``thermocomp compare``, all but gp.
+        Method for the slopes: any of ``thermocomp compare`` except gp.
     inputs : list of str
-        Channels to predict the slopes from; all temperatures and the spindle speed if not given.
+        Channels used as inputs for the slopes. Default: all temperatures and the spindle speed.
     slopes : int
-        Highest power of the position; 0: the cold profile alone. As many as are worth it if not given.
+        Highest power of the position; 0: the cold profile only. Default: as many powers as are useful.
     offset : bool
-        Model a shift of the whole profile too. If not given: where it is more than noise.
+        Also model a shift of the whole profile. Default: only where the shift exceeds the noise.
     profile : str
-        polynomial or spline, for the cold profile.
+        Form of the cold profile: polynomial or spline.
     order : int
-        Of the polynomial, or number of knots of the spline; chosen by points left out if not given.
+        Order of the polynomial, or number of knots of the spline. Default: chosen by leaving out points.
     reference : list of int
-        States of each test that count as cold, from 0: their mean is the cold profile. The first if not given.
+        States of each test that count as cold, as indices from 0; their mean is the cold profile. Default: the first
+        state.
     reference_position : float
-        Where the slopes turn [mm]; where the thermal part is smallest if not given.
+        Reference position of the slopes [mm]. Default: where the thermal part is smallest.
     split : str
-        Judge by time: shares of the states such as 0.6/0.4, or hours such as 10h/6h.
+        Chronological train/test split: fractions of the states such as 0.6/0.4, or durations such as 10h/6h.
     leave_one_cycle_out : bool
-        Judge on each thermal cycle in turn (what is done with fewer than three recordings, if nothing is said).
+        Leave out each thermal cycle in turn and judge on it (default with fewer than three recordings).
     leave_one_file_out : bool
-        Judge on each recording in turn (what is done with three and more).
+        Leave out each recording in turn and judge on it (default with three or more recordings).
     absolute : bool
-        Count all tests from one cold state, the mean of theirs, with temperatures as they are: for a machine that is
-        not the same every morning. Without it each test counts from its own.
+        Use absolute temperatures and one common cold state, the mean of those of the tests: for a machine whose state
+        differs from morning to morning. Default: each test relative to its own cold state.
     jobs : int
-        Processes to share the work among; -1 takes all cores.
+        Number of parallel processes; -1: one per core.
     """
 
     columns: str = ""
@@ -77,7 +79,7 @@ class PositionSettings:
     jobs: int = -1
 
     def left_out(self, recordings: int) -> "LeaveOne | None":
-        """Return what is left out in turn; with many recordings each of them, if nothing is said."""
+        """Return the unit left out in turn; by default each recording if there are many."""
         asked = (self.split is not None) + self.leave_one_cycle_out + self.leave_one_file_out
         if asked > 1:
             raise InputError("--split, --leave-one-cycle-out, --leave-one-file-out exclude each other: choose one")

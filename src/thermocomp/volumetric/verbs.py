@@ -1,4 +1,4 @@
-"""Errors along the axes and anywhere in the work volume, in Python."""
+"""Errors along the axes and in the work volume, in Python."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -30,29 +30,29 @@ from thermocomp.volumetric.models.positionoptions import Setting
 from thermocomp.volumetric.positionsettings import PositionSettings
 from thermocomp.volumetric.report import records, volumetric_tables
 
-#: stands for every component that has columns of its own
+#: denotes all components that have separate columns
 ALL = "all"
-#: points along each axis, if nothing is said
+#: default number of points along each axis
 GRID = 5
 
 
 @dataclass(frozen=True, eq=False)
 class Positioned:
-    """Components of a machine, fitted and judged.
+    """Fitted and judged error components of a machine.
 
     Parameters
     ----------
     found : sequence of PositionStudy
     tests : list of tuple of Profiles
-        Of each component.
+        Profiles of each component.
     left_open : tuple of str
-        Settings that were found out from the profiles.
+        Settings determined from the profiles.
     several : bool
-        Several components were asked for, or all that there are.
+        Several components, or all of them, were requested.
     trouble : tuple of str
-        What is wrong with the recordings.
+        Data-quality problems of the recordings.
     accept_unproven : str, optional
-        Who takes unproven models all the same, and why.
+        Person who approves the use of unproven models, and the reason.
     """
 
     found: Sequence[PositionStudy]
@@ -64,11 +64,11 @@ class Positioned:
 
     @property
     def models(self) -> tuple[PositionModel, ...]:
-        """The models, one per component."""
+        """Models, one per component."""
         return tuple(f.fit.model.taken(self.accept_unproven) for f in self.found)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all of it for a program: what ``--json`` prints; several components stand in a list."""
+        """Return all results as a dict, as printed by ``--json``; several components are in a list."""
         entries = [records.position(f, self.left_open) for f in self.found]
         return {
             "trouble": self.trouble,
@@ -90,24 +90,25 @@ def position(
     progress: Callable[..., None] = silent,
     **settings: Any,
 ) -> Positioned:
-    """Fit position-dependent errors: cold profiles and thermal slopes, judged on what they have not seen.
+    """Fit position-dependent errors: cold profiles and thermal slopes, judged on unseen data.
 
-    Settings that are not given are found out from the profiles, and again wherever a part is left out: how many slopes
-    are worth it, whether the profile shifts as a whole, and about which position it turns.
+    Settings that are not given are determined from the profiles, and again wherever a part is left out: the useful
+    number of slopes, whether the profile shifts as a whole, and the position about which it tilts.
 
     Parameters
     ----------
     recordings : path, or sequence of them
-        CSV, XLSX or Parquet files with profiles in several thermal states; each is one test.
+        CSV, XLSX or Parquet files with profiles in several thermal states; each one is a separate test.
     component : str or sequence of str
-        Codes of the errors, such as EYY, EXX or EAZ, or all that have columns of their own: a code says along which
-        axis and in which unit. One file holds the models of all.
+        Codes of the error components, such as EYY, EXX or EAZ, or "all" for those that have separate columns. A code
+        defines axis and unit. The models of all components are saved in one file.
     accept_unproven : str, optional
         As for `fit`.
     progress : callable
-        Called with a line of text after each piece of work.
+        Called with a line of text after each task.
     **settings
-        Of the fit, see `thermocomp.volumetric.positionsettings.PositionSettings`: ``model="ols"``, ``slopes=1``.
+        Settings of the fit, see `thermocomp.volumetric.positionsettings.PositionSettings`: ``model="ols"``,
+        ``slopes=1``.
 
     Returns
     -------
@@ -116,7 +117,7 @@ def position(
     Raises
     ------
     InputError
-        A file, component or setting cannot be used, the method cannot be frozen, or settings do not go together.
+        A file, component or setting is invalid, the method cannot be frozen, or settings exclude each other.
 
     Examples
     --------
@@ -182,15 +183,15 @@ def position(
 
 @dataclass(frozen=True, eq=False)
 class VolumetricErrors(Paged):
-    """A machine's errors in its work volume.
+    """Errors of a machine in its work volume.
 
     Parameters
     ----------
     study : Volumetric
     point, volume : bool
-        The point, the volume was asked for.
+        Whether the errors at a point, and in the volume, were requested.
     trouble : tuple of str
-        What is wrong with the recording.
+        Data-quality problems of the recording.
     """
 
     study: Volumetric
@@ -199,7 +200,7 @@ class VolumetricErrors(Paged):
     trouble: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all of it for a program: what ``--json`` prints."""
+        """Return all results as a dict, as printed by ``--json``."""
         return {"trouble": self.trouble, **volumetric_tables.content(self.study)}
 
     def page(self) -> str:
@@ -220,29 +221,30 @@ def volumetric(
     time: Sequence[float] | None = None,
     progress: Callable[..., None] = silent,
 ) -> VolumetricErrors:
-    r"""Tell the error of the tool's tip at a point and all over the work volume, and what corrections leave of it.
+    r"""Compute the error of the tool tip at a point and in the work volume, before and after correction.
 
-    With neither a point nor a grid both are told, in the middle of the travels and on 5 points along each axis.
+    With neither a point nor a grid, both are evaluated: at mid-travel and on 5 points along each axis.
 
     Parameters
     ----------
     machine : Machine, str or Path
-        Machine file (.toml): axes, and what is known of the 32 error components.
+        Machine file (.toml): axes, and known ones of the 32 error components.
     recording : Recording, path or DataFrame, optional
-        CSV, XLSX or Parquet file to replay through the machine's models; without it the machine is taken in its
-        reference state, with its constants and profiles alone.
+        CSV, XLSX or Parquet file to replay through the models of the machine. Default: the machine in its reference
+        state, with its constants and profiles only.
     mapping : str, Path or Mapping, optional
-        TOML file that says what the recording's columns are.
+        TOML mapping file: role and unit of each column of the recording.
     at : tuple of float, optional
-        Positions X Y Z of the axes [mm]: error, tilt and contributions there. The straight lines go through it.
+        Axis positions X Y Z of the point [mm] at which error, tilt and contributions are computed. The straight lines
+        pass through this point.
     grid : int, optional
-        Points along each axis: the volume before and after correction.
+        Number of points along each axis for the errors in the volume before and after correction.
     tool_length : float, optional
-        From the gauge point to the tip, along -Z [mm]; the machine file's tool if not given.
+        Tool length from the gauge point to the tip, along -Z [mm]. Default: the tool of the machine file.
     time : sequence of float, optional
-        Times to look at [h]; start, largest error and end of the recording if not given.
+        Times to evaluate [h]. Default: start, largest error and end of the recording.
     progress : callable
-        Called with a line of text, and the number of rows that were replayed.
+        Called with a line of text and the number of rows replayed.
 
     Returns
     -------
@@ -251,7 +253,7 @@ def volumetric(
     Raises
     ------
     InputError
-        A file, a point or a time cannot be used.
+        A file, a point or a time is invalid.
 
     Examples
     --------
@@ -295,7 +297,7 @@ def _several(component: Sequence[str]) -> bool:
 
 
 def _read(paths: Sequence[Path], components: Sequence[str], s: PositionSettings) -> list[tuple[Profiles, ...]]:
-    """Read one component, however its columns are called, or several by columns that are called after them."""
+    """Read one component with any column names, or several from columns named after them."""
     given = mappings.read_mapping(s.mapping) if s.mapping is not None else None
     if _several(components):
         if s.columns or s.positions is not None or s.layout == "long":

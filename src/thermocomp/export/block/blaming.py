@@ -1,4 +1,4 @@
-"""Which failure explains how readings differ from predictions, as scalars and loops: see `thermocomp.runtime.blame`."""
+"""Failure that explains the residuals of readings, as scalars and loops: see `thermocomp.runtime.blame`."""
 
 from thermocomp.export.block.names import Names
 from thermocomp.export.block.numbers import follow, larger
@@ -7,7 +7,7 @@ from thermocomp.runtime.watch import GOOD, OFF, REST, STEPPED, STUCK, SWAPPED
 
 
 def blame(s: Names, w: Names, t: Names, elapsed: float) -> None:
-    """Take out of use what failed: two that are swapped if that explains all, and better than one; or each alone.
+    """Exclude failed sensors: two that are swapped if that explains all, and better than one; or each alone.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def weigh_swaps(s: Names, w: Names, t: Names, counts: float) -> None:
 
 
 def fail(s: Names, w: Names, t: Names) -> None:
-    """Take sensors out of use; what their last readings did to the predictions is taken back."""
+    """Exclude sensors; the effect of their last readings on the predictions is removed."""
     fails = False
     for i in range(t.SENSORS):
         if w.failing[i]:

@@ -1,4 +1,4 @@
-"""Values with a clock of their own, as scalars and loops: see `thermocomp.core.expression.Recurrence`."""
+"""Values with a separate clock, as scalars and loops: see `thermocomp.core.expression.Recurrence`."""
 
 import math
 
@@ -17,7 +17,7 @@ def run_clock(s: Names, w: Names, t: Names, c: int, begun: bool) -> None:
     s, w, t : Names
         Variables that are kept, worked out again, and known.
     c : int
-        Of the clock.
+        Index of the clock.
     begun : bool
         It was called before.
     """

@@ -1,4 +1,4 @@
-"""How far inputs are beyond what a model was trained on, as scalars and loops: see `thermocomp.core.joint`."""
+"""Distance of inputs from the training data of a model, as scalars and loops: see `thermocomp.core.joint`."""
 
 import math
 
@@ -14,7 +14,7 @@ def find_distances(s: Names, w: Names, t: Names, k: int) -> None:
     s, w, t : Names
         Variables that are kept, worked out again, and known.
     k : int
-        Of the supports.
+        Index of the support.
     """
     w.excess = 0.0
     for m in range(t.member_begin[k], t.member_begin[k + 1]):
@@ -45,7 +45,7 @@ def find_nearest(s: Names, w: Names, t: Names, k: int, columns: int) -> None:
     s, w, t : Names
         Variables that are kept, worked out again, and known.
     k : int
-        Of the supports.
+        Index of the support.
     columns : int
         Inputs that count.
     """

@@ -1,4 +1,4 @@
-"""What the models say: written from their formulas (`thermocomp.export.block.models`); nothing runs here."""
+"""Outputs of the models: generated from their formulas (`thermocomp.export.block.models`); nothing runs here."""
 
 from thermocomp.export.block.names import Names
 
@@ -12,12 +12,12 @@ def models_rezeroed(s: Names, w: Names, t: Names) -> None:
 
 
 def tick(s: Names, w: Names, t: Names, c: int) -> None:
-    """Work out what a value with a clock of its own is at its next tick.
+    """Compute a value with a separate clock at its next tick.
 
     Parameters
     ----------
     s, w, t : Names
         Variables that are kept, worked out again, and known.
     c : int
-        Of the clock.
+        Index of the clock.
     """

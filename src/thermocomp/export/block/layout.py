@@ -1,4 +1,4 @@
-"""What a compensator's block remembers, works with and knows: the variables of `thermocomp.export.block`."""
+"""State, working memory and constants of a compensator's block: the variables of `thermocomp.export.block`."""
 
 from typing import Literal, NamedTuple
 
@@ -13,11 +13,11 @@ class Var(NamedTuple):
     kind : {'real', 'time', 'int', 'bool'}
         ``time`` is a number of double precision everywhere [s].
     about : str
-        What it holds, and its unit.
+        Meaning and unit.
     dims : tuple of str
-        How many there are: names of `sizes`.
+        Dimensions: names of `sizes`.
     cap : bool
-        What nothing may exceed: where digits are lost it gets smaller, never larger.
+        Upper bound that nothing may exceed: if digits are lost it becomes smaller, never larger.
     """
 
     kind: Kind

@@ -17,14 +17,14 @@ _FACTORS = 16
 
 
 class Formulas:
-    """What the functions of `thermocomp.export.block.formulas` do, in Python, and the numbers that they need.
+    """Bodies of the functions of `thermocomp.export.block.formulas`, in Python, and the numbers that they need.
 
     Parameters
     ----------
     ranges : sequence of Input
         Inputs of the models, each once.
     channels : sequence of int
-        Which of the values that are read each of them is.
+        Index of each of them among the values that are read.
     """
 
     def __init__(self, ranges: Sequence[Input], channels: Sequence[int]) -> None:
@@ -45,7 +45,7 @@ class Formulas:
         Parameters
         ----------
         name : str
-            Of the function; ``models_`` stands before it.
+            Name of the function; ``models_`` is prefixed.
         models : iterable of (int, ErrorModel, Node)
             Place of each, and its formula, whose inputs are numbered as the ranges are.
         """
@@ -92,7 +92,7 @@ class Formulas:
         self.functions[name] = "\n".join([f"def {name}({parameters}):", *(f"    {line}" for line in lines or ["pass"])])
 
     def _value(self, node: e.Node, clock: "_Clock | None" = None) -> str:
-        """Return the name of what a part says; a part that stands in several places is worked out once."""
+        """Return the name of a part's value; a part that occurs in several places is computed once."""
         if isinstance(node, e.Named):
             return self._value(node.of, clock)
         if isinstance(node, e.Constant):
@@ -162,7 +162,7 @@ class Formulas:
 
 
 class _Clock(Clock):
-    """A value with a clock of its own, and where in the block's arrays it keeps what was."""
+    """A value with a separate clock, and the location of its past values in the block's arrays."""
 
     def __init__(self, tick: e.Node, interval: float, before: Sequence["_Clock"]) -> None:
         super().__init__(tick, interval)
@@ -171,7 +171,7 @@ class _Clock(Clock):
         self.average_begin = sum(c.means * len(c.leaves) for c in before)
 
     def text(self, node: e.Node) -> str:
-        """Return where a past value is; nothing if it is none."""
+        """Return the location of a past value; empty if it is none."""
         match node:
             case e.Past(ticks):
                 return f"s.past[{self.past_begin + ticks - 1}]"

@@ -71,7 +71,7 @@ def larger(one: float, other: float) -> float:
 
 
 def follow(lag: float, value: float, paces: float) -> float:
-    """Return a first-order lag so many time constants later."""
+    """Return a first-order lag after a number of time constants."""
     return lag - math.expm1(-paces) * (value - lag)
 
 
@@ -88,7 +88,7 @@ def find_linear(s: Names, w: Names, t: Names, at: float, first: int, end: int) -
     s, w, t : Names
         Variables that are kept, worked out again, and known.
     at : float
-        Where.
+        Position.
     first, end : int
         Points of the table.
     """
@@ -111,7 +111,7 @@ def find_step(s: Names, w: Names, t: Names, at: float, first: int, end: int) -> 
     s, w, t : Names
         Variables that are kept, worked out again, and known.
     at : float
-        Where.
+        Position.
     first, end : int
         Points of the table, the last beyond everything.
     """

@@ -24,7 +24,7 @@ class Function(NamedTuple):
 
     @property
     def parameters(self) -> list[str]:
-        """Those beside the variables."""
+        """Parameters other than the variables."""
         return [a.arg for a in self.tree.args.args if a.arg not in VARIABLES]
 
     @property
@@ -60,9 +60,9 @@ def functions(tables: Tables, own: Mapping[str, str] = MappingProxyType({})) -> 
     Parameters
     ----------
     tables : Tables
-        Of the compensator: an ``if`` that one of their sizes decides is decided here.
+        Tables of the compensator: an ``if`` that depends on one of their sizes is resolved here.
     own : mapping of str to str
-        Functions of the block that stand for those of a library, by the names of these.
+        Functions of the block that replace those of a library, by the names of these.
     """
     known = _all() | {name: _made(name, text) for name, text in tables.formulas.items()}
     known |= {name: known[of]._replace(name=name) for name, of in own.items()}
@@ -95,7 +95,7 @@ class _Decided(ast.NodeTransformer):
         self._sizes = sizes
 
     def visit_If(self, node: ast.If) -> ast.AST | list[ast.stmt]:
-        """Take an ``if`` that is decided for what it does."""
+        """Replace an ``if`` with a known condition by the branch it selects."""
         self.generic_visit(node)
         match node.test:
             case ast.Attribute(ast.Name("t"), name) if name in self._sizes:
@@ -103,7 +103,7 @@ class _Decided(ast.NodeTransformer):
         return node
 
     def visit_For(self, node: ast.For) -> ast.AST | list[ast.stmt]:
-        """Take away a loop over nothing."""
+        """Remove a loop without iterations."""
         self.generic_visit(node)
         match node.iter:
             case ast.Call(args=[ast.Attribute(ast.Name("t"), name)]) if self._sizes[name] == 0:
@@ -112,7 +112,7 @@ class _Decided(ast.NodeTransformer):
 
 
 def kind_of(node: ast.expr, local: Mapping[str, Kind]) -> Kind:  # noqa: PLR0911 - a case for every kind of node
-    """Return what an expression gives: ``time`` where one is in it."""
+    """Return the type of an expression: ``time`` if it contains one."""
     match node:
         case ast.Compare() | ast.BoolOp() | ast.UnaryOp(ast.Not()):
             return "bool"
@@ -164,7 +164,7 @@ PARAMETER: dict[str, Kind] = {"int": "int", "float": "real", "bool": "bool"}
 
 
 def parameters_of(function: Function) -> dict[str, Kind]:
-    """Return the kinds of a function's parameters beside the variables."""
+    """Return the kinds of a function's parameters other than the variables."""
     return {
         a.arg: PARAMETER[ast.unparse(a.annotation)]
         for a in function.tree.args.args

@@ -21,7 +21,7 @@ UNTIMELY, IMPLAUSIBLE, NO_START = 1, 2, 3
 
 
 def step(s: Names, w: Names, t: Names) -> None:
-    """Take values in that were measured a while ago, and move the corrections."""
+    """Process values that were measured some time ago, and move the corrections."""
     tell_time(s, w, t)
     for c in range(t.CHANNELS):
         w.given[c] = w.value[c] >= -1e30 and w.value[c] <= 1e30  # what is not a number is not
@@ -47,7 +47,7 @@ def step(s: Names, w: Names, t: Names) -> None:
 
 
 def tell_time(s: Names, w: Names, t: Names) -> None:
-    """Say when the values were taken, and whether they may be used by that."""
+    """Determine when the values were measured, and whether their time is valid."""
     w.passes = w.dt >= 0.0 and w.dt <= GAP
     w.travel = 0.0
     if not s.begun:
@@ -76,7 +76,7 @@ def tell_time(s: Names, w: Names, t: Names) -> None:
 
 
 def check(s: Names, w: Names, t: Names) -> None:
-    """Say whether all values are there, finite and plausible; before the zero is known, as a start."""
+    """Return whether all values are present, finite and plausible; before the zero is known, as a start."""
     for r in range(t.RANGES):
         c = t.channel[r]
         least = t.least[r]
@@ -93,14 +93,14 @@ def check(s: Names, w: Names, t: Names) -> None:
 
 
 def check_start(s: Names, w: Names, t: Names, g: int) -> None:
-    """Say whether the temperatures of a model are those of a machine that starts.
+    """Return whether the temperatures of a model are plausible for a machine that starts.
 
     Parameters
     ----------
     s, w, t : Names
         Variables that are kept, worked out again, and known.
     g : int
-        Of the sets of ranges.
+        Index of the set of ranges.
     """
     w.rows = 0
     for m in range(t.set_begin[g], t.set_begin[g + 1]):
@@ -121,7 +121,7 @@ def check_start(s: Names, w: Names, t: Names, g: int) -> None:
 
 
 def take(s: Names, w: Names, t: Names) -> None:
-    """Take a reading into the zero, or into the models, and let these drive the corrections."""
+    """Add a reading to the zero, or pass it to the models, and let these drive the corrections."""
     w.step = 0.0
     if s.seen:
         w.step = w.now - s.time
@@ -156,7 +156,7 @@ def take(s: Names, w: Names, t: Names) -> None:
 
 
 def gather(s: Names, w: Names, t: Names) -> None:
-    """Take a reading into the zero; once that is known, the models go through the readings before this one."""
+    """Add a reading to the zero; once that is known, the models process the readings before this one."""
     belongs = s.gathered == 0
     if not belongs and s.gathered < t.MOST and (w.stands or not s.resting):
         belongs = w.now - s.gathered_at[0] <= (t.at_rest if s.resting else t.otherwise)
@@ -194,14 +194,14 @@ def gather(s: Names, w: Names, t: Names) -> None:
 
 
 def drive(s: Names, w: Names, t: Names, k: int) -> None:
-    """Move a correction to where its models want it, as far as the limits allow at both ends of the travel.
+    """Move a correction towards the demand of its models, as far as the limits allow at both ends of the travel.
 
     Parameters
     ----------
     s, w, t : Names
         Variables that are kept, worked out again, and known.
     k : int
-        Of the target.
+        Index of the target.
     """
     w.offset = 0.0
     w.tilt = 0.0
@@ -236,7 +236,7 @@ def idle(s: Names, w: Names, t: Names, k: int) -> None:
     s, w, t : Names
         Variables that are kept, worked out again, and known.
     k : int
-        Of the target.
+        Index of the target.
     """
     s.idle[k] = s.idle[k] + w.travel
     if s.idle[k] > t.hold:
@@ -255,7 +255,7 @@ def idle(s: Names, w: Names, t: Names, k: int) -> None:
 
 
 def limit(wanted: float, current: float, travel: float, magnitude: float, rate: float, band: float) -> float:
-    """Return a correction after a move towards where it is wanted: no further, no faster, and not for a trifle [um].
+    """Return a correction after a move towards the demand: no further, no faster, and not within the dead band [um].
 
     Parameters
     ----------
@@ -264,7 +264,7 @@ def limit(wanted: float, current: float, travel: float, magnitude: float, rate: 
     travel : float
         Time it has had to move [s].
     magnitude, rate, band : float
-        Of `thermocomp.core.correction.Limits`.
+        As for `thermocomp.core.correction.Limits`.
     """
     aim = larger(-magnitude, smaller(magnitude, wanted))
     moved = current

@@ -1,4 +1,4 @@
-"""What models do beyond their trained range: ``hold`` and ``fade``, as statements of a block and their numbers."""
+"""Models outside their training range: ``hold`` and ``fade``, as statements of a block and their numbers."""
 
 import math
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ class Supports:
     Parameters
     ----------
     ranges : sequence of Input
-        Of which the inputs of the models are.
+        Ranges that include those of the inputs of the models.
     """
 
     def __init__(self, ranges: Sequence[Input]) -> None:
@@ -25,15 +25,15 @@ class Supports:
         self._models: list[ErrorModel] = []
 
     def statements(self, model: ErrorModel, place: int, said: str, worked_out: set[int]) -> list[str]:
-        """Return what becomes of what a model says: they change ``s.deviation[place]``.
+        """Return the statements applied to the output of a model: they change ``s.deviation[place]``.
 
         Parameters
         ----------
         model : ErrorModel
         place : int
-            Of the model.
+            Index of the model.
         said : str
-            What it says.
+            Output of the model.
         worked_out : set of int
             Distances that the function has already.
         """
@@ -97,5 +97,5 @@ class Supports:
 
 
 def _begins(sizes: Sequence[int]) -> list[int]:
-    """Return where each of several lists begins in one after the other, and where the last ends."""
+    """Return the start index of each of several concatenated lists, and the end of the last."""
     return list(accumulate(sizes, initial=0))

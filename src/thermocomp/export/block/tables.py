@@ -1,4 +1,4 @@
-"""The numbers of a compensator, as its block wants them: see `thermocomp.export.block.layout`."""
+"""Numbers of a compensator, in the form of its block: see `thermocomp.export.block.layout`."""
 
 from typing import Any, NamedTuple
 
@@ -20,7 +20,7 @@ ANY = (-1e30, 1e30)
 
 
 class Tables(NamedTuple):
-    """What a block is made from."""
+    """Source data of a block."""
 
     channels: tuple[Input, ...]  #: in the order of the values that it takes
     ranges: tuple[Input, ...]  #: inputs of the models, each once
@@ -105,7 +105,7 @@ def gather(compensator: Compensator) -> Tables:
 
 
 def _channels(known: list[Input], speed: str) -> tuple[Input, ...]:
-    """Return what a reading brings, each once: what models and watch want, and the speed that says when it stands."""
+    """Return the channels of a reading, each once: inputs of models and watch, and the spindle speed."""
     if speed:
         known.append(Input(speed, "spindle_speed", unit="1/min", reference=0.0, rezero=False, low=0.0, high=0.0))
     by_name = {i.name: i for i in reversed(known)}
@@ -125,7 +125,7 @@ def _sizes(values: dict[str, Any]) -> dict[str, int]:
 
 
 def formula(model: ErrorModel, ranges: tuple[Input, ...]) -> Node:
-    """Return what a model computes, its inputs being numbered as the ranges are."""
+    """Return the formula of a model, with its inputs numbered like the ranges."""
     low, high, _ = model.bounds
     leaves = (Leaf(ranges.index(i), i.name) for i in model.inputs)
     return model.expression([Clip(*clip) for clip in zip(leaves, low, high, strict=True)])

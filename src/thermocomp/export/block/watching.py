@@ -1,4 +1,4 @@
-"""The watch over the temperatures as scalars and loops: see `thermocomp.runtime.watch`, which says why."""
+"""The watch over the temperatures as scalars and loops: see `thermocomp.runtime.watch` for explanations."""
 
 import math
 
@@ -65,7 +65,7 @@ def make_up(s: Names, w: Names, t: Names) -> None:
 
 
 def begin(s: Names, w: Names, t: Names) -> None:
-    """Take a reading into the zero, if that is not known; begin at rest in it, or in the first reading."""
+    """Add a reading to the zero, if that is not known; start at rest in it, or in the first reading."""
     belongs = t.watch_waits and s.watch_gathered == 0
     if t.watch_waits and not belongs and s.watch_gathered < t.MOST and (w.stands or not s.watch_resting):
         belongs = w.now - s.watch_gathered_at[0] <= (t.at_rest if s.watch_resting else t.otherwise)
@@ -274,7 +274,7 @@ def judge(s: Names, w: Names, t: Names, k: int) -> None:
     s, w, t : Names
         Variables that are kept, worked out again, and known.
     k : int
-        Of the target.
+        Index of the target.
     """
     for m in range(t.line_begin[k], t.line_begin[k + 1]):
         lost = 0

@@ -134,7 +134,7 @@ class Sources:
     Parameters
     ----------
     name : str
-        Of the files and of all that is in them.
+        Name of the files and prefix of all names in them.
     header, source : str
     """
 
@@ -151,11 +151,11 @@ def translate(tables: Tables, name: str, facts: Sequence[str] = (), *, double_on
     Parameters
     ----------
     tables : Tables
-        Of the compensator.
+        Tables of the compensator.
     name : str
-        Of the files and of all that is in them.
+        Name of the files and prefix of all names in them.
     facts : sequence of str
-        What stands above them.
+        Lines at the top of the files.
     double_only : bool
         It does not compile in single precision.
 

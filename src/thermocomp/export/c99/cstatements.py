@@ -23,7 +23,7 @@ def write_functions(tables: Tables, state: str) -> str:
     Parameters
     ----------
     tables : Tables
-        Of the compensator.
+        Tables of the compensator.
     state : str
         Name of the type that keeps its variables.
     """

@@ -83,16 +83,16 @@ _FAULTS = """        for (j = 0; j < SENSORS; j++) {
 
 
 def write_test(name: str, tables: Tables, readings: Readings, answers: Answers, double: float, single: float) -> str:
-    """Return a program that says whether the code does what the compensator did.
+    """Return a program that checks whether the code gives the same outputs as the compensator.
 
     Parameters
     ----------
     name : str
-        Of the code.
+        Name of the code.
     tables : Tables
     readings : Readings
     answers : Answers
-        Of the compensator.
+        Outputs of the compensator.
     double, single : float
         Difference that is allowed in double and in single precision, as a share of a correction, or in um of one below
         1 um; 0: it is not made for single precision.

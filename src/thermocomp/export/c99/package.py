@@ -121,13 +121,13 @@ def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str
 
 
 def _double(compensator: Compensator, tables: Tables, readings: Readings, answers: Answers) -> float:
-    """Return how far double precision may be off: large coefficients make more of the last digit of a reading."""
+    """Return the tolerance for double precision: large coefficients amplify the last digit of a reading."""
     rows = [readings._replace(values=_shifted(readings.values, way)) for way in (1, -1)]
     return max(find_tolerance(tables), *(4.0 * _apart(answers, replay(compensator, tables, r)) for r in rows))
 
 
 def _single(compensator: Compensator, tables: Tables, readings: Readings, answers: Answers) -> float:
-    """Return how far single precision may be off: ten times what rounding of all numbers changes; 0 if too far.
+    """Return the tolerance for single precision: ten times the effect of rounding all numbers; 0 if too large.
 
     Where a curve has steps, a reading beside one may get to its other side: so readings are moved to either side, too,
     by what rounding does to the difference of two.

@@ -1,4 +1,4 @@
-"""`thermocomp export`: a model file as code for another controller, with its proof."""
+"""`thermocomp export`: a model file as code for another controller, with its verification."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -20,16 +20,16 @@ from thermocomp.export.verbs import ExportedCode
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class CorrectionOptions(CompensatorOptions):
-    """What the correction may never do.
+    """Limits of the correction.
 
     Parameters
     ----------
     hold : float
         Hold time of a correction without valid readings [s].
     fade : float
-        Time constant with which it goes to zero after that [s].
+        Time constant of the decay of the correction to zero after the hold time [s].
     reading_age : float
-        Older readings are not used [s].
+        Maximum age of a reading; older readings are not used [s].
     """
 
     hold: float = Limits.hold
@@ -37,7 +37,7 @@ class CorrectionOptions(CompensatorOptions):
     reading_age: float = Limits.reading_age
 
     def value(self) -> Limits:
-        """Return them as the compensator takes them."""
+        """Return the limits as an object for the compensator."""
         return replace(super().value(), hold=self.hold, fade=self.fade, reading_age=self.reading_age)
 
 
@@ -45,7 +45,7 @@ Parameter(name="*")(ReductionOptions)
 
 
 def no_file(output: Path, _: Mapping[str, Any]) -> list[Path]:
-    """Refuse a file where a folder is wanted; what is written there the target says."""
+    """Refuse a file where a folder is expected; the target determines the files written there."""
     if output.exists() and not output.is_dir():
         raise InputError(f"{output}: is not a directory")
     return []
@@ -69,12 +69,12 @@ def export(found: ExportedCode, face: CommandFace) -> int:
     Parameters
     ----------
     output : Path
-        Folder to write into.
+        Output folder.
 
     Returns
     -------
     int
-        0 done, 1 a model was refused and left out, 2 unusable input.
+        0 done, 1 a model was refused and not exported, 2 unusable input.
     """
     face.write(found.save)
     files = [str(face.output / file) for file in found.files] if face.output is not None else []

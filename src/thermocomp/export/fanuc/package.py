@@ -83,7 +83,7 @@ def write_fanuc(
         One per axis.
     limits : Limits
     name : str
-        Of the files.
+        Name of the files.
     facts : Facts
     figure : str
         File of the figure; empty if there is none.
@@ -166,7 +166,7 @@ def _within(variable: str, most: float) -> Iterator[str]:
 
 
 def _cap(limits: Limits, option: str, times: float) -> float:
-    """Return a limit [um] in the digits of a control, so many times: no larger than it was asked for."""
+    """Return a limit [um] in the digits of a control, times a factor: not larger than requested."""
     asked: float = getattr(limits, option)
     # the product in decimals: 0.1 um/s is 6 um in a minute, not a digit of double precision more
     taken = float(Decimal(shorten(in_mm(float(Decimal(repr(asked)) * Decimal(times))), cap=True)).scaleb(3))
@@ -214,7 +214,7 @@ def _real(number: float | str) -> str:
 
 
 def _comment(text: str) -> str:
-    """Return what may stand in a comment: no brackets, no small letters, nothing beyond ASCII."""
+    """Return text that is valid in a comment: no brackets, no lower-case letters, ASCII only."""
     plain = text.upper().encode("ascii", "replace").decode()
     return re.sub(r"[^-+#*/=:,. 0-9A-Z_]", ".", plain.replace("(", " ").replace(")", " "))
 

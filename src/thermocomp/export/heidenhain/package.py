@@ -71,7 +71,7 @@ def write_heidenhain(
         One per axis.
     limits : Limits
     name : str
-        Of the files.
+        Name of the files.
     facts : Facts
     figure : str
         File of the figure; empty if there is none.
@@ -118,7 +118,7 @@ def write_heidenhain(
 
 
 def find_marks(reductions: Sequence[Reduced]) -> dict[str, str]:
-    """Return what stands for the temperatures of several formulas, by their names."""
+    """Return the symbols of the temperatures in several formulas, by their names."""
     found: dict[str, str] = {}
     for r in reductions:
         for i, _ in r.terms:

@@ -85,7 +85,7 @@ def write_klipper(
         One, of Z.
     limits : Limits
     name : str
-        Of the files.
+        Name of the files.
     facts : Facts
     figure : str
         File of the figure; empty if there is none.

@@ -172,7 +172,7 @@ def name_component(name: str) -> str:
     Parameters
     ----------
     name : str
-        Of the compensator's files.
+        Name of the compensator's files.
 
     Raises
     ------
@@ -191,11 +191,11 @@ def write_component(tables: Tables, name: str, facts: Sequence[str], letters: Ma
     Parameters
     ----------
     tables : Tables
-        Of the compensator.
+        Tables of the compensator.
     name : str
-        Of its C99.
+        Name of its C99.
     facts : sequence of str
-        What stands above it.
+        Lines at the top of the file.
     letters : mapping of str to str
         Axes by target.
     """
@@ -234,11 +234,11 @@ def write_hal(tables: Tables, name: str, facts: Sequence[str], letters: Mapping[
     Parameters
     ----------
     tables : Tables
-        Of the compensator.
+        Tables of the compensator.
     name : str
-        Of its C99.
+        Name of its C99.
     facts : sequence of str
-        What stands above it.
+        Lines at the top of the file.
     letters : mapping of str to str
         Axes by target.
     """

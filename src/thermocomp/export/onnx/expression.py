@@ -21,7 +21,7 @@ class Memory:
     ----------
     graph : Graph
     state : str
-        What comes in.
+        Incoming state.
     begin : int
         First place that is free.
     """
@@ -31,13 +31,13 @@ class Memory:
         self.after: list[str] = []  #: what goes out
 
     def before(self, size: int = 1) -> str:
-        """Return what was kept in the next places; what is kept there now goes to `after`, in the same order."""
+        """Return the values stored in the next places; those to be stored there are in `after`, in the same order."""
         self.end += size
         return self._graph.part(self._state, self.end - size, self.end)
 
 
 class Walk:
-    """Works trees out; a part that stands in several places once.
+    """Converter of trees; a part that occurs in several places is converted once.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class Walk:
         self._known: dict[e.Node, str] = {}
 
     def value(self, node: e.Node) -> str:
-        """Return the name of what a part says."""
+        """Return the name of a part's value."""
         if isinstance(node, e.Named):
             return self.value(node.of)
         if (known := self._known.get(node)) is None:
@@ -89,7 +89,7 @@ class Walk:
         return after
 
     def _clock(self, tick: e.Node, interval: float) -> str:
-        """Return a value that is made again at every tick: `thermocomp.core.autoregressive` says how."""
+        """Return a value that is updated at every tick: see `thermocomp.core.autoregressive`."""
         g, clock = self._graph, Clock(tick, interval)
         now = g.join([self.value(leaf) for leaf in clock.leaves])
         n, means = len(clock.leaves), clock.means
@@ -174,7 +174,7 @@ def _tick(g: Graph, clock: Clock, past: str, kept: str, mean: str) -> str:
 
 
 def arithmetic(g: Graph, node: e.Node, value: Callable[[e.Node], str]) -> str:  # noqa: PLR0911 - a case for every kind
-    """Return what a part without memory is, its parts being named by `value`."""
+    """Return the ONNX form of a part without memory, with its parts named by `value`."""
     match node:
         case e.Constant(number):
             return g.constant(float(number))
@@ -201,7 +201,7 @@ def arithmetic(g: Graph, node: e.Node, value: Callable[[e.Node], str]) -> str:  
 
 
 def _sum(g: Graph, terms: Sequence[e.Node], value: Callable[[e.Node], str]) -> str:
-    """Return a sum; what has a weight of its own is worked out at once."""
+    """Return a sum; terms with a separate weight are computed at once."""
     weights, weighted, others = list[float](), list[str](), list[str]()
     for term in terms:
         match term:

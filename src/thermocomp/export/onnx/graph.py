@@ -31,7 +31,7 @@ class GraphBlock:
     size : int
         Numbers in its state.
     deviation : int
-        Where in the state the deviations of the models begin.
+        Index in the state at which the deviations of the models begin.
     """
 
     graph: Graph
@@ -66,7 +66,7 @@ def translate(tables: Tables) -> GraphBlock:
     Parameters
     ----------
     tables : Tables
-        Of the compensator without its watch.
+        Tables of the compensator without its watch.
 
     Raises
     ------
@@ -126,7 +126,7 @@ def _changes(g: Graph, tables: Tables, value: str, zero: str) -> tuple[str, str]
 
 
 def _moment(g: Graph, tables: Tables, state: str, dt: str, plausible: str) -> _Moment:
-    """Return when a call is; a time that is none moves nothing.
+    """Return the time of a call; an invalid time changes nothing.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def _moment(g: Graph, tables: Tables, state: str, dt: str, plausible: str) -> _M
 
 
 def _models(g: Graph, tables: Tables, memory: Memory, moment: _Moment, change: str) -> str:
-    """Return what the models say, and what they remember after it.
+    """Return the outputs of the models, and their state afterwards.
 
     Parameters
     ----------
@@ -160,7 +160,7 @@ def _models(g: Graph, tables: Tables, memory: Memory, moment: _Moment, change: s
     memory : Memory
     moment : _Moment
     change : str
-        Of all inputs.
+        Changes of all inputs.
     """
     last = memory.before(len(tables.models))
     inputs = [g.pick(change, k) for k in range(len(tables.ranges))]

@@ -1,4 +1,4 @@
-"""What a correction may never do, as operators of ONNX: all targets at once."""
+"""Limits of a correction as operators of ONNX: all targets at once."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,12 +38,12 @@ class Drive:
         return g.every(g.put("And", within, flat))
 
     def move(self, deviation: str, correction: str, slope: str, travel: str) -> tuple[str, str]:
-        """Return corrections and slopes after a move towards where the models want them.
+        """Return corrections and slopes after a move towards the demand of the models.
 
         Parameters
         ----------
         deviation : str
-            Of all models.
+            Deviations of all models.
         correction, slope, travel : str
         """
         g = self._graph
@@ -68,7 +68,7 @@ class Drive:
         ----------
         correction, slope : str
         idle : str
-            How long nothing has driven them [s].
+            Time without a demand [s].
         travel : str
         """
         g, largest = self._graph, self._largest(correction, slope)

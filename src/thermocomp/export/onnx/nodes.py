@@ -1,4 +1,4 @@
-"""A graph of ONNX while it is made: numbers and names in, the name of what was worked out of them out."""
+"""A graph of ONNX under construction: numbers and names in, the name of the result out."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -19,14 +19,14 @@ OPSET, IR = 17, 8
 
 @dataclass(frozen=True)
 class Port:
-    """What goes into a graph, or comes out of it.
+    """Input or output of a graph.
 
     Parameters
     ----------
     name : str
     shape : tuple of int
     kind : type
-        Of its numbers.
+        Type of its numbers.
     """
 
     name: str
@@ -53,12 +53,12 @@ class Node:
 
 
 class Graph:
-    """Operators in order; what is the same is worked out once.
+    """Operators in order; identical ones are computed once.
 
     Parameters
     ----------
     outer : Graph, optional
-        In which this one is: it sees what was worked out there before.
+        Enclosing graph, whose values are visible.
     """
 
     def __init__(self, outer: "Graph | None" = None) -> None:
@@ -142,12 +142,12 @@ class Graph:
         return self.put("Slice", of, np.array([begin]), np.array([end]))
 
     def loop(self, trips: str, carried: Sequence[str], body: "Graph") -> list[str]:
-        """Return what a body leaves of values that it changes again and again.
+        """Return the final values of variables that a loop body updates.
 
         Parameters
         ----------
         trips : str
-            So often, unless the body says that it is enough.
+            Number of iterations, unless the body ends the loop.
         carried : sequence of str
             Their first values.
         body : Graph
@@ -178,7 +178,7 @@ def serialize(graph: Graph, name: str, facts: Sequence[str], properties: dict[st
     properties : dict of str to str
         The same for programs.
     version : str
-        Of thermocomp.
+        Version of thermocomp.
     """
     from onnx import checker, helper, numpy_helper
 

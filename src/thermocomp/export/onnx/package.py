@@ -117,7 +117,7 @@ def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str
 
 
 def _properties(tables: Tables, said: list[str], facts: Facts) -> dict[str, str]:
-    """Return what a program may want to read in the file."""
+    """Return the metadata of the file."""
     named = dict(line.split(": ", 1) for line in said[1:] if line.startswith(("Limits: ", "Sign: ", "Units: ", "Not ")))
     return {
         "verdict": said[0],
@@ -145,7 +145,7 @@ def _readme(compensator: Compensator, tables: Tables, name: str, said: list[str]
         Facts.
     block : GraphBlock
     calls : int
-        Of the test vectors.
+        Number of calls in the test vectors.
     """
     slopes, zeroing = any(tables.values["to_slope"]), compensator.models[0].zeroing
     counted = sorted({r.name for r in tables.ranges if r.rezero})
@@ -179,7 +179,7 @@ def _readme(compensator: Compensator, tables: Tables, name: str, said: list[str]
 
 
 def _rows(tables: Tables) -> list[str]:
-    """Return what each value is."""
+    """Return the meaning of each value."""
     rows, t = list[str](), tables.values
     for k, c in enumerate(tables.channels):
         of = [r for r in range(len(tables.ranges)) if t["channel"][r] == k]

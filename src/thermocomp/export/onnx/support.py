@@ -1,4 +1,4 @@
-"""What a model does beyond its trained range as operators of ONNX: ``hold`` and ``fade``, alone and together."""
+"""Behaviour of a model outside its training range as ONNX operators: ``hold`` and ``fade``, alone and together."""
 
 import math
 
@@ -10,7 +10,7 @@ from thermocomp.export.onnx.nodes import Graph
 
 
 def support(g: Graph, model: ErrorModel, change: str, said: str, before: str) -> str:
-    """Return the deviation that the policy of a model lets pass.
+    """Return the deviation after the support policy of a model.
 
     Parameters
     ----------
@@ -19,7 +19,7 @@ def support(g: Graph, model: ErrorModel, change: str, said: str, before: str) ->
     change : str
         Its inputs minus their zero.
     said : str
-        What it says of them within its range.
+        Output of the model within its range.
     before : str
         The last deviation that passed.
     """
@@ -38,7 +38,7 @@ def support(g: Graph, model: ErrorModel, change: str, said: str, before: str) ->
 
 
 def distance(g: Graph, joint: JointSupport, change: str) -> str:
-    """Return how far inputs together are from what was trained: 1 is the limit."""
+    """Return the joint distance of inputs from the training data: 1 is the limit."""
     parts = [g.constant(0.0)]
     if joint.columns:
         unit = joint.limit * math.sqrt(len(joint.columns))

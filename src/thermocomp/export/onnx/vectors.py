@@ -75,7 +75,7 @@ def pick_zero(tables: Tables) -> FloatArray:
 
 
 def pick_readings(tables: Tables) -> Readings:
-    """Return readings for test vectors; what is too old is missing, as the caller has to say."""
+    """Return readings for test vectors; readings that are too old are missing, as the caller must mark them."""
     readings, age = make_readings(tables), tables.values["reading_age"]
     timely = (readings.age >= -CLOCK_SKEW) & (readings.age <= age)
     values = np.where(timely[:, None], readings.values, np.nan)
@@ -89,7 +89,7 @@ def pick_readings(tables: Tables) -> Readings:
 
 
 def answer(compensator: Compensator, tables: Tables, readings: Readings, zero: FloatArray) -> Answers:
-    """Return what a compensator says of readings, its zero being known from the start.
+    """Return the outputs of a compensator for readings, its zero being known from the start.
 
     Parameters
     ----------
@@ -114,11 +114,11 @@ def write_vectors(
     tables : Tables
     readings : Readings
     answers : Answers
-        Of the compensator.
+        Outputs of the compensator.
     zero : ndarray of shape (n_channels,)
     facts : sequence of str
     sha256 : str
-        Of the model file.
+        SHA-256 of the model file.
     size : int
         Numbers in the state.
     """

@@ -1,4 +1,4 @@
-"""Reduction: the best model of a controller's shape, judged on cycles it has not seen, beside the full one."""
+"""Reduction: the best model of a controller's form, judged on unseen cycles, next to the full one."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -68,7 +68,7 @@ def reduce_model(
     jobs: int = 1,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Reduction:
-    """Fit the best model of a shape to recordings, and judge it beside the full one.
+    """Fit the best model of a form to recordings, and judge it next to the full one.
 
     Sensors are chosen again without each unseen cycle, by cycles left out of the others. What is judged says its
     numbers in the digits that are printed, and knows no range: neither does the controller. The full model is fitted
@@ -85,9 +85,9 @@ def reduce_model(
     sensors : sequence of str, optional
         Temperatures to choose from; all if not given.
     starts : Start or sequence of Start, optional
-        How the recordings begin; found out if not given.
+        Initial state of the recordings. Default: determined from the recordings.
     rules : Rules
-        What is stated before judging.
+        Rules stated before judging.
     jobs : int
         Processes to share the work among; -1 takes all cores.
     progress : callable

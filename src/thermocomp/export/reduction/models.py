@@ -45,7 +45,7 @@ class LinearReduction(TermRegressor):
     unseen_ : float
         RMS over the cycles left out [unit of y].
     chosen_by_ : str
-        What was left out to choose.
+        Units left out for the choice.
     terms_, coef_, intercept_, r_squared_, adjusted_r_squared_, standard_error_, n_effective_, condition_
         See `thermocomp.models.linear.TermRegressor`; of the coefficients before they are rounded.
 

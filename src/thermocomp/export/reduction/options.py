@@ -1,4 +1,4 @@
-"""How a model is reduced to what a controller holds, in the words of ``thermocomp export``."""
+"""Options of ``thermocomp export`` for the reduction of a model to a form the controller supports."""
 
 from dataclasses import dataclass
 
@@ -7,21 +7,21 @@ from thermocomp.core.exceptions import InputError
 
 @dataclass(frozen=True, kw_only=True)
 class ReductionOptions:
-    """How a model is reduced to what klipper, heidenhain and fanuc hold.
+    """Reduction of a model to a form that klipper, heidenhain and fanuc support.
 
     Parameters
     ----------
     most_loss : float
-        Largest loss that is let pass: RMS on unseen cycles over that of the full model.
+        Largest tolerated loss: RMS on unseen cycles divided by that of the full model.
     axes : list of str
-        Which targets are written and along which axes they go, such as ch5_um=Z; by their names if not given: z_um is
-        Z.
+        Targets to export and their axes, such as ch5_um=Z. Default: the axes given by the names of the targets, such as
+        Z for z_um.
     sensors : list of str
-        Temperatures that the controller has, to choose from; all of the recordings if not given.
+        Temperatures available at the controller, from which the inputs are selected. Default: all of the recordings.
     harm_margin : float
-        Tolerated degradation in a single cycle [um]; as in ``thermocomp fit`` if not given.
+        Tolerated degradation in a single cycle [um]. Default: as in ``thermocomp fit``.
     jobs : int
-        Processes to share the work among; -1 takes all cores.
+        Number of parallel processes; -1: one per core.
     """
 
     most_loss: float = 2.0

@@ -1,4 +1,4 @@
-"""What controllers hold that hold less than a model, and a model reduced to that: numbers to be printed."""
+"""Model forms of controllers that support less than a full model, and a model reduced to such a form."""
 
 import math
 import re
@@ -18,14 +18,14 @@ _LARGEST = Decimal(99_999_999)
 
 @dataclass(frozen=True)
 class Shape:
-    """What a controller's formula may be made of: present temperatures times numbers.
+    """Form of a controller's formula: present temperatures times numbers.
 
     Parameters
     ----------
     sensors : int
         At most.
     constant : bool
-        A constant may stand beside them. False: it counts from the temperature at homing.
+        A constant may be added. False: it is relative to the temperature at homing.
     axes : str
         Letters of the axes that have one.
     """
@@ -44,7 +44,7 @@ SHAPES = {
 
 
 class RemainingError(NamedTuple):
-    """What is left of a deviation [um]; nan if it is not known."""
+    """Residual of a deviation [um]; nan if it is not known."""
 
     rms: float
     largest: float
@@ -52,12 +52,12 @@ class RemainingError(NamedTuple):
 
 @dataclass(frozen=True)
 class LeftOut:
-    """What was fitted without a cycle, and how it did there.
+    """Model fitted without a cycle, and its result there.
 
     Parameters
     ----------
     name : str
-        Of the cycle.
+        Name of the cycle.
     model : ErrorModel
         Reduced.
     none, full, reduced : float
@@ -73,7 +73,7 @@ class LeftOut:
 
 @dataclass(frozen=True)
 class Reduced:
-    """A model in the shape of a controller, beside the full one.
+    """A model in the form of a controller, with the full one for comparison.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class Reduced:
     axis : str
         X, Y or Z.
     beside : str
-        What the full model is, and on what its error was found.
+        Description of the full model, and the data on which its error was found.
     none, full, reduced : RemainingError
         On unseen cycles: without compensation, with the full model, with this one.
     cycles : tuple of LeftOut
@@ -90,7 +90,7 @@ class Reduced:
     replayed : RemainingError or None
         With the model as it is written, over all rows of the recordings that it was fitted to.
     most : float
-        Largest deviation that was said in all of this [um].
+        Largest output in all of this [um].
     """
 
     model: ErrorModel
@@ -112,7 +112,7 @@ class Reduced:
 
     @property
     def loss_in_words(self) -> str:
-        """What is lost, such as ``RMS 2.10 um on unseen cycles, 1.05 um more than the full model: 2.00 times``."""
+        """Loss of accuracy, such as ``RMS 2.10 um on unseen cycles, 1.05 um more than the full model: 2.00 times``."""
         more = self.reduced.rms - self.full.rms
         way = "more" if more >= 0 else "less"
         return (
@@ -121,7 +121,7 @@ class Reduced:
         )
 
     def why_not(self, most_loss: float) -> str:
-        """Return why it must not be written; empty if it may."""
+        """Return the reason why it must not be written; empty if it may."""
         found = self.model.honest_error
         if found is None:
             return "it was never judged on cycles it has not seen"
@@ -144,17 +144,17 @@ class Reduced:
 
     @property
     def zeros(self) -> list[float]:
-        """What each of the temperatures counts from in a formula that knows no start [degC]."""
+        """Reference of each temperature in a formula that has no start of a test [degC]."""
         return [round(i.reference, 2) if i.rezero else i.reference for i, _ in self.terms]
 
     def deviation(self, temperatures: Sequence[float]) -> float:
-        """Return what the formula says of the temperatures in `terms` [um]."""
+        """Return the output of the formula for the temperatures in `terms` [um]."""
         parts = zip(self.terms, temperatures, self.zeros, strict=True)
         return self.model.intercept + sum(f * (t - zero) for (_, f), t, zero in parts)
 
 
 def linear_factors(model: ErrorModel) -> list[float] | None:
-    """Return what a degree of each input makes [um/K]; None if a model is no sum of present temperatures."""
+    """Return the effect of a degree of each input [um/K]; None if a model is not a sum of present temperatures."""
     if not isinstance(model, Polynomial) or any(len(t) != 1 for t in model.terms):
         return None
     if any(i.quantity != "temperature" for i in model.inputs) or model.support.policy != "clip":
@@ -211,7 +211,7 @@ def vectors(reduced: Reduced) -> list[tuple[float, ...]]:
 
 
 def find_axis(target: str, named: dict[str, str]) -> str:
-    """Return the letter of the axis that a target goes along, as `named` or by its name; empty if it does not say."""
+    """Return the letter of the axis of a target, as `named` or by its name; empty if neither defines it."""
     if target in named:
         return named[target]
     found = re.fullmatch(r"([xyz])([\d_].*)?", target, re.IGNORECASE)
@@ -259,7 +259,7 @@ def mark(name: str, taken: Sequence[str] = ()) -> str:
 
 
 def head(reductions: Sequence[Reduced], facts: Facts, sign: str, units: str) -> list[str]:
-    """Return what is to be known of an export, the verdict in the first line.
+    """Return the header of an export, with the verdict in the first line.
 
     Parameters
     ----------

@@ -63,16 +63,16 @@ def write_page(
     Parameters
     ----------
     name : str
-        Of the files.
+        Name of the files.
     head : sequence of str
         The verdict, and what else is to be known first.
     reductions : sequence of Reduced
     what, about : str
-        What it is written for, and how that computes.
+        Target of the export, and its computation.
     limits, failed : str
-        What becomes of limits and of failed sensors.
+        Handling of limits and of failed sensors.
     install, check, off : str
-        What to do.
+        Instructions.
     figure : str
         File of the figure; empty if there is none.
     """

@@ -88,7 +88,7 @@ def write_package(
 
 
 def _type(drive: Drive) -> str:
-    """Return what MD32750 is: bit 0 an offset, bit 1 a slope."""
+    """Return the value of MD32750: bit 0 for an offset, bit 1 for a slope."""
     return "3 (bits 0, 1)" if drive.travel[0] < drive.travel[1] else "1 (bit 0)"
 
 

@@ -123,7 +123,7 @@ def write_blocks(
     more : sequence of SourceUnit
         Beside the compensator.
     about : str
-        What the page says of them.
+        Description on the page.
 
     Raises
     ------

@@ -85,9 +85,9 @@ def translate(tables: Tables, name: str, dialect: Dialect) -> list[SourceUnit]:
     Parameters
     ----------
     tables : Tables
-        Of the compensator.
+        Tables of the compensator.
     name : str
-        Of the function block, and before all other names.
+        Name of the function block, and prefix of all other names.
     dialect : {'codesys', 'twincat', 'scl'}
 
     Raises
@@ -107,7 +107,7 @@ def translate(tables: Tables, name: str, dialect: Dialect) -> list[SourceUnit]:
 
 
 def _start(tables: Tables, name: str, used: str, scl: bool) -> SourceUnit:
-    """Return the function that begins again; the corrections in force stay, and move from there."""
+    """Return the function that restarts; the corrections in force stay, and move from there."""
     mark = "#" if scl else ""
     lines = []
     for n, var in used_in("s", used).items():

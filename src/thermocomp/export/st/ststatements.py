@@ -56,7 +56,7 @@ def write_functions(tables: Tables, name: str, dialect: Dialect) -> dict[str, tu
     Parameters
     ----------
     tables : Tables
-        Of the compensator.
+        Tables of the compensator.
     name : str
         Before all names.
     dialect : {'codesys', 'twincat', 'scl'}
@@ -223,7 +223,7 @@ def write_type(tables: Tables, name: str, bag: str, used: str, dialect: Dialect)
     Parameters
     ----------
     tables : Tables
-        Of the compensator.
+        Tables of the compensator.
     name : str
         Before all names.
     bag : {'s', 'w', 't'}
@@ -249,7 +249,7 @@ def used_in(bag: str, used: str) -> dict[str, Var]:
 
 
 def size_of(var: Var, sizes: Mapping[str, int]) -> int:
-    """Return how many numbers a variable holds."""
+    """Return the number of elements of a variable."""
     size = 1
     for dim in var.dims:
         size *= max(sizes[dim], 1)

@@ -59,11 +59,11 @@ def write_test(tables: Tables, name: str, dialect: Dialect, readings: Readings, 
     ----------
     tables : Tables
     name : str
-        Of the function block that is tested.
+        Name of the function block that is tested.
     dialect : {'codesys', 'twincat', 'scl'}
     readings : Readings
     answers : Answers
-        Of the compensator.
+        Outputs of the compensator.
     """
     scl, inputs, calls = dialect == "scl", len(tables.channels), len(readings.age)
     targets, sensors = len(tables.targets), len(tables.sensors)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 Tables = Annotated[list[Path], Parameter(show_default=False)]
 
-#: columns that the widest table needs
+#: width of the widest table [characters]
 TABLE_WIDTH = 136
 
 
@@ -47,7 +47,7 @@ def iso230(found: Evaluated, face: CommandFace) -> int:
     Parameters
     ----------
     output : Path
-        Page with tables and figures to write (.html).
+        Output page with tables and figures (.html).
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Figures of ISO 230 tests, as SVG text. Each answers one question; the question stands in its docstring."""
+"""Figures of ISO 230 tests, as SVG text. Each answers one question, which is given in its docstring."""
 
 from collections.abc import Sequence
 
@@ -127,7 +127,7 @@ def profiles(test: ThermalTest, number: int) -> str:
     ----------
     test : ThermalTest
     number : int
-        Which of its targets.
+        Index of the target.
     """
     targets = test.targets[number]
     time, running = test.time, test.running

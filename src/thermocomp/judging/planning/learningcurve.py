@@ -1,4 +1,4 @@
-"""How much test is enough: the error on unseen thermal cycles over how many cycles, and speeds, were learned from."""
+"""Learning curve: the error on unseen thermal cycles against the number of training cycles and speeds."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -82,14 +82,14 @@ class LearningCurve:
 
     @property
     def last_gain(self) -> float:
-        """What each of the last cycles has taken from the error [um]: the slope over the upper half of the numbers."""
+        """Reduction of the error per cycle over the last cycles [um]: slope over the upper half of the numbers."""
         levels = self.by_cycles()
         upper = levels[(len(levels) - 1) // 2 :]
         return -float(np.polyfit([x.learned for x in upper], [x.rms for x in upper], 1)[0]) if len(upper) > 1 else 0.0
 
     @property
     def worth(self) -> float:
-        """What a further cycle has to gain to be worth its time [um]: as of a sensor, see `assessment.budget`."""
+        """Reduction that makes a further cycle worth its time [um]: as for a sensor, see `assessment.budget`."""
         return min(WORTH, SHARE * self.none)
 
     @property
@@ -99,7 +99,7 @@ class LearningCurve:
 
     @property
     def words(self) -> str:
-        """Say what the curve says."""
+        """Return the interpretation of the curve."""
         levels = self.by_cycles()
         first, last = levels[0], levels[-1]
         of = f"{first.rms:.2f} um after {first.learned} cycle(s), {last.rms:.2f} after {last.learned}"
@@ -134,7 +134,7 @@ def learning_curve(
     jobs : int
         Processes to share the work among; -1 takes all cores.
     seed : int
-        Of the draw.
+        Seed of the draw.
     progress : callable
         Called with a line of text after each piece of work; there are `n_pieces` of them.
 

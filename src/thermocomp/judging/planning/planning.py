@@ -1,4 +1,4 @@
-"""Which test next: what each of a grid of tests is expected to take from the error on what was not seen."""
+"""Next test: expected reduction of the error on unseen data by each of a grid of tests."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -42,9 +42,9 @@ class Candidate:
     doubt : float
         Error that is expected in the test itself, mean over the targets [um].
     gain : float
-        What it is expected to take from the error over all tests of the grid, mean over the targets [um].
+        Expected reduction of the error over all tests of the grid, mean over the targets [um].
     news : str
-        What in it was not there so far; empty if nothing.
+        New conditions in the test; empty if there are none.
     """
 
     trial: Trial
@@ -55,14 +55,14 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Covered:
-    """What was recorded so far.
+    """Conditions recorded so far.
 
     Parameters
     ----------
     runs : tuple of (float, float, float)
         Mean speed [1/min] and length [s] of each run, and length of the stop after it [s]; 0 without one.
     rooms : tuple of float
-        How far the room's temperature changed within each test [degC]; none: it is not known.
+        Change of the ambient temperature within each test [degC]; none: it is not known.
     """
 
     runs: tuple[tuple[float, float, float], ...]
@@ -70,7 +70,7 @@ class Covered:
 
     @classmethod
     def of(cls, samples: Samples, column: int) -> "Covered":
-        """Return what some samples cover; their spindle speed is in a column."""
+        """Return the conditions covered by some samples; their spindle speed is in a column."""
         runs: list[tuple[float, float, float]] = []
         ranges = []
         air = [j for j, c in enumerate(samples.inputs) if AMBIENT.search(c.name) and c.quantity == "temperature"]
@@ -88,7 +88,7 @@ class Covered:
         return cls(tuple(runs), tuple(ranges))
 
     def news(self, trial: Trial, top_speed: float, swing: float) -> str:
-        """Say what in a test was not there so far; its speeds, lengths and stops, each by itself."""
+        """Return the new conditions in a test: its speeds, durations and stops, each separately."""
         if trial.kind == "room" and not self.rooms:
             return "no temperature of the room was recorded"
         if trial.kind == "room":
@@ -120,9 +120,9 @@ class Plan:
         Error over all tests of the grid as things are, mean over the targets [um]. Of the same calculation as the
         gains; an order of size, no judged error.
     top_speed, hours, swing : float
-        What the grid was made with [1/min], [h], [degC].
+        Settings of the grid [1/min], [h], [degC].
     covered : Covered
-        What was recorded so far.
+        Conditions recorded so far.
     """
 
     candidates: tuple[Candidate, ...]
@@ -139,9 +139,9 @@ def make_grid(top_speed: float, hours: float) -> tuple[Trial, ...]:
     Parameters
     ----------
     top_speed : float
-        Of the machine [1/min].
+        Maximum spindle speed of the machine [1/min].
     hours : float
-        Each lasts so long, after a stop of 15 min [h].
+        Duration of each, after a stop of 15 min [h].
 
     Returns
     -------
@@ -170,7 +170,7 @@ def make_grid(top_speed: float, hours: float) -> tuple[Trial, ...]:
 
 
 def plan(samples: Samples, top_speed: float | None = None, *, hours: float = 12.0, swing: float = 5.0) -> Plan:
-    """Return which test would bring most.
+    """Return the test with the largest expected benefit.
 
     What is expected to be wrong follows from the covariance of the weights of `averaged` (`thermocomp.models.doubt`),
     over all tests of the grid, the room changing in each of them. A test takes from the covariance what regression on
@@ -180,9 +180,9 @@ def plan(samples: Samples, top_speed: float | None = None, *, hours: float = 12.
     Parameters
     ----------
     samples : Samples
-        Of the recordings so far.
+        Samples of the recordings so far.
     top_speed : float, optional
-        Of the machine [1/min]; the highest recorded one if not given.
+        Maximum spindle speed of the machine [1/min]. Default: the highest recorded speed.
     hours : float
         Length of a test [h].
     swing : float

@@ -18,7 +18,7 @@ class Trial:
         repeated: short runs and stops in turn; stop: a run, then a stop as long; run: a run without a stop; room: the
         spindle is stopped while the temperature of the room changes.
     speed : float
-        Of the spindle [1/min].
+        Spindle speed [1/min].
     steps : tuple of (float, float)
         Speed [1/min] and duration [s], one after the other; the first is the stop before the start.
     """
@@ -34,7 +34,7 @@ class Trial:
 
     @property
     def words(self) -> str:
-        """What is done, in words."""
+        """Description of the test in words."""
         _, (_, longest), *_ = self.steps
         if self.kind == "room":
             return f"spindle is stopped {longest / 3600:g} h, the room changes"

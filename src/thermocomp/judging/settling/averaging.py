@@ -1,4 +1,4 @@
-"""Averages over a stated time and their uncertainty: no single noisy row decides what a curve is told to be.
+"""Averages over a stated time and their uncertainty: no single noisy row determines the result of a curve.
 
 How the noise is found: the scatter of second differences from row to row, robustly, is what is independent from row
 to row; that of third differences of means over `WINDOW` is what of it is left in a mean, however neighbouring rows hang
@@ -31,14 +31,14 @@ _MEANS = 6  # fewer tell nothing of their own scatter
 
 @dataclass(frozen=True)
 class Noise:
-    """What the rows of one curve scatter by.
+    """Scatter of the rows of one curve.
 
     Parameters
     ----------
     sigma : float
         Standard deviation from row to row [unit of the curve].
     inflation : float
-        Standard error of a mean over the window, by that of so many independent rows; at least 1.
+        Standard error of a mean over the window, relative to that of the same number of independent rows; at least 1.
     resolution : float
         Smallest difference between two values; averaging does not get below its standard uncertainty.
     window : float
@@ -55,7 +55,7 @@ class Noise:
     moves: bool
 
     def of_mean(self, rows: FloatArray | float) -> FloatArray:
-        """Return the standard uncertainty of means over so many rows [unit of the curve]."""
+        """Return the standard uncertainty of means over a number of rows [unit of the curve]."""
         floor = self.resolution / np.sqrt(12.0) if self.sigma == 0.0 else 0.0
         return np.asarray(np.maximum(self.inflation * self.sigma / np.sqrt(np.maximum(rows, 1.0)), floor))
 
@@ -69,7 +69,7 @@ class Zero:
     value, u : float
         Mean, and its standard uncertainty [unit of the curve].
     rows : int
-        Over so many.
+        Number of rows.
     """
 
     value: float
@@ -122,7 +122,7 @@ def scatter(values: FloatArray) -> float:
 
 
 def replace_outliers(values: FloatArray) -> FloatArray:
-    """Return values of a curve without bends, single outliers replaced by what the rows around them say.
+    """Return values of a curve without bends, with single outliers replaced by values from the neighbouring rows.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ def _scatter_of_means(parts: Sequence[FloatArray]) -> float:
 
 
 def _moves(means: FloatArray, white: float, rows: int, own: float) -> bool:
-    """Return whether means move: the last third beside the first, or any two of them, beyond their standard errors."""
+    """Return whether means move: the last third compared with the first, or any two, beyond their standard errors."""
     third = max(1, len(means) // 3)
     rise = abs(float(means[-third:].mean() - means[:third].mean())) / np.sqrt(2.0 / third)
     span = float(np.ptp(means)) / np.sqrt(2.0)
@@ -234,7 +234,7 @@ def zero_of(time: FloatArray, values: FloatArray, noise: Noise, *, rests: bool =
         Up to the row in which the test begins; nan where missing.
     noise : Noise
     rests : bool
-        The machine has rested all the time, so that the mean tells its state; else a straight line through the rows.
+        The machine has been at rest all the time, so that the mean gives its state; else a straight line is fitted.
 
     Returns
     -------

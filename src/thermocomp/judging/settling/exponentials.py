@@ -43,9 +43,9 @@ class ExponentialFit:
         The faster first.
     r_squared : float
     rms : float
-        Of the residual [unit].
+        RMS of the residual [unit].
     duration : float
-        Of what it was fitted to [s].
+        Duration of the fitted data [s].
     """
 
     start: float

@@ -41,9 +41,9 @@ class Phase:
     ----------
     kind : {'warm-up', 'cool-down'}
     number : int
-        Of its kind, from 1.
+        Number among those of its kind, from 1.
     start, end : int
-        Row of the state it begins in, and its last row.
+        Row of the initial state, and last row.
     """
 
     kind: Kind
@@ -54,7 +54,7 @@ class Phase:
 
 @dataclass(frozen=True)
 class Settling:
-    """How a channel goes from one state to the next in a phase; without the later ones it has too few values.
+    """Transition of a channel between two states in a phase; without the later values it has too few rows.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class Settling:
     change : float
         Value at the end minus that at the start, both averaged [unit].
     uncertainty : float
-        Of `change`, expanded (k = 2) [unit].
+        Uncertainty of `change`, expanded (k = 2) [unit].
     noise : float
         Standard deviation from row to row [unit].
     moves : bool
@@ -105,7 +105,7 @@ class Settling:
 
     @property
     def words(self) -> str:
-        """Say what a reader must know of it; empty if there is nothing."""
+        """Return cautions for the reader; empty if there are none."""
         if not self.moves:
             return "does not move"
         if not self.clear:
@@ -230,7 +230,7 @@ def settle(
     channel, unit : str
     phase : Phase
     lead : int
-        So many rows come before the phase: what it starts from is averaged over them.
+        Number of rows before the phase over which its initial value is averaged.
     rests : bool
         The machine has rested in these rows.
 
@@ -286,7 +286,7 @@ def _rests(t: FloatArray, y: FloatArray, curve: FloatArray, limit: float, noise:
 
 
 def _reached(t: FloatArray, y: FloatArray, c: AveragedCurve, share: float) -> float:
-    """Return when the average first reached a share of its change [s]; a parabola through the rows nearby tells it."""
+    """Return the time at which the average first reached a fraction of its change [s], by a local parabola."""
     level = share * c.values[-1]
     done = c.values / c.values[-1]
     k = int(np.argmax(done >= share))

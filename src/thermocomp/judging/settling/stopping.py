@@ -36,14 +36,14 @@ K = 2.0
 
 @dataclass(frozen=True)
 class SteadyState:
-    """What is known of the end of a curve that still moves.
+    """Estimated steady state of a curve that has not settled yet.
 
     Parameters
     ----------
     final : float
         Value it tends to, counted from the start of the phase [unit].
     uncertainty : float
-        Of that, expanded (k = 2) [unit]; inf where too little was recorded.
+        Expanded uncertainty of that (k = 2) [unit]; inf where too little was recorded.
     change : float
         Last value, counted from the start of the phase [unit].
     largest : float
@@ -75,9 +75,9 @@ class Running:
     phase : Phase
         The last one: a warm-up or a cool-down.
     seconds : float
-        It has lasted so long [s].
+        Duration so far [s].
     states : tuple of (str, SteadyState)
-        Of each target, by name.
+        State of each target, by name.
     """
 
     phase: Phase
@@ -100,7 +100,7 @@ class Running:
 
     @property
     def words(self) -> str:
-        """Say what to do."""
+        """Return the recommended action."""
         what = f"{self.phase.kind} {self.phase.number}, {self.seconds / 3600:.1f} h"
         if self.may_stop:
             then = (
@@ -166,7 +166,7 @@ def judge_running(recording: Recording, targets: Sequence[str]) -> Running:
     Parameters
     ----------
     recording : Recording
-        Of the test, up to now.
+        Recording of the test, up to now.
     targets : sequence of str
         Displacements.
 

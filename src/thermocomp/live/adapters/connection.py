@@ -1,4 +1,4 @@
-"""What connections share: how one is, and since when."""
+"""Common part of connections: status, and time of its last change."""
 
 import time
 from dataclasses import dataclass, field
@@ -9,7 +9,7 @@ from thermocomp.core.ports import LinkStatus
 
 @dataclass
 class Connection:
-    """How a connection is.
+    """Status of a connection.
 
     Parameters
     ----------
@@ -19,6 +19,6 @@ class Connection:
     now: LinkStatus = field(default=LinkStatus("closed"))
 
     def to(self, state: Literal["closed", "connecting", "connected", "failed"], reason: str = "") -> None:
-        """Say how it is from now on."""
+        """Set the status from now on."""
         if (self.now.state, self.now.reason) != (state, reason):
             self.now = LinkStatus(state, reason, time.time())

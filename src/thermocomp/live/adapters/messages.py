@@ -32,7 +32,7 @@ def read_message(payload: bytes | str, arrived: float, names: Mapping[str, str])
         JSON: values by channel, such as ``{"t1_C": 21.3, "spindle_rpm": 4000}``; with ``time`` (s since 1970) when
         it was taken. What is not a number is missing.
     arrived : float
-        The clock, now [s]: its time if it does not say.
+        Present time of the clock [s]: used if the message has none.
     names : mapping of str to str
         Channel by the name in the message, for those that are called otherwise there.
 
@@ -62,7 +62,7 @@ def read_measurement(payload: bytes | str, arrived: float) -> Measurement:
         ``position_mm``, ``time`` (s since 1970) and ``id`` (text or a whole number) if they are known. The id or the
         time tells it from others, without them its content.
     arrived : float
-        The clock, now [s]: its time if it does not say.
+        Present time of the clock [s]: used if the message has none.
 
     Raises
     ------

@@ -19,7 +19,7 @@ from thermocomp.live.adapters.messages import read_message, write_message
 
 @dataclass(kw_only=True)
 class Broker:
-    """Where a broker is, and what is talked about there.
+    """Address of a broker, and its topics.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a configuration says of the network: brokers, topics, hosts."""
+"""Network settings of a configuration: brokers, topics, hosts."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -17,13 +17,13 @@ _TOPIC, _HOST, _LABEL = 65_535, 253, 63
 
 @dataclass(frozen=True, kw_only=True)
 class OnBroker:
-    """What is said on an MQTT topic.
+    """Source or sink on an MQTT topic.
 
     Parameters
     ----------
     topic : str
     host, port : str, int
-        Of the broker.
+        Host and port of the broker.
     """
 
     published: ClassVar[bool] = False
@@ -40,7 +40,7 @@ class OnBroker:
             raise SettingError(f"port = {self.port}: want one from 1 to 65535")
 
     def hears(self, other: "OnBroker") -> bool:
-        """Return whether what is published to another's topic comes back on this one, as far as names tell."""
+        """Return whether messages published to another's topic come back on this one, judged by the names."""
         levels, topic = self.topic.split("/"), other.topic.split("/")
         levels = levels[2:] if levels[0] == "$share" else levels
         fits = all(level in ("+", "#", found) for level, found in zip(levels, topic, strict=False))
@@ -55,7 +55,7 @@ class MqttIn(OnBroker):
     Parameters
     ----------
     topic, host, port
-        Of `OnBroker`.
+        As for `OnBroker`.
     kind : {'mqtt'}
     names : dict of str to str
         Channel by the name in the message, for those that are called otherwise there.
@@ -86,7 +86,7 @@ class MqttProbing(OnBroker):
     Parameters
     ----------
     topic, host, port
-        Of `OnBroker`.
+        As for `OnBroker`.
     kind : {'mqtt'}
     """
 
@@ -100,7 +100,7 @@ class MqttOut(OnBroker):
     Parameters
     ----------
     topic, host, port
-        Of `OnBroker`.
+        As for `OnBroker`.
     kind : {'mqtt'}
     """
 
@@ -115,19 +115,19 @@ class MqttOut(OnBroker):
 
 
 def explain_topic(topic: str, *, published: bool) -> str:
-    """Say why a topic cannot be one; the empty string if it can.
+    """Return the reason why a topic is invalid; empty if it is valid.
 
     Parameters
     ----------
     topic : str
     published : bool
-        It is published to, so that wildcards stand for nothing.
+        It is published to, so that wildcards have no meaning.
     """
     return next(_faults_of_topic(topic, published=published), "")
 
 
 def explain_host_name(host: str) -> str:
-    """Say why a host cannot be one; the empty string if it can be: an address or a name.
+    """Return the reason why a host is invalid; empty if it is valid: an address or a name.
 
     Parameters
     ----------

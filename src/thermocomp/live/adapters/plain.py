@@ -31,7 +31,7 @@ class Played:
     Parameters
     ----------
     speed : float
-        How many times faster than they were taken.
+        Replay speed relative to real time.
     """
 
     speed: float = 1.0
@@ -81,7 +81,7 @@ class Played:
             raise
 
     def status(self) -> LinkStatus:
-        """Return how it is, at once."""
+        """Return the status without blocking."""
         return self._connection.now
 
     async def close(self) -> None:
@@ -111,7 +111,7 @@ class SimulatedSource(Played):
     Parameters
     ----------
     experiment : Experiment
-        What it does; all its tests, one after the other.
+        Experiment to run; all its tests, one after the other.
     seed : int
     """
 
@@ -167,7 +167,7 @@ class FileSink:
             raise ThermocompError(str(e)) from e
 
     async def confirmed(self) -> dict[str, Correction] | None:
-        """Return what stands in the file; None if there is none yet."""
+        """Return the content of the file; None if there is none yet."""
         try:
             table = json.loads(self.path.read_text(encoding="utf-8"))["corrections"]
             return {
@@ -178,7 +178,7 @@ class FileSink:
             return None
 
     def status(self) -> LinkStatus:
-        """Return how it is, at once."""
+        """Return the status without blocking."""
         return self._connection.now
 
     async def close(self) -> None:
@@ -243,7 +243,7 @@ def _parsed(row: Sequence[str], place: int) -> float | None:
 
 
 def find_experiment(name: str, folder: Path) -> Experiment:
-    """Return an experiment of the virtual machine: one that comes with the package, or a protocol of one's own.
+    """Return an experiment of the virtual machine: one included in the package, or a custom protocol.
 
     Raises
     ------

@@ -83,7 +83,7 @@ class SimulatedProbe:
                     )
 
     def status(self) -> LinkStatus:
-        """Return how it is, at once."""
+        """Return the status without blocking."""
         return self._connection.now
 
     async def close(self) -> None:

@@ -27,7 +27,7 @@ class SourceSection(Protocol):
         Parameters
         ----------
         folder : Path
-            Of the configuration: files are named from there.
+            Folder of the configuration: relative paths start from there.
         speed : float
             Seconds of the machine in a second of the world, for what is played back.
         """
@@ -52,9 +52,9 @@ class SimulatedIn:
     ----------
     kind : {'simulated'}
     experiment : str
-        What it does: one that comes with the package, or a protocol (.toml).
+        Experiment to run: one included in the package, or a protocol (.toml).
     seed : int
-        Of weather and noise.
+        Random seed of weather and noise.
     """
 
     kind: Literal["simulated"]
@@ -103,7 +103,7 @@ class SimulatedProbing:
     every : float
         Time of the machine between two [s].
     repeatability : float
-        Of the probe, standard deviation [um].
+        Repeatability of the probe, standard deviation [um].
     """
 
     kind: Literal["simulated"]
@@ -123,7 +123,7 @@ class LinuxCncOut:
     ----------
     kind : {'linuxcnc'}
     socket : str
-        Of the HAL component that ``thermocomp linuxcnc setup`` puts there.
+        Socket of the HAL component that ``thermocomp linuxcnc setup`` installs.
     axes : dict of str to str
         Axis by target, such as ``{z_um = "Z"}``.
     """

@@ -1,4 +1,4 @@
-"""``thermocomp journal``: what the live compensator has written down."""
+"""``thermocomp journal``: records of the live compensator."""
 
 from datetime import UTC, datetime
 from pathlib import Path
@@ -26,25 +26,25 @@ def journal(
     overwrite: bool = False,
     json: bool = False,
 ) -> int:
-    """Tell what a journal of the live compensator holds, or export it as a recording.
+    """Summarise a journal of the live compensator, or export it as a recording.
 
     Parameters
     ----------
     what : {'show', 'export'}
-        show: how much of what there is, and what happened last. export: a recording with the temperatures, what was
-        measured, the correction that the controller confirmed, and the uncompensated deviation, which fit takes.
+        Action. show: numbers of records and the last events. export: a recording with the temperatures, the
+        measurements, the correction confirmed by the controller, and the uncompensated deviation, for fit.
     path : Path
-        The journal, as it stands in the configuration of the service: all its files are read; or one of them.
+        Path of the journal as in the configuration of the service, to read all its files; or one of these files.
     output : Path
-        Recording to write (.csv or .parquet).
+        Output recording (.csv or .parquet).
     every : float
-        Export a reading at most so often [s]; 0: all.
+        Minimum interval between exported readings [s]; 0: all readings.
     last : int
-        Show so many of the last events.
+        Number of the last events to show.
     overwrite : bool
-        Write over an existing recording.
+        Overwrite an existing recording.
     json : bool
-        Print results for a machine instead of text.
+        Print results as JSON instead of text.
 
     Returns
     -------
@@ -117,7 +117,7 @@ def _show(reader: "JournalReader", last: int, *, as_json: bool) -> None:
 
 
 def told(stored: "StoredRun", reader: "JournalReader") -> tuple[str, str]:
-    """Return kind and text of a row, as a person reads it."""
+    """Return kind and text of a row in readable form."""
     from thermocomp.live.journal.journalrows import (
         MeasurementRow,
         ReferenceRow,

@@ -1,4 +1,4 @@
-"""`thermocomp linuxcnc`: what a LinuxCNC needs to be corrected."""
+"""`thermocomp linuxcnc`: setup of a LinuxCNC for corrections."""
 
 from pathlib import Path
 from typing import Annotated, Literal
@@ -29,44 +29,44 @@ def linuxcnc(
     overwrite: bool = False,
     json: bool = False,
 ) -> int:
-    """Write what a LinuxCNC needs to be corrected, and say what to change in its configuration.
+    """Write the files that a LinuxCNC needs for corrections, and list the changes to its configuration.
 
-    Nothing that is there is changed: a HAL file and a component are written beside the INI file.
+    Existing files are not changed: a HAL file and a component are written next to the INI file.
 
     Parameters
     ----------
     what : {'setup'}
-        What to do.
+        Action; setup is the only one.
     ini : Path
         INI file of the machine.
     pattern : {'offset', 'drive'}
-        How corrections come in. offset: external offsets, which the controller knows of and keeps within its soft
-        limits; drive: between the controller and the drive, which the position display does not show.
+        Path of the corrections. offset: external offsets, which are visible to the controller and stay within its soft
+        limits; drive: between controller and drive, which the position display does not show.
     axes : str
         Letters of the axes to correct, such as XZ.
     magnitude : float
-        Largest correction, whatever the service says [um].
+        Largest correction, regardless of the service [um].
     rate : float
-        Fastest change of a correction, the same [um/s].
+        Fastest change of a correction, regardless of the service [um/s].
     timeout : float
-        The service counts as lost when it says nothing for so long [s].
+        Time without a message after which the service is treated as disconnected [s].
     hold : float
-        So long corrections then stay as they are [s].
+        Hold time of the corrections after a disconnect [s].
     fade : float
-        How fast they go to zero after that [um/s].
+        Rate at which corrections ramp to zero after the hold time [um/s].
     group : str
-        Group whose members may connect; without it only the user that runs LinuxCNC.
+        User group whose members may connect. Default: only the user that runs LinuxCNC.
     output : Path
-        Another folder for the files.
+        Output folder. Default: the folder of the INI file.
     overwrite : bool
-        Write over existing files.
+        Overwrite existing files.
     json : bool
-        Print what was done for a program instead.
+        Print results as JSON instead of text.
 
     Returns
     -------
     int
-        0 written, 2 the machine cannot be corrected like this.
+        0 files written, 2 the machine cannot be corrected with these settings.
     """
     assert what == "setup"
     settings = HalSettings(

@@ -1,4 +1,4 @@
-"""`thermocomp serve`: the compensator beside the controller, live."""
+"""`thermocomp serve`: live compensation."""
 
 import asyncio
 import contextlib
@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     from thermocomp.live.config import ServiceSettings
     from thermocomp.live.loop import Service
 
-#: seconds of the virtual machine in one of the world, in the demo
+#: speed of the virtual machine relative to real time, in the demo
 _SPEED = 60
 
-#: what the demo's model knows the virtual machine by
+#: targets and inputs of the demo's model
 _TARGETS = ("x1_um", "y1_um", "z_um")
 _INPUTS = (
     *("t_housing_C", "t_motor_C", "t_column_front_left_C", "t_z_bearing_C", "t_table_C", "t_enclosure_C"),
@@ -44,21 +44,21 @@ def serve(
     Parameters
     ----------
     config : Path
-        TOML file: models, sources, sinks, limits, page.
+        TOML configuration file: models, sources, sinks, limits, page.
     demo : bool
-        Without a configuration: the virtual machine at 60 times the speed of the world, with a model that is fitted to
-        a recording of it first (a minute or more).
+        Run a demo without a configuration: the virtual machine at 60 times real time, with a model that is fitted to a
+        recording of it first (a minute or more).
     port : int
-        Of the page, in place of the configured one; 0: any that is free.
+        Port of the page, overrides the configured one; 0: any free port.
     output : Path
-        Folder of the demo: its model, state and corrections.
+        Output folder of the demo: its model, state and corrections.
     check : bool
-        Only read the configuration and what it names, and say what is wrong.
+        Only check the configuration and the files it names, and report problems.
 
     Returns
     -------
     int
-        0 stopped as asked.
+        0 stopped on request.
     """
     with needs("live"):
         from thermocomp.live.config import read_config
@@ -131,7 +131,7 @@ async def _run(service: "Service", fades: bool, work: Sequence[Coroutine[Any, An
 
 
 def _demo(folder: Path) -> Path:
-    """Return the configuration of the demo, in a folder that is made if it is not there."""
+    """Return the configuration of the demo, in a folder that is created if missing."""
     config, model = folder / "serve.toml", folder / "model.json"
     folder.mkdir(parents=True, exist_ok=True)
     if not model.exists():

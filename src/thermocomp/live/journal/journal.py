@@ -27,14 +27,14 @@ _INSERT = "INSERT OR IGNORE INTO rows (run, seq, time, kind, content, crc) VALUE
 
 @dataclass(frozen=True)
 class JournalLimits:
-    """What a journal may take.
+    """Limits of the size of a journal.
 
     Parameters
     ----------
     size_bytes : int
         A file that has become larger is followed by a new one.
     files : int
-        So many at most: the oldest is removed.
+        Maximum number of files: the oldest is removed.
     waiting_bytes : int
         Memory of rows that wait for the disk; beyond it the oldest are lost.
     """
@@ -50,7 +50,7 @@ class JournalLimits:
 
 
 class JournalStatus(NamedTuple):
-    """How a journal is."""
+    """Status of a journal."""
 
     file: Path | None  #: that is written; None: there is none at the moment
     files: int
@@ -90,7 +90,7 @@ class Journal:
 
     @classmethod
     def open(cls, path: str | Path, limits: JournalLimits, start: StartRow) -> Self:
-        """Open a journal, to continue with it or to begin it; a disk that does not let us is told by `status`.
+        """Open a journal, existing or new; a failure of the disk is reported by `status`.
 
         A file that is damaged or no journal is kept as ``.refused``; one of a newer version stays as it is.
 
@@ -100,7 +100,7 @@ class Journal:
             Its files are numbered: ``live.db`` is ``live.000001.db`` and so on.
         limits : JournalLimits
         start : StartRow
-            What readings hold, and what is compensated.
+            Channels of the readings, and compensated targets.
 
         Raises
         ------
@@ -154,7 +154,7 @@ class Journal:
             return True
 
     def status(self) -> JournalStatus:
-        """Return how the journal is; for no price an error."""
+        """Return the status of the journal; never raises."""
         files: list[Path] = []
         total = 0
         with suppress(OSError):
@@ -200,7 +200,7 @@ class Journal:
         connection.execute("COMMIT")
 
     def _connect(self) -> sqlite3.Connection:
-        """Continue with the newest file, or begin one."""
+        """Continue with the newest file, or create one."""
         files = numbered(self.path)
         newest = files[max(files)] if files else None
         if newest is not None:

@@ -1,4 +1,4 @@
-"""A journal becomes a recording: what was measured, what was in force at the machine, and what that says of it."""
+"""Conversion of a journal to a recording: measurements, corrections in force, and uncompensated deviations."""
 
 from array import array
 from collections.abc import Sequence
@@ -35,7 +35,7 @@ _AT_ONCE = 1e-5
 
 
 class ExportedTarget(NamedTuple):
-    """What is known of a target."""
+    """Data of a target."""
 
     name: str
     measured: int  #: rows with a measurement
@@ -61,7 +61,7 @@ class _Confirmed:
         self.numbers.extend((c.offset, c.slope, c.reference_position))
 
     def at(self, time: FloatArray, position: float, within: float) -> FloatArray:
-        """Return what was in force at a position [um]; nan where the last confirmation is older than `within`."""
+        """Return the correction in force at a position [um]; nan where the last confirmation is older than `within`."""
         stamps, numbers = np.array(self.time), np.array(self.numbers).reshape(-1, 3)
         k = np.searchsorted(stamps, time, side="right") - 1
         fresh = (k >= 0) & (time - stamps[k] <= within)
@@ -92,7 +92,7 @@ def export(reader: JournalReader, every: float = 0.0) -> Exported:
     ----------
     reader : JournalReader
     every : float
-        Of readings that follow closer, the first is taken [s].
+        Minimum interval: of readings that follow closer, the first is used [s].
 
     Raises
     ------
@@ -244,7 +244,7 @@ def _parted(
 
 
 def _in_force(m: MeasurementRow, start: StartRow, confirmed: _Confirmed) -> float:
-    """Return what was in force where and when a measurement was made [um]; nan if that is not known."""
+    """Return the correction in force at the place and time of a measurement [um]; nan if it is unknown."""
     if start.own_compensation != "off":
         return float("nan")
     if m.in_force is not None:

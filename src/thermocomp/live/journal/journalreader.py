@@ -45,7 +45,7 @@ class StoredRun(NamedTuple):
 
 
 class Summary(NamedTuple):
-    """What a journal holds."""
+    """Contents of a journal."""
 
     files: tuple[Path, ...]
     size_bytes: int
@@ -103,7 +103,7 @@ class JournalReader:
                     yield stored
 
     def overtaken(self) -> Callable[[StoredRun], bool]:
-        """Return what tells whether a row stands at a time that was written again later: a clock was set back.
+        """Return a predicate: a row is at a time that was written again later, because a clock was set back.
 
         Then the later rows are right, and the earlier ones would stand among them.
         """
@@ -143,7 +143,7 @@ class JournalReader:
         return found[::-1]
 
     def summary(self) -> Summary:
-        """Return what the journal holds."""
+        """Return a summary of the journal."""
         counts: Counter[str] = Counter(dict.fromkeys(KINDS, 0))
         for _, (kind, n) in self._each("SELECT kind, COUNT(*) FROM rows WHERE seq > 0 GROUP BY kind"):
             counts[kind] += n
@@ -229,7 +229,7 @@ def find_version(connection: sqlite3.Connection) -> int | None:
 
 @contextmanager
 def telling(path: Path) -> Iterator[None]:
-    """Turn what SQLite says of a file into an error that names it."""
+    """Turn an SQLite error about a file into an error that names the file."""
     try:
         yield
     except sqlite3.Error as e:

@@ -1,4 +1,4 @@
-"""What a journal holds: rows of fixed types, checked before they are written and when they are read."""
+"""Rows of a journal: fixed types, checked before they are written and when they are read."""
 
 import json
 import math
@@ -26,7 +26,7 @@ _MOST = 10_000
 
 
 class TargetRow(NamedTuple):
-    """What is compensated: a target or an axis."""
+    """A compensated target or axis."""
 
     name: str
     quantity: str = "displacement"  #: or ``angle``
@@ -60,7 +60,7 @@ class DemandRow(NamedTuple):
 
 
 class ConfirmationRow(NamedTuple):
-    """The correction that is in force, as the controller says."""
+    """Correction in force, as reported by the controller."""
 
     time: float
     target: str
@@ -68,7 +68,7 @@ class ConfirmationRow(NamedTuple):
 
 
 class StateRow(NamedTuple):
-    """How a target is from now on."""
+    """Status of a target from now on."""
 
     time: float
     target: str
@@ -107,7 +107,7 @@ class MeasurementRow(NamedTuple):
 
 
 class AlarmRow(NamedTuple):
-    """Something that somebody should look at."""
+    """An alarm that needs attention."""
 
     time: float
     kind: str
@@ -115,7 +115,7 @@ class AlarmRow(NamedTuple):
 
 
 class UpdateRow(NamedTuple):
-    """What a probing changed."""
+    """Change by a probing."""
 
     time: float
     target: str
@@ -151,7 +151,7 @@ _NAMES = {kind: name for name, kind in KINDS.items()}
 
 
 def measured_by(row: MeasurementRow, start: StartRow, in_force: Correction | None = None) -> float | None:
-    """Return the uncompensated deviation that a measurement tells [um].
+    """Return the uncompensated deviation from a measurement [um].
 
     At the place that is probed the tool point is where it should be: the motors stand off by minus the deviation. A
     report that includes the correction tells that as it is; one without it tells what is left of the deviation under
@@ -161,14 +161,14 @@ def measured_by(row: MeasurementRow, start: StartRow, in_force: Correction | Non
     ----------
     row : MeasurementRow
     start : StartRow
-        Of its run.
+        Start row of its run.
     in_force : Correction, optional
-        What was in force, where the row does not tell.
+        Correction in force, where the row does not contain it.
 
     Returns
     -------
     float or None
-        None if it cannot be known: the controller compensates by itself, or nobody knows what was in force.
+        None if it cannot be determined: the controller compensates by itself, or the correction in force is unknown.
     """
     known = row.in_force if row.in_force is not None else in_force
     if start.own_compensation != "off":
@@ -202,7 +202,7 @@ def dumps(row: Row, start: StartRow) -> str:
     ----------
     row : Row
     start : StartRow
-        Of its run: readings are written in the order of its channels.
+        Start row of its run: readings are written in the order of its channels.
 
     Raises
     ------
@@ -229,7 +229,7 @@ def loads(kind: str, time: float, text: str, start: StartRow | None) -> Row:
     time : float
     text : str
     start : StartRow or None
-        Of its run.
+        Start row of its run.
 
     Raises
     ------

@@ -23,7 +23,7 @@ class Guarded(H11Protocol):
     Parameters
     ----------
     config, server_state, app_state, _loop
-        Of uvicorn.
+        As for uvicorn.
     """
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -68,9 +68,9 @@ class Guarded(H11Protocol):
             self.drop()
 
     def _waits(self) -> bool:
-        """Return whether the client has to say something next: there is no request, or not all of it."""
+        """Return whether the client must send something next: there is no request, or it is incomplete."""
         return self.cycle is None or self.cycle.response_complete or self.cycle.more_body
 
     def _rank(self) -> tuple[bool, bool, bool, float]:
-        """Return what tells who goes first: idle before stuck before busy, never served before served, by age."""
+        """Return the sort key for precedence: idle before stuck before busy, never served before served, by age."""
         return not self._waits(), not self.unsent, self._served, self._since

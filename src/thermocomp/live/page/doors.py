@@ -38,9 +38,9 @@ class Json(JSONResponse):
     Parameters
     ----------
     content : object
-        Of `write_json`.
+        As for `write_json`.
     status_code, headers, media_type, background
-        Of the response.
+        As for the response.
     """
 
     def render(self, content: Any) -> bytes:
@@ -65,7 +65,7 @@ class Doorkeeper:
     Parameters
     ----------
     token : str
-        Empty: no orders are taken.
+        Empty: no commands are accepted.
     """
 
     def __init__(self, token: str) -> None:
@@ -102,7 +102,7 @@ class Door:
     ----------
     app : ASGI application
     names : collection of str
-        Host names that the page is called by, beside ``localhost`` and the addresses of this computer.
+        Host names of the page, in addition to ``localhost`` and the addresses of this computer.
     """
 
     def __init__(self, app: ASGIApp, names: Collection[str] = ()) -> None:
@@ -140,7 +140,7 @@ class Door:
 
 
 def explain_host(header: str, names: Collection[str], server: str) -> str:
-    """Say why a request may not be answered under a name; the empty string if it may.
+    """Return the reason why a request must not be answered under a host name; empty if it may.
 
     A page of another site whose name leads to this computer (DNS rebinding) carries that name. An address cannot be
     made to lead elsewhere.
@@ -165,7 +165,7 @@ def explain_host(header: str, names: Collection[str], server: str) -> str:
 
 
 def explain_foreign(request: Request) -> str:
-    """Say why a request comes from a page of another origin; the empty string if it comes from this page or no page.
+    """Return the reason why a request comes from a page of another origin; empty if from this page or from no page.
 
     Browsers state the origin of the page with whatever may change something; programs state none.
 

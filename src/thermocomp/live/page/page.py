@@ -1,4 +1,4 @@
-"""The page beside the machine: an application of routers, each a page of its own."""
+"""Web application of the page: an application of routers, each a separate page."""
 
 from collections.abc import Collection
 from pathlib import Path
@@ -25,11 +25,11 @@ def make_app(
     ----------
     service : Service
     token : str
-        That orders want; empty: none are taken.
+        Token required for commands; empty: none are accepted.
     settled : float
         A drift below this in ten minutes counts as settled [um].
     hosts : tuple of str
-        Names by which it may be called, beside ``localhost`` and the addresses of this computer.
+        Host names of the page, in addition to ``localhost`` and the addresses of this computer.
     pages : collection of str
         Pages of other packages, by their entry points of ``thermocomp.pages``; one that fails is reported and left out.
     """

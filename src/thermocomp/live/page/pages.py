@@ -1,4 +1,4 @@
-"""What a page of the service is made of: a router, found by an entry point of ``thermocomp.pages``."""
+"""Interface of a page of the service: a router, found by an entry point of ``thermocomp.pages``."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,13 +17,13 @@ _FOLDER = Path(__file__).parent / "templates"
 
 @dataclass(frozen=True)
 class Board:
-    """What a page shows and may ask for.
+    """Data that a page shows and commands that it may send.
 
     Parameters
     ----------
     service : Service
     token : str
-        That orders want; empty: none are taken.
+        Token required for commands; empty: none are accepted.
     settled : float
         A drift below this in ten minutes counts as settled [um].
     """

@@ -1,4 +1,4 @@
-"""All that a service has to show, as plain numbers and words: what the page draws, and its JSON twin."""
+"""State of a service as plain numbers and text, for the page and for JSON."""
 
 import math
 from typing import Any
@@ -11,7 +11,7 @@ from thermocomp.runtime.lines import DeviationLine
 
 
 def snapshot(service: Service, settled: float) -> dict[str, Any]:
-    """Return how a service is now.
+    """Return the present state of a service.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def snapshot(service: Service, settled: float) -> dict[str, Any]:
 
 
 def curves(service: Service) -> dict[str, list[float | None]]:
-    """Return what is drawn over time: a list of numbers per curve, ``time`` among them."""
+    """Return the curves over time: a list of numbers per curve, ``time`` among them."""
     rows = list(service.curves)
     names = dict.fromkeys(name for row in rows for name in row)
     return {name: [row.get(name) for row in rows] for name in names}

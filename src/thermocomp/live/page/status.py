@@ -1,4 +1,4 @@
-"""How the service is: the page, its JSON twin, the curves and the event stream."""
+"""Status of the service: the page, its JSON twin, the curves and the event stream."""
 
 import asyncio
 import time

@@ -78,7 +78,7 @@ def listen(host: str, port: int) -> socket.socket:
     Raises
     ------
     InputError
-        It is taken, or there is no such host.
+        The port is in use, or there is no such host.
     """
     bare = host.removeprefix("[").removesuffix("]")
     try:

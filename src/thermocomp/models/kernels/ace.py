@@ -1,4 +1,4 @@
-"""ACE on ranks: the sweeps; see `kernels.ranks` for what they stand on."""
+"""ACE on ranks: the sweeps; see `kernels.ranks` for the data structures."""
 
 from typing import Any
 
@@ -90,7 +90,7 @@ def solve(
     theta : ndarray of shape (n,)
         By rank of S.
     phi : ndarray of shape (p, n)
-        Each by the rank of its own variable.
+        Each by the rank of its variable.
     psi : float
     errors : ndarray of shape (n_sweeps,)
         E[(theta - sum phi)^2] after each sweep.

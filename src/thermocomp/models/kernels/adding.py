@@ -32,7 +32,7 @@ DIGITS = 1e-14
 def try_exactly(
     columns: FloatArray, least: FloatArray, lists: Lists, inside: ByteArray, chosen: IntArray, n: int
 ) -> None:
-    """Put the first `n` of `chosen` on the list if QR says so."""
+    """Put the first `n` of `chosen` on the list if QR confirms them."""
     value = exact(columns, least, chosen, n)
     if value < lists[3][n]:
         inside[:] = 0

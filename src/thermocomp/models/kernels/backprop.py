@@ -116,7 +116,7 @@ def train(  # noqa: PLR0912, PLR0915 - in one piece it is a sixth faster
     shuffled : bool
         True: the patterns come in a new random order in every epoch.
     seed : uint64
-        Of that order.
+        Seed of that order.
     goal : float
         Stop after the first epoch with a loss not above this.
 

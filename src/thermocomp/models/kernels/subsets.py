@@ -1,4 +1,4 @@
-"""What both searches for best subsets share, compiled: the lists of good sets, and QR.
+"""Common part of both searches for best subsets, compiled: the lists of good sets, and QR.
 
 They work on the triangle of the columns (scaled to the norm 1) and y. The lists are a tuple: residual sums of squares,
 rising, and the sets they belong to, per size; the least sum lost from each list; the limit below which a set of each

@@ -52,7 +52,7 @@ def scaling_out(low: FloatArray, high: FloatArray) -> Affine:
 
 
 def constant(low: FloatArray, high: FloatArray) -> NDArray[np.bool_]:
-    """Return which channels have no range but rounding."""
+    """Return a mask of the channels that are constant up to rounding."""
     return np.asarray(high - low <= 1e-12 * np.maximum(np.abs(low), np.abs(high)))
 
 
@@ -90,7 +90,7 @@ def learning_rates(n_epochs: int, start: float, end: float, schedule: str) -> Fl
 
 @dataclass(frozen=True)
 class TrainedNet:
-    """What `train_net` gives.
+    """Result of `train_net`.
 
     Parameters
     ----------

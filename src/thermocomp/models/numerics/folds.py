@@ -22,7 +22,7 @@ def number_folds(cycle: ArrayLike | None, n_rows: int) -> tuple[IntArray, str]:
     folds : ndarray of int of shape (n_rows,)
         0, 1, ... in the order of the cycles; one too short to judge a model on joins the one before. -1 stays.
     description : str
-        What is left out, in words.
+        Left-out units, in words.
     """
     if cycle is None:
         return np.arange(n_rows) * min(5, n_rows) // n_rows, "five stretches of equal length, left out in turn"
@@ -70,7 +70,7 @@ def halve(folds: IntArray, turning: NDArray[np.bool_]) -> tuple[IntArray, str]:
         0, 1, ...; -1 stays. A fold that does not end in a stop is cut in the middle of its rows. Of many folds none is
         cut, and of very many several are one part.
     description : str
-        What is left out, in words.
+        Left-out units, in words.
     """
     n_folds = int(folds.max()) + 1
     if 2 * n_folds > _MOST_PARTS:

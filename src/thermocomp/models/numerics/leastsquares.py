@@ -1,4 +1,4 @@
-"""Least squares by QR, centred and scaled; and how many independent rows a residual stands for."""
+"""Least squares by QR, centred and scaled; and the number of independent rows equivalent to a residual."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -24,7 +24,7 @@ class Triangle:
     factor : ndarray of shape (min(n_rows, n_columns + 1), n_columns + 1)
         R of the QR factorisation; the last column is that of y.
     centre : ndarray of shape (n_columns + 1,)
-        What was subtracted from the columns: their means, or zeros without an intercept.
+        Offsets subtracted from the columns: their means, or zeros without an intercept.
     n_rows : int
     intercept : bool
     """
@@ -56,7 +56,7 @@ class Triangle:
 
     @property
     def noise(self) -> FloatArray:
-        """What rounding alone may leave of each column, shape (n_columns + 1,).
+        """Residual that rounding alone may cause in each column, shape (n_columns + 1,).
 
         64 units in the last place, and one more for each column. A column of which not more is left, given the columns
         before it, depends on them.
@@ -169,7 +169,7 @@ def solve(X: FloatArray, y: FloatArray, tri: Triangle, *, columns: Sequence[int]
     X : ndarray of shape (n_rows, n_columns)
     y : ndarray of shape (n_rows,)
     tri : Triangle
-        Of [X y].
+        Triangle of [X y].
     columns : sequence of int, optional
         Fit these only: ``Solution.coefficients`` and ``Solution.dependent`` go by their order.
 
@@ -214,7 +214,7 @@ def _independent(factor: FloatArray, norms: FloatArray, noise: FloatArray) -> ND
 
 
 def effective_sample_size(residual: FloatArray) -> float:
-    """Return how many independent rows the rows of a time series stand for (E-C12).
+    """Return the number of independent rows equivalent to the rows of a time series (E-C12).
 
     n / (1 + 2 sum of the autocorrelations), the sum taken over the lags before the first autocorrelation that is not
     positive; at least 1 and at most n. Where several tests follow one another, the seams between them are ignored.

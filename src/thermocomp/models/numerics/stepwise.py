@@ -152,7 +152,7 @@ class StepwiseStep:
         From 1.
     action : {'enter', 'remove'}
     index : int
-        Of the term among the candidates.
+        Index of the term among the candidates.
     term : str
         Its name.
     f : float
@@ -162,7 +162,7 @@ class StepwiseStep:
     alpha : float
         Significance that corresponds to `f` if the rows were independent, which those of a time series are not (E-C12).
     r_squared : float
-        Of the model after the step; uncentred if it has no intercept (E-C10).
+        R2 of the model after the step; uncentred if it has no intercept (E-C10).
     r_squared_step : float
         Change of `r_squared` (E-T3).
     """
@@ -185,7 +185,7 @@ class StepwiseStep:
 
 @dataclass(frozen=True)
 class StepwiseSelection:
-    """What stepwise regression found.
+    """Result of stepwise regression.
 
     Parameters
     ----------
@@ -222,10 +222,10 @@ def stepwise(
     Parameters
     ----------
     triangle : Triangle
-        Of the candidates and y.
+        Triangle of the candidates and y.
     rule : Rule
     names : sequence of str
-        Of the candidates.
+        Names of the candidates.
     needs : sequence of frozenset of int, optional
         Per candidate, the candidates that must be in the model for it to enter, and must stay while it is in (C-21).
     tolerance : float
@@ -330,7 +330,7 @@ class _Tableau:
         return None if np.isinf(loss) else (self.active[place], _ratio(loss, self.sse, self.df))
 
     def enter(self, index: int) -> None:
-        """Take a column into the model: a Householder reflection of the rows below the model."""
+        """Add a column to the model: a Householder reflection of the rows below the model."""
         rest = self._rows[len(self.active) :]
         v = rest[:, index].copy()
         length = math.copysign(math.sqrt(v @ v), v[0])
@@ -342,7 +342,7 @@ class _Tableau:
         self._changed([*self.active, index])
 
     def remove(self, index: int) -> None:
-        """Take a column out of the model: Givens rotations make the others triangular again."""
+        """Remove a column from the model: Givens rotations make the others triangular again."""
         place = self.active.index(index)
         active = [j for j in self.active if j != index]
         for row, column in enumerate(active[place:], start=place):

@@ -30,7 +30,7 @@ class LagStructure:
 
 @dataclass(frozen=True)
 class Moments:
-    """All that ridge regressions and their errors need to know of the rows.
+    """Moments of the rows for ridge regressions and their errors.
 
     Parameters
     ----------

@@ -50,7 +50,7 @@ class TickedRun:
 
 
 def check_steps(dt: ArrayLike | None, n_rows: int) -> FloatArray:
-    """Check time steps [s]; without any, every row is a test of its own.
+    """Check time steps [s]; without any, every row is a separate test.
 
     Raises
     ------

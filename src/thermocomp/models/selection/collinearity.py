@@ -1,4 +1,4 @@
-"""How far variables repeat each other, and what each has to do with the error (Hwang, section 3.2.3)."""
+"""Collinearity of variables, and the correlation of each with the error (Hwang, section 3.2.3)."""
 
 from dataclasses import dataclass
 
@@ -23,7 +23,7 @@ class Spectrum:
     Parameters
     ----------
     eigenvalues : tuple of float
-        Falling [degC^2]; 0 for what cannot be told from 0.
+        Decreasing [degC^2]; 0 for values indistinguishable from 0.
     """
 
     eigenvalues: tuple[float, ...]
@@ -69,7 +69,7 @@ def spectrum(X: FloatArray) -> Spectrum:
 
 
 def find_varying(X: FloatArray, size: FloatArray | None = None) -> BoolArray:
-    """Say which columns are not constant.
+    """Return a mask of the columns that are not constant.
 
     Parameters
     ----------

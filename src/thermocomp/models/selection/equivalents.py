@@ -21,7 +21,7 @@ _DECIMALS = 12  # differences of psi are compared to so many: the rest is roundi
 
 @dataclass(frozen=True, eq=False)
 class Equivalents:
-    """What the comparison of the sets found.
+    """Result of the comparison of sensor sets.
 
     Parameters
     ----------
@@ -32,11 +32,11 @@ class Equivalents:
     best : tuple of int
         Per displacement the set with the greatest sum, as index of `subsets`.
     p_values : ndarray of shape (n_displacements, n_subsets)
-        Of the Wilcoxon test against the best.
+        P-values of the Wilcoxon test against the best.
     equivalent : ndarray of bool of shape (n_displacements, n_subsets)
-        Not told from the best by the test.
+        Not distinguishable from the best by the test.
     notes : tuple of str
-        What the test cannot do with these data.
+        Limitations of the test with these data.
     """
 
     subsets: tuple[tuple[int, ...], ...]
@@ -101,7 +101,7 @@ def equivalents(
     subsets : sequence of sequence of int
         The sets of sensors, in the order of the rows of `psi`.
     level : float
-        Of significance; the paper gives none (E-W6).
+        Significance level; the paper gives none (E-W6).
     holm : bool
         True: Holm's step-down correction for the number of sets that are compared with the best. Fewer sets are
         rejected, so more remain.
@@ -197,7 +197,7 @@ def _below(ranks: NDArray[np.intp]) -> FloatArray:
 
 
 def _rejected(p: FloatArray, level: float, holm: bool) -> BoolArray:
-    """Say which hypotheses are rejected, with or without Holm's step-down rule."""
+    """Return a mask of the rejected hypotheses, with or without Holm's step-down rule."""
     if not holm:
         return np.asarray(p <= level)
     order = np.argsort(p, kind="stable")

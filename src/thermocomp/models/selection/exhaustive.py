@@ -67,7 +67,7 @@ def search_subsets(tri: Triangle, columns: Sequence[int], *, limit: int = LIMIT)
     Parameters
     ----------
     tri : Triangle
-        Of [X y].
+        Triangle of [X y].
     columns : sequence of int
         Candidates, in the order of preference.
     limit : int
@@ -105,12 +105,12 @@ def search_subsets(tri: Triangle, columns: Sequence[int], *, limit: int = LIMIT)
 def search_members(tri: Triangle, groups: Sequence[Sequence[int]], *, limit: int = LIMIT) -> Search:
     """Find the best combination of one member of each group (Hwang, section 2.4 and Fig. 2; H-06).
 
-    Of equally good combinations the first is taken.
+    Of equally good combinations the first is chosen.
 
     Parameters
     ----------
     tri : Triangle
-        Of [X y].
+        Triangle of [X y].
     groups : sequence of sequence of int
         Those that take part.
     limit : int

@@ -165,7 +165,7 @@ def representatives(tri: Triangle, groups: Groups) -> tuple[int, ...]:
     Parameters
     ----------
     tri : Triangle
-        Of [X y].
+        Triangle of [X y].
     groups : tuple of tuple of int
         Columns of X.
 
@@ -206,7 +206,7 @@ def uncentre(tri: Triangle) -> FloatArray:
 
 @dataclass(frozen=True)
 class Grouped:
-    """What Hwang's method chose.
+    """Result of Hwang's method.
 
     Parameters
     ----------
@@ -239,7 +239,7 @@ def choose(tri: Triangle, groups: Groups, *, limit: int = LIMIT) -> Grouped:
     Parameters
     ----------
     tri : Triangle
-        Of [X y].
+        Triangle of [X y].
     groups : tuple of tuple of int
         From `group`.
     limit : int
@@ -263,7 +263,7 @@ def choose(tri: Triangle, groups: Groups, *, limit: int = LIMIT) -> Grouped:
 
 @dataclass(frozen=True)
 class Swept:
-    """What an interval of thresholds leads to.
+    """Result for an interval of thresholds.
 
     Parameters
     ----------
@@ -271,9 +271,9 @@ class Swept:
     choice : Grouped or None
         None where nothing could be chosen.
     spectrum : Spectrum or None
-        Of the chosen variables.
+        Spectrum of the chosen variables.
     failure : str
-        Why nothing could be chosen, such as too much to search; empty if it could.
+        Reason why no set could be chosen, such as too much to search; empty if one was.
     """
 
     interval: Interval
@@ -288,9 +288,9 @@ def sweep(temperatures: FloatArray, tri: Triangle, *, absolute: bool = False, li
     Parameters
     ----------
     temperatures : ndarray of shape (n_rows, n_columns)
-        What is grouped; none of them constant.
+        Temperatures to group; none of them constant.
     tri : Triangle
-        Of [X y], X being what is regressed on: the temperatures, or their differences from a reference.
+        Triangle of [X y], X being the regressors: the temperatures, or their differences from a reference.
     absolute : bool
         As in `group`.
     limit : int

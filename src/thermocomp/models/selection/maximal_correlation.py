@@ -39,7 +39,7 @@ class MaximalCorrelations:
     Parameters
     ----------
     psi : ndarray of shape (n_displacements, n_subsets, n_tests)
-        Of models that were not reached before the work was stopped: nan.
+        Psi; nan for models that were not reached before the work was stopped.
     subsets : tuple of tuple of int
         Indices of the temperatures.
     tests : tuple of str
@@ -96,7 +96,7 @@ def maximal_correlations(
     half_window : int
         N: the boxcar holds 2N + 1 ranks.
     converged : bool
-        True: sweep until the functions stand still; False: with the paper's boxcar, until the error fails to decrease.
+        True: sweep until the functions converge; False: with the paper's boxcar, until the error fails to decrease.
     tolerance : float, optional
         Root mean square by which a sweep may still move the functions, summed over all; the error then falls by about
         its square a sweep. With 1e-3, taken if not given, Psi is mostly within 1e-4 of its limit. With the paper's

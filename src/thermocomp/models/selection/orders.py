@@ -26,7 +26,7 @@ class Order:
     Parameters
     ----------
     k, m : int
-        Past deviations, and past values of each input beside the present one.
+        Past deviations, and past values of each input in addition to the present one.
     n_parameters, n_rows : int
         d, the intercept included and inputs that depend on others left out, and N.
     sse : float
@@ -81,10 +81,10 @@ def compute_orders(
     Parameters
     ----------
     tri : Triangle
-        Of dz(t-1) .. dz(t-K), all inputs at t, all inputs at t-1, .. at t-M, and dz(t).
+        Triangle of dz(t-1) .. dz(t-K), all inputs at t, all inputs at t-1, .. at t-M, and dz(t).
     n_inputs : int
     ks, ms : sequence of int
-        Orders wanted; K and M are the greatest of them.
+        Orders requested; K and M are the greatest of them.
     largest_root : float
         An order is admissible if all roots are smaller.
 

@@ -22,7 +22,7 @@ class SensorSets:
     Parameters
     ----------
     sets : tuple of tuple of int
-        Of 1, 2, ... temperatures, each their places in ``PacedFeatures.temperatures``; the last holds all.
+        Sets of 1, 2, ... temperatures, as indices into ``PacedFeatures.temperatures``; the last holds all.
     error : ndarray of shape (n_sets, n_targets)
         Mean root mean square error on what was left out [unit of the target].
     loss : ndarray of shape (n_sets, n_targets)
@@ -39,20 +39,20 @@ class SensorSets:
 
 @dataclass(frozen=True, eq=False)
 class StandIns:
-    """What each temperature can be made up from; one that is kept, from the other kept ones, as if its sensor failed.
+    """Substitutes of temperatures; a kept one is predicted from the other kept ones, as if its sensor failed.
 
     Parameters
     ----------
     single : tuple of int
-        The one other temperature that makes up each best; itself where there is no other.
+        Best single substitute of each temperature; itself where there is no other.
     single_residual : ndarray of shape (n_temperatures,)
-        Root mean square of what is left of each then [degC]; inf where there is no other.
+        Root mean square of the residual of each with it [degC]; inf where there is no other.
     weights : ndarray of shape (n_temperatures, n_temperatures)
-        Column j makes temperature j from the kept ones.
+        Column j: weights of the kept temperatures in the substitute of temperature j.
     residual : ndarray of shape (n_temperatures,)
-        Root mean square of what is left of each then [degC].
+        Root mean square of the residual of each with it [degC].
     loss : ndarray of shape (n_temperatures, n_targets)
-        Of the answer with all temperatures, where that one alone is made up from the kept ones [unit of the target].
+        Loss of accuracy of the model with all temperatures if that one alone is substituted [unit of the target].
     """
 
     single: tuple[int, ...]
@@ -64,7 +64,7 @@ class StandIns:
 
 @dataclass(frozen=True, eq=False)
 class StandInAnswer:
-    """What a model with all temperatures makes of them and their lags.
+    """Output of a model with all temperatures, for them and their lags.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ class StandInAnswer:
         return _root((lost * (self.gram @ lost)).sum(axis=0))
 
     def stand_ins(self, kept: Sequence[int]) -> StandIns:
-        """Return what each temperature can be made up from, by one other and by those that are kept."""
+        """Return the substitutes of each temperature: by one other sensor, and by those that are kept."""
         gram, everything = self.temperatures, range(self.copies.shape[1])
         pairs = np.full(gram.shape, np.inf)  # what one leaves of another
         for k in everything:
@@ -116,7 +116,7 @@ class StandInAnswer:
 def reduce_sensors(
     features: PacedFeatures, moments: Moments, noise: float, most: int, *, structures: int, random_state: int = 0
 ) -> SensorSets:
-    """Take temperatures away, one after the other, the one each time that is missed least.
+    """Remove temperatures one after the other, each time the one with the smallest loss.
 
     Errors on what was left out alone are too few to choose by: the set that errs least there is the luckiest. So the
     model with all temperatures is asked as well. Each temperature left out is made up from those that stay (linear,
@@ -127,13 +127,13 @@ def reduce_sensors(
     ----------
     features : PacedFeatures
     moments : Moments
-        Of all targets.
+        Moments of all targets.
     noise : float
         Standard deviation of the temperatures in use [degC].
     most : int
-        Largest set, beside that of all.
+        Largest set, in addition to that of all.
     structures : int
-        Of the model with all temperatures.
+        Structures of the model with all temperatures.
     random_state : int
 
     Returns

@@ -1,4 +1,4 @@
-"""A run of the searches of `best_subsets`: threads, clock, and what is safe to say when it has ended."""
+"""A run of the searches of `best_subsets`: threads, clock, and the guarantees when it has ended."""
 
 import signal
 import threading
@@ -87,11 +87,11 @@ def run(
     problem : Problem
     route : {'dropping', 'adding'}
     sizes, n_best, jobs : int
-        Largest size, sets wanted of each, threads.
+        Largest size, sets requested of each, threads.
     nodes : int or None
-        Stop after about so many sets.
+        Stop after about this number of sets.
     seconds : float or None
-        Stop after about so long [s].
+        Time limit, approximate [s].
     progress : callable or None
         Called about once a second with a line of text.
 
@@ -141,7 +141,7 @@ def run(
 
 
 class _Watch:
-    """What stops a search, and who is told of it."""
+    """Stop conditions of a search, and its progress receiver."""
 
     def __init__(
         self, result: SearchResult, nodes: int | None, seconds: float | None, progress: Callable[[str], None] | None

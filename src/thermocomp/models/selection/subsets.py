@@ -49,11 +49,11 @@ class Subsets:
     ranked : tuple of tuple of Subset
         Per size from 1 on, the best first; empty if none was found before the search was stopped.
     n_columns : int
-        Of X.
+        Number of columns of X.
     left_out : tuple of int
         Columns that were not searched: constant ones, and copies of a column before (up to a factor and a shift).
     rank : int
-        Of the others; larger sets there are not.
+        Rank of the others; there are no larger sets.
     total : float
         Sum of squares of y, about its mean if there is an intercept.
     full_rss : float
@@ -61,13 +61,13 @@ class Subsets:
     n_rows : int
     intercept : bool
     route : {'dropping', 'adding'}
-        How it was searched.
+        Search method.
     nodes : int
         Sets looked at.
     possible : float
         Sets there are, of the sizes asked for.
     stopped : {'', 'nodes', 'seconds', 'interrupted'}
-        Why the search ended early.
+        Reason why the search ended early.
     """
 
     ranked: tuple[tuple[Subset, ...], ...]
@@ -139,13 +139,13 @@ def best_subsets(
     max_size : int, optional
         Up to this size only.
     n_best : int
-        So many sets of every size.
+        Number of sets of every size.
     jobs : int
         Threads.
     nodes : int, optional
-        Stop after about so many sets.
+        Stop after about this number of sets.
     seconds : float, optional
-        Stop after about so long [s].
+        Time limit, approximate [s].
     route : {'dropping', 'adding'}, optional
         Do not choose.
     progress : callable, optional

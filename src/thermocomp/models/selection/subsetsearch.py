@@ -21,7 +21,7 @@ _LANES = 8  # numbers in a register
 
 @dataclass(frozen=True)
 class Problem:
-    """What is searched.
+    """Search problem.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class Problem:
 
     @classmethod
     def of(cls, tri: Triangle, columns: Sequence[int]) -> "Problem":
-        """Take some columns of a triangle."""
+        """Select some columns of a triangle."""
         p = len(columns)
         which = [*columns, -1]
         norms, noise = tri.norms[which], tri.noise[which]
@@ -91,7 +91,7 @@ class Search(ABC):
     sizes : int
         Largest size searched.
     n_best : int
-        Sets wanted of each size.
+        Sets requested of each size.
     limit : ndarray of shape (p + 1,)
         Sum of squares from which on a set is of no interest, per size; shared by all threads and falling.
     bound : ndarray of shape (p + 1,)
@@ -118,7 +118,7 @@ class Search(ABC):
 
     @abstractmethod
     def start(self, first: int, last: int) -> None:
-        """Take the branches from the `first` to before the `last` of the root."""
+        """Add the branches from the `first` to before the `last` of the root."""
 
     @abstractmethod
     def go_on(self, budget: int) -> int:
@@ -134,7 +134,7 @@ class Search(ABC):
 
 
 class Swapping(Search):
-    """Good sets to begin with; it ends at once."""
+    """Good initial sets; it ends at once."""
 
     def __init__(self, problem: Problem, sizes: int, n_best: int, limit: FloatArray, bound: FloatArray) -> None:
         super().__init__(problem, sizes, n_best, limit, bound)
@@ -143,7 +143,7 @@ class Swapping(Search):
         list_good_sets(problem.triangle, problem.least, self.lists, self.inside, sizes)
 
     def start(self, first: int, last: int) -> None:
-        """Take nothing."""
+        """Start without branches."""
 
     def go_on(self, budget: int) -> int:  # noqa: ARG002
         """Do nothing."""
@@ -180,7 +180,7 @@ class Dropping(Search):
         self.tasks = p - 1
 
     def start(self, first: int, last: int) -> None:
-        """Take branches of the root."""
+        """Start with branches of the root."""
         self._orders[1, 0, : last - first] = range(first, last)
         self._numbers[2, 0] = last - first
 
@@ -225,7 +225,7 @@ class Adding(Search):
         self.tasks = p
 
     def start(self, first: int, last: int) -> None:
-        """Take branches of the root."""
+        """Start with branches of the root."""
         self._numbers[1:, 0] = first, last - 1
 
     def go_on(self, budget: int) -> int:

@@ -1,4 +1,4 @@
-"""`thermocomp revise`: an NC program is corrected by the drift it will cause, before it is run."""
+"""`thermocomp revise`: correct an NC program for the thermal drift it will cause, before it is run."""
 
 import math
 import sys
@@ -26,11 +26,11 @@ MANY = 1000
 
 
 _GROUPS = {
-    "The drift": Drifting,
-    "The state at the start: exactly one of cold, carried, measured": Starting,
-    "The revision": Way,
-    "The controller: what does not stand in the program": Controller,
-    "The time it takes": Timing,
+    "Drift: models and inputs": Drifting,
+    "Initial thermal state: exactly one of cold, carried, measured": Starting,
+    "Revision": Way,
+    "Controller: settings that are not in the program": Controller,
+    "Machining time": Timing,
 }
 for order, (title, group) in enumerate(_GROUPS.items(), start=1):
     Parameter(name="*", group=Group(title, sort_key=order))(group)
@@ -50,40 +50,41 @@ def revise(
     overwrite: bool = False,
     json: bool = False,
 ) -> int:
-    """Correct an NC program by the drift it will cause, before it is run.
+    """Correct an NC program for the thermal drift it will cause, before it is run.
 
-    The program is followed as the controller would, timed, and its spindle speed drives the models; what they say is
-    taken off its coordinates. What cannot be corrected safely is refused with line and reason. The original stays as it
-    is. Beside the new program are written: the differences (.diff), a table of all lines (.csv), a picture (.png), and
-    the state that the machine is left in (.job.json), from which the next job can start.
+    The program is interpreted and timed as by the controller, and its spindle speed drives the models; the predicted
+    drift is subtracted from its coordinates. A program that cannot be corrected safely is refused with line and reason.
+    The original program is not changed. Next to the new program are written: the differences (.diff), a table of all
+    lines (.csv), a figure (.png), and the thermal state of the machine at the end (.job.json), from which the next job
+    can start.
 
     Parameters
     ----------
     program : Path
         NC program (ISO 6983, as LinuxCNC and Fanuc controls read it).
     drifting : Drifting
-        What makes the tool drift.
+        Models and inputs of the thermal drift.
     output : Path
-        Program to write.
+        Output program.
     starting : Starting
-        How warm the machine is when the program starts.
+        Thermal state of the machine at the start of the program.
     way : Way
-        How the correction gets into the program.
+        Method of correction.
     controller : Controller
-        What stands at the controller and not in the program.
+        Settings of the controller that are not in the program.
     timing : Timing
-        How fast the machine is.
+        Dynamics and waiting times of the machine.
     date : str
-        For the header, such as 2026-01-31; today if not given.
+        Date for the header of the program, such as 2026-01-31. Default: today.
     overwrite : bool
-        Write over existing files; never over the program.
+        Overwrite existing files, but never the original program.
     json : bool
-        Print results for a machine instead of tables.
+        Print results as JSON instead of tables.
 
     Returns
     -------
     int
-        0 done, 1 nothing was corrected and nothing written, 2 the program or something else cannot be used.
+        0 done, 1 no correction was needed and nothing was written, 2 the program or another input is invalid.
     """
     job, notes = prepare_job(program, drifting, output, starting, way, controller, timing, date, overwrite=overwrite)
     loudness.tell(f"read {job.program}")
@@ -97,7 +98,7 @@ def revise(
 
 
 def _show(job: Job, done: Done, notes: Sequence[str]) -> None:
-    """Print what was done to a program, and how far the tool may still be off."""
+    """Print the changes to a program, and the residual error of the tool."""
     revision = job.revision
 
     def say(mark: str, text: str) -> None:

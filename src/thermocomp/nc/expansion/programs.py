@@ -123,7 +123,7 @@ class File:
         )
 
     def called(self, number: int, line: int, *, told: bool) -> tuple[Program, int]:
-        """Return the program that M98 P calls, and how often: the P of some controls says both.
+        """Return the program that M98 P calls, and the number of repeats: the P of some controls contains both.
 
         Parameters
         ----------

@@ -289,7 +289,7 @@ class _Unroller:
             self._go_back(frame)
 
     def _go_back(self, frame: _Frame) -> None:
-        """Take in that the program continues at a line before; refuse a pass that is the same as the one before."""
+        """Register that the program continues at an earlier line; refuse a pass that equals the previous one."""
         place, state = frame.place, (frame.variables.changes, list(frame.loops))
         self._passes[place] = self._passes.get(place, (0, 0))[0] + 1, self._steps
         if frame.seen.get(place) == state:

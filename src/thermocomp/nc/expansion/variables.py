@@ -42,7 +42,7 @@ class Variables:
         return Variables({**self._common(), **arguments}, macro=True)
 
     def returned(self, inner: "Variables") -> None:
-        """Take over the common variables of a macro that has ended."""
+        """Adopt the common variables of a macro that has ended."""
         own: dict[Key, float] = {key: self._parameters[key] for key in _LOCAL if key in self._parameters}
         common = inner._common()
         self.changes += common != self._common()
@@ -134,9 +134,9 @@ def arguments(
     ----------
     line : Line
     variables : Variables
-        Of the level that calls.
+        Variables of the calling level.
     integers : {'whole', 'least', 'refuse'}
-        What a length without a decimal point is.
+        Meaning of a length without a decimal point.
     least : float
         In the unit in force.
 

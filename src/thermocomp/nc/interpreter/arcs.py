@@ -21,7 +21,7 @@ Flat = tuple[float, float]
 
 
 class ArcError(Exception):
-    """The arc cannot be; the text says why."""
+    """The arc is impossible; the text contains the reason."""
 
 
 def check_centre(start: Flat, end: Flat, centre: Flat, inch: bool) -> None:

@@ -1,4 +1,4 @@
-"""What a line of an NC program makes the machine do: the state it runs in, and its moves."""
+"""Effect of a line of an NC program on the machine: the state in which it runs, and its moves."""
 
 from dataclasses import dataclass, field
 from typing import Final, Literal, NamedTuple
@@ -40,7 +40,7 @@ class Modal:
     system_told : bool
         The program has said which; else it is taken for G54.
     rotation : float
-        Of the program's coordinates about Z, stored or by G68 [deg].
+        Rotation of the program coordinates about Z, stored or by G68 [deg].
     rotation_told : bool
         Program or setup say it; else one that is stored in the controller may be in force.
     origin_told : bool
@@ -87,7 +87,7 @@ PLANES: Final = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
 
 
 class Arc(NamedTuple):
-    """How a move turns."""
+    """Direction and turns of an arc."""
 
     plane: int  #: 17, 18, 19
     centre: tuple[float, float]  #: in the plane's own axes (17: X Y, 18: Z X, 19: Y Z), machine coordinates [mm]
@@ -108,7 +108,7 @@ class Move:
     feed : float
         Along the path [mm/min], 0 for rapids and inverse time; degrees per minute if only rotary axes move.
     seconds : float or None
-        How long it takes, where the program says so (G93) or the spindle does (G95, G33, taps).
+        Duration, where the program gives it (G93) or the spindle does (G95, G33, taps).
     rotary : float
         Way of the rotary axes [deg].
     """
@@ -124,7 +124,7 @@ class Move:
 
 @dataclass(slots=True)
 class Block:
-    """What one line does.
+    """Effect of one line.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ class Block:
     values : dict of str to float
         Their values, expressions evaluated, in the program's units.
     start, end : tuple of float
-        Where the tool is before and after it, in the coordinates an absolute word would have at that time [mm].
+        Position of the tool before and after it, in the coordinates an absolute word would have at that time [mm].
     known : tuple of bool
         Per axis: `end` is certain, and was reached in work coordinates: an absolute word of that axis with the value of
         `end` would not move it. False at the start of the program, after G53, G28, G30, M6 and stops, after a
@@ -186,12 +186,12 @@ class Block:
 
 @dataclass(frozen=True)
 class Setup:
-    """What stands at the controller and not in the program.
+    """Settings of the controller that are not in the program.
 
     Parameters
     ----------
     controller : {'linuxcnc', 'fanuc'}
-        Whose habits the program has.
+        Controller whose NC dialect the program uses.
     inch : bool or None
         Unit in force when the program starts; None: unknown, and the program has to say it before the first length.
     startup : str
@@ -204,13 +204,13 @@ class Setup:
     tools : dict of int to float
         Lengths of the tools [mm]; the same holds for them.
     home : tuple of float or None
-        Where G28 goes, in machine coordinates [mm]; None: not stated.
+        Position approached by G28, in machine coordinates [mm]; None: not given.
     rotations : dict of int to float
         Rotations of work coordinate systems about Z that are stored in the controller [deg], as far as they are stated.
     no_shift : bool
         It is stated that no G92 or G52 is in force when the program starts.
     rotary : dict of str to {'head', 'table'}
-        What the rotary axes A, B, C turn, as far as it is stated: the spindle or the workpiece.
+        Part that the rotary axes A, B, C turn, as far as given: the spindle or the workpiece.
     integers : {'whole', 'least', 'refuse'}
         What a length without a decimal point is: whole millimetres or inches, the least increment, or a reason to
         refuse.

@@ -23,7 +23,7 @@ FREE: Final = frozenset("XYZABCFST")
 
 
 class Code(NamedTuple):
-    """One code; two codes of one group cannot stand on one line."""
+    """One code; a line can have only one code of each group."""
 
     name: str  #: such as ``G38.2``
     group: str

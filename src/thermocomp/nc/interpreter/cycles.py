@@ -15,7 +15,7 @@ MOST: Final = 100_000
 
 
 class CycleError(Exception):
-    """The cycle cannot be; the text says why."""
+    """The cycle is impossible; the text contains the reason."""
 
 
 class CycleMove(NamedTuple):
@@ -56,13 +56,13 @@ class CannedCycle:
         G99: back to R only.
     inch : bool
     start : tuple of float
-        Where the tool is, as program coordinates in program units; so is all the rest.
+        Position of the tool, in program coordinates and units, like all other values.
     named : dict of str to float
         Axis words of the line.
     sticky : dict of str to float
         R, Q, P, I, J, K and the depth (by its axis) in force, those of the line included.
     level : float
-        Where the tool was across the plane when the cycle began, which G98 goes back to.
+        Position of the tool across the plane at the start of the cycle, to which G98 returns.
     repeats : int
     direct : bool
         From R to the next hole it goes at R, also in G98 (Fanuc).

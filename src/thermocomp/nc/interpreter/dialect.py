@@ -77,18 +77,18 @@ class Place(NamedTuple):
 
 @dataclass
 class Judgement:
-    """What a program shows.
+    """Signs of the dialect in a program.
 
     Parameters
     ----------
     linuxcnc, fanuc : Place or None
         The first sign of each.
     hint : Place or None
-        Of LinuxCNC.
+        Hint of LinuxCNC.
     open : dict of str to Place
         The first word of each kind that is read in two ways: its readings, and what to write instead.
     count : dict of str to int
-        How many lines have one.
+        Number of lines with one.
     fault : Place or None
         The first such word on a line that neither can read, and why: a slip of the pen has made it.
     """
@@ -102,7 +102,7 @@ class Judgement:
 
 
 def check_dialect(lines: Iterable[str], *, whole: bool = False, startup: str = "") -> None:
-    """Raise an error if a program of which nobody has said whose it is need not be LinuxCNC's.
+    """Raise an error if the dialect of a program is not specified, and it need not be LinuxCNC's.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def check_dialect(lines: Iterable[str], *, whole: bool = False, startup: str = "
 
 
 def judge_dialect(lines: Iterable[str], *, whole: bool = False, startup: str = "") -> Judgement:
-    """Return what a whole program shows of its dialect; see `check_dialect`."""
+    """Return the signs of the dialect in a whole program; see `check_dialect`."""
     scan = _Scan(InForce(whole))
     words = _WORD.findall(_squeeze(startup.upper()))
     scan.force.take(
@@ -201,7 +201,7 @@ class _Scan:
         return True
 
     def take(self, number: int, text: str) -> None:
-        """Take a line in."""
+        """Process a line."""
         self._line, self._whole, self._text = number, text, text.strip()[:40]
         for mark in _MARKS:
             text = text.removeprefix(mark)
@@ -237,7 +237,7 @@ class _Scan:
         self.found.count[kind] = self.found.count.get(kind, 0) + 1
 
     def _fault(self) -> str:
-        """Return why neither reads the line; empty if one does."""
+        """Return the reason why neither control can read the line; empty if one can."""
         fault = read_line(self._whole, self._line).error
         return fault if fault and read_line(self._whole, self._line, "fanuc").error else ""
 

@@ -1,4 +1,4 @@
-"""What a Fanuc does in its own way: G80 with words, G0 beside G28, G68, and what its makers leave open in cycles."""
+"""Special behaviour of a Fanuc: G80 with words, G0 next to G28, G68, and manufacturer-specific parts of cycles."""
 
 from typing import Final
 
@@ -17,7 +17,7 @@ _SAME: Final = 1e-6
 
 
 def motion_beside_g80(state: InterpreterState, words: BlockWords) -> str:
-    """Return the motion that the axis words beside a lone G80 make: that in force before the cycle.
+    """Return the motion of the axis words on a line with G80 only: that in force before the cycle.
 
     Raises
     ------
@@ -32,7 +32,7 @@ def motion_beside_g80(state: InterpreterState, words: BlockWords) -> str:
 
 
 def put_in_force(state: InterpreterState, motion: str) -> None:
-    """Put a motion code in force that stands beside a code which takes the axis words, such as ``G0 G91 G28 Z0.``."""
+    """Put a motion code in force next to a code that uses the axis words, such as ``G0 G91 G28 Z0.``."""
     state.moves_by(motion)
     state.level, state.sticky = None, {}
 
@@ -198,7 +198,7 @@ def drills(state: InterpreterState, words: BlockWords) -> bool:
 
 
 def _check_level(state: InterpreterState, words: BlockWords) -> None:
-    """Refuse a cycle whose R is above the level where it begins: when the tool goes up to it depends on the control."""
+    """Refuse a cycle whose R is above its initial level: when the tool moves up to it depends on the control."""
     plane, level = state.sticky["R"] * state.scale, state.level or 0.0
     above = plane - level if state.modal.absolute else plane
     sure = state.level_known or not state.modal.absolute

@@ -1,4 +1,4 @@
-"""What is in force in a program, and the words of a line, as far as it counts for whose program it is."""
+"""Codes in force in a program, and the words of a line, as far as they determine its dialect."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -47,7 +47,7 @@ class LineWords:
 
 @dataclass
 class InForce:
-    """What is in force in a program, as far as it counts here.
+    """Codes in force in a program, as far as they determine its dialect.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class InForce:
     across : bool
         Holes are drilled in another plane than XY (G18, G19).
     kept : bool or None
-        What `absolute` was when the cycle's words were written; None if they are not.
+        State of `absolute` when the cycle's words were written; None if they are not.
     unit : str
         With a blank before it; empty if it is not known.
     per_turn : bool
@@ -105,7 +105,7 @@ class InForce:
         return not self.whole and (self.per_turn or self.unit == " in")
 
     def take(self, line: LineWords) -> None:
-        """Take the codes of a line in."""
+        """Process the codes of a line."""
         codes = set(line.g)
         before = self.motion
         for code in (*MOTIONS, 80.0):

@@ -32,7 +32,7 @@ def follow_program(lines: Iterable[Line], setup: Setup) -> Iterator[Block]:
     ----------
     lines : iterable of Line
     setup : Setup
-        What stands at the controller and not in the program.
+        Settings of the controller that are not in the program.
 
     Yields
     ------
@@ -236,7 +236,7 @@ class Follower:
             state.moves_by(before)
 
     def _motion(self, words: BlockWords) -> str:
-        """Return the motion code that this line runs; empty if it makes no move of its own."""
+        """Return the motion code that this line runs; empty if it makes no move."""
         groups, values = words.groups, words.values
         told = groups.get("motion")
         once = groups.get("once")
@@ -270,7 +270,7 @@ class Follower:
         return fanuc.motion_beside_g80(self.state, words)
 
     def _beside(self, words: BlockWords, told: str | None, other: str) -> None:
-        """Take in a motion code beside another one that takes the axis words."""
+        """Process a motion code next to another one that uses the axis words."""
         if told in ("G0", "G1") and self.state.fanuc and other in ("G28", "G30", "G68"):
             fanuc.put_in_force(self.state, told)
         elif told not in (None, "G80"):

@@ -63,7 +63,7 @@ def in_machine(state: InterpreterState, words: BlockWords, block: Block) -> None
 
 
 def _doubt(state: InterpreterState, axes: dict[int, float]) -> Known:
-    """Return what is still known after machine coordinates of some axes were reached."""
+    """Return which coordinates are still known after some axes moved to machine coordinates."""
     known = mark_axes(state.known, axes, to=False)
     turned = state.offsets.rotation and (0 in axes or 1 in axes)
     return (False, False, known[2]) if turned else known
@@ -164,7 +164,7 @@ def in_step(state: InterpreterState, words: BlockWords, block: Block) -> None:
 
 
 def probe(state: InterpreterState, words: BlockWords, block: Block) -> None:
-    """G38 and G31: nobody knows where it stops; the goal is taken for the end."""
+    """G38 and G31: the end of the move is unknown; the target is used as the end."""
     code = state.modal.motion
     if state.modal.cutter:
         raise words.error(f"{code} {_NOT_COMPENSATED}")
@@ -182,7 +182,7 @@ def probe(state: InterpreterState, words: BlockWords, block: Block) -> None:
 
 
 def curve(state: InterpreterState, words: BlockWords, block: Block) -> None:
-    """G5 and G5.1; the move is told as the straight line from start to end."""
+    """G5 and G5.1; the move is recorded as the straight line from start to end."""
     code, values = state.modal.motion, words.values
     if code not in ("G5", "G5.1"):  # whoever adds a code to the table has to say what it does
         raise words.error(f"{code} is known, and nothing does it")

@@ -87,13 +87,13 @@ class Offsets:
 
     @property
     def certain(self) -> Known:
-        """Per axis, whether program coordinates tell machine coordinates."""
+        """Per axis, whether machine coordinates are known from program coordinates."""
         origin = self._certain_origins.get(self.system, _NEVER) if self.named else _NEVER
         return combine_known(origin, combine_known(self._certain_shift, self.certain_tool))
 
     @property
     def origin_told(self) -> bool:
-        """Whether program or setup say where the system in force begins."""
+        """Whether program or setup define the origin of the system in force."""
         return self.system in self._told_origins
 
     @property
@@ -103,7 +103,7 @@ class Offsets:
         return self.system in self.rotations and (self.named or alike)
 
     def state(self) -> tuple[object, ...]:
-        """Return all that tells whether something has changed."""
+        """Return all values that show whether something has changed."""
         return (self._turn, self.system, dict(self.origins), dict(self.rotations), self.shift, self._kept, self.tool)
 
     def machine(self, place: Point) -> Point:

@@ -159,7 +159,7 @@ def _open_radius(side: str, number: str | None) -> Iterator[OpenWord]:
 
 
 def _open_machine(line: LineWords) -> Iterator[OpenWord]:
-    """Yield the M codes that do something of their own on a Fanuc's machine."""
+    """Yield the M codes with machine-specific functions on a Fanuc's machine."""
     for number in line.m:
         if number in _MAKERS_M:
             what = (

@@ -1,4 +1,4 @@
-"""Codes that are in force when a program starts, that it need not say, and that no program's end puts back."""
+"""Codes in force when a program starts, which it need not contain, and which no program end resets."""
 
 from typing import Final
 
@@ -12,7 +12,7 @@ _RETRACTS: Final = {98.0: "G98", 99.0: "G99"}
 
 
 def tidy(text: str, controller: Controller) -> str:
-    """Return startup codes as they stand in a `Setup`, such as ``G64 P0.01 G98``.
+    """Return startup codes as in a `Setup`, such as ``G64 P0.01 G98``.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What a controller knows while it runs a program."""
+"""State of a controller while it runs a program."""
 
 import math
 from dataclasses import replace
@@ -16,7 +16,7 @@ _TRUE: Known = (True, True, True)
 
 
 class InterpreterState:
-    """Where the tool is, and everything that words and codes have set.
+    """Position of the tool, and everything set by words and codes.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class InterpreterState:
         return self.turning * (self.spindle or 0.0)
 
     def changed(self, **fields: object) -> None:
-        """Take over new modal fields."""
+        """Adopt new modal fields."""
         modal = replace(self.modal, **fields)  # type: ignore[arg-type]
         if modal != self.modal:
             self.modal = modal
@@ -85,7 +85,7 @@ class InterpreterState:
         self.modal = known
 
     def placed(self) -> None:
-        """Take over what is known of the coordinates in force."""
+        """Adopt the known values of the coordinates in force."""
         offsets = self.offsets
         self.changed(
             system=offsets.system,
@@ -105,7 +105,7 @@ class InterpreterState:
         return found
 
     def goal(self, words: BlockWords) -> tuple[Point, Known]:
-        """Return where the axis words lead to in program coordinates [mm], and what is known of it."""
+        """Return the target of the axis words in program coordinates [mm], and which of it is known."""
         values, scale, modal = words.values, self.scale, self.modal
         x, y, z = self.place
         if modal.absolute:
@@ -151,7 +151,7 @@ class InterpreterState:
         self.machine = self.offsets.machine(place)
 
     def renamed(self, still: Known) -> None:
-        """Be where the tool was, under new offsets; coordinates stay known where `still` says so."""
+        """Keep the tool position under new offsets; coordinates stay known as given by `still`."""
         self.place = self.offsets.program(self.machine)
         a, b, c = self.known
         self.known = (a and still[0], b and still[1], c and still[2])

@@ -1,4 +1,4 @@
-"""What a line words: its codes by modal group, and the values of its words, checked as far as they stand alone."""
+"""Words of a line: its codes by modal group, and the values of its words, checked individually."""
 
 from dataclasses import dataclass
 
@@ -114,7 +114,7 @@ class Reader:
                 raise words.error(self._unused(words, letter))
 
     def _unused(self, words: BlockWords, letter: str) -> str:
-        """Say that no code of a line uses a letter, and which control has one that does."""
+        """Return the message that no code of a line uses a letter, and the control that has such a code."""
         owner = ""
         if letter == "P":
             codes = iter(words.codes)

@@ -37,7 +37,7 @@ MOST_IDLE = 20.0
 
 
 def load_sibling(name: str) -> Any:
-    """Return the module of a file beside this one; its folder is not one that modules are looked for in."""
+    """Return the module of a file next to this one; its folder is not on the module path."""
     spec = spec_from_file_location(name, __file__.replace("_rs274_child", name))
     assert spec is not None
     assert spec.loader is not None
@@ -87,7 +87,7 @@ class Canon:
         self.last = 0.0  # processor time when a call was last seen [s]
 
     def begin(self, job: dict[str, Any]) -> None:
-        """Take what the program is run in."""
+        """Set the context in which the program is run."""
         self.parameter_file = job["parameters"]
         self.delete = bool(job["block_delete"])
         self.tools: list[tuple[int, float, float]] = job["tools"]  # number, length, diameter
@@ -197,7 +197,7 @@ class Canon:
         self.extra(kind, re.sub("[^ -~]", "?", text))
 
     def extra(self, kind: str, what: Any) -> None:
-        """Tell what is no row of numbers."""
+        """Record data other than a row of numbers."""
         self.more.append(what)
         self.record(kind, len(self.more) - 1)
 
@@ -223,7 +223,7 @@ class Canon:
         return [values[0] * c - values[1] * s, values[0] * s + values[1] * c, *values[2:]]
 
     def shifted(self, name: str, values: tuple[float, ...]) -> None:
-        """Take an offset; the machine stays."""
+        """Apply an offset; the machine stays."""
         sums = [o + t for o, t in zip(self.offset["g5x"], self.offset["length"], strict=True)]
         machine = self.turned(tuple(p + g for p, g in zip(self.place, self.offset["g92"], strict=True)), self.angle)
         machine = [m + f for m, f in zip(machine, sums, strict=True)]
@@ -305,7 +305,7 @@ class Canon:
         self.tell("naive", self.length(tolerance))
 
     def curved(self, line: int, vector: int, order: int) -> None:
-        """Tell a spline; the argument is a std::vector of (x, y, weight)."""
+        """Record a spline; the argument is a std::vector of (x, y, weight)."""
         first, last = (ctypes.c_size_t.from_address(vector + 8 * i).value for i in (0, 1))
         numbers = (D * ((last - first) // 8)).from_address(first)
         points = [n if i % 3 == 2 else self.length(n) for i, n in enumerate(numbers)]

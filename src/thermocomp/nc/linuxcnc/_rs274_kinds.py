@@ -1,4 +1,4 @@
-"""The canonical calls that `_rs274_child.py` tells, and how they stand in its blocks: standard library only."""
+"""Canonical calls reported by `_rs274_child.py`, and their layout in its blocks: standard library only."""
 
 import ctypes
 import struct

@@ -1,4 +1,4 @@
-"""What LinuxCNC's interpreter reads: no file outside the folders of the job, and nothing without end.
+"""Limits on the input of LinuxCNC's interpreter: no file outside the folders of the job, and no endless loop.
 
 Part of the script `_rs274_child.py`: standard library only.
 """
@@ -28,7 +28,7 @@ LOOP = re.compile(r"(?i)^[\s/N0-9.]*O.*[\]>0-9\s](WHILE|DO|REPEAT)\b")
 
 
 class RefusedError(Exception):
-    """The program wants something that is not done for it: the line, and the reason."""
+    """The program needs something that is not permitted: the line, and the reason."""
 
 
 class ProgramReading:
@@ -40,9 +40,9 @@ class ProgramReading:
     home : str
         Folder of the runs: all in it may be read and written.
     folders : iterable of str
-        Of the program and of its subprograms: what is in them may be read.
+        Folders of the program and of its subprograms: files in them may be read.
     lines : int
-        Of the program.
+        Number of lines of the program.
     where : callable
         Gives the line in execution, and whether it is one of the program itself.
     """
@@ -81,7 +81,7 @@ class ProgramReading:
         )
 
     def count_line(self) -> None:
-        """Take in that a line is read; refuse a program whose loop does not end."""
+        """Count a line that is read; refuse a program whose loop does not end."""
         self.lines += 1
         if not self.lines % LOOK:
             self.look_at_time()
@@ -109,7 +109,7 @@ class ProgramReading:
         self.late = now - self.since > MOST_SECONDS
 
     def count_call(self, *, moved: bool) -> str | None:
-        """Take in that a line does something, and whether an axis moves; return why it does too much."""
+        """Count an action of a line, and whether an axis moves; return the reason if there are too many."""
         if moved:
             self.moved = self.lines
         if self.acted != self.lines:
@@ -122,7 +122,7 @@ class ProgramReading:
         return None
 
     def find_loop(self) -> int:
-        """Return the line at which the loop begins that the watched lines are in: the outermost one."""
+        """Return the first line of the loop that contains the watched lines: the outermost one."""
         # a line that was read last; the next one is about to be
         passes = Counter(line + 1 for line, own in self.watched if own)
         if not passes:

@@ -1,4 +1,4 @@
-"""What a LinuxCNC configuration says of its axes, and what its HAL files already use."""
+"""Axes in a LinuxCNC configuration, and the names already used in its HAL files."""
 
 import math
 import re
@@ -14,7 +14,7 @@ _ARROWS = ("=>", "<=", "<=>")
 
 @dataclass(frozen=True)
 class Ini:
-    """An INI file of LinuxCNC, whose keys may stand there several times.
+    """An INI file of LinuxCNC, whose keys may occur several times.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ class Ini:
 
 @dataclass
 class HalFiles:
-    """What HAL files use, as far as it can be seen: no Tcl, no conditions.
+    """Names used in HAL files, as far as they can be determined: no Tcl, no conditions.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class HalFiles:
     functions : list of str
         In the order in which the servo thread calls them.
     unread : list of str
-        What cannot be seen through.
+        Files that cannot be analysed.
     read : set of Path
         Files that were read.
     """
@@ -156,7 +156,7 @@ def read_hal(ini: Ini, leave: str) -> HalFiles:
 
 
 def _find(ini: Ini, name: str) -> Path:
-    """Return the path of a HAL file: beside the INI, or one that comes with LinuxCNC."""
+    """Return the path of a HAL file: next to the INI, or one included in LinuxCNC."""
     first = (name.split() or [""])[0]
     path = ini.path.parent / Path(first.removeprefix("LIB:")).expanduser()
     return LIBRARY / path.name if first.startswith("LIB:") or not path.exists() else path

@@ -1,4 +1,4 @@
-"""The canonical calls of an NC program, as LinuxCNC's own interpreter tells them.
+"""Canonical calls of an NC program, as reported by LinuxCNC's interpreter.
 
 It is what judges every program that is written here, and what takes loops and parameters apart (see `expand`). It comes
 with Debian's package linuxcnc-uspace and needs neither a machine nor a display.
@@ -34,7 +34,7 @@ ORIGIN: Place = (0.0,) * 9
 
 
 class ArcPath(NamedTuple):
-    """How an arc turns; the third coordinate of its centre is that of the arc's end."""
+    """Geometry of an arc; the third coordinate of its centre is that of the arc's end."""
 
     plane: int  #: 17, 18, 19
     centre: tuple[float, float, float]  #: program coordinates [mm]
@@ -66,14 +66,14 @@ class Canonical(NamedTuple):
 
 
 class ProgramFrame:
-    """What stands between program and machine coordinates.
+    """Transformation between program and machine coordinates.
 
     Attributes
     ----------
     system : int
         Work coordinate system in force, 1 to 9.
     origin, shift, length : tuple of float
-        Of the system, of G92, of the tool, X to W [mm, deg].
+        Offsets of the system, of G92, of the tool, X to W [mm, deg].
     rotation : float
         About Z [deg].
     """
@@ -138,7 +138,7 @@ def _nine(values: Iterator[float] | Sequence[float]) -> Place:
 
 @cache
 def find_obstacle() -> str | None:
-    """Return why the interpreter cannot be used here; None if it can."""
+    """Return the reason why the interpreter cannot be used here; None if it can."""
     advice = f"LinuxCNC's interpreter is needed: install the Debian package {PACKAGE} (apt-get install {PACKAGE})"
     python = rs274process.PYTHON
     if not python.exists():
@@ -177,7 +177,7 @@ def read(
     ----------
     path : Path
     stored : Stored, optional
-        What is stored in the controller; nothing if not given.
+        Values stored in the controller. Default: none.
     inch : bool
         The controller stands in G20 when the program starts.
     block_delete : bool
@@ -185,7 +185,7 @@ def read(
     subroutines : sequence of Path
         Folders of subprograms, at most 8; the program's own folder comes first anyway.
     task : bool
-        What ``#<_task>`` tells: that the program is run, not previewed.
+        Value of ``#<_task>``: the program is run, not previewed.
     seconds : int
         Processor time the interpreter may take [s]: a program can have an endless loop.
     left : dict, optional

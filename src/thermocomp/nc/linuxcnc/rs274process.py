@@ -64,7 +64,7 @@ class InterpreterJob:
     subroutines : sequence of Path
         Folders of subprograms, at most 8; the program's own folder comes first anyway.
     task : bool
-        What ``#<_task>`` tells: that the program is run, not previewed.
+        Value of ``#<_task>``: the program is run, not previewed.
     seconds : int
         Processor time the interpreter may take [s].
     """
@@ -89,7 +89,7 @@ class InterpreterRun:
     Attributes
     ----------
     codes : dict of str to int
-        Of the kinds of calls.
+        Codes of the kinds of calls.
     """
 
     def __init__(self, *jobs: InterpreterJob) -> None:
@@ -130,7 +130,7 @@ class InterpreterRun:
         self._home.close()
 
     def blocks(self) -> Iterator[CallBlock]:
-        """Yield what the interpreter tells of the next job; the last record is ``done``.
+        """Yield the records of the interpreter for the next job; the last record is ``done``.
 
         Raises
         ------

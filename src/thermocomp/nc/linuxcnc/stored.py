@@ -1,4 +1,4 @@
-"""What is stored in a controller and not in the program; and controllers that have nothing in common."""
+"""Values stored in a controller and not in the program; and controllers that have nothing in common."""
 
 import random
 from collections.abc import Mapping, Sequence
@@ -12,24 +12,24 @@ SYSTEMS = range(1, 10)
 
 @dataclass(frozen=True)
 class Stored:
-    """What is stored in the controller and not in the program.
+    """Values stored in the controller and not in the program.
 
     Parameters
     ----------
     origins : dict of int to sequence of float
-        Of the work coordinate systems, 1 (G54) to 9 (G59.3), X to W [mm, deg]; the others are 0.
+        Origins of the work coordinate systems, 1 (G54) to 9 (G59.3), X to W [mm, deg]; the others are 0.
     rotations : dict of int to float
-        Of the work coordinate systems about Z [deg].
+        Rotations of the work coordinate systems about Z [deg].
     shift : sequence of float
         G92 offset in force, X to W [mm, deg].
     lengths, diameters : dict of int to float
-        Of the tools [mm]; all tools up to 1000 are there, those that are not named with 0.
+        Dimensions of the tools [mm]; all tools up to 1000 are included, those not listed with 0.
     active_length : float
         Tool length offset in force at the start [mm].
     spindle : int
         Number of the tool in the spindle at the start; 0: none.
     home28, home30 : sequence of float
-        Where G28 and G30 go, X to W [mm, deg].
+        Positions approached by G28 and G30, X to W [mm, deg].
     startup : str
         Codes in force at the start that no program's end puts back, such as ``G64 P0.01 G98`` (mm).
     start : sequence of float or None

@@ -158,14 +158,14 @@ _REFUSED_BY_FANUC = {
 
 
 class Parameters:
-    """What parameters are known to be, local and global ones in one table.
+    """Known values of parameters, local and global ones in one table.
 
     Parameters
     ----------
     controller : {'linuxcnc', 'fanuc'}
-        Whose rules expressions follow.
+        Controller whose rules apply to expressions.
     values : mapping of int or str to float, optional
-        What is known before the program starts; names without ``#<`` and ``>``.
+        Values known before the program starts; names without ``#<`` and ``>``.
     """
 
     def __init__(
@@ -179,7 +179,7 @@ class Parameters:
         return _key(key) in self._values
 
     def __getitem__(self, key: Key) -> float:
-        """Return the value; InputError tells why it is unknown."""
+        """Return the value; InputError contains the reason if it is unknown."""
         key = _key(key)
         if key in self._values:
             return self._values[key]
@@ -259,7 +259,7 @@ def evaluate(text: str, parameters: Parameters, *, word: bool = True) -> float:
 def _read_simple(
     text: str, controller: Literal["linuxcnc", "fanuc"]
 ) -> tuple[float | int, Binary | None, float | int] | None:
-    """Return what a simple expression does to what: numbers, or the numbers (int) of parameters; None: it is none."""
+    """Return operands and operator of a simple expression: numbers, or parameter numbers (int); None for others."""
     found = _SIMPLE.fullmatch(_BLANKS.sub("", text).lower())
     if found is None or bool(found[1]) != bool(found[7]) or not (found[1] or controller == "fanuc" or not found[4]):
         return None
@@ -300,7 +300,7 @@ class _Reader:
             raise self.error("the end of the value")
 
     def expression(self) -> float:
-        """Read values and operators: of two operators beside each other the one that binds tighter goes first."""
+        """Read values and operators: of two adjacent operators the one of higher precedence goes first."""
         values = [self.value()]
         waiting: list[tuple[int, Binary]] = []
         while True:
@@ -349,7 +349,7 @@ class _Reader:
         raise self.error("a number, a parameter, a function or '['")
 
     def parameter(self) -> Key:
-        """Read what stands behind ``#``."""
+        """Read the key after ``#``."""
         marks = 0
         while self.takes("#"):
             marks += 1

@@ -48,7 +48,7 @@ class Line:
     label : str
         Line number, such as ``120``; empty without one.
     error : str
-        What cannot be understood, and where; empty if all of it can be.
+        Part that cannot be understood, and its position; empty if all of it can be.
     """
 
     number: int

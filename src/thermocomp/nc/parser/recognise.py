@@ -1,4 +1,4 @@
-"""Tell from the first lines of a file which control it is for, and refuse by name what is not ISO 6983."""
+"""Recognition of the control from the first lines of a file; formats other than ISO 6983 are refused by name."""
 
 import re
 from collections.abc import Sequence

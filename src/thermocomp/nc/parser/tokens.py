@@ -1,4 +1,4 @@
-"""Take lines of ISO 6983 programs apart, and lose nothing (habits of LinuxCNC and of Fanuc).
+"""Tokeniser of ISO 6983 programs, without loss of text (syntax of LinuxCNC and of Fanuc).
 
 Both controls ignore blanks, tabs and case outside comments: ``g 0 x - 1 . 5`` is ``G0X-1.5``. Ordinary lines (words,
 comments, line number, block delete) are read by one regular expression as they stand; all other lines are squeezed
@@ -111,7 +111,7 @@ def read_lines(texts: Iterable[str], controller: Controller = "linuxcnc") -> Ite
 
 
 def read_line(text: str, number: int, controller: Controller = "linuxcnc") -> Line:
-    """Take a line apart. Never raises: what cannot be understood is told in ``Line.error``, with its column.
+    """Tokenise a line. Never raises: errors are given in ``Line.error``, with the column.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ def read_line(text: str, number: int, controller: Controller = "linuxcnc") -> Li
 
 
 def _few_words(found: re.Match[str]) -> list[Word] | None:
-    """Return the words of a line that has no others; None if a letter stands there twice."""
+    """Return the words of a simple line; None if a letter occurs twice."""
     groups, spans = found.groups(), found.regs
     last = found.lastindex or 0
     letters = groups[0:last:2]
@@ -344,7 +344,7 @@ def _read_words(text: str, place: int, columns: Sequence[int], controller: Contr
 
 
 def _complaint(text: str, place: int) -> str:
-    """Say what is wrong with a character that begins nothing."""
+    """Return the fault of a character that starts no token."""
     letter = text[place]
     if letter == "," and text[place + 1 : place + 2] in {"R", "C", "A"}:
         return f"',{text[place + 1]}' (corner rounding, chamfer, angle) is not supported; write the moves out"
@@ -360,7 +360,7 @@ def _complaint(text: str, place: int) -> str:
 
 
 def _value(text: str, place: int, letter: str, controller: Controller) -> int:
-    """Return where the value ends."""
+    """Return the end of the value."""
     begin = place
     while text[place : place + 1] in {"+", "-"} and (controller == "linuxcnc" or place == begin):
         place += 1  # LinuxCNC takes X--5 for X5
@@ -381,7 +381,7 @@ def _value(text: str, place: int, letter: str, controller: Controller) -> int:
 
 
 def _parameter(text: str, place: int) -> int:
-    """Return where a parameter ends that begins here."""
+    """Return the end of a parameter that starts here."""
     while text.startswith("#", place):
         place += 1
     if found := _NAME.match(text, place) or re.compile("[0-9]+").match(text, place):
@@ -392,7 +392,7 @@ def _parameter(text: str, place: int) -> int:
 
 
 def _assigned(text: str, equals: int, controller: Controller) -> int:
-    """Return where the value of an assignment ends; Fanuc's is an expression without brackets, up to the end."""
+    """Return the end of the value of an assignment; Fanuc's is an expression without brackets, up to the end."""
     if controller == "linuxcnc":
         return _value(text, equals + 1, "the parameter", controller)
     end = text.find("(", equals)

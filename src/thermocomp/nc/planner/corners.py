@@ -1,4 +1,4 @@
-"""How a controller goes around corners: what it may do between one move and the next.
+"""Cornering of a controller: its possible behaviour between one move and the next.
 
 The controller is LinuxCNC 2.9. Moves that meet at a small angle run through; else an arc is put into the corner, as
 wide as the tolerance and half of each move allow; where no arc fits, the next move begins while the last one brakes.
@@ -19,14 +19,14 @@ REST = 4
 
 
 class Corners:
-    """What happens between two moves.
+    """Behaviour between two moves.
 
     Parameters
     ----------
     speeds, accelerations : tuple of float
         Most of each axis [mm/s, mm/s2].
     cycle : float
-        Of the interpolation [s].
+        Interpolation cycle [s].
     """
 
     def __init__(self, speeds: Vector, accelerations: Vector, cycle: float) -> None:
@@ -40,7 +40,7 @@ class Corners:
         before, after : Segment
             Changed in place.
         tolerance : float or None
-            How far the path may leave the corner [mm]; 0: as far as the moves allow; None: not at all.
+            Largest deviation of the path from the corner [mm]; 0: as far as the moves allow; None: none.
 
         Returns
         -------
@@ -131,7 +131,7 @@ class Corners:
         return min(ax * x, ay * y, az * z), min(vx * x, vy * y, vz * z)
 
     def _overlap(self, before: Segment, after: Segment, tolerance: float, otherwise: float) -> bool:
-        """Let the second move begin while the first one brakes, if that is faster than a corner taken at a speed."""
+        """Let the second move begin while the first one brakes, if that is faster than a corner at a speed."""
         dot = 0.0
         if not before.rotary and not after.rotary:
             u, w = before.leave, after.entry
@@ -162,7 +162,7 @@ def find_overlap_speeds(
     b : float
         Its acceleration [mm/s2].
     share : float
-        Of their lengths that is there for sure.
+        Fraction of their lengths that is certainly available.
     """
     tolerance, cos = overlap
     first = min(math.sqrt(a * before.length * share), before.speed)

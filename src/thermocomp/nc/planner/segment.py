@@ -31,7 +31,7 @@ class Segment:
         [mm/s2]
     rapid, rotary : bool
     radius : float
-        Of an arc, 0: a line [mm].
+        Radius of an arc, 0: a line [mm].
     bend : float
         The radius that its acceleration is counted with [mm].
     sweep : float
@@ -94,7 +94,7 @@ class Segment:
         Parameters
         ----------
         cycle : float
-            Of the interpolation [s].
+            Interpolation cycle [s].
         last : bool
             Nothing follows: LinuxCNC keeps back half of the acceleration for what may still come.
         """
@@ -137,7 +137,7 @@ class Segments:
         self.speeds, self.accelerations, self.feed, self.rotary = speeds, accelerations, feed, rotary
 
     def of(self, serial: int, move: Move, block: Block) -> Segment | None:
-        """Return what a move is to the planner; None: it goes nowhere."""
+        """Return the planner segment of a move; None if it does not move."""
         if move.arc is not None:
             return self._arc(serial, move, block)
         (x, y, z), (ex, ey, ez) = move.start, move.end
@@ -171,7 +171,7 @@ class Segments:
         return min(speed, self.feed)
 
     def _arc(self, serial: int, move: Move, block: Block) -> Segment:
-        """Return what an arc or a helix is to the planner."""
+        """Return the planner segment of an arc or a helix."""
         arc = move.arc
         assert arc is not None
         i, j, k = PLANES[arc.plane]

@@ -52,7 +52,7 @@ HALTS = frozenset(
 
 @dataclass(frozen=True)
 class MotionLimits:
-    """How fast a machine and its controller are.
+    """Dynamics of a machine and its controller.
 
     Parameters
     ----------
@@ -69,11 +69,11 @@ class MotionLimits:
     tool_change : float
         From the last move before a tool change to the first one after it [s].
     stop : float
-        How long M0, M1 and M60 take [s]: the operator decides.
+        Duration of M0, M1 and M60 [s]: the operator decides.
     spindle : float
-        How long a change of the spindle speed holds up the program [s].
+        Delay of the program by a change of the spindle speed [s].
     cycle : float
-        Of the controller's interpolation [s].
+        Interpolation cycle of the controller [s].
 
     Raises
     ------
@@ -132,7 +132,7 @@ class Timed(NamedTuple):
 
 
 def time_blocks(blocks: Iterable[Block], kinematics: MotionLimits) -> Iterator[Timed]:
-    """Tell when each block begins and ends.
+    """Return the start and end time of each block.
 
     A corner that is cut counts to the block after it, as it does at LinuxCNC, and of lines that become one under
     ``G64 P`` the last one takes the time. Memory is bounded: some hundred moves are looked ahead.
@@ -164,7 +164,7 @@ def time_blocks(blocks: Iterable[Block], kinematics: MotionLimits) -> Iterator[T
 
 
 class _Plan:
-    """What lies ahead of the controller, and what it has done."""
+    """Queue of the controller, and the completed moves."""
 
     def __init__(self, kinematics: MotionLimits) -> None:
         self.kinematics = kinematics
@@ -218,7 +218,7 @@ class _Plan:
             self.halt(after)
 
     def halt(self, pause: float) -> None:
-        """Come to a stop, and stay so long [s]."""
+        """Stop, and wait [s]."""
         self._unchain()
         if self.last is not None:
             self._push(self.last, self.tolerance is not None)
@@ -244,7 +244,7 @@ class _Plan:
         self.chained = (serial, move, block)
 
     def _near(self, end: Point) -> bool:
-        """Tell whether a line to there passes by all points of the chain."""
+        """Return whether a line to there passes near all points of the chain."""
         chain, most = self.chain, self.straight * self.straight
         if len(chain) > CHAIN:
             return False
@@ -357,7 +357,7 @@ class _Plan:
 
 
 def _lifts(segment: Segment, block: Block) -> bool:
-    """Tell whether a segment of a cycle is the way up to its height R: all that follows that is run exactly."""
+    """Return whether a segment of a cycle is the retract to its height R: all that follows that is run exactly."""
     first = block.moves[0]
     i, j, k = PLANES[block.modal.plane]
     up = first.end[k] > first.start[k] and first.end[i] == first.start[i] and first.end[j] == first.start[j]

@@ -30,9 +30,9 @@ def draw(run: Run, bounds: Sequence[Bound], tool_changes: Sequence[float], title
     ----------
     run : Run
     bounds : sequence of Bound
-        Of the axes that have a model.
+        Bounds of the axes that have a model.
     tool_changes : sequence of float
-        When [s].
+        Times of the tool changes [s].
     title : str
 
     Returns
@@ -95,7 +95,7 @@ def _drift(ax: Axes, bound: Bound, time: FloatArray, run: Run) -> None:
 
 
 def _said(bound: Bound, *, cut: bool) -> str:
-    """Return what the table says: drift, what is left of it, and the bound, which has the model's error in it."""
+    """Return the drift, the residual, and the bound including the error of the model, for the table."""
     far = max(abs(bound.low), abs(bound.high))
     if not cut:
         return f"the tool drifts by up to {far:.1f} um; nothing is cut"

@@ -26,7 +26,7 @@ def write_expanded(
     program, out : Path
     setup : Setup
     diameters : dict of int to float, optional
-        Of the tools [mm], for LinuxCNC.
+        Tool diameters [mm], for LinuxCNC.
     subroutines : sequence of Path
         Folders of subprograms, for LinuxCNC.
     progress : callable

@@ -1,4 +1,4 @@
-"""Forecasts of inputs that a program does not tell: a CSV file with a column of time and one per input."""
+"""Forecasts of inputs that do not follow from a program: a CSV file with a time column and one per input."""
 
 import csv
 import math
@@ -18,7 +18,7 @@ _TIME = ("time", "t", "elapsed")
 
 @dataclass(frozen=True)
 class Forecast:
-    """What a forecast file holds, in house units.
+    """Content of a forecast file, in internal units.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ class Forecast:
         By channel name, such as ``t3_C``: times since the start of the program [s], and values; empty cells are left
         out.
     left_out : tuple of str
-        Why a column was not read.
+        Reasons why columns were not read.
     """
 
     source: str
@@ -136,7 +136,7 @@ def _columns(headings: list[str], source: str) -> tuple[dict[int, tuple[str, Uni
 
 
 def _number(cell: str, unit: Unit, delimiter: str, where: str) -> float | None:
-    """Return a cell in the house unit; None if it is empty."""
+    """Return a cell in the internal unit; None if it is empty."""
     text = cell.strip()
     if not text:
         return None

@@ -1,4 +1,4 @@
-"""What the header of a revised program says of its run."""
+"""Header of a revised program, with the data of its run."""
 
 import math
 from collections.abc import Sequence
@@ -18,12 +18,12 @@ _ALWAYS = 7
 
 
 def count_lines(models: Sequence[str], taken: Sequence[str], states: str, *, by_position: bool) -> int:
-    """Return how many lines a header has, before it is known what they say.
+    """Return the number of lines of a header, before its text is known.
 
     Parameters
     ----------
     models, taken : sequence of str
-        What is told of models, and of those who take unproven ones.
+        Descriptions of the models, and of the persons who approved unproven ones.
     states : str
         In which states of the controller it will be proved; empty: it will not be.
     by_position : bool
@@ -51,14 +51,14 @@ def told_taken(taken: Sequence[str]) -> list[str]:
 
 
 def describe_bound(bounds: Sequence[Bound]) -> str:
-    """Return how far the tool may be off in the cuts."""
+    """Return the bound of the tool error in the cuts."""
     return "bound " + ", ".join(
         f"{b.axis} {b.most:.1f} um" if math.isfinite(b.most) else f"{b.axis} not known" for b in bounds
     )
 
 
 def describe_proof(proof: Proof | None, lines: int) -> list[str]:
-    """Return in which states of the controller it was proved, in so many lines."""
+    """Return the states of the controller in which it was proved, in a given number of lines."""
     return [UNPROVED] if proof is None else wrap_text(f"proved {proof.sentence}", lines)
 
 
@@ -80,6 +80,6 @@ def describe_origins(revision: Revision) -> str:
 
 
 def cost(elsewhere: Elsewhere, axes: Sequence[str]) -> str:
-    """Return what another work offset or tool length would cost."""
+    """Return the cost of another work offset or tool length."""
     costs = ", ".join(f"{axis} {elsewhere.most['XYZ'.index(axis)]:.1f} um" for axis in axes)
     return f"{AWAY:g} mm of another offset cost up to {costs}"

@@ -52,7 +52,7 @@ class Paths(NamedTuple):
 
     @classmethod
     def of(cls, output: Path, *, expanded: bool) -> "Paths":
-        """Return the names of the files beside a program."""
+        """Return the names of the files next to a program."""
 
         def beside(end: str) -> Path:
             return output.with_name(output.name + end)
@@ -68,7 +68,7 @@ class Paths(NamedTuple):
 
 @dataclass(frozen=True)
 class Job:
-    """What is done to a program.
+    """Revision of a program.
 
     Parameters
     ----------
@@ -79,14 +79,14 @@ class Job:
         That of the revision.
     models : sequence of str
     taken : sequence of str
-        Who takes unproven ones of them, and why.
+        Persons who approved unproven ones of them, and the reasons.
     start, zero, method : str
         For the header: which models, from what state, what the drift counts from, in what way.
     when : date
     unproved : bool
         It is written though no interpreter has judged it.
     diameters : dict of int to float, optional
-        Of the tools, for the expansion [mm].
+        Tool diameters for the expansion [mm].
     subroutines : sequence of Path
         Folders of subprograms, for the expansion.
     travel : Travel, optional
@@ -113,12 +113,12 @@ class Job:
 
     @property
     def begun(self) -> str:
-        """Return how the run begins, in words."""
+        """Return the start state of the run, in words."""
         return f"{self.start}, {self.zero}"
 
 
 class Done(NamedTuple):
-    """What has come of it."""
+    """Result of a revision."""
 
     run: Run
     bounds: tuple[Bound, ...]
@@ -228,7 +228,7 @@ def _rehearse(job: Job, source: Path, phase: Phase) -> None:
 def _write(
     job: Job, source: Path, folder: Path, table: Path, listeners: Sequence[Ledger | Course | Travel], tell: Tell
 ) -> tuple[str, ...]:
-    """Write program, diff and table, and return the header that still says nothing."""
+    """Write program, diff and table, and return the header, which is still blank."""
     size = max(source.stat().st_size, 1)
     axes = ["XYZ".index(axis) for axis in job.drift.axes]
     blank: tuple[str, ...] = ()
@@ -293,7 +293,7 @@ def _bounds(job: Job, run: Run) -> tuple[Bound, ...]:
 
 
 def _facts(job: Job, bounds: Sequence[Bound], proof: Proof | None) -> list[str]:
-    """Return what the header says."""
+    """Return the data of the header."""
     place = headers.describe_place(job.revision, job.drift.axes) if job.drift.by_position else []
     facts = [
         f"thermocomp {__version__}, {job.when.date()}, for {job.revision.setup.controller}",
@@ -311,7 +311,7 @@ def _facts(job: Job, bounds: Sequence[Bound], proof: Proof | None) -> list[str]:
 
 
 def _proved(job: Job, original: Path, revised: Path, ledger: Ledger, tell: Tell) -> Proof:
-    """Return what the interpreter says."""
+    """Return the result of the interpreter."""
     lines, last = max(job.revision.lines, 1), 0
 
     def progress(line: int) -> None:

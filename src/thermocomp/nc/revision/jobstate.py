@@ -1,4 +1,4 @@
-"""What a job leaves behind for the next one, as JSON: versioned, bit-exact, damaged or unknown files refused."""
+"""State after a job for the next one, as JSON: versioned, bit-exact; damaged or unknown files are refused."""
 
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
@@ -49,7 +49,7 @@ def loads(text: str, source: str = "state of a job") -> SavedJob:
     ----------
     text : str
     source : str
-        What to call it in an error.
+        Name of the source in an error.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What can be told of a revision, in the words of ``thermocomp revise``, and the objects that come of it."""
+"""Options of a revision, as for ``thermocomp revise``, and the objects made from them."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -38,7 +38,7 @@ from thermocomp.nc.thermal.stations import Station, stations
 
 Zero = Literal["start", "cold", "last"]
 
-#: a temperature that has moved by more is no constant, unless it is that of the surroundings [degC]
+#: largest range of a temperature that may be set constant, except the ambient temperature [degC]
 WARMED = 3.0
 
 _COUNTED: dict[Zero, str] = {
@@ -50,21 +50,22 @@ _COUNTED: dict[Zero, str] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Drifting:
-    """What makes the tool drift.
+    """Models and inputs of the thermal drift.
 
     Parameters
     ----------
     model : list of Path
         Model files of thermocomp fit (.json).
     axis : list of str
-        Which axis a model is for, such as ch3=Z, or "zz=X at Z 200 mm" for one of several places; models that are not
-        named are left out. Not needed where the targets are called x_um, z or z_at_200.
+        Axis corrected by a model, such as ch3=Z, or "zz=X at Z 200 mm" for one of several positions; models that are
+        not listed are ignored. Default: the axes given by names of the targets such as x_um, z or z_at_200.
     constant : list of str
-        Inputs that the program does not tell, such as "ambient=22 degC".
+        Constant values of model inputs that do not follow from the program, such as "ambient=22 degC".
     forecast : Path
-        CSV file with such inputs over the time since the start of the program (columns such as time_min, ambient_C).
+        CSV file with the course of such inputs over the time since the start of the program (columns such as time_min,
+        ambient_C).
     accept_unproven : str
-        Who takes unproven models all the same, and why: "NAME, REASON".
+        Person who approves the use of unproven models, and the reason: "NAME, REASON".
     """
 
     model: list[Path]
@@ -74,12 +75,12 @@ class Drifting:
     accept_unproven: str | None = None
 
     def stations(self) -> list[Station]:
-        """Return which model stands for which axis."""
+        """Return the model of each axis."""
         models = [m.taken(self.accept_unproven) for path in self.model for m in modelfile.read(path)]
         return stations(models, self.axis or ())
 
     def others(self, found: Sequence[Station]) -> tuple[dict[str, InputSignal], list[str]]:
-        """Return the inputs that the program does not tell, and what was not read of them."""
+        """Return the inputs that do not follow from the program, and what was not read of them."""
         models = [s.model for s in found]
         if self.constant and all(i.quantity == SPEED for m in models for i in m.inputs):
             raise InputError(f"--constant {self.constant[0]!r}: the models are driven by the spindle speed alone")
@@ -114,7 +115,7 @@ class Drifting:
 
 
 def _refuse_heated(model: ErrorModel, constant: Iterable[str]) -> None:
-    """Raise `InputError` if a temperature that the machine warms is said to stand still while a program runs."""
+    """Raise `InputError` if a temperature that the machine heats is set constant while a program runs."""
     surroundings = model.validity.ambient_channel if model.validity is not None else ""
     for i in model.inputs:
         if i.name in constant and i.quantity == "temperature" and i.name != surroundings and i.high - i.low > WARMED:
@@ -131,22 +132,22 @@ def _taken(names: Iterable[str], how: str) -> list[str]:
 
 @dataclass(frozen=True, kw_only=True)
 class Starting:
-    """How warm the machine is when the program starts.
+    """Thermal state of the machine at the start of the program.
 
     Parameters
     ----------
     cold : bool
-        It has stood still for long.
+        The machine is cold: it has been at rest for a long time.
     carried : Path
-        It is as the last job has left it: the file OUT.job.json of that revision.
+        State at the end of the last job: the file OUT.job.json of its revision.
     pause : str
-        How long the spindle was stopped still since then, such as "30 min"; not at all if not given.
+        Time since the last job with the spindle stopped, such as "30 min". Default: none.
     measured : list of str
-        How far the tool point has drifted from the cold machine, such as z=12um.
+        Measured drift of the tool point relative to the cold machine, such as z=12um.
     zero : str
-        What the drift counts from, that is when the work offsets were set. start: at the start of the program; cold: on
-        the cold machine; last: when those of the last job were. If not given, nobody has touched them since the machine
-        was cold, or since the last job: start for --cold, cold for --measured, last for --carried.
+        Zero of the drift, that is when the work offsets were set. start: at the start of the program; cold: on the cold
+        machine; last: when those of the last job were set. The default assumes that they have not been changed since
+        the machine was cold, or since the last job: start for --cold, cold for --measured, last for --carried.
     """
 
     cold: bool = False
@@ -156,7 +157,7 @@ class Starting:
     zero: Zero | None = None
 
     def check(self) -> None:
-        """Raise `InputError` if the state is not stated, or more than once."""
+        """Raise `InputError` if the state is not given, or given more than once."""
         given = self.cold + (self.carried is not None) + (self.measured is not None)
         if given != 1:
             found = "it is not stated" if not given else f"it is stated {given} times"
@@ -168,7 +169,7 @@ class Starting:
             raise InputError("--pause is the time since the last job: it goes with --carried")
 
     def start(self, found: Sequence[Station], others: Mapping[str, InputSignal]) -> ThermalStart:
-        """Return the state of the models."""
+        """Return the state of the models at the start of the program."""
         if self.carried is not None:
             pause = 0.0 if self.pause is None else read_value(self.pause, "time", "--pause", "30 min")
             return start.carry_over(found, jobstate.read(self.carried).state, pause)
@@ -192,41 +193,41 @@ class Starting:
         return f"measured {', '.join(self.measured)}" if self.measured else "cold"
 
     def counted(self) -> str:
-        """Return what the drift counts from, in words."""
+        """Return the zero of the drift in words."""
         return _COUNTED[self._zero]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Way:
-    """How the correction gets into the program.
+    """Method of correction.
 
     Parameters
     ----------
     method : str
-        coordinates: it is added to the words of X, Y and Z; offset: G52 shifts the work coordinates, where the tool is
-        up only; it wants --no-g92.
+        Method of correction. coordinates: the correction is added to the X, Y and Z words; offset: G52 shifts the work
+        coordinates, only where the tool is up; requires --no-g92.
     every : str
-        Renew the correction every so often, such as "10 min".
+        Interval at which the correction is updated, such as "10 min".
     tolerance : str
-        Renew it as soon as the drift has moved by that much; with --every only along the way, where the drift depends
-        on the place.
+        Change of the drift at which the correction is updated; with --every it applies only along the path, where the
+        drift depends on the position.
     step : str
-        In a cut it changes by that much at most per 10 mm of way, spread over the block.
+        Largest change of the correction in a cut per 10 mm of path, distributed over the block.
     largest : str
-        A correction beyond that is refused: it is no thermal drift any more.
+        Largest plausible correction; a larger one is refused, because it is not a thermal drift.
     safe_z : str
-        At and above this Z of the work coordinates the tool is up: no cut is there. If not given, the tool counts as up
-        after a rapid that lifts it (coordinates), or after tool changes and moves of Z in machine coordinates (offset).
+        Work coordinate Z at and above which the tool is up and there is no cut. Default: the tool counts as up after a
+        rapid that lifts it (coordinates), or after tool changes and moves of Z in machine coordinates (offset).
     no_split : bool
-        Split no long cut. If not given, it is split where one straight change of the correction would leave more than a
-        step in its middle (method coordinates, linuxcnc).
+        Do not split long cuts. Default: a cut is split where a linear change of the correction would leave an error of
+        more than a step in its middle (method coordinates, linuxcnc).
     expand : bool
-        Turn loops, variables and subprograms into plain lines first: by LinuxCNC's interpreter, or, for a Fanuc, those
-        in the same file by an unroller of our own.
+        Expand loops, variables and subprograms into plain lines first: with the interpreter of LinuxCNC, or, for fanuc,
+        with a built-in unroller for those in the same file.
     subroutines : list of Path
-        With --expand: folders of subprograms; the program's own comes first anyway.
+        Folders of subprograms for --expand; the folder of the program is always searched first.
     unproved : bool
-        Write the program though no interpreter has judged it; its header says so.
+        Write the program although no interpreter has verified it; its header states this.
     """
 
     method: Literal["coordinates", "offset"] = "coordinates"
@@ -241,13 +242,13 @@ class Way:
     unproved: bool = False
 
     def demand(self) -> Demand:
-        """Return when the correction is renewed."""
+        """Return the conditions for updating the correction."""
         every = None if self.every is None else read_positive(self.every, "time", "--every", "10 min")
         tolerance = read_positive(self.tolerance, "displacement", "--tolerance", "1 um")
         return Demand(tolerance, every, read_positive(self.largest, "displacement", "--largest", "400 um"))
 
     def made(self, setup: Setup, axes: Sequence[str]) -> CorrectionMethod:
-        """Return the method."""
+        """Return the method of correction."""
         digits, step = DIGITS[setup.controller], read_positive(self.step, "displacement", "--step", "1 um")
         safe = None if self.safe_z is None else read_value(self.safe_z, "position", "--safe-z", "5 mm")
         if self.method == "coordinates":
@@ -279,44 +280,47 @@ class Way:
 
 @dataclass(frozen=True, kw_only=True)
 class Controller:
-    """What stands at the controller and not in the program.
+    """Settings of the controller that are not in the program.
 
     Parameters
     ----------
     controller : str
-        Whose habits the program has: linuxcnc, or fanuc, for Haas and the ISO programs of most machining centres too.
-        If not given, linuxcnc; but a program that is a Fanuc's, or that the two would read in different ways, is
+        Controller whose NC dialect the program uses: linuxcnc, or fanuc, also for Haas and the ISO programs of most
+        machining centres. Default: linuxcnc, but a Fanuc program, or one that the two would interpret differently, is
         refused.
     units : str
-        Unit when the program starts; without it the program has to say G20 or G21.
+        Unit of length in force at the start of the program. Default: none, the program must contain G20 or G21.
     startup : str
-        Codes in force when the program starts, such as "G64 P0.01 G98" (mm). Without it G64 (no tolerance) is taken,
-        and G99 for linuxcnc, G98 for fanuc; what --expand needs to know of them the program has to say itself.
+        Codes in force at the start of the program, such as "G64 P0.01 G98" (mm). Default: G64 (no tolerance), and G99
+        for linuxcnc, G98 for fanuc; those that --expand needs must be in the program itself.
     speed : str
-        Spindle speed when the program starts, such as "6000 1/min"; without it the program has to say S and M3.
+        Spindle speed at the start of the program, such as "6000 1/min". Default: none, the program must contain S and
+        M3.
     origin : list of str
-        Where work coordinates begin, such as "G54=100 mm, 50 mm, 0 mm": it counts where the drift depends on the place.
+        Origins of the work coordinates, such as "G54=100 mm, 50 mm, 0 mm"; needed where the drift depends on the
+        position.
     tool : list of str
-        Lengths of tools, such as "1=120 mm".
+        Tool lengths, such as "1=120 mm".
     diameter : list of str
-        With --expand: diameters of tools, such as "1=10 mm", for which G41 and G42 are worked out.
+        Tool diameters for --expand, such as "1=10 mm", from which the paths of G41 and G42 are computed.
     home : str
-        Where G28 goes, such as "0 mm, 0 mm, 400 mm".
+        Position approached by G28, such as "0 mm, 0 mm, 400 mm".
     rotation : list of str
-        Rotations of work coordinate systems that are stored in the controller, such as "G54=12 deg"; none if there are
-        none. They turn a correction of X and Y.
+        Rotations of work coordinate systems stored in the controller, such as "G54=12 deg"; none if there are
+        none. They rotate the corrections of X and Y.
     no_g92 : bool
-        No G92 or G52 is in force when the program starts, nor put away by G92.2: the method offset would erase it.
+        Confirm that no G92 or G52 is in force at the start of the program, nor suspended by G92.2: the method offset
+        would erase it.
     integers : str
-        What a length without a decimal point is: whole millimetres or inches; the least increment; or a reason to
-        refuse the program. If not given, whole for linuxcnc, refuse for fanuc.
+        Meaning of a length without a decimal point: whole millimetres or inches; the least increment; or a reason to
+        refuse the program. Default: whole for linuxcnc, refuse for fanuc.
     least : str
-        The least increment.
+        Least increment of the controller.
     block_delete : str
-        on: lines that begin with / are not run. off: they may be run or not, and what depends on it is refused. With
-        --expand it has to be said: off writes them out as plain lines.
+        Block delete. on: lines that begin with / are not run. off: they may be run or not, and a program that depends
+        on it is refused. Required with --expand: off writes them as plain lines.
     harmless : list of str
-        M codes of the machine's maker that move no axis and leave the spindle as it is, such as M88
+        M codes of the machine builder that move no axis and do not change the spindle state, such as M88
         of a Fanuc or M101 of LinuxCNC.
     """
 
@@ -337,11 +341,11 @@ class Controller:
 
     @property
     def whose(self) -> Literal["linuxcnc", "fanuc"]:
-        """Whose habits the program has."""
+        """Controller whose NC dialect the program uses."""
         return self.controller or "linuxcnc"
 
     def setup(self, machine: Machine | None) -> Setup:
-        """Return it as the follower wants it, with what the machine file tells."""
+        """Convert the options to a Setup for the program interpreter, with the rotary axes from the machine file."""
         return Setup(
             controller=self.whose,
             inch=None if self.units is None else self.units == "inch",
@@ -360,7 +364,7 @@ class Controller:
         )
 
     def diameters(self, *, expand: bool) -> dict[int, float] | None:
-        """Return the diameters of the tools [mm]."""
+        """Return the tool diameters [mm]."""
         if self.diameter is None:
             return None
         if not expand:
@@ -370,16 +374,16 @@ class Controller:
 
 @dataclass(frozen=True, kw_only=True)
 class Timing:
-    """How fast the machine is.
+    """Dynamics and waiting times of the machine.
 
     Parameters
     ----------
     machine : Path
-        Machine file (.toml) with rapids and accelerations of the axes; its structure tells where rotary axes are.
+        Machine file (.toml) with rapid rates and accelerations of the axes; its structure gives the rotary axes.
     tool_change : str
-        How long a tool change takes.
+        Duration of a tool change.
     stop : str
-        How long the operator lets it stand at M0 and M1.
+        Duration of the operator stops at M0 and M1.
     """
 
     machine: Path | None = None
@@ -387,11 +391,11 @@ class Timing:
     stop: str = "60 s"
 
     def read(self) -> Machine | None:
-        """Return the machine, if there is a file of it."""
+        """Return the machine, if a machine file is given."""
         return None if self.machine is None else read_machine(self.machine)
 
     def kinematics(self, machine: Machine | None) -> tuple[MotionLimits, list[str]]:
-        """Return how fast the machine is, and what of it is a guess."""
+        """Return the dynamics of the machine, and which values are assumed."""
         change = read_value(self.tool_change, "time", "--tool-change", "8 s")
         stop = read_value(self.stop, "time", "--stop", "60 s")
         if machine is None:

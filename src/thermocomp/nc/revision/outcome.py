@@ -1,4 +1,4 @@
-"""What has come of a revision: its warnings, and all its numbers."""
+"""Result of a revision: its warnings, and all its numbers."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -13,7 +13,7 @@ from thermocomp.nc.thermal.inputs import SPEED
 
 
 def warnings(job: Job, done: Done) -> list[str]:
-    """Return why the result may be worse than its bound says."""
+    """Return the reasons why the result may be worse than its bound."""
     drift, revision = job.drift, job.revision
     found = list(drift.assumed)
     found += [
@@ -75,7 +75,7 @@ def describe_place(job: Job, done: Done) -> list[str]:
 
 
 def explain_nothing(job: Job, done: Done) -> str:
-    """Return why nothing was corrected a program, and what to do."""
+    """Return the reason why no correction was made, and what to do."""
     revision, most = job.revision, max((b.without for b in done.bounds), default=0.0)
     said = f"nothing was corrected: the drift in the cuts is {most:.1f} um at most"
     method, tolerance = revision.method, revision.demand.tolerance
@@ -99,7 +99,7 @@ def explain_nothing(job: Job, done: Done) -> str:
 
 
 def _assumed(setup: Setup) -> str:
-    """Return what was taken for granted of the controller, because nobody has stated or tried it."""
+    """Return the assumptions about the controller that were neither stated nor tested."""
     found = [
         text
         for text, missing in (
@@ -168,7 +168,7 @@ def _proof(proof: Proof) -> dict[str, Any]:
 
 
 def duration(seconds: float) -> str:
-    """Return a time as people say it."""
+    """Return a duration in words."""
     if seconds < 120:
         return f"{seconds:.3g} s"
     minutes = round(seconds / 60)

@@ -1,4 +1,4 @@
-"""What is told of a revision becomes a job, or is refused before any work."""
+"""Conversion of the options of a revision to a job; invalid ones are refused before any work."""
 
 from collections.abc import Mapping, Sequence
 from datetime import date, datetime
@@ -33,7 +33,7 @@ def prepare_job(
     *,
     overwrite: bool,
 ) -> tuple[Job, list[str]]:
-    """Return what is to be done to a program, and notes.
+    """Return the job for a program, and notes.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def prepare_job(
 
 
 def _files(stations: Sequence[Station], hashes: Mapping[str, str]) -> list[str]:
-    """Return which files the models come from, each with what it is for."""
+    """Return the files of the models, each with the targets used."""
     found = []
     for name in dict.fromkeys(hashes[s.model.target] for s in stations):
         mine = [s for s in stations if hashes[s.model.target] == name]
@@ -121,7 +121,7 @@ def _files(stations: Sequence[Station], hashes: Mapping[str, str]) -> list[str]:
 
 
 def _check_dialect(program: Path, controller: Controller) -> None:
-    """Raise `InputError` if nobody has said whose a program is, and it need not be LinuxCNC's."""
+    """Raise `InputError` if the dialect of a program is not specified, and it need not be LinuxCNC's."""
     startup = f"{controller.startup or ''} {'G20' if controller.units == 'inch' else ''}"
     with ncprogram.open_to_read(program) as texts:
         lines = program_lines(texts)
@@ -156,7 +156,7 @@ def _check_interpreter(way: Way, setup: Setup, *, diameters: bool) -> None:
 
 
 def _moment(text: str | None) -> datetime:
-    """Return when it is: a date the user gives, or now.
+    """Return the date: given by the user, or now.
 
     Raises
     ------

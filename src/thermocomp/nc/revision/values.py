@@ -1,4 +1,4 @@
-"""What the texts of the options of ``thermocomp revise`` mean."""
+"""Conversion of the texts of the options of ``thermocomp revise``."""
 
 import re
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ _SYSTEM = re.compile(r"G?5([4-9])(?:\.([1-3]))?(?:\s*P(\d+))?", re.IGNORECASE)
 
 
 def read_value(text: str, quantity: str, option: str, example: str) -> float:
-    """Return the value of an option in house units.
+    """Return the value of an option in internal units.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def read_value(text: str, quantity: str, option: str, example: str) -> float:
     option : str
         Its name.
     example : str
-        Of what is wanted.
+        Example of a valid value.
 
     Returns
     -------
@@ -58,7 +58,7 @@ def read_positive(text: str, quantity: str, option: str, example: str) -> float:
     option : str
         Its name.
     example : str
-        Of what is wanted.
+        Example of a valid value.
 
     Returns
     -------
@@ -148,7 +148,7 @@ def point_of(text: str, said: str) -> Point:
     text : str
         As it was given.
     said : str
-        What the message begins with.
+        Start of the message.
 
     Returns
     -------
@@ -174,7 +174,7 @@ def startup_of(text: str, controller: Controller) -> str:
     text : str
         As it was given.
     controller : str
-        Whose.
+        Name of the controller.
 
     Returns
     -------
@@ -200,7 +200,7 @@ def m_code_of(text: str, controller: Controller) -> int:
     text : str
         As it was given.
     controller : str
-        Whose.
+        Name of the controller.
 
     Returns
     -------
@@ -231,7 +231,7 @@ def tool_of(text: str, option: str, example: str) -> tuple[int, float]:
     option : str
         Its name.
     example : str
-        Of what is wanted.
+        Example of a valid value.
 
     Returns
     -------

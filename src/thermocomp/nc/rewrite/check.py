@@ -16,7 +16,7 @@ ROUNDING = 0.1
 
 
 class Check:
-    """Follows the revised program beside the original.
+    """Interprets the revised program in parallel with the original.
 
     Parameters
     ----------

@@ -34,7 +34,7 @@ class Contact:
     _length: float = field(default=0.0, init=False)
 
     def begin(self, block: Block) -> None:
-        """Take a block up, before `most` is asked."""
+        """Start a block, before `most` is called."""
         if block.tool_change is not None:
             self._leave()
         self._length = sum(map(length, block.moves))
@@ -52,7 +52,7 @@ class Contact:
         return self.step * (max(spread, 1.0) if self._way[axis] >= SPREAD else math.floor(spread))
 
     def end(self, block: Block, changed: list[bool]) -> None:
-        """Take in what a block has done, and of which axes the correction has changed in it."""
+        """Register the end of a block, and the axes whose correction changed in it."""
         self._way = [0.0 if c else w + self._length for c, w in zip(changed, self._way, strict=True)]
         if not block.moves:
             return

@@ -85,7 +85,7 @@ class Coordinates(CorrectionMethod):
         return self.digits.mm >= 4
 
     def held_by(self, block: Block) -> str:
-        """Return what keeps the correction from following the drift in a block."""
+        """Return the reason why the correction cannot follow the drift in a block."""
         if block.modal.cutter:
             return "cutter radius compensation"
         if block.kind in ("arc", "curve", "cycle"):
@@ -263,7 +263,7 @@ class Coordinates(CorrectionMethod):
     # -- what may change ---------------------------------------------------------------------------------------------
 
     def _placed(self, block: Block, axis: int, carried: float, *, moved: bool) -> None:
-        """Take in that an axis goes to a place in absolute coordinates, if the line is run."""
+        """Register that an axis moves to a position in absolute coordinates, if the line is run."""
         self.fixed[axis] = False
         if not block.line.optional:
             self.doubtful[axis] = False
@@ -328,7 +328,7 @@ class Coordinates(CorrectionMethod):
         return out[0], out[1], out[2]
 
     def _take(self, block: Block, frame: Frame, old: Vector, new: list[float]) -> None:
-        """Carry the new words; an axis whose word has not changed does too if it stands on the line in G90."""
+        """Store the new words; an axis with an unchanged word too, if it is on the line in G90."""
         words = block.words if block.modal.absolute else {}
         taken = [n != o or letter in words for letter, n, o in zip(AXES, new, old, strict=True)]
         if frame.turned:

@@ -1,4 +1,4 @@
-"""How a revised program runs, in as many points as a picture needs, however long it is."""
+"""Course of a revised program, in as many points as a figure needs, however long it is."""
 
 import math
 from dataclasses import dataclass, field
@@ -27,7 +27,7 @@ class Run(NamedTuple):
 
 
 class Bound(NamedTuple):
-    """How far the tool may be off in a cut, of one axis [um]."""
+    """Bound of the tool error in a cut, of one axis [um]."""
 
     axis: str
     low: float  #: of the drift, in the whole run
@@ -62,7 +62,7 @@ class Course:
     _stride: int = field(default=1, init=False)  # rows of a stretch
 
     def take(self, revised: Revised) -> None:
-        """Take a line in, in its order."""
+        """Add a line, in order."""
         block = revised.block
         if block is None:
             return

@@ -16,7 +16,7 @@ Field = Callable[[Point], Vector]
 
 
 class DriftSource(Protocol):
-    """What a machine's drift is asked for."""
+    """Interface to the drift of a machine."""
 
     @property
     def by_position(self) -> bool:
@@ -29,12 +29,12 @@ class DriftSource(Protocol):
         """Return by how much the tool point deviates now [um], at a place in machine coordinates [mm]."""
 
     def field(self) -> Field:
-        """Return what `deviation` gives now, as a function of the place that time does not change any more."""
+        """Return the present `deviation` as a function of position, unaffected by later time steps."""
 
 
 @dataclass
 class Demand:
-    """What the axes should carry.
+    """Demanded corrections of the axes.
 
     A correction is renewed when it is due: every `every` seconds (P-06), or as soon as the drift has moved by
     `tolerance` since. Renewed every so often, it still follows the place by `tolerance`, where it depends on it.
@@ -108,7 +108,7 @@ def oppose_deviation(deviation: Vector) -> Vector:
 
 
 class CutErrors(NamedTuple):
-    """What was met in a block in which the tool cuts, at its ends and inside: lowest and highest of each axis [um]."""
+    """Errors in a block in which the tool cuts, at its ends and inside: lowest and highest of each axis [um]."""
 
     drift: tuple[Vector, Vector]
     left: tuple[Vector, Vector]  #: what the correction leaves of it
@@ -116,14 +116,14 @@ class CutErrors(NamedTuple):
 
 @dataclass
 class Left:
-    """What a correction leaves of the drift that it was computed from, in the cuts.
+    """Residual of the drift from which a correction was computed, in the cuts.
 
     Parameters
     ----------
     most : list of float
         Per axis, largest magnitude in the cuts [um].
     line : list of int
-        Where.
+        Line of each.
     without : list of float
         The same without correction.
     """
@@ -133,7 +133,7 @@ class Left:
     without: list[float] = field(default_factory=lambda: [0.0] * 3)
 
     def take(self, line: int, samples: Iterable[tuple[Vector, Vector]]) -> CutErrors:
-        """Take a cut in.
+        """Add a cut.
 
         Parameters
         ----------

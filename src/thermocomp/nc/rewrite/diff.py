@@ -17,7 +17,7 @@ def unified(pairs: Iterable[tuple[str, tuple[str, ...]]], name: str, revised: st
     pairs : iterable of (str, tuple of str)
         Lines of the original in order, each with the lines it has become; an empty text stands for no line.
     name, revised : str
-        Of the two programs.
+        Names of the two programs.
     before : int
         Lines that the revised program begins with and that are in none of the pairs.
 

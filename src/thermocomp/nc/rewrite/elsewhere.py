@@ -1,4 +1,4 @@
-"""What a program revised for some work offsets would be wrong by with others, where the drift depends on the place."""
+"""Error of a program revised for some work offsets if run with others, where the drift depends on the position."""
 
 import math
 from dataclasses import dataclass, field
@@ -28,7 +28,7 @@ class Elsewhere:
     _place: Point = field(default=(math.inf,) * 3, init=False)
 
     def take(self, time: float, point: Point, drift: DriftSource) -> None:
-        """Take in where a cut is [mm, machine coordinates], and when [s]; most of them tell nothing new."""
+        """Process the position of a cut [mm, machine coordinates] at a time [s]; most of them add nothing new."""
         if time - self._time < OFTEN and math.dist(point, self._place) < DENSE:
             return
         self._time, self._place = time, point

@@ -1,4 +1,4 @@
-"""Corrections in machine axes, and as the numbers that stand in a program."""
+"""Corrections in machine axes, and as the numbers in a program."""
 
 import math
 from dataclasses import dataclass
@@ -13,14 +13,14 @@ _MM = 1e-3  # mm per um
 
 @dataclass(frozen=True)
 class Frame:
-    """How a shift of the tool [um, machine axes] stands in the words of X, Y and Z, under one modal state.
+    """Conversion of a shift of the tool [um, machine axes] to the words X, Y and Z, under one modal state.
 
     Parameters
     ----------
     scale : tuple of float
         Program units per um, of X, Y and Z.
     cosine, sine : float
-        Of the work coordinate system's rotation about Z.
+        Cosine and sine of the work coordinate system's rotation about Z.
     digits : int
         Decimals.
     """
@@ -44,7 +44,7 @@ class Frame:
         return self.sine != 0 or self.cosine != 1
 
     def words(self, shift: Vector) -> Vector:
-        """Return what a shift [um, machine axes] adds to absolute words, rounded to the decimals."""
+        """Return the values that a shift [um, machine axes] adds to absolute words, rounded to the decimals."""
         x, y, z = shift
         if self.turned:
             x, y = self.cosine * x + self.sine * y, self.cosine * y - self.sine * x

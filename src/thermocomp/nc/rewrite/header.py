@@ -22,7 +22,7 @@ _TOLD = str.maketrans("()%;", "[]_,")
 
 
 def make_blank(ending: str, lines: int = LINES) -> tuple[str, ...]:
-    """Return a header that says nothing yet."""
+    """Return a blank header."""
     return tuple(f"({MARK} {k}){ending}" for k in range(lines))
 
 
@@ -34,9 +34,9 @@ def fill(facts: Sequence[str], ending: str, lines: int = LINES, *, upper: bool =
     facts : sequence of str
         At most ``lines - 1``; what does not fit into a comment is cut or replaced.
     ending : str
-        Of its lines.
+        Line ending.
     lines : int
-        How many it has.
+        Number of lines.
     upper : bool
         In capitals: old controls have no small letters.
 
@@ -51,17 +51,17 @@ def fill(facts: Sequence[str], ending: str, lines: int = LINES, *, upper: bool =
 
 
 def clean_comment(text: str) -> str:
-    """Return a text that may stand in any comment: printable ASCII with nothing in it that ends one."""
+    """Return a text that is valid in any comment: printable ASCII without characters that end one."""
     return "".join(c if " " <= c <= "~" else "_" for c in text.translate(_TOLD))
 
 
 def wrap_text(text: str, lines: int | None = None) -> list[str]:
-    """Return a text in lines of a header, as many as it takes; dots stand for what does not fit into so many."""
+    """Return a text in lines of a header, as many as needed; dots replace the part beyond a given number."""
     return textwrap.wrap(text, ROOM, max_lines=lines, placeholder=" ...")
 
 
 def refuse_revised(line: Line) -> None:
-    """Raise `ProgramError` if a comment says that the program has been revised."""
+    """Raise `ProgramError` if a comment shows that the program has been revised."""
     if f"{MARK} REVISED" in line.comment:
         raise ProgramError(
             line.number,

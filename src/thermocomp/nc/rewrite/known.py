@@ -1,4 +1,4 @@
-"""What has to be known before a block can be corrected, and what is said where it is not."""
+"""Conditions that must be known before a block can be corrected, and the messages if they are not."""
 
 import math
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What the two ways of revising share: what each axis carries, and the change a block makes to it."""
+"""Common part of the two methods of revising: the correction of each axis, and its change by a block."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
@@ -17,7 +17,7 @@ STILL = 1e-7
 
 
 class Change(NamedTuple):
-    """What became of a block."""
+    """Result of the revision of a block."""
 
     texts: tuple[str, ...]  #: lines to write instead of its line; the last one is the line itself
     before: Vector  #: correction that the axes carried when it began [um, machine axes]
@@ -60,13 +60,13 @@ class CorrectionMethod(ABC):
     _frame: Frame = field(default_factory=lambda: Frame.of(Modal(), Digits()), init=False)
 
     def revise(self, block: Block, demand: Vector) -> Change:
-        """Take the correction into a block, as far as it can.
+        """Apply the correction to a block, as far as possible.
 
         Parameters
         ----------
         block : Block
         demand : tuple of float
-            What the axes should carry at its end [um, machine axes].
+            Demanded corrections of the axes at its end [um, machine axes].
 
         Returns
         -------
@@ -113,20 +113,20 @@ class CorrectionMethod(ABC):
 
     @abstractmethod
     def held_by(self, block: Block) -> str:
-        """Return what keeps the correction from following the drift in a block."""
+        """Return the reason why the correction cannot follow the drift in a block."""
 
     @abstractmethod
     def _revise(self, block: Block, demand: Vector) -> tuple[str, ...]: ...
 
     def doubt(self, axis: int, other: float) -> None:
-        """Take in that an axis may carry something else [um]; one that stands in machine coordinates does not."""
+        """Register that an axis may have another correction [um]; one at machine coordinates does not."""
         if not self.fixed[axis]:
             if not self.doubtful[axis]:
                 self.other[axis] = other
             self.doubtful[axis] = True
 
     def doubt_all(self) -> None:
-        """Take in that any axis may have been moved by hand or by the machine itself."""
+        """Register that any axis may have been moved by hand or by the machine itself."""
         for i in range(3):
             self.doubt(i, self.carried[i])
 
@@ -156,7 +156,7 @@ class CorrectionMethod(ABC):
         return not moves and not (unknown and ROTARY.isdisjoint(block.words) and block.moves[-1].rapid)
 
     def frame(self, block: Block) -> Frame:
-        """Return how corrections stand in the words of a block."""
+        """Return the conversion of corrections to the words of a block."""
         if block.modal is not self._modal:  # one snapshot serves many blocks
             self._modal, self._frame = block.modal, Frame.of(block.modal, self.digits)
         return self._frame
@@ -166,7 +166,7 @@ class CorrectionMethod(ABC):
         return [i for i, letter in enumerate(AXES) if letter in block.words]
 
     def names_place(self, block: Block) -> bool:
-        """Return whether a block gives the place where the tool stands another name.
+        """Return whether a block renames the position of the tool.
 
         Raises
         ------
@@ -192,7 +192,7 @@ class CorrectionMethod(ABC):
         return True
 
     def leave(self, block: Block) -> None:
-        """Take in a move in machine coordinates: its axes carry nothing afterwards."""
+        """Process a move in machine coordinates: its axes have no correction afterwards."""
         all_go = block.kind == "home" and ROTARY.isdisjoint(block.words)
         axes = self.named(block) or ([0, 1, 2] if all_go else [])
         if axes and self.frame(block).turned and {0, 1} & set(axes):
@@ -215,7 +215,7 @@ class CorrectionMethod(ABC):
 
 
 def refuse_probing(block: Block) -> None:
-    """Raise `ProgramError` if a block probes: what it finds holds a correction nobody knows of."""
+    """Raise `ProgramError` if a block probes: its result contains an unknown correction."""
     if block.kind == "probe":
         raise ProgramError(
             block.line.number,

@@ -38,7 +38,7 @@ class Offset(CorrectionMethod):
     _level: float | None = field(default=None, init=False)
 
     def held_by(self, block: Block) -> str:  # noqa: ARG002 - whatever it does
-        """Return what keeps the correction from following the drift in a block."""
+        """Return the reason why the correction cannot follow the drift in a block."""
         return "a long way between safe points"
 
     @property
@@ -92,7 +92,7 @@ class Offset(CorrectionMethod):
         )
 
     def _near(self, block: Block) -> bool:
-        """Return whether a cycle begins at its R, which of them is higher must not change, or where the tool stands."""
+        """Return whether a cycle begins at its R, so that their order must not change, or at the tool position."""
         first, second, drill = PLANES[block.modal.plane]
         if all(self.before[i] and abs(block.end[i] - block.start[i]) <= STILL for i in (first, second)):
             return True
@@ -112,7 +112,7 @@ class Offset(CorrectionMethod):
             self._cycling = block.kind == "cycle"
 
     def _stay(self, block: Block, frame: Frame) -> tuple[str, ...]:
-        """Put back the offset of axes that a block names where they stand: it would move them."""
+        """Reset the offset of axes that a block names at their position: it would move them."""
         named = self.named(block) if block.modal.absolute else []
         x, y, z = (self.carried[i] if i in named else self._shift[i] for i in range(3))
         if (x, y, z) == self._shift or block.modal.cutter or block.modal.turned or block.line.optional:
@@ -206,5 +206,5 @@ class Offset(CorrectionMethod):
 
 
 def ending(text: str) -> str:
-    """Return how a line ends."""
+    """Return the line ending of a line."""
     return text[len(text.rstrip("\r\n")) :] or "\n"

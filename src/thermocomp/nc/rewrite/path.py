@@ -14,7 +14,7 @@ def length(move: Move) -> float:
 
 
 def find_point(move: Move, share: float) -> Point:
-    """Return where the tool is when it has gone a share of a move [mm, machine coordinates]."""
+    """Return the position of the tool after a fraction of a move [mm, machine coordinates]."""
     point = [a + share * (b - a) for a, b in zip(move.start, move.end, strict=True)]
     arc = move.arc
     if arc is not None:

@@ -79,9 +79,9 @@ class Revision:
     Attributes
     ----------
     left : Left
-        What the correction leaves of the drift in the cuts.
+        Residual of the drift after the correction in the cuts.
     elsewhere : Elsewhere
-        What another work offset would cost, where the drift depends on the place.
+        Cost of another work offset, where the drift depends on the position.
     taken_system : bool
         The tool cut before the program said in which work coordinate system: G54 was taken.
     corrected : bool
@@ -89,13 +89,13 @@ class Revision:
     lines, changed : int
         Lines read, and how many of them are not as they were.
     seconds : float
-        How long the program runs [s].
+        Duration of the program [s].
     tool_changes : list of float
-        When [s].
+        Times of the tool changes [s].
     slowest, fastest : float
         Spindle speeds met [1/min].
     held : dict of str to (float, int)
-        What kept a correction from following the drift in a cut, what was left there at most [um], and in which line.
+        Reason why a correction could not follow the drift in a cut, the largest residual there [um], and its line.
     standing : int
         First line that cuts while the spindle is stopped; 0: none does.
     idle : int
@@ -243,7 +243,7 @@ class Revision:
         self._refuse_open(ended, carried)
 
     def _cut(self, block: Block, samples: list[Sample], knots: list[tuple[float, Vector]], demand: Vector) -> CutErrors:
-        """Return how far the tool is off in a cut, and note what has held the correction."""
+        """Return the errors of the tool in a cut, and note what has limited the correction."""
         cut = self.left.take(block.line.number, _beside(samples, knots))
         self._note_held(block, demand, samples[0].deviation, (knots[0][1], knots[-1][1]), cut)
         return cut
@@ -274,7 +274,7 @@ class Revision:
         return revised
 
     def _changed(self, block: Block, samples: list[Sample], check: Check) -> tuple[Change, list[tuple[float, Vector]]]:
-        """Return what becomes of a block, and what the axes carry where on its way."""
+        """Return the revision of a block, and the corrections of the axes along its path."""
         method = self.method
         before, begun = method.before, method.carried
         parts = [1.0]
@@ -325,7 +325,7 @@ class Revision:
             raise ProgramError(line, str(e)) from e
 
     def _cuts(self, block: Block) -> bool:
-        """Return whether the tool may cut in a block: it moves in feed, or stands where it has cut."""
+        """Return whether the tool may cut in a block: it moves in feed, or stays where it has cut."""
         if block.tool_change is not None or block.kind in ("machine", "home"):
             self._touching = False
         elif block.moves:

@@ -83,14 +83,14 @@ def may_split(block: Block, before: Known) -> bool:
 
 
 def shares(samples: Sequence[Sample], carried: Vector, axes: Sequence[int], step: float, way: float) -> list[float]:
-    """Return where the pieces of a cut end, as shares of its way; one alone if it is not split.
+    """Return the ends of the parts of a cut, as fractions of its path; a single one if it is not split.
 
     Parameters
     ----------
     samples : sequence of Sample
         From the start to the end.
     carried : tuple of float
-        What the axes carry at the start [um].
+        Corrections of the axes at the start [um].
     axes : sequence of int
         Those whose correction can change within it.
     step : float
@@ -132,7 +132,7 @@ def pieces(block: Block, parts: Sequence[float], before: Known, controller: Cont
     block : Block
         One that `may_split`.
     parts : sequence of float
-        Where they end, as shares of its way; the last is 1.
+        Ends of the parts, as fractions of its path; the last is 1.
     before : tuple of bool
         Axes whose place was known before it.
     controller : {'linuxcnc', 'fanuc'}

@@ -18,12 +18,12 @@ Shifts = Mapping[str, float]
 
 @dataclass(frozen=True)
 class Digits:
-    """How many decimals a written length has.
+    """Number of decimals of a written length.
 
     Parameters
     ----------
     mm, inch : int
-        What a correction is rounded to: all of it is in these decimals, so that no word is rounded twice.
+        Decimals to which a correction is rounded: all of it is in these decimals, so that no word is rounded twice.
     """
 
     mm: int = 4
@@ -39,7 +39,7 @@ DIGITS = {"linuxcnc": Digits(), "fanuc": Digits(3, 4)}
 
 
 def format_number(value: float, digits: int) -> str:
-    """Return a number with a decimal point always, and without zeros that say nothing."""
+    """Return a number always with a decimal point, and without redundant zeros."""
     text = f"{value:.{digits}f}".rstrip("0")
     if text.endswith("."):
         text += "0"

@@ -1,4 +1,4 @@
-"""Whether a program stays where the machine can go: if it does not, it is wrong, or what was told of its origins."""
+"""Travel check: a program beyond the travels is wrong, or its given origins are."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,7 +11,7 @@ BEYOND = 1.0
 
 @dataclass
 class Travel:
-    """Follows the cuts of a program in machine coordinates, where program or setup tell origin and tool length.
+    """Checks the cuts of a program in machine coordinates, where program or setup define origin and tool length.
 
     Parameters
     ----------
@@ -23,7 +23,7 @@ class Travel:
     _farthest: dict[str, tuple[float, float, int]] = field(default_factory=dict, init=False)  # beyond, position, line
 
     def take(self, revised: Revised) -> None:
-        """Take a line in, in its order."""
+        """Add a line, in order."""
         block = revised.block
         if block is None:
             return
@@ -41,7 +41,7 @@ class Travel:
                     self._farthest[axis] = beyond, position, block.line.number
 
     def warnings(self) -> list[str]:
-        """Return which axes have left their travel, and where they were the farthest beyond."""
+        """Return the axes that have left their travel, and the positions farthest beyond."""
         return [
             f"{axis} goes to {position:.6g} mm at line {line}, in machine coordinates: outside its travel, "
             f"{self.limits[axis][0]:g} to {self.limits[axis][1]:g} mm; check the program and the origins"

@@ -39,7 +39,7 @@ class Outside(NamedTuple):
 
 
 class Drift:
-    """How far the tool point has drifted, at any moment of a program and anywhere.
+    """Drift of the tool point, at any time of a program and at any position.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Drift:
     time : float
         Since the start of the program, up to the last step of the models [s].
     assumed : tuple of str
-        What the start has made of one measurement for several stations.
+        Assumptions made at the start about one measurement for several stations.
     beyond : dict of str to float
         Per axis, how far the positions asked for were beyond its outermost station, at most [mm].
 
@@ -219,7 +219,7 @@ class Drift:
         return (found[0], found[1], found[2])
 
     def field(self) -> Callable[[Point], Point]:
-        """Return what `deviation` gives now, as a function of the place that time does not change any more."""
+        """Return the present `deviation` as a function of position, unaffected by later time steps."""
         everywhere = self._everywhere
         if not self._ladders:
             return lambda _: everywhere
@@ -240,7 +240,7 @@ class Drift:
 
     @property
     def driven(self) -> tuple[str, ...]:
-        """The axes whose models say anything: an input has an influence on them, or they are not 0 at rest."""
+        """Axes whose models have an effect: an input influences them, or they are not 0 at rest."""
         return tuple(
             a for a in AXES if any(s.axis == a and (s.model.sensors or s.model.intercept) for s in self.stations)
         )
@@ -282,7 +282,7 @@ class Drift:
         return {n: h for n, s in self._others.items() if n in used and (h := s.held(self.time)) > 0}
 
     def uncertainty(self) -> tuple[float, float, float]:
-        """Return how wrong the models may be.
+        """Return the uncertainty of the models.
 
         Per axis, of its stations the greatest of: the greatest error on cycles the method had not seen, twice if the
         zero itself is a prediction; and, since an input has left the trained range, all that the model says on top.
@@ -303,7 +303,7 @@ class Drift:
     # -- the next job ------------------------------------------------------------------------------------------------
 
     def state(self) -> JobState:
-        """Return what the next job can start from; the models are stepped up to now."""
+        """Return the state from which the next job can start; the models are stepped up to now."""
         if self._pending:
             self._flush()
         return hand_over_state(self.stations, self._states, self._zeros, self._doubts, zero_known=self._zero_known)

@@ -1,4 +1,4 @@
-"""What drives the models along a program: the spindle speed of the program, all else constant or forecast."""
+"""Inputs of the models along a program: the spindle speed of the program, all others constant or forecast."""
 
 import math
 from bisect import bisect_right
@@ -89,7 +89,7 @@ Inputs = Mapping[str, InputSignal]
 
 
 class Wiring:
-    """Where the inputs of one model come from.
+    """Sources of the inputs of one model.
 
     An input of quantity ``spindle_speed`` gets the speed of the program; one without influence on the deviation needs
     nothing.
@@ -130,14 +130,14 @@ class Wiring:
 
 
 def constants(texts: Sequence[str], models: Sequence[ErrorModel]) -> dict[str, InputSignal]:
-    """Read what the user says is constant.
+    """Read the constants given by the user.
 
     Parameters
     ----------
     texts : sequence of str
         Such as ``t3=21.5degC``: an input, with or without its unit at the end (``t3_C``), and its value with a unit.
     models : sequence of ErrorModel
-        Whose inputs they are.
+        Models that have these inputs.
 
     Returns
     -------

@@ -8,25 +8,25 @@ from thermocomp.core.exceptions import SettingError
 
 @dataclass(frozen=True)
 class StationState:
-    """What the model of one station remembers.
+    """State of the model of one station.
 
     Parameters
     ----------
     station : str
-        Which one, such as ``Z at Z 200 mm``.
+        Name of the station, such as ``Z at Z 200 mm``.
     target : str
-        Of its model.
+        Target of its model.
     model : str
-        Which numbers the model is made of: a hash.
+        Hash of the numbers of the model.
     reference : tuple of float
-        What counts as zero, per input.
+        Zero of each input.
     memory : tuple of float
     deviation : float
         Last deviation given [um].
     zero : float
         Deviation that counts as zero [um].
     doubt : float
-        What the bound was widened by because the model had left its trained range [um].
+        Widening of the bound because the model had left its training range [um].
     """
 
     station: str
@@ -49,7 +49,7 @@ class StationState:
 
 @dataclass(frozen=True)
 class JobState:
-    """What one job leaves behind for the next one (E-P5).
+    """State after one job for the next one (E-P5).
 
     Parameters
     ----------

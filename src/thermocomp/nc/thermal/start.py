@@ -26,7 +26,7 @@ _LONG = 2 * 86400.0
 
 
 class ThermalStart(NamedTuple):
-    """State of the models when the program starts, or so long before it as the spindle is stopped."""
+    """State of the models when the program starts, or earlier by the time the spindle is stopped."""
 
     states: tuple[State, ...]  #: per station
     known: bool  #: the state is no prediction: the machine is cold or measured
@@ -97,7 +97,7 @@ def carry_over(stations: Sequence[Station], left: JobState, pause: float = 0.0) 
 
 
 def begin_measured(stations: Sequence[Station], deviations: Mapping[str, float], others: Inputs) -> ThermalStart:
-    """Return a state in which the models say what has been measured, the spindle standing still.
+    """Return a state in which the outputs of the models equal the measurement, with the spindle stopped.
 
     An autoregressive model is told its past. For another one that remembers, the machine is taken to have settled at
     that constant spindle speed, the least one in the trained range, at which the deviation is the measured one as soon
@@ -196,13 +196,13 @@ def hand_over_state(
     *,
     zero_known: bool,
 ) -> JobState:
-    """Return what the next job can start from.
+    """Return the state from which the next job can start.
 
     Parameters
     ----------
     stations : sequence of Station
     states : sequence of State
-        Of their models.
+        States of their models.
     zeros, doubts : sequence of float
         Per station, see `StationState` [um].
     zero_known : bool
@@ -237,7 +237,7 @@ def identity(model: ErrorModel) -> str:
 
 
 def _names(station: Station) -> list[str]:
-    """Return how a measured deviation of a station may be named, the best first; its axis is another name."""
+    """Return the valid names for a measured deviation of a station, the best first; its axis is another name."""
     target = station.model.target
     return [n for n in (target.removesuffix("_um"), target) if n != station.axis]
 
@@ -324,13 +324,13 @@ def _stopped(model: ErrorModel, wiring: Wiring, speed: float) -> State:
 
 
 def _begun(model: Ticking, wiring: Wiring, deviation: float) -> State:
-    """Return the state of an autoregressive model that is told its past."""
+    """Return the state of an autoregressive model with a given past."""
     still, reference = wiring.values(0.0, 0.0), model.init().reference
     return model.begin_at(deviation, still, np.where(np.isnan(reference), still, reference))
 
 
 def _bisected(too_much: Callable[[float], float], low: float, high: float) -> float:
-    """Return where a function with another sign at either end is zero, as closely as numbers can."""
+    """Return the zero of a function with a sign change between both ends, to the precision of the numbers."""
     rising = too_much(low) <= 0
     while low < (middle := 0.5 * (low + high)) < high:
         if (too_much(middle) <= 0) == rising:

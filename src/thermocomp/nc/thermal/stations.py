@@ -1,4 +1,4 @@
-"""Which model stands for the drift of which axis, and where (P-04)."""
+"""Assignment of models to the drift of axes, and their positions (P-04)."""
 
 import re
 from collections.abc import Sequence
@@ -32,7 +32,7 @@ class Station:
     along : {'X', 'Y', 'Z'} or None
         The axis whose position it depends on; None: the model holds everywhere.
     at : float
-        Where along it the model holds, machine coordinate [mm].
+        Position along it at which the model is valid, machine coordinate [mm].
     shadow : bool
         True: the drift is computed, and no machine runs by it, as in a study; the model may be one that was never
         judged.
@@ -71,7 +71,7 @@ def stations(models: Sequence[ErrorModel], texts: Sequence[str] = ()) -> list[St
     Parameters
     ----------
     models : sequence of ErrorModel
-        Of one model file, or of several.
+        Models of one model file, or of several.
     texts : sequence of str
         What the user says: ``ch3=Z``, ``zz=X at Z 200 mm``, or only a target whose name says it. Models that no text
         names are left out. Without any text all are taken, and the names of their targets must say it: ``x``, ``y_um``,

@@ -45,7 +45,7 @@ TOOLS = (60.0, 300.0)
 
 @dataclass(frozen=True, eq=False)
 class Volume:
-    """What compensation leaves at random points of the work volume, in random thermal states of unseen tests.
+    """Residuals of compensation at random points of the work volume, in random thermal states of unseen tests.
 
     Parameters
     ----------
@@ -72,12 +72,12 @@ class Volume:
         return {name: np.linalg.norm(e, axis=1) for name, e in self.errors.items()}
 
     def gain(self, what: str = WITH) -> float:
-        """Return how many times smaller the error is, by its RMS."""
+        """Return the factor by which the RMS error is reduced."""
         return rms(self.sizes[WITHOUT]) / rms(self.sizes[what])
 
 
 class _Points(NamedTuple):
-    """Random points of the volume in random rows of a test: the machine there and then, and what a model tells of it.
+    """Random points of the volume in random rows of a test: the machine then, and the prediction of a model.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def judge(learned: LearnedVolume, seed: int) -> Volume:
     ----------
     learned : LearnedVolume
     seed : int
-        Of weather, noise, points and rows; another one than what was learned from.
+        Random seed of weather, noise, points and rows; different from that of the training data.
 
     Returns
     -------
@@ -122,7 +122,7 @@ def judge(learned: LearnedVolume, seed: int) -> Volume:
     truth, kinematics = VolumetricTruth(MachiningCentre().observables), Kinematics(learned.machine)
 
     def effect(values: FloatArray, codes: Collection[str] = INDEX) -> FloatArray:
-        """Return what the errors of some components do to the tool points [um]."""
+        """Return the effect of the errors of some components at the tool points [um]."""
         alone = np.zeros_like(values)
         columns = [INDEX[code] for code in codes]
         alone[:, columns] = values[:, columns]
@@ -181,7 +181,7 @@ def _points(learned: LearnedVolume, test: SimulatedTest, n: int, rng: np.random.
 
 
 def as_measured(truth: VolumetricTruth, now: FloatArray, start: FloatArray, points: FloatArray) -> FloatArray:
-    """Return the true components as instruments tell them: lasers set to zero at the test position, and a nest there.
+    """Return the true components as measured: lasers set to zero at the test position, and a nest there.
 
     Parameters
     ----------
@@ -325,7 +325,7 @@ def tables(found: Volume) -> list[StudyTable]:
 
 
 def figures(found: Volume) -> list[Figure]:
-    """Return how large the error is in what share of the points."""
+    """Return the cumulative distribution of the error over the points, before and after."""
     share = 100.0 * np.arange(1, POINTS + 1) / POINTS
     lines = [PlotCurve(name, np.sort(size), share) for name, size in found.sizes.items()]
     text = f"The volumetric error at {POINTS} random points and thermal states, before and after."
@@ -334,7 +334,7 @@ def figures(found: Volume) -> list[Figure]:
 
 
 def _off(fit: PositionFit) -> float:
-    """Return how far the cold profile of EYX is off the true one, RMS over the travels of X and Z [um]."""
+    """Return the error of the cold profile of EYX from the true one, RMS over the travels of X and Z [um]."""
     x, z = np.meshgrid(*(np.linspace(0.0, TRAVEL[a], 31) for a in "xz"))
     points = np.stack([x.ravel(), np.full(x.size, float(TEST_POSITION["y"])), z.ravel()], axis=-1)
     assert fit.model.profile is not None

@@ -53,7 +53,7 @@ class LearnedNet:
 
 @dataclass(frozen=True, eq=False)
 class LearnedDrift:
-    """All that was learned from the 810 sets.
+    """Results of learning from the 810 sets.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ class LearnedDrift:
     nets : sequence of LearnedNet
         9-20-3, each from another start.
     others : mapping of str to sequence of LearnedNet
-        What the paper tried and rejected (C-26, C-28, C-30).
+        Methods that the paper tried and rejected (C-26, C-28, C-30).
     """
 
     samples: Samples
@@ -113,7 +113,7 @@ class LearnedDrift:
 
     @property
     def independent(self) -> dict[str, float]:
-        """How many independent rows their residuals count as."""
+        """Number of independent rows equivalent to their residuals."""
         return {t: r.n_effective_ for t, r in self.regressions.items()}
 
     @property
@@ -128,7 +128,7 @@ def learn(seed: int, told: Callable[[float], None]) -> LearnedDrift:
     Parameters
     ----------
     seed : int
-        Of weather and noise; the nets' own starts are the same for every seed.
+        Random seed of weather and noise; the nets' own starts are the same for every seed.
     told : callable
         Is told the share done (0..1).
 

@@ -1,4 +1,4 @@
-"""Chen, Yuan, Ni 1996, section 3.3: do 51 profiles tell the law of the slope? Eq. 6 and 8 are planted, and sought.
+"""Chen, Yuan, Ni 1996, section 3.3: recovery of the slope law from 51 profiles. Eq. 6 and 8 are the known law.
 
 The virtual machine's own slopes follow no law in temperatures that anyone knows. So its temperatures are kept, and its
 profiles are replaced by those of a machine that obeys Eq. 6 and 8; noise is then put on all that is read. What is found
@@ -39,15 +39,15 @@ POSITIONS = np.arange(0.0, 551.0, 50.0)
 
 @dataclass(frozen=True)
 class Design:
-    """How 51 profiles are measured and what is counted from where.
+    """Measurement of 51 profiles, and the reference of each quantity.
 
     Parameters
     ----------
     name : str
     experiment : str
-        Whose temperatures are taken.
+        Experiment that supplies the temperatures.
     runs : int
-        Of the laser, whose mean is a profile; the temperatures are means over them too.
+        Number of runs of the laser, whose mean is a profile; the temperatures are means over them too.
     centred : bool
         Temperatures and slopes count from the mean of all states of their test; else from its first one, as Chen's.
     laser, sensor : float
@@ -88,14 +88,14 @@ DESIGNS = (
 
 
 class Measured(NamedTuple):
-    """What is read in one test.
+    """Measured data of one test.
 
     Parameters
     ----------
     temperatures : ndarray of shape (n_profiles, 9)
         T1 to T9 [degC].
     errors : ndarray of shape (n_profiles, 12)
-        Of Y at `POSITIONS` [um].
+        Errors of Y at `POSITIONS` [um].
     """
 
     temperatures: FloatArray
@@ -122,7 +122,7 @@ class Measured(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Recovery:
-    """What came back of the law in many draws.
+    """Recovery of the law in many draws.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def temperatures(experiment: str, seed: int) -> list[FloatArray]:
     ----------
     experiment : str
     seed : int
-        Of the weather.
+        Random seed of the weather.
     """
     return [test.values([test.channel(t) for t in TEMPERATURES]) for test in recordings(experiment, seed, 0.0)]
 
@@ -177,7 +177,7 @@ def plant(day: Sequence[FloatArray], design: Design, rng: np.random.Generator) -
         From `temperatures`, a row per run of the laser; the first is that of the cold machine.
     design : Design
     rng : Generator
-        Of the noise.
+        Generator of the noise.
 
     Returns
     -------
@@ -221,7 +221,7 @@ def recover(design: Design, days: Sequence[Sequence[FloatArray]], n_draws: int, 
         With another weather each, taken in turn; see `plant`.
     n_draws : int
     seed : int
-        Of the noise.
+        Random seed of the noise.
 
     """
     rng = np.random.default_rng(seed)
@@ -236,19 +236,19 @@ def recover(design: Design, days: Sequence[Sequence[FloatArray]], n_draws: int, 
 
 @dataclass(frozen=True, eq=False)
 class Law:
-    """What was found of the planted law.
+    """Results of recovering the known (synthetic) law.
 
     Parameters
     ----------
     recoveries : mapping of Design to Recovery
     fit : PositionFit
-        Of the first draw of `OURS`.
+        Fit of the first draw of `OURS`.
     net : SigmoidNet
         5-8-1, trained on the same profiles, counted from the cold state.
     net_r2 : float
         About zero, in-sample (E-C10).
     idle : float
-        How much the net's slope changes at most over the range of T1, which the law does not know [um/m].
+        Largest change of the net's slope over the range of T1, on which the law does not depend [um/m].
     elsewhere : mapping of str to float
         Of a test in which all is warmed together: RMS of the slope ("law"), and of what regression ("MRA") and net
         ("net") miss of it [um/m].
@@ -268,7 +268,7 @@ def seek(seed: int) -> Law:
     Parameters
     ----------
     seed : int
-        Of weather and noise.
+        Random seed of weather and noise.
 
     Returns
     -------
@@ -368,7 +368,7 @@ def numbers(found: Law) -> dict[str, float]:
 
 
 def tables(found: Law) -> list[StudyTable]:
-    """Return how often the law came back, and its coefficients."""
+    """Return the frequency with which the law was recovered, and its coefficients."""
     rates = [
         [d.name, f"{d.laser:g}", f"{d.sensor:g}", *(f"{v:.1%}" for v in (r.whole, r.missing, r.wrong))]
         for d, r in found.recoveries.items()

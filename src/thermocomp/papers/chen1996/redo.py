@@ -16,7 +16,7 @@ def run(seed: int, progress: Progress) -> Study:
     Parameters
     ----------
     seed : int
-        Of weather and noise. New tests get other ones: the same seed would give them the weather that was learned from.
+        Random seed of weather and noise. New tests get others: the same seed would repeat the weather of the training.
     progress : callable
         Told the share done and what comes next.
 

@@ -60,7 +60,7 @@ def recordings(experiment: str, seed: int, sensor_noise: float | None = None) ->
     experiment : str
     seed : int
     sensor_noise : float, optional
-        Of the temperatures [degC]; the sensors' own if not given.
+        Noise of the temperatures [degC]. Default: that of the sensors.
 
     Returns
     -------

@@ -23,7 +23,7 @@ EQ5 = {
 
 
 def tables(found: LearnedDrift) -> list[StudyTable]:
-    """Return Tables 1 and 2, the fits, Eq. 5 beside ours, the logs of Fig. 2 and the sweep."""
+    """Return Tables 1 and 2, the fits, Eq. 5 next to ours, the logs of Fig. 2 and the sweep."""
     first = [
         [name, SENSORS.get(name, "mean of T6 to T9"), *(f"{r:.2f}" for r in row)]
         for name, row in screening(found).items()
@@ -62,12 +62,12 @@ def _sweep_row(nets: Sequence[LearnedNet]) -> list[str]:
 
 
 def beside(what: str, equation: str, ours: Mapping[str, float], paper: Mapping[str, float]) -> StudyTable:
-    """Lay out coefficients by their terms, ours beside the paper's.
+    """Arrange coefficients by their terms, ours next to the paper's.
 
     Parameters
     ----------
     what : str
-        What the coefficients are of, and their unit.
+        Quantity that the coefficients describe, and their unit.
     equation : str
         The paper's, such as ``Eq. 5``.
     ours, paper : mapping of str to float
@@ -111,9 +111,9 @@ def figure(number: int, text: str, axes: tuple[str, str], curves: Sequence[PlotC
     ----------
     number : int
     text : str
-        Of the caption.
+        Text of the caption.
     axes : tuple of str
-        What stands at x and y.
+        Labels of x and y.
     curves : sequence of PlotCurve
 
     Returns

@@ -35,7 +35,7 @@ NONE, MRA, NET, DYNAMIC, MEASURED = "no compensation", "MRA", "net", "dynamic (o
 
 @dataclass(frozen=True, eq=False)
 class LearnedPositioning:
-    """What was learned from the profiles of one test, and those of another day.
+    """Models learned from the profiles of one test, and from those of another day.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class LearnedPositioning:
     pitch : Profiles
         EAY, measured with the former.
     fits : mapping of str to PositionFit
-        Of `learned`, one of each method; of the nets the one with the median error after training.
+        Fits of `learned`, one of each method; of the nets the one with the median error after training.
     nets : sequence of PositionFit
         5-8-1, each from another start.
     linear : PositionFit
@@ -81,7 +81,7 @@ class LearnedPositioning:
         return 1e3 * (thermal @ day.position) / (day.position @ day.position)
 
     def predicted(self, fit: PositionFit, day: Profiles) -> FloatArray:
-        """Return the slope that a model tells from the readings of a day, shape (n_states,) [um/m]."""
+        """Return the slope predicted by a model from the readings of a day, shape (n_states,) [um/m]."""
         model = fit.model.slopes[0]
         samples, _ = slope_samples([day], PositionOptions(inputs=[i.name for i in model.inputs]))
         return common.predict_deviation(model, samples)
@@ -107,7 +107,7 @@ def learn(seed: int, other_seed: int) -> LearnedPositioning:
     Parameters
     ----------
     seed, other_seed : int
-        Of weather and noise on the two days.
+        Random seeds of weather and noise on the two days.
 
     Returns
     -------
@@ -254,7 +254,7 @@ def _lateral(found: LearnedPositioning) -> Ours:
 
 
 def residuals(found: LearnedPositioning, day: Profiles) -> dict[str, FloatArray]:
-    """Return what each method leaves of the profiles of a day, cold profile taken off, (n_states, n_points) [um]."""
+    """Return the residuals of each method for a day's profiles minus the cold profile, (n_states, n_points) [um]."""
     thermal, k1 = day.values - found.geometric(day), found.slope(day)
     slopes = {m: found.predicted(fit, day) for m, fit in found.fits.items()} | {MEASURED: k1}
     return {NONE: thermal} | {m: thermal - 1e-3 * np.outer(slope, day.position) for m, slope in slopes.items()}
@@ -279,7 +279,7 @@ def numbers(found: LearnedPositioning) -> dict[str, float]:
 
 
 def tables(found: LearnedPositioning) -> list[StudyTable]:
-    """Return Eq. 6 and Eq. 8 beside ours, the planted law, and the error without and with compensation."""
+    """Return Eq. 6 and Eq. 8 next to ours, the known law, and the error without and with compensation."""
     learned = found.learned
     ours = dict(zip(found.regression.terms_, found.regression.coef_.tolist(), strict=True))
     # in plain mm, as the paper's

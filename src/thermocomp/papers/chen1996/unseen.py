@@ -64,7 +64,7 @@ class Unseen:
         ]
 
     def errors(self, test: int, target: str, method: str) -> Errors:
-        """Return what a method leaves in one of the tests."""
+        """Return the residuals of a method in one of the tests."""
         return Errors.of(self.residuals[test][target][method])
 
     def nets(self, target: str, samples: Samples) -> FloatArray:
@@ -263,7 +263,7 @@ def noise(found: Unseen, law: Literal["uniform", "normal"]) -> dict[str, float]:
     Returns
     -------
     dict of str to float
-        Of the nets the median.
+        Median of the nets.
     """
     noisy = [found.left("z", common.with_noise(found.tests[0], NOISE, law, k)) for k in range(DRAWS)]
     return {m: float(np.mean([left[m] for left in noisy])) for m in found.models}
@@ -280,7 +280,7 @@ def largest_depth(found: Unseen) -> dict[str, float]:
 
 
 def _since_change(found: Unseen, method: str) -> float:
-    """Return how long before the largest error of a method the spindle had changed its speed [h]."""
+    """Return the time from the last change of the spindle speed to the largest error of a method [h]."""
     lengths = [_length(r, method) for r in found.residuals]
     k = int(np.argmax([e.max() for e in lengths]))
     test, row = found.tests[k], int(lengths[k].argmax())
@@ -315,7 +315,7 @@ def numbers(found: Unseen) -> dict[str, float]:
 
 
 def tables(found: Unseen) -> list[StudyTable]:
-    """Return what is left of x, y and z in each new test, and how many independent rows that is."""
+    """Return the residuals of x, y and z in each new test, and the number of independent rows."""
     residuals = {
         (f"{t}, {name}", method): e
         for name, tests in zip(TESTS, found.residuals, strict=True)

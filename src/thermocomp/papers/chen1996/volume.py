@@ -53,7 +53,7 @@ def learn(seed: int) -> LearnedVolume:
     Parameters
     ----------
     seed : int
-        Of weather and noise.
+        Random seed of weather and noise.
 
     Returns
     -------
@@ -73,7 +73,7 @@ def learn(seed: int) -> LearnedVolume:
 
 
 def every(test: Recording, step: int) -> Recording:
-    """Return every so many rows of a recording."""
+    """Return every `step`-th row of a recording."""
     time, table = test.time[::step], test.table.iloc[::step].reset_index(drop=True)
     return replace(test, time=time, table=table, cycles=find_cycles(time, table["spindle_rpm"].to_numpy()))
 

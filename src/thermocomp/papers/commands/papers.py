@@ -1,4 +1,4 @@
-"""``thermocomp papers``: the papers' studies redone, their number beside ours."""
+"""``thermocomp papers``: reproduction of the papers' studies, their numbers next to ours."""
 
 import time
 from functools import partial
@@ -27,10 +27,10 @@ if TYPE_CHECKING:
 Name = Literal["chen1996", "wessel2004", "hwang", "precompensation", "stepwise2017", "cross"]
 Names = Annotated[list[Name], Parameter(show_default=False)]
 Measured = Annotated[list[Path], Parameter(name="--with", show_default=False)]
-#: what is not a paper's study but the table of all methods on all experiments (X-03)
+#: not a paper's study but the table of all methods on all experiments (X-03)
 CROSS = "cross"
 
-#: columns that the tables of cross need
+#: width of the tables of cross [characters]
 TABLE_WIDTH = 120
 
 _TONES = {"yes": "good", "no": "grave", "-": "soft"}
@@ -53,45 +53,45 @@ def papers(
     overwrite: bool = False,
     json: bool = False,
 ) -> int:
-    """Redo the papers' studies on the virtual machine: their number, ours, and whether their claim holds here.
+    """Reproduce the papers' studies on the virtual machine: their numbers, ours, and whether their claims hold.
 
-    A claim that does not hold is a finding, not a failure.
+    A claim that does not hold is a result, not an error.
 
     Parameters
     ----------
     names : list of str
-        Papers; all five if none is named. cross is the table of methods on all experiments.
+        Papers to reproduce; cross is the table of methods on all experiments. Default: all five papers.
     measured : list of Path
-        Recordings on which the methods of cross are judged as well; each is one test.
+        Measured recordings on which the methods of cross are judged as well; each one is a separate test.
     mapping : Path
-        TOML file that says what their columns are.
+        TOML mapping file: role and unit of each column of the measured recordings.
     target : list of str
-        Their displacements that cross judges; all of them if not given.
+        Displacements of the measured recordings that cross judges. Default: all of them.
     models : list of str
-        Methods of cross, or all; without it those that take seconds.
+        Methods of cross, or "all". Default: those that run within seconds.
     physics : {'linear', 'nonlinear'}
-        Of the virtual machine, for wessel2004: linear, or with joints, bearings and films that depend on temperature
-        and speed.
+        Physics of the virtual machine for wessel2004: linear, or nonlinear with joints, bearings and films that depend
+        on temperature and speed.
     seed : int
-        Of the weather, the sensors' noise and what is drawn by lot.
+        Random seed of the weather, the sensor noise and random draws.
     repeats : int
-        Runs of each paper's study, with seeds 100 apart: what holds in one weather only is told. Numbers and figures
-        are those of the first.
+        Number of runs of each paper's study, with seeds 100 apart: claims that hold in some runs only are reported.
+        Numbers and figures are those of the first run.
     jobs : int
-        Processes to share the runs, or the methods of cross, among; -1 takes all cores.
+        Number of parallel processes for the runs or the methods of cross; -1: one per core.
     scheduler : str
-        Dask scheduler whose workers do the work in place of these processes, such as tcp://192.168.1.20:8786.
+        Address of a Dask scheduler whose workers replace the local processes, such as tcp://192.168.1.20:8786.
     output : Path
-        Page with claims, figures and tables to write (.html).
+        Output page with claims, figures and tables (.html).
     overwrite : bool
-        Write over an existing page.
+        Overwrite an existing page.
     json : bool
-        Print results for a machine instead of tables.
+        Print results as JSON instead of tables.
 
     Returns
     -------
     int
-        0 the studies ran, whatever holds; 1 one of them failed; 2 unusable input.
+        0 all studies were completed, whether their claims hold or not; 1 a study failed; 2 unusable input.
     """
     _check_numbers(seed, repeats, jobs)
     from thermocomp.judging.sharing import shared_among
@@ -147,7 +147,7 @@ def _check_numbers(seed: int, repeats: int, jobs: int) -> None:
 
 
 def _tried(name: str, run: "Callable[[Told], Study]", progress: "Told") -> "Study":
-    """Return a study; one that says why if it fails: the others are run all the same."""
+    """Return a study, or one with the reason if it fails, so that the other studies still run."""
     from thermocomp.judging.pieces import explain
     from thermocomp.papers.studies import not_redone
 

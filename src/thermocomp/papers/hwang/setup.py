@@ -1,4 +1,4 @@
-"""What the study of Hwang, Lee and Yang computes; `thermocomp.papers.hwang.redo` tells it.
+"""Computation of the study of Hwang, Lee and Yang; `thermocomp.papers.hwang.redo` presents it.
 
 One test of six hours in three states drawn by lot, 14 sensors, drift Z. T14 (bed) is the reference: every variable is
 ``T_i - T14``, temperatures as they are, not from the start of the test (H-08). The paper's threshold is not known
@@ -88,7 +88,7 @@ def polynomial(samples: Samples, names: Sequence[str], degree: int) -> PaperFit:
     ----------
     samples : Samples
     names : sequence of str
-        Of the temperatures.
+        Names of the temperatures.
     degree : int
         Highest power; there are no products.
 
@@ -119,7 +119,7 @@ def agreement(groups: Groups) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Computed:
-    """Everything the study tells.
+    """All results of the study.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ class Computed:
     shaken : dict of (str, float) to dict of str to Sensitivity
         R2 under random sensor error, by its law and size [degC].
     dynamic : ndarray of shape (n_new,)
-        What `dynamic` leaves of the new tests [um].
+        Residuals of `dynamic` in the new tests [um].
     """
 
     fit: Samples
@@ -156,7 +156,7 @@ class Computed:
 
     @cached_property
     def worth(self) -> float:
-        """How many independent rows the fit of the optimal model is worth."""
+        """Number of independent rows equivalent to the fit of the optimal model."""
         return effective_sample_size(self.drift - self.fitted(OPTIMAL))
 
     @cached_property
@@ -165,12 +165,12 @@ class Computed:
         return self.fit.values[:, :-1] - self.fit.values[:, -1:]
 
     def fitted(self, name: str) -> FloatArray:
-        """Return what a model says of the rows it was fitted to [um]."""
+        """Return the output of a model for the rows it was fitted to [um]."""
         return predict_deviation(self.fits[name].model, self.fit)
 
     @cached_property
     def residuals(self) -> dict[str, FloatArray]:
-        """What each model leaves of the new tests [um]."""
+        """Residuals of each model in the new tests [um]."""
         z = self.new.deviations[:, 0]
         left = {name: z - predict_deviation(f.model, self.new) for name, f in self.fits.items()}
         return {NONE: z} | left | {"dynamic (not of the paper)": self.dynamic}
@@ -234,7 +234,7 @@ def _fit_of(g: CorrelationGrouping, samples: Samples) -> PaperFit:
 
 
 def _dynamic(tests: Sequence[Recording]) -> FloatArray:
-    """Return what `dynamic` leaves of the new tests, learned from the first; it counts from the start of a test."""
+    """Return the residuals of `dynamic` in the new tests, fitted to the first one; relative to the start of a test."""
     inputs = [*(f"t_{p}_C" for p in HWANG_PLACES), "spindle_rpm"]
     learned, new = (stacked(r, [TARGET], inputs) for r in (tests[:1], tests[1:]))
     return new.deviations[:, 0] - predict_deviation(trained("dynamic", learned), new)

@@ -1,4 +1,4 @@
-"""What the study of Hwang, Lee and Yang shows: its tables and figures."""
+"""Tables and figures of the study of Hwang, Lee and Yang."""
 
 from collections.abc import Callable
 

@@ -51,7 +51,7 @@ HOUSE = ("arx-free-run", "dynamic")
 
 @dataclass(frozen=True)
 class Changing(Climate):
-    """A room that gets warmer or colder while the test runs, beside what its air does anyway.
+    """A room that gets warmer or colder during the test, in addition to the usual changes of its air.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class Changing(Climate):
         ----------
         state : ndarray of shape (2, 3)
         start : float
-            When the first step begins, since the start of the test [s].
+            Start of the first step, since the start of the test [s].
         step : float
             [s]
         n_steps : int
@@ -95,12 +95,12 @@ class Changing(Climate):
 
 @dataclass(frozen=True, eq=False)
 class Surfaces:
-    """What came out of all tests, milled with programs that were revised in one way.
+    """Surfaces of all tests, milled with programs that were revised by one method.
 
     Parameters
     ----------
     depth : ndarray of shape (n_tests, n_positions)
-        How far the mean of the second surface lies above that of the first [um].
+        Height of the mean of the second surface above that of the first [um].
     unevenness : ndarray of shape (n_tests, 2, n_positions)
         From the lowest to the highest place within a surface [um].
     """
@@ -131,7 +131,7 @@ class Surfaces:
 
 @dataclass(frozen=True, eq=False)
 class Milled:
-    """All that was milled.
+    """All milled surfaces.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ class Milled:
     turning : float
         Share of the time in which the programs have the spindle speed of the recorded tests.
     lines : int
-        Of the first program.
+        Number of lines of the first program.
     first : dict of str to list of (Face, ndarray)
         Of the first test, cold: faces, and where their surfaces lie [um]; by the way of revising, with the net.
     """
@@ -151,16 +151,16 @@ class Milled:
     first: dict[str, list[tuple[program.FacedSurface, FloatArray]]] = field(default_factory=dict)
 
     def without(self, case: str) -> Surfaces:
-        """Return what the programs mill that nobody has revised."""
+        """Return the surfaces milled by the unrevised programs."""
         return self.surfaces[case, NONE, ""]
 
     def paper(self, case: str, model: str = NET) -> Surfaces:
-        """Return what comes of the paper's way."""
+        """Return the surfaces of the paper's method."""
         return self.surfaces[case, model, program.EVERY]
 
 
 def house_models(learn: Samples) -> dict[str, list[ErrorModel]]:
-    """Fit what the house has for machines without sensors, as it comes, to the identification.
+    """Fit the default methods of thermocomp for machines without sensors to the identification.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ def compute(models: Mapping[str, Sequence[ErrorModel]], seed: int, progress: Pro
     models : mapping of str to sequence of ErrorModel
         One per position.
     seed : int
-        Of the first test; the others have the next ones.
+        Random seed of the first test; the others have the next ones.
     progress : callable
 
     Returns

@@ -1,4 +1,4 @@
-"""What the study tells of the cutting tests with NC programs: claims, tables, figures and numbers."""
+"""Report of the cutting tests with NC programs: claims, tables, figures and numbers."""
 
 import numpy as np
 

@@ -98,7 +98,7 @@ def write_program(test: Recording) -> list[str]:
 
 
 def milling(test: Recording) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return when the cold faces and the other ones are milled, from and to [s]: see `MILLING`."""
+    """Return the times at which the cold faces and the other ones are milled, from and to [s]: see `MILLING`."""
     running = np.flatnonzero(_speeds(test)[1:] > 0)
     begin, end = float(test.time[running[0]]), float(test.time[running[-1] + 1])
     return (begin, begin + MILLING * MINUTE), (end - MILLING * MINUTE, end)
@@ -221,7 +221,7 @@ class FacedSurface:
     number : int
         1 is milled cold, 2 after the hour.
     position : float
-        Of Z, in the drawing [mm].
+        Position of Z, in the drawing [mm].
     time : ndarray of shape (n,)
         [s]
     z : ndarray of shape (n,)
@@ -234,12 +234,12 @@ class FacedSurface:
     z: FloatArray
 
     def surface(self, drift: Recording) -> FloatArray:
-        """Return where the surface lies, actual minus drawing, (n,) [um].
+        """Return the position of the surface, actual minus drawing, (n,) [um].
 
         Parameters
         ----------
         drift : Recording
-            What the machine deviates by at each of `POSITIONS`.
+            Deviation of the machine at each of `POSITIONS`.
         """
         columns = [drift.table[f"z_at_{p}_um"].to_numpy(dtype=np.float64) for p in POSITIONS]
         there = np.column_stack([np.interp(self.time, drift.time, column) for column in columns])
@@ -254,7 +254,7 @@ def run(lines: Iterable[str]) -> Iterator[Timed]:
 
 
 def faces(lines: Iterable[str]) -> list[FacedSurface]:
-    """Return what a program cuts; it says itself, in comments, where a face begins.
+    """Return the faces that a program cuts; comments in the program mark the start of each face.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What the study of pre-compensation computes; `thermocomp.papers.precompensation.redo` tells it."""
+"""Computation of the study of pre-compensation; `thermocomp.papers.precompensation.redo` presents it."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -63,14 +63,14 @@ class CuttingTest:
 
 @dataclass(frozen=True, eq=False)
 class Warm:
-    """A job that begins on a machine that is still warm (E-P5), at one position.
+    """A job that starts on a machine that is still warm (E-P5), at one position.
 
     Parameters
     ----------
     hours, drift : ndarray of shape (n_rows,)
         Since the job began [h], and the drift since then [um].
     cold, carried : ndarray of shape (n_rows,)
-        What is left of it [um] if the model begins cold, and if it carries its state over.
+        Residual [um] if the model starts cold, and if its state is carried over.
     """
 
     hours: FloatArray
@@ -81,7 +81,7 @@ class Warm:
 
 @dataclass(frozen=True, eq=False)
 class Computed:
-    """Everything the study tells.
+    """All results of the study.
 
     Parameters
     ----------
@@ -120,18 +120,18 @@ class Computed:
 
     @cached_property
     def free_run(self) -> dict[str, FloatArray]:
-        """What each model predicts of the verification, (n_rows, n_positions) [um]."""
+        """Prediction of each model for the verification, (n_rows, n_positions) [um]."""
         return {name: at_positions(models, self.judge) for name, models in self.models.items()}
 
     @cached_property
     def left(self) -> dict[str, FloatArray]:
-        """What is left of the verification, (n_rows, n_positions) [um]."""
+        """Residuals of the verification, (n_rows, n_positions) [um]."""
         z = self.judge.deviations
         return {NONE: z} | {name: z - p for name, p in self.free_run.items()}
 
     @cached_property
     def schedule(self) -> FloatArray:
-        """What is added to the programmed Z in the verification, by the nets, (n_rows, n_positions) [um]."""
+        """Values added to the programmed Z in the verification, by the nets, (n_rows, n_positions) [um]."""
         return schedule_corrections(self.judge.time, self.free_run[NET])
 
     @property
@@ -155,7 +155,7 @@ class Computed:
         return tuple(range(1, len(POSITIONS) - 1))
 
     def interpolated(self, k: int, name: str) -> FloatArray:
-        """Return what the models at all other positions say of the verification at position k, linearly between."""
+        """Return the prediction for position k by the models at all other positions, linearly interpolated."""
         others = [j for j in range(len(POSITIONS)) if j != k]
         nodes = [float(POSITIONS[j]) for j in others]
         return np.array([np.interp(POSITIONS[k], nodes, row) for row in self.free_run[name][:, others]])
@@ -226,12 +226,12 @@ def in_a_workshop(experiment: Experiment) -> Experiment:
 
 
 def at_positions(models: Sequence[ErrorModel], samples: Samples) -> FloatArray:
-    """Return what the model of each position predicts in free run, (n_rows, n_positions) [um]."""
+    """Return the free-run prediction of the model of each position, (n_rows, n_positions) [um]."""
     return np.column_stack([predict_deviation(m, samples) for m in models])
 
 
 def schedule_corrections(time: FloatArray, predictions: FloatArray) -> FloatArray:
-    """Return what is added to the programmed Z: computed every ten minutes, and kept until the next time (P-06).
+    """Return the values added to the programmed Z: computed every ten minutes, and held until the next time (P-06).
 
     Parameters
     ----------

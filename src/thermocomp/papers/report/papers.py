@@ -25,7 +25,7 @@ COLUMNS, INDENT = 88, "    "
 
 
 def count_verdicts(study: Study) -> dict[str, int]:
-    """Return how many claims there are by verdict: ``yes``, ``no``, ``some`` (runs do not agree) and ``-``."""
+    """Return the number of claims by verdict: ``yes``, ``no``, ``some`` (runs do not agree) and ``-``."""
     words = [c.verdict if c.verdict in ("yes", "no", "-") else "some" for c in study.claims]
     return {word: words.count(word) for word in ("yes", "no", "some", "-")}
 
@@ -80,13 +80,13 @@ def format_table(table: StudyTable) -> str:
 
 
 def words(table: StudyTable) -> list[int]:
-    """Return which columns of a table hold words: in the others most cells are numbers, and stand on the right."""
+    """Return the text columns of a table: in the others most cells are numbers, and right-aligned."""
     cells = [[row[k] for row in table.rows if row[k]] for k in range(len(table.header))]
     return [k for k, column in enumerate(cells) if column and 2 * sum(map(_is_number, column)) <= len(column)]
 
 
 def rows(table: StudyTable) -> list[list[str]]:
-    """Return the rows of a table; words of the first column are said once, not in every row beneath."""
+    """Return the rows of a table; repeated text in the first column is shown only once."""
     above = ["", *(row[0] for row in table.rows)] if 0 in words(table) else [""] * len(table.rows)
     return [["" if row[0] == said else row[0], *row[1:]] for row, said in zip(table.rows, above, strict=False)]
 
@@ -147,7 +147,7 @@ def render(studies: Sequence[Study], *, seed: int) -> str:
     ----------
     studies : sequence of Study
     seed : int
-        Of the (first) run.
+        Random seed of the (first) run.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What the study of stepwise2017 computes; `thermocomp.papers.stepwise2017.redo` tells it."""
+"""Computation of the study of stepwise2017; `thermocomp.papers.stepwise2017.redo` presents it."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -59,7 +59,7 @@ class Thinned:
     ----------
     rows : int
     effective : float
-        How many independent rows the residual stands for.
+        Number of independent rows equivalent to the residual.
     first : float
         R2 that a first variable needs to enter.
     names : tuple of str
@@ -77,7 +77,7 @@ class Thinned:
 
 @dataclass(frozen=True, eq=False)
 class Computed:
-    """Everything the study tells.
+    """All results of the study.
 
     Parameters
     ----------
@@ -103,12 +103,12 @@ class Computed:
 
     @cached_property
     def left_in_fit(self) -> dict[str, FloatArray]:
-        """What each model leaves of the test it was fitted to [um]."""
+        """Residuals of each model in the test it was fitted to [um]."""
         return _left(self.models, self.fit)
 
     @cached_property
     def left(self) -> dict[str, FloatArray]:
-        """What each model leaves of the on-line test [um]."""
+        """Residuals of each model in the on-line test [um]."""
         return _left(self.models, self.online)
 
     @cached_property
@@ -123,7 +123,7 @@ class Computed:
 
     @cached_property
     def worth(self) -> float:
-        """How many independent rows the stepwise fit is worth."""
+        """Number of independent rows equivalent to the stepwise fit."""
         return effective_sample_size(self.left_in_fit[STEPWISE])
 
 

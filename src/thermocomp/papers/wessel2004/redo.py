@@ -21,11 +21,11 @@ def run(seed: int, progress: Progress, physics: Physics | None = None) -> Study:
     Parameters
     ----------
     seed : int
-        Of weather and noise.
+        Random seed of weather and noise.
     progress : callable
         Told the share done and what comes next.
     physics : {'linear', 'nonlinear'}, optional
-        Of the virtual machines; what the experiments say if not given.
+        Physics of the virtual machines. Default: as defined by the experiments.
 
     Returns
     -------

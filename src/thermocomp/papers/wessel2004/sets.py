@@ -34,17 +34,17 @@ TOLERANCE, TOLERANCE_LARGER = 1e-6, 1e-5
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """What Appendix B finds.
+    """Results of Appendix B.
 
     Parameters
     ----------
     psi, larger : MaximalCorrelations
-        Of the sets of at most three, and of all larger ones.
+        Correlations of the sets of at most three, and of all larger ones.
     small, holm, converged : Equivalents
         Comparison of the sets of at most three: without correction for their number, by Holm's rule, and with sweeps to
         the limit.
     rows : sequence of int
-        Of the data sets.
+        Rows of the data sets.
     seconds : float
         All models took [s].
     """
@@ -77,7 +77,7 @@ class Selection:
         return len(self.psi.subsets) + len(self.larger.subsets)
 
     def models(self, sets: int) -> int:
-        """Return the number of models that so many sets make."""
+        """Return the number of models for a number of sets."""
         return sets * len(self.rows) * len(self.psi.psi)
 
 
@@ -122,7 +122,7 @@ def appendix_b(seed: int, progress: Progress, physics: Physics | None = None) ->
 
 
 def told(s: Selection) -> Part:
-    """Return what is told of Appendix B."""
+    """Return the report of Appendix B."""
     numbers = {
         "sets_models": float(s.models(s.sets)),
         "sets_small": float(len(s.psi.subsets)),

@@ -57,7 +57,7 @@ class Spindle:
 
     @property
     def how(self) -> str:
-        """What is to be said of `peaked` beforehand."""
+        """Note on `peaked` if it has the two series exchanged; else empty."""
         return "" if self.peaked is self.found else "the two series exchanged: "
 
     @property

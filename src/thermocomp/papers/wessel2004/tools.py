@@ -56,7 +56,7 @@ class Resting:
     paper, own : MillingTrial
         With the paper's set of temperatures, and with that of our own Appendix B.
     selection : Selection
-        Of Appendix B.
+        Selection of Appendix B.
     by_set : mapping of tuple of int to float
         RMS of ACE in the unseen test with each set of at most three temperatures [um].
     """
@@ -80,7 +80,7 @@ def resting_tool(seed: int, progress: Progress, selection: Selection, physics: P
     seed : int
     progress : callable
     selection : Selection
-        Of Appendix B; the paper's own set is looked at beside.
+        Selection of Appendix B; the paper's set is shown next to it.
     physics : {'linear', 'nonlinear'}, optional
 
     Returns

@@ -63,7 +63,7 @@ class MillingTrial:
 
     @property
     def measured(self) -> FloatArray:
-        """What was measured in the unseen test [um]."""
+        """Measured displacements of the unseen test [um]."""
         return self.unseen.deviations[:, 0]
 
     @property
@@ -96,7 +96,7 @@ class MillingTrial:
         return rms(self.learned.deviations[:, 0] - self.fits[method])
 
     def numbers(self, prefix: str) -> dict[str, float]:
-        """Return what is told of every trial as numbers, each name with a prefix."""
+        """Return the reported results of every trial as numbers, each name with a prefix."""
         return {
             f"{prefix}_psi": self.ace.psi_,
             f"{prefix}_falling_theta": self.ace.falling_theta_,
@@ -122,14 +122,14 @@ class MillingTrial:
         return errors_table(caption, {(name, NONE_NAME): self.measured} | residuals)
 
     def reach(self) -> FloatArray:
-        """Return how far the boxcar reaches to one side, at the displacement of each row of the unseen test [um]."""
+        """Return the reach of the boxcar to one side, at the displacement of each row of the unseen test [um]."""
         known, n = np.sort(self.learned.deviations[:, 0]), self.ace.half_window_
         rank = np.searchsorted(known, self.measured).clip(max=len(known) - 1)
         above = known[(rank + n).clip(max=len(known) - 1)] - known[rank]
         return np.asarray(np.maximum(above, known[rank] - known[(rank - n).clip(min=0)]))
 
     def straight(self) -> str:
-        """Say how close to straight lines the transformations are: linear regression is enough if they are (W-01)."""
+        """Return the linearity of the transformations in words: if linear, linear regression is sufficient (W-01)."""
         curves = {f"theta({place(self.target)})": self.ace.theta_}
         curves |= {f"phi({place(c.name)})": phi for c, phi in zip(self.learned.inputs, self.ace.phi_, strict=True)}
         told = []
@@ -139,7 +139,7 @@ class MillingTrial:
         return f"Share of the variance of each curve that a straight line explains: {', '.join(told)}."
 
     def reasons(self) -> str:
-        """Say in numbers what limits the estimate by ACE, and what linear regression and a memory make of the same."""
+        """Return in numbers what limits the estimate by ACE, and the results of linear regression and a memory."""
         error, out, seen = self.residual(ACE_NAME), self.flagged, self.learned.deviations[:, 0]
         linear = float(np.corrcoef(seen, self.fits[MLR_NAME])[0, 1])
         text = (
@@ -171,7 +171,7 @@ class MillingTrial:
 def stacked(
     recordings: Sequence[Recording], displacement: int, temperatures: Sequence[int], *, rezero: bool = False
 ) -> Samples:
-    """Stack recordings with one displacement and some temperatures, told by their place among the channels.
+    """Stack recordings with one displacement and some temperatures, given by their indices among the channels.
 
     Parameters
     ----------
@@ -244,7 +244,7 @@ def trial(
 
 
 def loop_width(samples: Samples, steps: int = 20) -> float:
-    """Return how far the displacement differs at equal temperature, as a share of its span: the hysteresis loop.
+    """Return the difference of the displacement at equal temperature, as a fraction of its span: the hysteresis loop.
 
     The span of each temperature is cut into equal steps; the width is the greatest range of the displacement in a
     step, after what a straight line explains there. Of several temperatures that of the narrowest loop counts.
@@ -278,7 +278,7 @@ def named(samples: Samples) -> dict[str, FloatArray]:
 
 
 def recorded(recordings: Sequence[Recording], temperatures: Sequence[int]) -> list[Panel]:
-    """Return what was measured, as the paper shows it: temperatures above, displacements below, by measuring point.
+    """Return panels of the measured data as in the paper: temperatures above, displacements below, by point.
 
     Parameters
     ----------

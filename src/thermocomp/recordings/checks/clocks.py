@@ -22,7 +22,7 @@ _LONGEST = 20_000
 
 @dataclass(frozen=True, eq=False)
 class _Fits:
-    """How well each channel follows the spindle, by the shift of its clock.
+    """Fit of each channel to the spindle speed, by the shift of its clock.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class _Fits:
 
     @property
     def least(self) -> float:
-        """Smallest shift that is told [s]: 8 min, and two steps."""
+        """Smallest shift that is reported [s]: 8 min, and two steps."""
         return max(_NEAR, 2 * float(self.shifts[1] - self.shifts[0]))
 
 
@@ -101,7 +101,7 @@ def _usable(signals: Sequence[Signal], quantity: str) -> list[Signal]:
 
 
 def _fit(group: Sequence[Signal], time: FloatArray, speed: FloatArray) -> _Fits | None:
-    """Regress the channels on the spindle at each shift; None if the test says too little."""
+    """Regress the channels on the spindle at each shift; None if the test has too little information."""
     step = max(60.0, float(np.median(np.diff(time))), float(time[-1] - time[0]) / _LONGEST)
     edges = np.arange(time[0], time[-1], step)
     every = max(1, round(120.0 / step))

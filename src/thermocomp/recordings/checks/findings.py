@@ -1,4 +1,4 @@
-"""`Finding` and `Signal`: what the checks of a recording tell, and what they look at."""
+"""`Finding` and `Signal`: results and input of the checks of a recording."""
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -33,9 +33,9 @@ class Finding:
     rows : ndarray of int, optional
         The rows it concerns, where the others are sound; None if it concerns the whole channel or recording.
     row : int, optional
-        Where a lasting trouble begins, or a gap: a place for a mark in a figure.
+        Row where a lasting trouble begins, or a gap: a position for a mark in a figure.
     remedy : Remedy, optional
-        What of a mapping would mend it, with the recording's names of channels and its times; None: nothing of it.
+        Mapping entry that would repair it, with the recording's names of channels and its times; None: there is none.
     """
 
     severity: Severity
@@ -128,19 +128,19 @@ def cut_out(severity: Severity, channel: Channel, kind: str, text: str, rows: In
     severity, channel, kind, text, rows
         See `Finding`.
     time : ndarray of shape (n_rows,)
-        Of all rows [s].
+        Times of all rows [s].
     """
     remedy = cut(channel.name, rows, time, kind)
     return Finding(severity=severity, channel=channel.name, kind=kind, text=text, rows=rows, remedy=remedy)
 
 
 def column(name: str, **keys: object) -> Remedy:
-    """Return what a mapping says of the column of a channel."""
+    """Return the mapping entry for the column of a channel."""
     return {"columns": {name: keys}}
 
 
 def at_row(row: int, time: FloatArray) -> str:
-    """Return a row as it is told: its number and its time [s]."""
+    """Return a row in words: its number and its time [s]."""
     return f"row {row} ({time[row]:.10g} s)"
 
 

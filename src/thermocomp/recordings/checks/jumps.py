@@ -43,12 +43,12 @@ class Edges:
     clear: BoolArray
 
     def near(self, row: int, *, clearly: bool = True) -> bool:
-        """Return whether the signal jumps at `row` or right beside it."""
+        """Return whether the signal jumps at `row` or next to it."""
         return bool(((self.clear | (not clearly)) & (self.before <= row + 1) & (self.after >= row)).any())
 
 
 def find_edges(signal: Signal) -> Edges:
-    """Find jumps: from one row to the next but one, a move that stands out from all those beside it.
+    """Find jumps: from one row to the next but one, a change much larger than the neighbouring ones.
 
     Clear is one over 4 times the largest move from row to row among the five rows on each side, so that no exponential
     of a warm-up is one, however coarsely it is sampled; and over 8 times the usual move over two rows (robust standard
@@ -150,7 +150,7 @@ def _explained(mine: Edges, k: int, moved: BoolArray) -> bool:
 
 
 def _step(mine: Edges, lone: list[int], time: FloatArray) -> Finding:
-    """Tell the largest step; two that cancel each other are told as a stretch to be deleted."""
+    """Return the finding of the largest step; two that cancel each other are reported as a stretch to be deleted."""
     channel = mine.signal.channel
     k = max(lone, key=lambda j: abs(mine.height[j]))
     height, row = float(mine.height[k]), int(mine.after[k])

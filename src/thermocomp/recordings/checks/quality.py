@@ -1,4 +1,4 @@
-"""What is wrong with a recording: gaps, dead, stuck and spiking sensors, codes, wrong units, steps, swaps, clocks."""
+"""Data-quality problems: gaps, dead, stuck and spiking sensors, codes, wrong units, steps, swaps, clocks."""
 
 from collections.abc import Iterator, Sequence
 
@@ -83,7 +83,7 @@ def troubled_rows(recording: Recording, findings: Sequence[Finding] | None = Non
     ----------
     recording : Recording
     findings : sequence of Finding, optional
-        Of `check`; it is called if they are not given.
+        Findings of `check`; it is called if they are not given.
 
     Returns
     -------
@@ -106,7 +106,7 @@ def lasting_trouble(findings: Sequence[Finding]) -> tuple[Finding, ...]:
 def _together(
     signals: Sequence[Signal], time: FloatArray, moved: BoolArray, speed: FloatArray | None, *, stamped: bool
 ) -> Iterator[Finding]:
-    """Yield what several channels, or a channel and the clock, tell together; a time from stamps has no unit."""
+    """Yield joint findings of several channels, or of a channel and the clock; a time from stamps has no unit."""
     of = {q: [s for s in signals if s.channel.quantity == q and s.good.any()] for q in _SENSED}
     yield from suspects.temperature_units(of["temperature"])
     yield from suspects.displacement_units(of["displacement"], of["temperature"])
@@ -245,7 +245,7 @@ def _no_cycle(recording: Recording) -> Iterator[Finding]:
 
 
 def _coded(channel: Channel, values: FloatArray, plausible: BoolArray) -> BoolArray:
-    """Return where a known code stands, if it stands apart from the other values by half their span and by 5 units."""
+    """Return the rows with a known code, if it is apart from the other values by half their span and by 5 units."""
     none = np.zeros(len(values), dtype=np.bool_)
     if channel.quantity not in _SENSED:
         return none

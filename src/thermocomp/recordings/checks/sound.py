@@ -1,4 +1,4 @@
-"""What `check` finds reaches the judgement: rows in trouble are left out, other trouble is kept in mind."""
+"""Effect of the findings of `check` on judging: rows in trouble are excluded, other trouble is kept as a note."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -17,12 +17,12 @@ def drop_unsound(samples: Samples, recordings: Sequence[Recording]) -> Samples:
     ----------
     samples : Samples
     recordings : sequence of Recording
-        What they were stacked of, in their order; the files that they continue from are looked at, too.
+        Recordings from which they were stacked, in their order; the files that they continue from are checked, too.
 
     Returns
     -------
     Samples
-        Values in trouble are missing (nan); trouble of a whole channel or recording stands in ``trouble``.
+        Values in trouble are missing (nan); trouble of a whole channel or recording is listed in ``trouble``.
     """
     values, deviations = samples.values.copy(), samples.deviations.copy()
     trouble: list[tuple[str, str]] = []

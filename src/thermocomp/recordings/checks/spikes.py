@@ -25,7 +25,7 @@ def spikes(signal: Signal, time: FloatArray, moved: BoolArray) -> Iterator[Findi
     Parameters
     ----------
     signal : Signal
-        Of 5 good rows or more.
+        Signal with 5 good rows or more.
     time : ndarray of shape (n_rows,)
         [s]
     moved : ndarray of bool of shape (n_rows,)

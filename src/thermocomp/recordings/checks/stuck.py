@@ -1,4 +1,4 @@
-"""A value that stands still though its sensor should move, and the steps a channel moves in."""
+"""A constant value although its sensor should move, and the resolution steps of a channel."""
 
 import math
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ _CHANCE = 1e-3
 
 
 def stuck(signal: Signal, time: FloatArray) -> Iterator[Finding]:
-    """Yield stretches of 30 or more rows in which a value stands still though the sensor says it should move.
+    """Yield stretches of 30 or more rows with a constant value although the sensor should move.
 
     It should if its noise shakes it right before and after, or if it was moving fast and stops dead. A sensor that
     creeps to rest, or whose noise is finer than its resolution, may well stand still: noise of a single step makes it a
@@ -25,7 +25,7 @@ def stuck(signal: Signal, time: FloatArray) -> Iterator[Finding]:
     Parameters
     ----------
     signal : Signal
-        Of 5 good rows or more, not constant.
+        Signal with 5 good rows or more, not constant.
     time : ndarray of shape (n_rows,)
         [s]
     """
@@ -58,7 +58,7 @@ def stuck(signal: Signal, time: FloatArray) -> Iterator[Finding]:
 
 
 def _by_chance(x: FloatArray, step: float, lively: BoolArray) -> float:
-    """Return how many rows the noise may leave a value in the middle of a step, by chance, somewhere in `x`."""
+    """Return the number of rows for which noise may hold a value within a step by chance, anywhere in `x`."""
     moves = np.diff(x)[lively[1:]]
     moving = moves[np.abs(moves) <= max(8 * float(np.median(np.abs(moves))), 2 * step)] if moves.size else moves
     if moving.size < 8:

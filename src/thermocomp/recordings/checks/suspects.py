@@ -15,7 +15,7 @@ FAR = 5000.0
 
 
 def temperature_units(signals: Sequence[Signal]) -> Iterator[Finding]:
-    """Yield temperatures that are Kelvin or degrees Fahrenheit, though the heading says degC.
+    """Yield temperatures that are Kelvin or degrees Fahrenheit, although the heading specifies degC.
 
     Kelvin: 98 % of the values lie between 240 and 400, so that the sensor never cooled to below 240 degC, which is
     hotter than any part of a machine stays. Fahrenheit: nothing in the whole test is ever below 50 (1 % quantile of
@@ -71,7 +71,7 @@ def _wrong_unit(signal: Signal, low: float, high: float, unit: str, coldest: flo
 
 
 def displacement_units(signals: Sequence[Signal], temperatures: Sequence[Signal]) -> Iterator[Finding]:
-    """Yield displacements whose numbers must be mm, though the heading says um, or um that are called mm.
+    """Yield displacements that must be in mm, although the heading specifies um, or um labelled as mm.
 
     No machine drifts by `FAR`.
 
@@ -111,7 +111,7 @@ def displacement_units(signals: Sequence[Signal], temperatures: Sequence[Signal]
 
 
 def time_unit(time: FloatArray, temperatures: Sequence[Signal]) -> Iterator[Finding]:
-    """Yield a time that must be ms, though the heading says s.
+    """Yield a time that must be in ms, although the heading specifies s.
 
     Rows over an hour apart (median) tell nothing of a warm-up; nobody records one so. With rows of a second or two,
     read as 17 or 33 min, the sensors tell it: the time in which a temperature moves by half its span, where it does so

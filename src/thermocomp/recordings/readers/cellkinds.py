@@ -1,4 +1,4 @@
-"""What the cells of a column hold, whatever its heading says: numbers, dates, times of day, or both in one."""
+"""Contents of the cells of a column, regardless of its heading: numbers, dates, times of day, or both in one."""
 
 import re
 from collections.abc import Callable, Sequence
@@ -31,7 +31,7 @@ Kinds = Callable[[int], Kind]
 
 
 def find_kind(cells: Sequence[str]) -> Kind:
-    """Return what cells hold.
+    """Return the kind of the cells' contents.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ _NAME = re.compile(rf"(?P<code>E[XYZABC][XYZ])_(?P<others>(?:[xyz]{_NUMBER}_)*)(
 
 
 def codes(recording: Recording) -> tuple[str, ...]:
-    """Return the components that have columns of their own, in the order of `thermocomp.core.components`."""
+    """Return the components that have separate columns, in the order of `thermocomp.core.components`."""
     return tuple(c.code for c in COMPONENTS if columns_of(recording, c.code)[0])
 
 
@@ -31,7 +31,7 @@ def columns_of(recording: Recording, code: str) -> tuple[dict[str, float], tuple
     ----------
     recording : Recording
     code : str
-        Of the component.
+        Code of the component.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What the columns of a recording are: understood by their headings' units, or by a mapping."""
+"""Columns of a recording: determined by the units in their headings, or by a mapping."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -36,7 +36,7 @@ class PlannedColumn:
         Position in the file.
     channel : Channel
     unit : Unit
-        Of the scaled value.
+        Unit of the scaled value.
     rule : ColumnMap
         Scale, zero and missing-value codes.
     """
@@ -61,7 +61,7 @@ class PlannedColumn:
     def convert(
         self, raw: FloatArray, missing: Sequence[float], place: Callable[[int], str]
     ) -> tuple[FloatArray, tuple[str, ...]]:
-        """Return the values in the house unit, nan where missing, and notes on what was replaced, and where."""
+        """Return the values in the internal unit, nan where missing, and notes on replaced values and their rows."""
         notes = []
         codes = np.array([*self.rule.missing, *missing])
         absent = np.isin(raw, codes) if codes.size else np.zeros(len(raw), dtype=np.bool_)
@@ -101,16 +101,16 @@ class PlannedColumn:
 
 @dataclass(frozen=True)
 class ColumnPlan:
-    """Which columns of a file are read, and as what.
+    """Columns of a file that are read, and their meaning.
 
     Parameters
     ----------
     times : TimePlan
         The columns that hold the time.
     time_unit : str
-        A unit of time, ``timestamp``, or empty if neither heading nor mapping says.
+        A unit of time, ``timestamp``, or empty if neither heading nor mapping gives one.
     beside : tuple of int
-        Positions of further columns that must hold the same times: one beside each channel.
+        Positions of further columns that must hold the same times: one next to each channel.
     cycle : int or None
         Position of the column of cycle labels.
     columns : tuple of PlannedColumn

@@ -46,7 +46,7 @@ def holds_own_date(table: FileTable, number: int) -> bool:
     ----------
     table : FileTable
     number : int
-        Of the row in the file, as `FileTable.place` tells it.
+        Number of the row in the file, as given by `FileTable.place`.
     """
     columns = [k for k in range(len(table.headings)) if find_kind(table.head(k)) not in ("date", "stamp")]
     cells = table.load([], columns)[0]
@@ -55,7 +55,7 @@ def holds_own_date(table: FileTable, number: int) -> bool:
 
 
 def check_dates(time: FloatArray, file: FileCells, others: Sequence[int] = ()) -> tuple[str, ...]:
-    """Refuse times without a date of their own that do not go with the dates of another column.
+    """Refuse times without a date that are inconsistent with the dates of another column.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""In which order day, month and year stand: where dates alone do not tell, a recording that continues does."""
+"""Order of day, month and year: where dates alone are ambiguous, the continuity of the recording decides."""
 
 from collections.abc import Mapping
 from typing import Literal, NamedTuple

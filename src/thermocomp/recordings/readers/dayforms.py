@@ -90,7 +90,7 @@ def find_day_columns(table: FileTable, columns: Sequence[int], *, beside_clock: 
 
 
 def find_column_kind(table: FileTable, column: int) -> Kind:
-    """Return what a column holds, also one that holds numbers by its type."""
+    """Return the kind of a column's contents, also of one that holds numbers by its type."""
     head = table.head(column)
     if not head and names_day(table.headings[column]) and table.is_number(column, empty=False):
         head = [str(cell).removesuffix(".0") for cell in table.load([], [column])[0][column].dropna().iloc[:100]]
@@ -227,5 +227,5 @@ def _read_forms(texts: "pd.Series[str]", *forms: str) -> list[IntArray]:
 
 
 def _unwrap(days: IntArray, period: int) -> IntArray:
-    """Return days that count on where a week or a year begins again."""
+    """Return days that continue to count where a week or a year begins again."""
     return np.concatenate([days[:1], days[0] + np.cumsum(np.diff(days) % period)])

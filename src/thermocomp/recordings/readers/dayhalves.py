@@ -1,4 +1,4 @@
-"""AM and PM in a column of their own, beside a clock of twelve hours."""
+"""AM and PM in a separate column, next to a clock of twelve hours."""
 
 import re
 from collections.abc import Sequence
@@ -60,7 +60,7 @@ def says_halves(heading: str) -> bool:
 def join_halves(
     clocks: "pd.Series[Any]", halves: "pd.Series[Any]", form: str, table: FileTable, names: tuple[str, str]
 ) -> "tuple[pd.Series[Any], tuple[str, ...]]":
-    """Return times of day with AM or PM behind them, as their column says; and how they were read.
+    """Return times of day followed by AM or PM from their column, and notes on how they were read.
 
     Parameters
     ----------

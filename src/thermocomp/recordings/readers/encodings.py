@@ -1,4 +1,4 @@
-"""How the characters of a text file are written, where they are not UTF-8."""
+"""Character encoding of a text file that is not UTF-8."""
 
 import re
 from collections.abc import Iterable
@@ -19,7 +19,7 @@ _LONE_CR = re.compile(rb"\r(?![\r\n])")
 
 
 def bring_to_utf8(path: Path, limits: FileLimits) -> tuple[bytes | None, tuple[str, ...]]:
-    """Return a file as UTF-8 with line ends of its own time, and what was done, if it has neither.
+    """Return a file as UTF-8 with standard line ends, and notes on the conversion, if it has neither.
 
     Returns
     -------
@@ -74,7 +74,7 @@ def find_encoding(lines: Iterable[bytes]) -> str:
 
 
 def _find_utf16(head: bytes) -> str:
-    """Return which UTF-16 the head of a file is written in, with or without its mark; empty if in none."""
+    """Return the UTF-16 variant of the head of a file, with or without byte order mark; empty if it is none."""
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16-le" if head[0] == 0xFF else "utf-16-be"
     half = len(head) // 2

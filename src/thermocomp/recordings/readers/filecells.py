@@ -49,12 +49,12 @@ class FileCells:
 
     @property
     def time_keys(self) -> dict[str, str]:
-        """What a mapping says of the columns that hold the time: ``column``, and ``date`` where there is one."""
+        """Mapping entries for the columns of the time: ``column``, and ``date`` where there is one."""
         date = self.times.date
         return {"column": self.heading, **({"date": self.table.headings[date]} if date is not None else {})}
 
     def at(self, row: int, column: int | None = None) -> str:
-        """Say where a cell stands; that of the time where no column is given."""
+        """Return the location of a cell; that of the time where no column is given."""
         heading = self.table.headings[self.times.time if column is None else column]
         return f"{self.source}: {self.table.place(row)}, column {heading!r}"
 
@@ -65,7 +65,7 @@ class FileCells:
         ----------
         row : int
         text : str
-            What is wrong, and what to do.
+            Fault, and what to do.
         column : int, optional
             The time without it.
         skip : bool

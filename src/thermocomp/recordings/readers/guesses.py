@@ -1,4 +1,4 @@
-"""What columns may be whose headings do not say: guesses by name and values, which somebody has to confirm."""
+"""Guesses for columns without a clear heading: by name and values, to be confirmed by the user."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -47,7 +47,7 @@ def guess(table: FileTable, mapping: Mapping) -> tuple[Remedy, ...]:
     ----------
     table : FileTable
     mapping : Mapping
-        What is known already.
+        Part of the mapping that is known already.
 
     Returns
     -------
@@ -72,7 +72,7 @@ def guess_columns(table: FileTable, mapping: Mapping) -> list[tuple[str, list[Re
     Returns
     -------
     list of (str, list of Remedy)
-        Heading with some values, and what a mapping may say of the column, the likeliest first.
+        Heading with some values, and possible mapping entries for the column, the likeliest first.
     """
     known = {rule.column or name for name, rule in mapping.columns.items()}
     known |= {mapping.time.column, mapping.time.date, mapping.cycles.column}
@@ -97,7 +97,7 @@ def guess_columns(table: FileTable, mapping: Mapping) -> list[tuple[str, list[Re
 
 
 def _table(heading: str, number: int, place: str | int, role: str, unit: str) -> Remedy:
-    """Return what a mapping says of a column that has a role, or none."""
+    """Return the mapping entry for a column that has a role, or none."""
     base = "_".join(re.sub(r"[^\w\s.-]", " ", heading).split()) or f"column_{number + 1}"
     name = f"{base}_{HOUSE_SUFFIX[HOUSE_UNITS[role]]}" if role else base
     said: dict[str, Any] = {} if name == place else {"column": place}
@@ -106,7 +106,7 @@ def _table(heading: str, number: int, place: str | int, role: str, unit: str) ->
 
 
 def understand_or_none(heading: str) -> Meaning | None:
-    """Return what a heading says; None if it says nothing, or has a unit that is not known."""
+    """Return the meaning of a heading; None if it has none, or has an unknown unit."""
     try:
         return understand(heading)
     except UnitError:
@@ -141,7 +141,7 @@ def _mostly_numbers(table: FileTable, columns: Sequence[int]) -> dict[int, Float
 
 
 def _role(heading: str, values: FloatArray) -> tuple[str, str]:
-    """Return what a column measures and its unit, both empty if its name does not say."""
+    """Return the quantity of a column and its unit, both empty if its name does not show them."""
     words = [w for w in re.split(r"[\W_]+", heading.casefold()) if w]
     good = values[np.isfinite(values)]
     low, middle, high = (float(v) for v in np.quantile(good, (0.02, 0.5, 0.98)))

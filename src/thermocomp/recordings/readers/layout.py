@@ -1,4 +1,4 @@
-"""Where in a file its headings, its units and its first and last row stand: loggers write more than a table."""
+"""Position of the headings, the units, and the first and last row in a file: loggers write more than a table."""
 
 import re
 from collections import Counter
@@ -126,7 +126,7 @@ def find_end(first: Sequence[Sequence[str]], last: Sequence[Sequence[str]]) -> i
 
 
 def tell_layout(numbers: Sequence[int], layout: FileLayout, word: str) -> tuple[str, ...]:
-    """Return what was passed over and taken for units, in words.
+    """Return the lines that were skipped and those read as units, in words.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def tell_layout(numbers: Sequence[int], layout: FileLayout, word: str) -> tuple[
         Places of the rows in the file, from 1.
     layout : FileLayout
     word : str
-        What a row is called there.
+        Name of a row in such a file.
     """
     found = []
     above = [numbers[k] for k in range(layout.heading) if k != layout.units]
@@ -199,7 +199,7 @@ def join_units(headings: Sequence[str], units: Sequence[str], rows: Sequence[Seq
 
 
 def name_stamps(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> tuple[list[str], tuple[str, ...]]:
-    """Name a first column without heading that holds dates, as the index of a data frame does, and say so."""
+    """Name a first column without heading that holds dates, as the index of a data frame has, and report this."""
     first = next((row[0].strip() for row in rows if row and row[0].strip()), "")
     if headings and not headings[0] and is_stamp(first):
         return ["timestamp", *headings[1:]], ("column 1 has no heading and holds dates: taken as the time",)
@@ -237,7 +237,7 @@ def _is_row(row: Sequence[str], columns: Sequence[int]) -> bool:
 
 
 def _is_remark(row: Sequence[str], columns: Sequence[int], width: int) -> bool:
-    """Return whether a row at the end is words or a statistic: no row of the table begins so."""
+    """Return whether a row at the end is text or a statistic: no row of the table begins like this."""
     words = [k for k, cell in enumerate(row) if cell.strip() and not _is_value(cell) and not is_filler(cell)]
     if not words or not columns:
         return False
@@ -248,7 +248,7 @@ def _is_remark(row: Sequence[str], columns: Sequence[int], width: int) -> bool:
 
 
 def _is_units(row: Sequence[str], numbers: Sequence[int]) -> bool:
-    """Return whether most of what stands over columns of numbers is a unit."""
+    """Return whether most cells above columns of numbers are units."""
     over = [row[k] for k in numbers if k < len(row)] if numbers else row
     filled = [unit for unit in map(_bare, over) if unit.casefold().rstrip(".:") not in _NO_UNIT]
     known = sum(map(is_unit, filled))

@@ -9,12 +9,12 @@ from thermocomp.recordings.headings import BRACKETS, HOUSE_SUFFIX, SUFFIXES, fin
 
 
 def refuse_nameless(headings: Sequence[str], source: str) -> None:
-    """Refuse columns of numbers whose names speak of a temperature, a displacement or a speed but say no unit.
+    """Refuse columns of numbers whose names suggest a temperature, a displacement or a speed but give no unit.
 
     Parameters
     ----------
     headings : sequence of str
-        Of columns of numbers that would be left out.
+        Headings of columns of numbers that would be left out.
     source : str
 
     Raises
@@ -37,7 +37,7 @@ def refuse_nameless(headings: Sequence[str], source: str) -> None:
 
 
 def why_left_out(heading: str) -> str:
-    """Say what a heading that `understand` makes nothing of lacks, and what to do."""
+    """Return what a heading that `understand` cannot interpret lacks, and what to do."""
     found = BRACKETS.fullmatch(heading.strip())
     symbol = (found["square"] or found["round"] or "").strip() if found else heading.rpartition("_")[2]
     mapped = f'a mapping [columns.NAME] with column = "{heading}" and'
@@ -62,6 +62,6 @@ def why_left_out(heading: str) -> str:
 
 
 def _says_unit(heading: str) -> bool:
-    """Return whether a heading says in which unit it is, even if not in one that is used here."""
+    """Return whether a heading contains a unit, even one that is not supported here."""
     found = BRACKETS.fullmatch(heading.strip())
     return found is not None and (found["square"] or found["round"] or "").strip() not in ("", "1")

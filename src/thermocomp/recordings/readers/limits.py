@@ -1,4 +1,4 @@
-"""What the readers take at most: every limit in one place, so that no file costs more time or memory than it may."""
+"""Limits of the readers, all in one place, so that no file needs more time or memory than allowed."""
 
 import stat
 from dataclasses import dataclass, field, fields
@@ -25,17 +25,17 @@ class FileLimits:
     Parameters
     ----------
     file_bytes : int
-        Of any file: beyond the memory of a workshop's computer.
+        Size of any file: beyond the memory of a workshop's computer.
     recoded_bytes : int
-        Of a file of text that has to be brought to UTF-8, or to the line ends of today, in memory.
+        Size of a text file that has to be converted to UTF-8, or to present line ends, in memory.
     line_bytes : int
-        Of a line of text, or of a text in a workbook: 10,000 columns of 400 characters.
+        Size of a line of text, or of a text in a workbook: 10,000 columns of 400 characters.
     cell_characters : int
         As many as a cell of a spreadsheet holds; no number and no name is longer.
     heading_characters : int
         Headings become names in tables, figures and messages.
     columns : int
-        Each becomes an object of its own. A machine has some hundred sensors at most.
+        Each becomes a separate object. A machine has some hundred sensors at most.
     rows : int
         Three years at one a second.
     cells : int
@@ -43,11 +43,11 @@ class FileLimits:
     skipped_lines : int
         Comments and blank lines: where they stand is kept, for messages.
     sheets : int
-        Of a workbook; each is opened to see whether it holds a table.
+        Number of sheets of a workbook; each is opened to check whether it contains a table.
     sheet_rows : int
         As many as a spreadsheet has; a workbook can claim any number in a few bytes.
     row_elements : int
-        Of the XML of a row, of a list of styles and the like: these are in memory at once.
+        Number of XML elements of a row, of a list of styles and the like: these are in memory at once.
     growth : int
         How many times larger than the file a workbook or a Parquet file may become when it is unpacked, after the
         first 64 MiB. Recordings become 3 to 30 times larger, a zip bomb 1,000 times.
@@ -81,9 +81,9 @@ class FileLimits:
         Parameters
         ----------
         name : str
-            Of the limit.
+            Name of the limit.
         found : int
-            What there is, or what has been counted until it was too much.
+            Present value, or the value counted until the limit was exceeded.
         where : object
             File and place, for the message.
 
@@ -124,7 +124,7 @@ class FileLimits:
         Parameters
         ----------
         unpacked : int
-            What it has become so far [byte].
+            Unpacked size so far [byte].
         path : Path
 
         Raises

@@ -36,7 +36,7 @@ def read_long(
     ----------
     path : str or Path
     mapping : Mapping or None
-        What the columns are, where their headings do not say.
+        Roles and units of columns whose headings do not give them.
     target : str
         The component.
     unit : {'um', 'urad'}
@@ -52,7 +52,7 @@ def read_long(
     Returns
     -------
     Profiles
-        Whose states have the means of the other channels over their rows.
+        Profiles whose states have the means of the other channels over their rows.
 
     Raises
     ------

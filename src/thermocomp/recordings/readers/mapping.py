@@ -1,4 +1,4 @@
-"""The small TOML that says what the columns of a foreign recording are."""
+"""Mapping file (TOML): roles and units of the columns of a foreign recording."""
 
 import codecs
 import math
@@ -49,14 +49,14 @@ class TimeColumn:
     unit : str
         A unit of time, or ``timestamp`` for dates with a time of day; empty: from the heading and the cells.
     format : str
-        How timestamps are written, in the letters of `datetime.strptime`; empty: ISO 8601.
+        Format of timestamps, in the letters of `datetime.strptime`; empty: ISO 8601.
     start : str
         ISO timestamp of the first row, for files that hold only relative times: it tells the days, and which
         file continues from another.
     date : str or int
         Column of the dates where `column` holds the time of day alone.
     zone : str
-        Time zone of timestamps that tell none, such as ``Europe/Berlin``; ``UTC`` for a clock that is never set.
+        Time zone of timestamps that contain none, such as ``Europe/Berlin``; ``UTC`` for a clock that is never set.
     """
 
     column: Place = ""
@@ -78,17 +78,17 @@ class ColumnMap:
     column : str or int
         Its heading in the file, or its number from 1, for headings that come twice; empty: NAME itself.
     unit : str
-        Unit of the scaled value; empty: the house unit of the role, or the unit in the heading.
+        Unit of the scaled value; empty: the internal unit of the role, or the unit in the heading.
     role : str, optional
-        What it measures, or ``cycle`` (labels of thermal cycles), or ``ignore``; without it the unit decides.
+        Measured quantity, or ``cycle`` (labels of thermal cycles), or ``ignore``; without it the unit decides.
     scale : float
         Factor from the number in the file to `unit`.
     zero : float or 'first'
         Number in the file that counts as zero; ``first``: the first valid one of the column.
     missing : tuple of float
-        Numbers in the file that stand for a missing value.
+        Numbers in the file that denote a missing value.
     place : str
-        Where the sensor sits, in words.
+        Location of the sensor, in words.
     valid : tuple of float, optional
         Lowest and highest value that the channel can have, in `unit` after `scale` and `zero`; others are missing.
     """
@@ -104,7 +104,7 @@ class ColumnMap:
 
     @property
     def conversion(self) -> Unit | None:
-        """What leads to the house unit; None if neither unit nor role says."""
+        """Conversion to the internal unit; None if neither unit nor role defines it."""
         quantity = self.role if self.role in HOUSE_UNITS else None
         if self.unit:
             return find_unit(self.unit, quantity)
@@ -118,14 +118,14 @@ class ReadOptions:
     Parameters
     ----------
     delimiter : str
-        One character; a space stands for any white space.
+        One character; a space denotes any white space.
     decimal : {'', '.', ','}
     encoding : str
         Such as ``cp1252``; empty: UTF-8, or Latin-1 if it is not UTF-8.
     comment : str
         Lines that begin with it are passed over; empty: there are none.
     missing : tuple of float
-        Numbers that stand for a missing value in every column.
+        Numbers that denote a missing value in every column.
     only_mapped : bool
         True: columns that have no table ``[columns.NAME]`` are left out.
     heading : int
@@ -133,7 +133,7 @@ class ReadOptions:
     skip : tuple of int or pair of int
         Lines or rows that are passed over, from 1, as errors name them; a pair is a stretch, both ends included.
     sheet : str
-        Of a workbook; empty: the only one, or the only one that holds a table with a time.
+        Sheet of a workbook; empty: the only one, or the only one that holds a table with a time.
     """
 
     delimiter: str = ""
@@ -170,7 +170,7 @@ class CycleRule:
 
 @dataclass(frozen=True)
 class Mapping:
-    """What the columns of a file are; see the tables' classes.
+    """Roles and units of the columns of a file; see the classes of the tables.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ class Mapping:
     read : ReadOptions
     cycles : CycleRule
     clean : tuple of Step
-        What is changed in the values that were read, in this order; see `thermocomp.recordings.cleaning`.
+        Changes of the values that were read, in this order; see `thermocomp.recordings.cleaning`.
     limits : FileLimits
     compensation : {'', 'off', 'known', 'unknown'}
         Whether a correction was in force at the machine; see `thermocomp.recordings.compensated`.
@@ -214,7 +214,7 @@ class Mapping:
         _check_encoding(self.read.encoding or "utf-8")
 
     def over(self, below: "Mapping") -> "Mapping":
-        """Return this mapping with what only `below` says of time, compensation and columns added."""
+        """Return this mapping with the entries for time, compensation and columns that only `below` has."""
         time = below.time if self.time == TimeColumn() else self.time
         taken = {rule.column or name for name, rule in self.columns.items()}
         added = {name: rule for name, rule in below.columns.items() if (rule.column or name) not in taken}
@@ -299,7 +299,7 @@ def check_content(content: dict[str, Any], owner: str) -> Mapping:
 
 
 def _explain(failure: ValidationError) -> str:
-    """Say table, key and the nearest known key of pydantic's first error."""
+    """Return the table, the key and the nearest known key of pydantic's first error."""
     errors = failure.errors()
     error = errors[0]
     if error["loc"][:1] == ("clean",):
@@ -316,7 +316,7 @@ def _explain(failure: ValidationError) -> str:
 
 
 def _explain_step(error: ErrorDetails) -> str:
-    """Say what is wrong with a table ``[[clean]]``."""
+    """Return the fault of a table ``[[clean]]``."""
     loc = error["loc"]
     table = f"[[clean]] number {int(loc[1]) + 1}" if len(loc) > 1 else "[[clean]]"
     if len(loc) < 4:

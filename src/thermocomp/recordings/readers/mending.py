@@ -1,4 +1,4 @@
-"""Mappings that are written for somebody: what reading a file, or checking it, asks for, filled in."""
+"""Suggested mappings: the settings needed for reading or cleaning a file, filled in."""
 
 import copy
 import re
@@ -40,16 +40,16 @@ _T = TypeVar("_T")
 
 @dataclass(frozen=True)
 class Question:
-    """What has to be decided.
+    """Decision to be made by the user.
 
     Parameters
     ----------
     text : str
-        What was found.
+        Finding.
     options : tuple of Remedy
         Parts of a mapping, the likeliest first.
     severity : {'error', 'column', 'trouble', 'warning', 'info'}
-        What it is about: the file cannot be read, a column is left out, or something that `check` finds.
+        Subject: the file cannot be read, a column is left out, or something that `check` finds.
     may_guess : bool
         False: how long the recording took depends on the answer.
     """
@@ -61,7 +61,7 @@ class Question:
 
     @property
     def others(self) -> tuple[str, ...]:
-        """What else may be true of a file that can be read in several ways, a line each."""
+        """Other possible interpretations of a file that can be read in several ways, a line each."""
         return tuple(to_toml(r).replace("\n", " ") for r in self.options[1:]) if self.severity == "error" else ()
 
 
@@ -100,7 +100,7 @@ class Draft:
         return f"{re.sub(_TIGHT, _APART, written)}\n" if written else ""
 
     def mapping(self, owner: str) -> Mapping:
-        """Return what it says.
+        """Return the resulting mapping.
 
         Raises
         ------
@@ -110,7 +110,7 @@ class Draft:
         return check_content(self.document.unwrap(), owner)
 
     def add(self, remedy: Remedy) -> bool:
-        """Write a remedy into it; return False if all of it stood there."""
+        """Write a remedy into it; return False if it contained all of it."""
         before = copy.deepcopy(self.document.unwrap())
         for key, content in remedy.items():
             if key == "clean":
@@ -155,7 +155,7 @@ class Mended:
 
 
 def read_draft(mapping: str | Path | None) -> str:
-    """Return the text of a mapping to begin with, once it is understood; empty for None."""
+    """Return the text of a mapping to start from, after it has been validated; empty for None."""
     if mapping is None:
         return ""
     read_mapping(mapping)  # says what is wrong with it
@@ -199,7 +199,7 @@ def mend(path: str | Path, text: str, decide: Decide) -> Mended:
 
 
 def read_or_offer(path: str | Path, mapping: Mapping | None = None) -> Recording:
-    """Read one test from a file; an error of it offers a mapping, filled in, in a note of its own.
+    """Read one test from a file; on an error, a note of the error suggests a filled-in mapping.
 
     Raises
     ------
@@ -226,7 +226,7 @@ def located(finding: Finding, recording: Recording, mapping: Mapping, headings: 
     mapping : Mapping
         That the recording was read by.
     headings : sequence of str
-        Of the file.
+        Headings of the file.
 
     Returns
     -------
@@ -253,7 +253,7 @@ def located(finding: Finding, recording: Recording, mapping: Mapping, headings: 
 
 
 def to_toml(remedy: Remedy) -> str:
-    """Return a remedy as it stands in a mapping file."""
+    """Return a remedy as text of a mapping file."""
     draft = Draft()
     draft.add(remedy)
     return draft.text.strip()
@@ -285,7 +285,7 @@ class _Dialogue:
         self.decided: list[tuple[Question, Remedy | None]] = []
 
     def ask(self, question: Question) -> bool:
-        """Have a question decided, once; return whether the mapping says something new now."""
+        """Have a question decided, once; return whether the mapping now has new entries."""
         if any(q.text == question.text and q.options == question.options for q, _ in self.decided):
             return False
         answer = self.decide(question)
@@ -296,7 +296,7 @@ class _Dialogue:
         return sum(1 for _, answer in self.decided if answer is not None and _skips(answer))
 
     def _skips_date(self, error: InputError) -> bool:
-        """Return whether the likeliest remedy passes over a row that says on which day the next ones were taken."""
+        """Return whether the likeliest remedy skips a row that contains the date of the next ones."""
         if not _skips(error.remedies[0]):
             return False
         try:
@@ -306,7 +306,7 @@ class _Dialogue:
         return holds_own_date(table, error.remedies[0]["read"]["skip"][-1])
 
     def until(self, action: Callable[[], _T]) -> _T:
-        """Do something; what stands in the way is asked about, one after the other."""
+        """Run an action; the obstacles are asked about, one after the other."""
         for _ in range(MOST_QUESTIONS):
             try:
                 return action()
@@ -348,7 +348,7 @@ def _offer(path: Path, mapping: Mapping, error: InputError) -> str:
 
 
 def _offer_choice(text: str, remedies: Sequence[Remedy], name: str) -> str:
-    """Return words that offer what somebody has to choose from."""
+    """Return the text that lists the choices for the user."""
     ways = "\n# or:\n".join(re.sub(r"^", "# ", to_toml(way), flags=re.MULTILINE) for way in remedies)
     return f"choose one, save it as {name} without the # and give it with --mapping {name}:\n\n{text}{ways}"
 

@@ -1,4 +1,4 @@
-"""How numbers are written: the decimal sign, separators of thousands, and words in place of a number."""
+"""Number formats: the decimal sign, separators of thousands, and text in place of a number."""
 
 import re
 from collections import Counter
@@ -27,7 +27,7 @@ _OPEN = re.compile(r"[-+]?[1-9]\d{0,2}[.,]\d{3}")
 
 
 class Notation(NamedTuple):
-    """How the numbers of a file are written."""
+    """Number format of a file."""
 
     decimal: str  #: point or comma
     thousands: str = ""  #: separators that may stand between groups of three digits
@@ -46,7 +46,7 @@ class Notation(NamedTuple):
 
 
 class Signs:
-    """What the cells of a file say about its decimal sign.
+    """Evidence from the cells of a file for its decimal sign.
 
     A sign that a zero or more than three digits precede, or that other than three digits follow, is a decimal sign; one
     that comes twice separates thousands. ``1,234`` alone may be either.
@@ -61,7 +61,7 @@ class Signs:
         self.groups: set[str] = set()
 
     def add(self, cells: Iterable[str]) -> None:
-        """Take cells into account."""
+        """Add cells to the evidence."""
         for cell in cells:
             text = cell.strip()
             grouped = _GROUPED.fullmatch(text)
@@ -80,14 +80,14 @@ class Signs:
         return self.proven.most_common(1)[0][0] if self.proven else ""
 
     def decide(self, stated: str, delimiter: str) -> Notation | None:
-        """Return how the numbers are written; None if no cell says.
+        """Return the number format; None if no cell shows it.
 
         Parameters
         ----------
         stated : str
             The decimal sign, if it is known beforehand.
         delimiter : str
-            Of the columns: where it is a comma, the decimal sign is a point unless a cell proves the opposite.
+            Delimiter of the columns: where it is a comma, the decimal sign is a point unless a cell shows the opposite.
 
         Raises
         ------
@@ -114,7 +114,7 @@ class Signs:
 
 
 def is_filler(cell: str) -> bool:
-    """Return whether a cell holds what stands for a missing number."""
+    """Return whether a cell contains a placeholder for a missing number."""
     text = cell.strip().casefold()
     return text in MISSING_TEXT or is_word(text)
 

@@ -1,4 +1,4 @@
-"""Files become tables whose cells nobody has understood yet, by their endings."""
+"""Conversion of files to raw tables with uninterpreted cells, by file extension."""
 
 import hashlib
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Parquet files: columns are read in batches, and only after what the file says of its size has been looked at."""
+"""Parquet files: columns are read in batches, and only after the size stated in the file has been checked."""
 
 import json
 from collections.abc import Iterator, Sequence
@@ -47,7 +47,7 @@ class ParquetTable:
     ----------
     path : Path
     names : tuple of str
-        Of the columns, as the file has them.
+        Names of the columns, as in the file.
     headings : tuple of str
     texts : tuple of str
         Names of the columns that hold texts.
@@ -121,7 +121,7 @@ class ParquetTable:
         return pd.DataFrame({k: data[k] for k in wanted}, copy=False), notes
 
     def place(self, row: int) -> str:
-        """Say in which row of the file, counted from 1, a row stands."""
+        """Return the location of a row in the file, counted from 1."""
         return f"row {row + 1}"
 
     def _batches(self, columns: Sequence[int]) -> Iterator["RecordBatch"]:

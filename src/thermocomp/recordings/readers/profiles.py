@@ -36,7 +36,7 @@ _PLACED = re.compile(r"(?P<base>.+)_(?P<position>-?\d+(?:\.\d+)?)_(?:um|urad)")
 
 @dataclass(frozen=True, kw_only=True)
 class ProfileOptions:
-    """What a table of profiles is of.
+    """Content of a table of profiles.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ class ProfileOptions:
         Raises
         ------
         InputError
-            Neither the component tells them, nor is it said.
+            They are neither given nor defined by the component.
         """
         component = BY_CODE.get(self.target)
         axis = self.axis or (component.depends_on if component else "") or ""
@@ -103,9 +103,9 @@ def read(
     path : str or Path
         See `thermocomp.recordings.readers.recordings.read`.
     options : ProfileOptions or str
-        What they are of; a text is the code of the component.
+        Options of the profiles; a text is the code of the component.
     mapping : Mapping, optional
-        What the columns are, where their headings do not say.
+        Roles and units of columns whose headings do not give them.
     layout : {'wide', 'long'}, optional
         A row per thermal state and a column per position, or a row per position; found out if not given.
 
@@ -174,14 +174,14 @@ def read_components(
 
 
 def from_recording(recording: Recording, options: ProfileOptions | str) -> Profiles:
-    """Take profiles out of a recording that has a column per position.
+    """Extract profiles from a recording that has a column per position.
 
     Parameters
     ----------
     recording : Recording
         A row per thermal state.
     options : ProfileOptions or str
-        What they are of; a text is the code of the component.
+        Options of the profiles; a text is the code of the component.
 
     Returns
     -------
@@ -238,7 +238,7 @@ def from_recording(recording: Recording, options: ProfileOptions | str) -> Profi
 
 
 def read_places(path: str | Path) -> dict[str, Place]:
-    """Read a TOML that says where each column of a wide table was measured.
+    """Read a TOML file with the measuring position of each column of a wide table.
 
     Returns
     -------
@@ -315,7 +315,7 @@ def _by_name(recording: Recording, quantity: str, owner: str) -> list[tuple[Chan
 
 
 def _refuse_another_axis(target: str, axis: str, found: Sequence[tuple[Channel, Place]], owner: str) -> None:
-    """Refuse columns that nobody named and that are called after an axis which has no part in the error."""
+    """Refuse columns found by name that are named after an axis without a part in the error."""
     for c, _ in found[:1]:
         called = re.match(r"([xyz])(?:\d?_)", c.name)
         if called and target in BY_CODE and called[1].upper() not in (axis, target[1]):

@@ -47,12 +47,12 @@ def read(path: str | Path, mapping: Mapping | None = None) -> Recording:
     path : str or Path
         A file ending in .csv, .tsv, .txt, .dat, .asc, .xlsx, .ods or .parquet.
     mapping : Mapping, optional
-        What the columns are, where their headings do not say; see `thermocomp.recordings.readers.mapping.read_mapping`.
+        Roles and units of columns without clear headings; see `thermocomp.recordings.readers.mapping.read_mapping`.
 
     Returns
     -------
     Recording
-        In house units; `notes` tells what was left out or replaced.
+        Recording in internal units; `notes` lists what was left out or replaced.
 
     Raises
     ------

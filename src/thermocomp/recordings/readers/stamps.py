@@ -197,7 +197,7 @@ def _parsed(stamps: "pd.Series[pd.Timestamp]", first: str, form: str, notes: tup
 
 
 def _simplify(text: "pd.Series[Any]", shape: re.Match[str]) -> "pd.Series[Any]":
-    """Bring what no format can say into one form: months in words, zones by name, signs before a fraction."""
+    """Convert parts that no format covers to one form: months in words, zones by name, signs before a fraction."""
     plain = text.str.strip().str.lstrip("'")
     if not (shape["a"].isdigit() and shape["b"].isdigit()):
         plain = plain.str.replace(r"[^\W\d_]{3,}(?=[ ,./-])", _month, regex=True)
@@ -276,7 +276,7 @@ def _format(shape: re.Match[str], order: str) -> str:
 
 
 def _shown_format(shape: re.Match[str], order: str) -> str:
-    """Return the format of the cells as they stand in the file."""
+    """Return the format of the cells as written in the file."""
     form = _format(shape, order)
     return form.replace("%S.", f"%S{shape['dot']}") if shape["dot"] else form
 

@@ -46,7 +46,7 @@ class FileTable(Protocol):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a user should know."""
+        """Notes for the user."""
 
     def is_number(self, column: int, *, empty: bool = True) -> bool:
         """Return whether the first filled cell of a column is a number; `empty` if there is none."""
@@ -55,7 +55,7 @@ class FileTable(Protocol):
         """Return the first filled cells of a column, as texts; none of one that holds numbers by its type."""
 
     def load(self, numbers: Sequence[int], texts: Sequence[int]) -> tuple[pd.DataFrame, tuple[str, ...]]:
-        """Read some columns, as float64 and as they are, and say what was made of their cells.
+        """Read some columns, as float64 and as text, and report the conversions.
 
         The table's columns are named by position.
 
@@ -66,7 +66,7 @@ class FileTable(Protocol):
         """
 
     def place(self, row: int) -> str:
-        """Say where a row stands in the file, such as ``line 7``."""
+        """Return the location of a row in the file, such as ``line 7``."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ class FrameTable:
         return pd.DataFrame(data, copy=False), notes
 
     def place(self, row: int) -> str:
-        """Say in which row of the sheet or file, counted from 1, a row stands."""
+        """Return the location of a row in the sheet or file, counted from 1."""
         return f"row {self.rows[row]}"
 
 
@@ -124,7 +124,7 @@ def first_is_number(cells: "pd.Series[Any]", *, empty: bool) -> bool:
     ----------
     cells : Series
     empty : bool
-        What to return if there is none.
+        Value to return if there is none.
     """
     filled = (str(cell) for cell in cells.dropna())
     first = next((cell for cell in filled if not is_filler(cell)), None)
@@ -214,7 +214,7 @@ def check_headings(path: Path, headings: Sequence[str], n_rows: int, limits: Fil
 
 
 def refuse_cell(table: FileTable, row: int, column: int, cell: object) -> NoReturn:
-    """Tell which cell holds text where a number belongs.
+    """Raise the error for a cell that contains text where a number is expected.
 
     Parameters
     ----------
@@ -222,7 +222,7 @@ def refuse_cell(table: FileTable, row: int, column: int, cell: object) -> NoRetu
     row, column : int
         Position of the cell in `table`.
     cell : object
-        What it holds.
+        Content of the cell.
 
     Raises
     ------
@@ -238,19 +238,19 @@ def refuse_cell(table: FileTable, row: int, column: int, cell: object) -> NoRetu
 
 
 def skip_row(table: FileTable, row: int) -> Remedy:
-    """Return what of a mapping passes over a row."""
+    """Return the mapping entry that skips a row."""
     return {"read": {"skip": [int(table.place(row).split()[-1])]}}
 
 
 def decide(signs: Signs, stated: str, delimiter: str, path: Path) -> Notation:
-    """Return how the numbers of a file are written; see `thermocomp.recordings.readers.numbers.Signs.decide`.
+    """Return the number format of a file; see `thermocomp.recordings.readers.numbers.Signs.decide`.
 
     Parameters
     ----------
     signs : Signs
     stated, delimiter : str
     path : Path
-        Of the file, for the message.
+        Path of the file, for the message.
 
     Raises
     ------
@@ -288,7 +288,7 @@ def convert_all(
 
 
 def tell_notation(notation: Notation) -> tuple[str, ...]:
-    """Say how numbers are written, where not as in Python."""
+    """Return the number format in words, where it differs from Python's."""
     notes: tuple[str, ...] = ("the decimal sign is a comma",) if notation.decimal == "," else ()
     if notation.thousands:
         notes += (f"thousands are separated by {' or '.join(map(repr, notation.thousands))}",)
@@ -312,9 +312,9 @@ def convert(
     Returns
     -------
     values : ndarray of shape (n_rows,)
-        nan where a word stands for a missing number.
+        nan where a word denotes a missing number.
     notes : tuple of str
-        Which words, and where.
+        Words found, and their locations.
 
     Raises
     ------
@@ -363,7 +363,7 @@ def read_plain(cells: "pd.Series[Any]", decimal: str) -> tuple[FloatArray, BoolA
 
 
 def tell_places(rows: Sequence[int], place: Callable[[int], str]) -> str:
-    """List where rows stand, not too many of them."""
+    """List the locations of rows, limited in number."""
     return ", ".join(place(int(k)) for k in rows[:_MOST_TOLD]) + " ..." * (len(rows) > _MOST_TOLD)
 
 

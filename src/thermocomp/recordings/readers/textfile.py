@@ -51,12 +51,12 @@ class CsvTable:
     sample : tuple of tuple of str
         Cells of the first rows.
     delimiter : str
-        One character; a space stands for any white space.
+        One character; a space denotes any white space.
     decimal : str
         Decimal sign, if it is known beforehand.
     encoding : str
     errors : {'strict', 'replace'}
-        What is done about bytes that are none of that encoding.
+        Handling of bytes that are invalid in that encoding.
     skipped : tuple of int
         Lines that are no rows (headings, comments, blank ones), from 0.
     n_rows : int
@@ -141,7 +141,7 @@ class CsvTable:
         return frame
 
     def place(self, row: int) -> str:
-        """Say in which line of the file, counted from 1, a row stands."""
+        """Return the location of a row in the file, as a line counted from 1."""
         line = row
         while (shifted := row + bisect_right(self.skipped, line)) != line:
             line = shifted
@@ -173,7 +173,7 @@ def open_csv(path: Path, options: ReadOptions, limits: FileLimits) -> CsvTable:
     ----------
     path : Path
     options : ReadOptions
-        What is known beforehand.
+        Options known beforehand.
     limits : FileLimits
 
     Raises
@@ -234,7 +234,7 @@ def open_csv(path: Path, options: ReadOptions, limits: FileLimits) -> CsvTable:
 
 
 class _Head(NamedTuple):
-    """What the first lines of a file say."""
+    """Content of the first lines of a file."""
 
     lines: list[tuple[int, bytes]]  #: with their numbers from 0
     delimiter: str
@@ -243,7 +243,7 @@ class _Head(NamedTuple):
 
 
 class _Body(NamedTuple):
-    """What a pass over all lines of a file finds."""
+    """Result of a pass over all lines of a file."""
 
     skipped: list[int]  #: lines that are no rows, from 0
     width: int

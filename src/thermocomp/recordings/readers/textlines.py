@@ -99,7 +99,7 @@ class Lines:
         return found
 
     def embedded(self) -> str:
-        """Return the description that thermocomp writes into the first line of its own files."""
+        """Return the description that thermocomp writes into the first line of its files."""
         with self.open() as f:
             line = f.readline(self.limits.line_bytes).removeprefix(_BOM)
         if not line.startswith(_OWN):
@@ -165,7 +165,7 @@ def open_lines(path: Path, data: bytes | None, options: ReadOptions, limits: Fil
 
 
 def split_line(line: str, delimiter: str) -> list[str]:
-    """Split a line into cells; a space as delimiter stands for any white space."""
+    """Split a line into cells; a space as delimiter denotes any white space."""
     if delimiter == " ":
         return re.split("[ \t]+", line.strip(" \t\r\n"))  # str.split takes more for white space than pandas
     try:
@@ -175,22 +175,22 @@ def split_line(line: str, delimiter: str) -> list[str]:
 
 
 def count_cells(line: bytes, delimiter: str) -> int:
-    """Return how many cells a line has."""
+    """Return the number of cells of a line."""
     if delimiter == " " or b'"' in line:
         return len(split_line(line.decode("latin-1"), delimiter))
     return line.count(delimiter.encode()) + 1
 
 
 def describe_ragged(path: Path, number: int, cells: int, width: int, line: bytes, delimiter: str) -> str:
-    """Say what is wrong with a line that is too short or too long, and what to do.
+    """Return the fault of a line that is too short or too long, and what to do.
 
     Parameters
     ----------
     path : Path
     number : int
-        Of the line, from 1.
+        Number of the line, from 1.
     cells, width : int
-        How many cells it has, and how many the headings have.
+        Number of its cells, and number of headings.
     line : bytes
     delimiter : str
     """

@@ -1,4 +1,4 @@
-"""Which columns of a file hold the time: found by headings, and by what the cells hold."""
+"""Columns of a file that contain the time: found by headings, and by the contents of the cells."""
 
 import re
 from collections.abc import Sequence
@@ -58,7 +58,7 @@ def find_time(table: FileTable, meanings: Sequence[Meaning | None], mapping: Map
     ----------
     table : FileTable
     meanings : sequence of Meaning or None
-        Of the headings.
+        Meanings of the headings.
     mapping : Mapping
     kinds : callable
         Tells what a column holds.
@@ -100,7 +100,7 @@ def find_position(place: Place, headings: Sequence[str], table: str, source: str
         Its heading, or its number from 1.
     headings : sequence of str
     table : str
-        Of the mapping, for messages.
+        Table of the mapping, for messages.
     source : str
         The file, for messages.
 
@@ -120,7 +120,7 @@ def find_position(place: Place, headings: Sequence[str], table: str, source: str
 
 
 def is_ignored(heading: str, index: int, mapping: Mapping) -> bool:
-    """Return whether a mapping says of a column that it is of no use."""
+    """Return whether a mapping marks a column as ignored."""
     rules = mapping.columns.items()
     return any(rule.role == "ignore" and (rule.column or name) in (heading, index + 1) for name, rule in rules)
 
@@ -217,6 +217,6 @@ def _find_fraction(headings: Sequence[str], time: int) -> int | None:
 
 
 def _bare_name(heading: str) -> str:
-    """Return a heading in small letters without whatever stands in brackets."""
+    """Return a heading in lower case without text in brackets."""
     found = BRACKETS.fullmatch(heading.strip())
     return plain_name(found["base"] if found else heading)

@@ -69,7 +69,7 @@ def refuse_falling(wrong: IntArray, time: FloatArray, shown: "pd.Series[Any]", s
 
 
 def _may_be_set_back(start: str, time: FloatArray, row: int) -> bool:
-    """Return whether a row stands before another on a Sunday in the night on which clocks are set back."""
+    """Return whether a row precedes another on a Sunday in the night on which clocks are set back."""
     if not start or time[row] < time[row - 1] - 3600:
         return False
     before, after = (pd.Timestamp(start) + pd.Timedelta(seconds=time[k]) for k in (row - 1, row))
@@ -77,7 +77,7 @@ def _may_be_set_back(start: str, time: FloatArray, row: int) -> bool:
 
 
 def refuse_passed(time: FloatArray, start: str, file: FileCells) -> None:
-    """Refuse times that begin with zero and run on where the date changes: they passed, and are none of the day.
+    """Refuse times that begin with zero and continue across a change of date: they are elapsed times.
 
     Parameters
     ----------

@@ -42,7 +42,7 @@ def read_times(file: FileCells, *, rising: bool) -> tuple[FloatArray, str, tuple
     start : str
         ISO timestamp of the first row; empty if it is not known.
     notes : tuple of str
-        How it was read, where that is not plain.
+        Notes on how it was read, where that is not plain.
 
     Raises
     ------
@@ -128,7 +128,7 @@ def _read_stamps(cells: "pd.Series[Any]", file: FileCells) -> tuple[FloatArray, 
 
 
 def _join_dates(file: FileCells, date: int) -> "pd.Series[str]":
-    """Return dates with their times of day behind them; where a format is given, as they stand in the file."""
+    """Return dates followed by their times of day; where a format is given, as written in the file."""
     dates, clocks, form = file.cells[date], file.cells[file.times.time], file.mapping.time.format
     lost = np.flatnonzero(dates.isna() & clocks.notna())
     if lost.size:
@@ -164,7 +164,7 @@ def _told(keys: dict[str, str]) -> str:
 
 
 def _read_clock(text: "pd.Series[Any]", file: FileCells) -> tuple[FloatArray, str, tuple[str, ...]]:
-    """Read times of day, or times that have passed: neither says the day."""
+    """Read times of day, or elapsed times: neither contains the day."""
     first = text.iloc[0].strip()
     halves = HALF.fullmatch(first) is not None
     parts = text.str.strip().str.extract(CLOCK)

@@ -1,4 +1,4 @@
-"""What a workbook becomes when it is unzipped: all of it is counted before anything is made of it."""
+"""Size limits of a workbook when unzipped: all of it is counted before it is parsed."""
 
 import zipfile
 from pathlib import Path

@@ -83,7 +83,7 @@ def open_workbook(path: Path, options: ReadOptions, limits: FileLimits) -> Frame
 
 
 def _choose(path: Path, sheets: Sheets, options: ReadOptions) -> tuple[str, tuple[str, ...]]:
-    """Return the name of the sheet that is read, and what is told of that."""
+    """Return the name of the sheet to read, and a note on it."""
     names = ", ".join(map(repr, sheets))
     if options.sheet:
         if options.sheet not in sheets:

@@ -20,7 +20,7 @@ _STEPS = 10
 
 @dataclass(frozen=True, eq=False)
 class ErrorField:
-    """What the components of a machine are in one thermal state, and what they do to its tool point (C-08).
+    """Error components of a machine in one thermal state, and their effect at its tool point (C-08).
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ class ErrorField:
         Components that are the same in the whole volume, in the order of `thermocomp.core.components.COMPONENTS`
         [um, urad]; zero where one is in `varying`.
     varying : tuple of (int, PositionModel, sequence of float)
-        Index of each other component, its model, and what that model's models of time say.
+        Index of each other component, its model, and the outputs of that model's models of time.
     """
 
     kinematics: Kinematics
@@ -116,7 +116,7 @@ class ErrorField:
         return self.kinematics.synthesize(self.components(places), places)[1]
 
     def correction(self, points: ArrayLike, tool: ArrayLike | None = None, *, tolerance: float = 0.01) -> FloatArray:
-        """Return what to add to the commanded position so that the tip is where it should be.
+        """Return the value to add to the commanded position so that the tip is at its intended position.
 
         Only axes that the machine has are corrected.
 
@@ -160,7 +160,7 @@ class ErrorField:
         )
 
     def sensitivity(self, point: ArrayLike, tool: ArrayLike | None = None) -> FloatArray:
-        """Return what one um or one urad of each component does to the tool's tip.
+        """Return the effect of one um or one urad of each component at the tool tip.
 
         Parameters
         ----------

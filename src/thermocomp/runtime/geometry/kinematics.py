@@ -75,7 +75,7 @@ class Kinematics:
         return self._moving(axis) * points + (self._tool(tool) - self.reference(axis))
 
     def reference(self, axis: str) -> FloatArray:
-        """Return an axis' reference point from the gauge point while all axes stand at 0, of shape (3,) [mm]."""
+        """Return an axis' reference point from the gauge point with all axes at 0, of shape (3,) [mm]."""
         found = self.axes[axis]
         return np.asarray(self._moving(axis) * np.asarray(found.measured_at) + np.asarray(found.measured_tool))
 
@@ -107,9 +107,9 @@ class Kinematics:
         Returns
         -------
         error : ndarray of shape (..., 3)
-            Of the tool's tip, actual minus commanded, along X, Y, Z [um].
+            Error of the tool tip, actual minus commanded, along X, Y, Z [um].
         tilt : ndarray of shape (..., 3)
-            Of the tool about X, Y, Z [urad].
+            Tilt of the tool about X, Y, Z [urad].
         """
         # the error is a sum of products: value of a component times 1, x, y or z
         shape = np.broadcast_shapes(values.shape[:-1], points.shape[:-1])
@@ -120,7 +120,7 @@ class Kinematics:
         return error, np.broadcast_to(values @ _TILT, (*shape, 3)).copy()
 
     def sensitivity(self, point: ArrayLike, tool: ArrayLike | None = None) -> FloatArray:
-        """Return what one um or one urad of each component does to the tool's tip.
+        """Return the effect of one um or one urad of each component at the tool tip.
 
         Parameters
         ----------
@@ -137,7 +137,7 @@ class Kinematics:
         return np.asarray(np.tensordot([1.0, *np.asarray(point, dtype=np.float64)], self._at_tool(tool), 1))
 
     def _at_tool(self, tool: ArrayLike | None) -> FloatArray:
-        """Return what a component does to the tip, per 1, x, y and z, of shape (4, 32, 3) [um per um, urad, mm]."""
+        """Return the effect of a component at the tip, per 1, x, y and z, of shape (4, 32, 3) [um per um, urad, mm]."""
         if tool is None:
             return self._own
         maps = self._maps[:4].copy()
@@ -150,7 +150,7 @@ class Kinematics:
 
     @cached_property
     def _maps(self) -> FloatArray:
-        """What a component does to the tip, per 1, x, y, z and the three coordinates of the tool: (7, 32, 3)."""
+        """Effect of a component at the tip, per 1, x, y, z and the three coordinates of the tool: (7, 32, 3)."""
         maps = np.zeros((7, len(COMPONENTS), 3))
         once, position, tool = maps[0], maps[1:4], maps[4:]
         for name in self.axes:
@@ -178,7 +178,7 @@ class Kinematics:
 
 
 def _turning(lever: FloatArray) -> FloatArray:
-    """Return what 1 urad about X, Y and Z does at the end of a lever [um], one row each."""
+    """Return the effect of 1 urad about X, Y and Z at the end of a lever [um], one row each."""
     return np.asarray(_LEVER * np.cross(np.eye(3), lever))
 
 

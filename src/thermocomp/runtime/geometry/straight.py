@@ -24,7 +24,7 @@ class StraightLine:
     deviation : Deviation
         The line; its reference position is that of the axis.
     along : Size
-        What it leaves of the error along this axis, on the line that it was laid through.
+        Residual of the error along this axis, on the line through which it was fitted.
     volume : Size
         The same over the work volume, when every axis is corrected by its own line.
     """
@@ -36,7 +36,7 @@ class StraightLine:
 
     @property
     def correction(self) -> Correction:
-        """What the controller has to add along this axis."""
+        """Correction to be added by the controller along this axis."""
         return Correction.opposing(self.deviation)
 
 
@@ -47,7 +47,7 @@ class StraightLines:
     Parameters
     ----------
     at : tuple of float
-        Where the other axes stood [mm].
+        Positions of the other axes [mm].
     lines : tuple of StraightLine
         One per axis of the machine, X first.
     before, after : Size
@@ -76,7 +76,7 @@ def straight_lines(
     field : ErrorField
         The machine in one thermal state.
     at : array-like of shape (3,)
-        Where the other axes stand while one moves [mm].
+        Positions of the other axes while one moves [mm].
     tool : array-like of shape (3,), optional
         From the gauge point to the tip [mm]; the machine's own if not given.
     stations : int
@@ -144,11 +144,11 @@ def best_lines(
     ----------
     field : ErrorField
     at : array-like of shape (3,)
-        Where the other axes stand while one moves [mm].
+        Positions of the other axes while one moves [mm].
     tool : array-like of shape (3,), optional
         From the gauge point to the tip [mm]; the machine's own if not given.
     axes : str
-        Which axes; those that the machine has not are left out.
+        Axes to correct; those that the machine does not have are ignored.
     stations : int
         Positions per axis, evenly over its travel, both ends included; at least 2.
     exact : bool
@@ -180,7 +180,7 @@ def best_line(positions: FloatArray, errors: FloatArray, reference: float) -> De
     errors : ndarray of shape (n,)
         [um]
     reference : float
-        Where the offset of the line holds [mm].
+        Position at which the offset of the line is valid [mm].
 
     Returns
     -------

@@ -27,7 +27,7 @@ class VolumetricModel:
     Parameters
     ----------
     machine : Machine
-        A component that it does not tell is zero.
+        A component that it does not define is zero.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class VolumetricModel:
     def step(
         self, state: VolumetricState, values: Mapping[str, float], dt: float
     ) -> tuple[VolumetricState, ErrorField]:
-        """Take one reading in and give the errors at its instant.
+        """Process one reading and return the errors at its instant.
 
         Parameters
         ----------
@@ -104,12 +104,12 @@ class VolumetricModel:
         return state, self.field(deviations)
 
     def field(self, deviations: FloatArray) -> ErrorField:
-        """Return the errors of the machine in the state that the models of time tell.
+        """Return the errors of the machine in the state given by the models of time.
 
         Parameters
         ----------
         deviations : ndarray of shape (n_models,)
-            What the models of `stack` say.
+            Outputs of the models of `stack`.
         """
         uniform = self._constants.copy()
         components, models = self._of_time
@@ -171,7 +171,7 @@ class ThermalStates:
     time : ndarray of shape (n,)
         [s]
     deviations : ndarray of shape (n, n_models)
-        What the models of ``model.stack`` say.
+        Outputs of the models of ``model.stack``.
     """
 
     model: VolumetricModel

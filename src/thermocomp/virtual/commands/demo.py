@@ -1,4 +1,4 @@
-"""`thermocomp demo`: the main job on the virtual machine."""
+"""`thermocomp demo`: the main workflow on the virtual machine."""
 
 from pathlib import Path
 
@@ -14,18 +14,18 @@ from thermocomp.virtual.commands.simulate import simulate
 def demo(
     *, output: Output = Path("thermocomp-demo"), seed: int = 0, overwrite: bool = False, json: bool = False
 ) -> int:
-    """Do the main job on the virtual machine: record, fit, judge on unseen cycles, report.
+    """Run the main workflow on the virtual machine: record, fit, judge on unseen cycles, report.
 
     Parameters
     ----------
     output : Path
-        Folder for recording, model and report.
+        Output folder for recording, model and report.
     seed : int
-        Of weather and noise.
+        Random seed of weather and noise.
     overwrite : bool
-        Write over the files of an earlier run.
+        Overwrite the files of an earlier run.
     json : bool
-        Print results for a machine instead of a table.
+        Print results as JSON instead of a table.
 
     Returns
     -------

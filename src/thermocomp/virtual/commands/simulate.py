@@ -38,9 +38,9 @@ def simulate(found: list[Recording] | list[Experiment], face: CommandFace, *, li
     Parameters
     ----------
     output : Path
-        File to write (.parquet or .csv); an experiment of several tests gets one file per test.
+        Output file (.parquet or .csv); one file per test if the experiment has several tests.
     list_ : bool
-        List the experiments and what they are.
+        List the experiments with their descriptions.
 
     Returns
     -------

@@ -36,7 +36,7 @@ def position(found: Positioned, face: CommandFace) -> int:
     Parameters
     ----------
     output : Path
-        File to write the models to (.json).
+        Output model file (.json).
 
     Returns
     -------

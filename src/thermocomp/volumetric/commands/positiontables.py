@@ -1,4 +1,4 @@
-"""What ``thermocomp position`` found, for people."""
+"""Terminal output of ``thermocomp position``."""
 
 import math
 from collections.abc import Sequence
@@ -15,14 +15,14 @@ from thermocomp.volumetric.models.positionoptions import Setting
 from thermocomp.volumetric.report import records
 from thermocomp.volumetric.verbs import Positioned
 
-#: cycles that are told one by one; of more, the `WORST`
+#: largest number of cycles that are listed individually; of more, the `WORST`
 FEW, WORST = 12, 5
-#: characters of a formula that are told; --json has all
+#: length of a formula as printed [characters]; --json has the full formula
 FORMULA = 300
 
 
 def show_positioned(result: Positioned, file: Path | None, console: Console) -> None:
-    """Print what was found of one component, or of several, and where the models are."""
+    """Print the results of one component or of several, and the path of the models."""
     if result.several:
         show_all(result.found, result.tests, result.left_open, console)
     else:
@@ -32,7 +32,7 @@ def show_positioned(result: Positioned, file: Path | None, console: Console) -> 
 
 
 def show(found: PositionStudy, tests: Sequence[Profiles], left_open: Sequence[Setting], console: Console) -> None:
-    """Print all about one component."""
+    """Print all results of one component."""
     fit, judged = found.fit, found.assessment
     model, unit = fit.model, fit.model.unit
     low, high = model.travel
@@ -90,7 +90,7 @@ def show_all(
     left_open: Sequence[Setting],
     console: Console,
 ) -> None:
-    """Print several components, a line each."""
+    """Print several components, one line each."""
     _show_notes(tests, console)
     states = sum(len(t) for t in tests[0])
     console.print(f"{len(found)} components, {states} profiles of each in {len(tests[0])} recording(s)")

@@ -1,4 +1,4 @@
-"""``thermocomp volumetric``: the error anywhere in the work volume, in the course of a recording."""
+"""``thermocomp volumetric``: the error in the work volume in the course of a recording."""
 
 from functools import partial
 from pathlib import Path
@@ -22,7 +22,7 @@ def volumetric(found: VolumetricErrors, face: CommandFace) -> int:
     Parameters
     ----------
     output : Path
-        Page with figures and tables to write (.html).
+        Output page with figures and tables (.html).
 
     Returns
     -------

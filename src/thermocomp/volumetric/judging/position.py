@@ -57,20 +57,20 @@ class CycleErrors:
 
 @dataclass(frozen=True, eq=False)
 class PositionAssessment:
-    """How a position model does on cycles that it has not seen.
+    """Result of a position model on unseen cycles.
 
     Parameters
     ----------
     protocol : str
-        How they were chosen.
+        Method by which they were chosen.
     cycles : tuple of CycleErrors
     overall : CycleErrors
-        Of all of them together.
+        Errors of all of them together.
     verdict : Verdict
         Of the do-no-harm gate: beside no compensation and, if there is a thermal part, beside the cold profile alone;
         by cycles or, if files were left out, by these.
     factors : tuple of HonestError
-        Of each factor's model on the same states [unit/m^i]; verdict and reason are those of the whole.
+        Errors of each factor's model on the same states [unit/m^i]; verdict and reason are those of the whole.
     unit : {'um', 'urad'}
     """
 
@@ -88,7 +88,7 @@ class PositionAssessment:
 
     @property
     def reason(self) -> str:
-        """Why, and what would decide it."""
+        """Reason for the verdict, and the data that would decide it."""
         return self.verdict.told
 
 
@@ -104,7 +104,7 @@ class PositionStudy:
         With what was left open filled in.
     assessment : PositionAssessment
     dropped : str
-        Why the thermal part was left out, if it was: its own verdict.
+        Reason why the thermal part was dropped, if it was: its own verdict.
     """
 
     fit: PositionFit
@@ -131,7 +131,7 @@ def study(
     Parameters
     ----------
     profiles : Profiles or sequence of Profiles
-        Of one component, one per test.
+        Profiles of one component, one per test.
     options : PositionOptions
     left_open : sequence of {'slopes', 'offset', 'reference_position'}
         Settings that the profiles tell, in place of `options`; see
@@ -176,7 +176,7 @@ def study_all(
     components : sequence of sequence of Profiles
         The tests of each.
     options, left_open, judging, jobs, progress
-        See `study`; `n_pieces` tells how often `progress` is called.
+        See `study`; `n_pieces` gives the number of calls of `progress`.
 
     Returns
     -------
@@ -274,7 +274,7 @@ def _study(one: _All, parts: Sequence["_Part"], options: PositionOptions, fit: P
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """What was judged in one split: errors of all points per state, and the predicted thermal parts."""
+    """Judged data of one split: errors of all points per state, and the predicted thermal parts."""
 
     state: NDArray[np.intp]  # (n,) row of the samples
     errors: tuple[tuple[FloatArray, FloatArray, FloatArray], ...]  # per state: none, cold profile alone, model
@@ -302,7 +302,7 @@ def _judged(tests: Sequence[Profiles], fit: PositionFit, options: PositionOption
 
 
 def _factors(one: _All, parts: Sequence[_Part], options: PositionOptions) -> tuple[FloatArray, FloatArray]:
-    """Return factors, measured and predicted, (n, n_factors): the predicted ones from what the model said everywhere.
+    """Return factors, measured and predicted, (n, n_factors): the predicted ones from the model outputs everywhere.
 
     A split may have chosen other powers; its thermal part is written in those of the whole.
     """

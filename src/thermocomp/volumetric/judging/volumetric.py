@@ -33,7 +33,7 @@ _PICKED = (_START, _LARGEST, _END, f"{_START} = {_LARGEST}", f"{_END} = {_LARGES
 
 @dataclass(frozen=True, eq=False)
 class PointCourse:
-    """What happens at one point while a recording is replayed.
+    """Course of the errors at one point while a recording is replayed.
 
     Parameters
     ----------
@@ -46,11 +46,11 @@ class PointCourse:
     values : ndarray of shape (n_rows, 32)
         Components at the point [um, urad].
     error : ndarray of shape (n_rows, 3)
-        Of the tool's tip, actual minus commanded [um].
+        Error of the tool tip, actual minus commanded [um].
     tilt : ndarray of shape (n_rows, 3)
-        Of the tool [urad].
+        Tilt of the tool [urad].
     sensitivity : ndarray of shape (32, 3)
-        What one um or urad of each component does to the tip [um].
+        Effect of one um or urad of each component at the tip [um].
     """
 
     point: Vector
@@ -67,7 +67,7 @@ class PointCourse:
         return int(np.argmax(np.linalg.norm(self.error, axis=-1)))
 
     def contributions(self, row: int) -> FloatArray:
-        """Return what each component adds to the error in one row, of shape (32, 3) [um]."""
+        """Return the contribution of each component to the error in one row, of shape (32, 3) [um]."""
         return self.values[row, :, None] * self.sensitivity
 
 
@@ -78,9 +78,9 @@ class Moment:
     Parameters
     ----------
     label : str
-        Why it was picked: ``start``, ``largest``, ``end``, ``reference state``, or the time that was asked for.
+        Reason for the choice: ``start``, ``largest``, ``end``, ``reference state``, or the requested time.
     row : int
-        Of the course.
+        Row of the course.
     time : float
         Since the first row of the recording [s].
     field : ErrorField
@@ -89,7 +89,7 @@ class Moment:
     tool : tuple of float
         From the gauge point to the tip [mm].
     grid : ndarray of shape (..., 3)
-        Where the numbers are judged [mm].
+        Points at which the errors are judged [mm].
     """
 
     label: str
@@ -111,12 +111,12 @@ class Moment:
         return self.field.error(points, self.tool, exact=True)
 
     def after_lines(self, points: FloatArray) -> FloatArray:
-        """Return what is left after the straight lines of the axes, of shape (..., 3) [um]."""
+        """Return the residual after the straight lines of the axes, of shape (..., 3) [um]."""
         lines = {line.axis: line.correction for line in self.straight.lines}
         return find_remaining_error(self.field, points, lines, self.tool, exact=True)
 
     def after_all(self, points: FloatArray) -> FloatArray:
-        """Return what is left after the whole correction, a vector at every point, of shape (..., 3) [um]."""
+        """Return the residual after the whole correction, a vector at every point, of shape (..., 3) [um]."""
         correction = self.field.correction(points, self.tool)
         return self.error(points + 1e-3 * correction) + correction
 
@@ -132,7 +132,7 @@ class Moment:
 
     @cached_property
     def shares(self) -> FloatArray:
-        """What each component alone adds to the error on the grid: RMS of the vector's length, of shape (32,) [um]."""
+        """Contribution of each component to the error on the grid: RMS of the vector's length, of shape (32,) [um]."""
         points = self.grid.reshape(-1, 3)
         values, shares = self.field.components(points), np.zeros(len(COMPONENTS))
         for k in np.flatnonzero(values.any(axis=0)):
@@ -151,7 +151,7 @@ class Volumetric:
     ----------
     machine : Machine
     recording : Recording or None
-        What was replayed; None: the reference state.
+        Replayed recording; None: the reference state.
     course : PointCourse
     moments : tuple of Moment
     missing : int
@@ -166,7 +166,7 @@ class Volumetric:
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """What is to be said of the machine: see `thermocomp.volumetric.notes`."""
+        """Notes on the machine: see `thermocomp.volumetric.notes`."""
         return notes.notes(replace(self.machine, tool=self.course.tool))
 
     @property
@@ -255,7 +255,7 @@ def study(
 
 
 def in_reference_state(machine: Machine) -> Machine:
-    """Return a machine whose models of time say nothing: constants and profiles alone."""
+    """Return a machine whose models of time give zero: constants and profiles alone."""
     kept: dict[str, Source] = {}
     for code, source in machine.components.items():
         if isinstance(source, PositionModel):
@@ -266,7 +266,7 @@ def in_reference_state(machine: Machine) -> Machine:
 
 
 def inputs_of(machine: Machine) -> dict[str, Input]:
-    """Return the inputs that the machine's models want, by name."""
+    """Return the inputs of the machine's models, by name."""
     return {i.name: i for source in machine.components.values() for m in models_of(source) for i in m.inputs}
 
 
@@ -278,7 +278,7 @@ def models_of(source: Source | None) -> tuple[ErrorModel, ...]:
 
 
 def describe_source(source: Source | None) -> str:
-    """Say in a few words what tells the value of a component."""
+    """Return a short description of the source of a component's value."""
     if source is None:
         return "nothing"
     if isinstance(source, PositionModel):
@@ -288,7 +288,7 @@ def describe_source(source: Source | None) -> str:
 
 
 def middle(machine: Machine) -> Vector:
-    """Return the middle of the travels; an axis that is not there stands at 0 [mm]."""
+    """Return the middle of the travels; 0 for an axis that does not exist [mm]."""
     x, y, z = (0.5 * sum(machine.axis(a).travel) if a in machine.structure.axes else 0.0 for a in "XYZ")
     return (x, y, z)
 

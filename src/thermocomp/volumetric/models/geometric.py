@@ -70,7 +70,7 @@ class ProfileFit:
     tried : tuple of Tried
         By rising number of terms; empty if the order was given.
     rms : float
-        What the fit leaves [unit], per degree of freedom; nan if there is none.
+        Residual of the fit [unit], per degree of freedom; nan if there is none.
     noise : float
         Standard deviation of the values at one point [unit]; nan where none comes twice, or only with the same number.
     misfit : float
@@ -94,7 +94,7 @@ class ProfileFit:
 
     @property
     def words(self) -> str:
-        """Say what a reader must know of it; empty if there is nothing."""
+        """Return cautions for the reader; empty if there are none."""
         if self.leaves_more:
             return (
                 f"leaves {self.rms:.3g} where repeated values differ by {self.noise:.3g}: it misses part of the shape"
@@ -311,7 +311,7 @@ class _Polynomial:
         self.distinct = [len(np.unique(points[:, a])) for a in range(3)]
 
     def orders(self, n_places: int) -> Iterator[Order]:
-        """Give the orders that leave a third of the points to spare, and no degree that a coordinate cannot tell."""
+        """Yield the orders that leave a third of the points to spare, with degrees that each axis can determine."""
         # Least squares on equidistant positions swings between them where the degree is above 2 sqrt(n).
         n_own = self.distinct[self.own]
         highest = min(n_own - 2, int(2 * n_own**0.5), HIGHEST)

@@ -61,9 +61,9 @@ class PositionFit:
         taken as independent but for the noise of the cold profile, which all of them share; terms as given, though they
         were selected (E-C12).
     remainders : mapping of int to float
-        What powers up to m leave of the thermal part, RMS per degree of freedom, by m [unit] (C-05).
+        Residual of the thermal part after powers up to m, RMS per degree of freedom, by m [unit] (C-05).
     offset_remainder : float
-        What the powers of the model leave with an offset k_0 [unit].
+        Residual after the powers of the model with an offset k_0 [unit].
     thermal_rms : float
         The thermal part itself, RMS over all states but the reference [unit].
     """
@@ -104,7 +104,7 @@ def fit_position(
     Parameters
     ----------
     profiles : Profiles or sequence of Profiles
-        Of one component, one per test.
+        Profiles of one component, one per test.
     options : PositionOptions
     learn : ndarray of bool of shape (n_states,), optional
         States that may be learned from, over all tests; all if not given. The reference states of a test are used
@@ -167,7 +167,7 @@ def fit_position(
 def slope_samples(
     tests: Sequence[Profiles], options: PositionOptions, learn: BoolArray | None = None
 ) -> tuple[Samples, tuple[Slopes, ...]]:
-    """Return what the factors are learned from: one row per state, the measured factors as targets.
+    """Return the training data of the factors: one row per state, the measured factors as targets.
 
     Parameters
     ----------
@@ -238,7 +238,7 @@ def _with_factors(test: Profiles, slopes: Slopes, names: Sequence[str], options:
 
 
 def _cold_inputs(samples: Samples, rows: NDArray[np.intp]) -> FloatArray:
-    """Return what the inputs are counted from."""
+    """Return the reference values of the inputs."""
     values = samples.values[rows]
     there = np.isfinite(values)
     counted = np.array([c.quantity == "temperature" for c in samples.inputs])
@@ -278,7 +278,7 @@ def _coefficient_errors(
 
 
 def _profile_alone(samples: Samples, seen: BoolArray) -> Provenance:
-    """Return where a model without factors comes from."""
+    """Return the provenance of a model without factors."""
     tests: Sequence[int] = np.unique(samples.test[seen]).tolist()
     return Provenance(
         method="cold profile alone",

@@ -1,4 +1,4 @@
-"""How a position-dependent error is modelled, and what of that its own profiles tell."""
+"""Model options of a position-dependent error, and those determined from its profiles."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -26,12 +26,12 @@ WORTH_OF_REST, WORTH_OF_THERMAL = 0.1, 0.05
 
 @dataclass(frozen=True, kw_only=True)
 class PositionOptions:
-    """How a position-dependent error is modelled.
+    """Model options of a position-dependent error.
 
     Parameters
     ----------
     method : str or ThermalRegressor
-        Of the slopes: any method of `thermocomp.models.methods`, or an estimator with settings of its own.
+        Method for the slopes: any of `thermocomp.models.methods`, or a custom estimator.
     inputs : sequence of str, optional
         Channels to predict the slopes from; all temperatures and the spindle speed if not given.
     slopes : int
@@ -40,18 +40,18 @@ class PositionOptions:
         Model a k_0(t) too; without it the thermal part is zero at the reference position, as Chen's.
     profile : {'polynomial', 'spline'}
     order : int, (int, int) or 'auto'
-        Of the profile; see `thermocomp.volumetric.models.geometric.fit_profile`.
+        Order of the profile; see `thermocomp.volumetric.models.geometric.fit_profile`.
     coordinates : str, optional
         Axes the profile may depend on (C-06).
     reference : int or sequence of int
         States that count as cold, in each test; of several, the mean (C-07). Temperatures are counted from them too.
     reference_position : float, optional
-        Where q is zero [mm]. If not given: the axis' zero, or the end of the measured travel that is next to it.
+        Position at which q is zero [mm]. Default: the axis' zero, or the end of the measured travel that is next to it.
     rezero : bool
         False: all tests count from one cold state, the mean of their reference states, and so does the model live:
         temperatures are absolute. For a machine whose cold profile is not the same every morning.
     support : Support
-        What the models of the slopes do outside their trained range.
+        Behaviour of the models of the slopes outside their training range.
     """
 
     method: str | ThermalRegressor = "mra"
@@ -83,7 +83,7 @@ def fill_options(
     *,
     learn: BoolArray | None = None,
 ) -> PositionOptions:
-    """Fill in what the profiles tell of themselves; temperatures are not looked at.
+    """Fill in the options that the profiles determine; temperatures are not used.
 
     - Reference position: the measured one where the thermal part is smallest: powers that are zero there leave least. A
       laser counts from where it was set to zero, a screw grows from its fixed bearing.
@@ -94,9 +94,9 @@ def fill_options(
     Parameters
     ----------
     profiles : Profiles or sequence of Profiles
-        Of one component, one per test.
+        Profiles of one component, one per test.
     options : PositionOptions
-        What is not left open stays.
+        Options; those that are set stay unchanged.
     left_open : sequence of {'slopes', 'offset', 'reference_position'}
     learn : ndarray of bool of shape (n_states,), optional
         States that may be looked at; see `thermocomp.volumetric.models.position.fit_position`.
@@ -130,7 +130,7 @@ def fill_options(
 
 
 def reference_position(tests: Sequence[Profiles], options: PositionOptions) -> float:
-    """Return where q is zero [mm]: see `PositionOptions`.
+    """Return the reference position, where q is zero [mm]: see `PositionOptions`.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ def set_cold_profiles(
 def blank_unlearned(
     tests: Sequence[Profiles], options: PositionOptions, learn: BoolArray | None = None
 ) -> tuple[Profiles, ...]:
-    """Return what may be learned from: the other states are blank, tests of which there is none are left out.
+    """Return the training data: the other states are blank, tests without training states are left out.
 
     Parameters
     ----------
@@ -207,7 +207,7 @@ def blank_unlearned(
 
 
 def remainder(tests: Sequence[Profiles], options: PositionOptions, m: int) -> float:
-    """Return what powers up to m leave of the thermal part, RMS per degree of freedom; reference states do not count.
+    """Return the residual of the thermal part after powers up to m, RMS per degree of freedom, no reference states.
 
     Parameters
     ----------
@@ -215,7 +215,7 @@ def remainder(tests: Sequence[Profiles], options: PositionOptions, m: int) -> fl
     options : PositionOptions
         Tells whether there is an offset too, and where q is zero.
     m : int
-        0 without an offset: nothing is fitted, the thermal part itself is told.
+        0 without an offset: no fit, the thermal part itself is used.
 
     Returns
     -------
@@ -245,7 +245,7 @@ def choose_power(remainders: Mapping[int, float], thermal: float) -> int | None:
     Parameters
     ----------
     remainders : mapping of int to float
-        What powers up to m leave [unit], by m.
+        Residual after powers up to m [unit], by m.
     thermal : float
         The thermal part itself [unit].
     """

@@ -194,7 +194,7 @@ def _section(
 
 
 def _plane_named(study: Volumetric, plane: str) -> str:
-    """Return the name of a section, and where the axis across it stands."""
+    """Return the name of a section, and the position of the axis across it."""
     across = next(a for a in "XYZ" if a not in plane)
     here = f" at {across} {study.course.point['XYZ'.index(across)]:g} mm"
     return f"{plane[0]}-{plane[1]}{here if across in study.machine.structure.axes else ''}"
@@ -207,7 +207,7 @@ def _nice(value: float) -> float:
 
 
 def _seen(points: FloatArray) -> FloatArray:
-    """Return where points are on the paper, (..., 3) -> (..., 2): a parallel projection."""
+    """Return the positions of points on the figure, (..., 3) -> (..., 2): a parallel projection."""
     a, e = math.radians(AZIMUTH), math.radians(ELEVATION)
     right = np.array([-math.sin(a), math.cos(a), 0.0])
     up = np.array([-math.cos(a) * math.sin(e), -math.sin(a) * math.sin(e), math.cos(e)])

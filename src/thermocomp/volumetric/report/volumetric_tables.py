@@ -67,7 +67,7 @@ def at_point(study: Volumetric, *, page: bool = False) -> Layout:
 
 
 def contributions(study: Volumetric, *, point: bool) -> Layout:
-    """Return what the largest contributions come from, at the point and over the volume or over it alone."""
+    """Return the largest contributions, at the point and over the volume or over it alone."""
     course = study.course
     largest = max(study.moments, key=lambda m: float(course.error[m.row] @ course.error[m.row]))
     moment = largest if point else study.worst
@@ -135,7 +135,7 @@ def volume(study: Volumetric) -> Layout:
 
 
 def listed(study: Volumetric) -> list[dict[str, Any]]:
-    """Return all 32 components: what tells their value, and the value at the point in each moment."""
+    """Return all 32 components: the source of their value, and the value at the point in each moment."""
     return [
         {
             "code": c.code,
@@ -204,7 +204,7 @@ def states(study: Volumetric) -> list[dict[str, Any]]:
 
 
 def contributed(study: Volumetric, moment: Moment) -> list[dict[str, Any]]:
-    """Return what every component adds to the error at the point, the largest first, and over the volume."""
+    """Return the contribution of every component at the point, the largest first, and over the volume."""
     course = study.course
     found = [
         {

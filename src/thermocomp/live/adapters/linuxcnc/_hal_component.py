@@ -58,13 +58,13 @@ class AxisLine:
         self.aside: float | None = None  # since when it does not follow
 
     def demand(self, offset: float, slope: float, reference: float, magnitude: float) -> None:
-        """Take a line: um, um/m, mm, and what it may be at most, um."""
+        """Process a line: um, um/m, mm, and the limit, um."""
         wanted = (offset + 1e-3 * slope * (p / self.unit - reference) for p in (self.low, self.high))
         self.ends = [1e-3 * self.unit * max(-magnitude, min(magnitude, v)) for v in wanted]
 
 
 class Server:
-    """Listens, and keeps HAL as it was told."""
+    """Socket server that sets HAL as received."""
 
     def __init__(self, options: argparse.Namespace) -> None:
         self.options = options
@@ -105,7 +105,7 @@ class Server:
     # -- the controller ------------------------------------------------------------------------------------------------
 
     def tick(self, now: float) -> None:
-        """Look at the controller, and say where the lines shall go and how fast."""
+        """Check the controller, and output the line targets and rates."""
         if self.pins["beat"] == self.sent:
             self.echoed, self.sent = now, not self.sent
             self.pins["heartbeat"] = self.sent
@@ -143,7 +143,7 @@ class Server:
         self.pins[f"{letter}.offset-rate"], self.pins[f"{letter}.slope-rate"] = (v / seconds for v in steps)
 
     def why(self) -> str:
-        """Return why nothing is in force; empty if something can be."""
+        """Return the reason why nothing is in force; empty if something can be."""
         if self.pins["on"]:
             return ""
         if not self.pins["homed"]:
@@ -151,7 +151,7 @@ class Server:
         return "in joint mode" if self.pins["enabled"] else "off"
 
     def report(self, beat: int) -> dict[str, Any]:
-        """Return what is in force."""
+        """Return the correction in force."""
         now = time.monotonic()
         why, limited = self.why(), self.pins["limited"]
         micron = 1e-3 * self.unit
@@ -177,7 +177,7 @@ class Server:
     # -- the service ---------------------------------------------------------------------------------------------------
 
     def accept(self) -> None:
-        """Let the service in; another one is told that there is one."""
+        """Accept the service; a second one gets a message that the place is occupied."""
         connection, _ = self.listener.accept()
         if self.client is not None and self.left():
             self.drop()
@@ -210,7 +210,7 @@ class Server:
             self.client = None
 
     def receive(self) -> None:
-        """Take what was said, and answer."""
+        """Receive messages, and answer."""
         client = self.client
         assert client is not None
         try:
@@ -230,7 +230,7 @@ class Server:
             self.drop()
 
     def take(self, message: dict[str, Any]) -> dict[str, Any]:
-        """Take a message: all of it or nothing."""
+        """Process a message: all of it or nothing."""
         limits = {}
         for name in ("magnitude", "rate"):
             value = float(message.get(name, getattr(self.options, name)))
@@ -253,7 +253,7 @@ class Server:
 
 
 def named(k: int) -> str:
-    """Return the name of the component after so many that were killed."""
+    """Return the name of the component after a number of killed ones."""
     return f"{NAME}-{k}" if k else NAME
 
 
@@ -312,12 +312,12 @@ def listen(path: str, group: str) -> socket.socket:
 
 
 def ending(child: "subprocess.Popen[bytes]") -> Callable[..., None]:
-    """Return what ends the process when this one is told to end."""
+    """Return a signal handler that terminates the child process."""
     return lambda *_: child.terminate()
 
 
 def keep(arguments: list[str]) -> None:
-    """Run the component in a process of its own, and again whenever it dies."""
+    """Run the component in a separate process, and restart it whenever it dies."""
     here = Path(__file__).resolve()
     while here.exists():
         child = subprocess.Popen([sys.executable, str(here), *arguments, "--once"])

@@ -22,7 +22,7 @@ LONGEST = 107
 
 @dataclass(frozen=True, kw_only=True)
 class HalSettings:
-    """What a correction may do inside LinuxCNC, whatever the service says.
+    """Limits of a correction inside LinuxCNC, regardless of the service.
 
     Parameters
     ----------
@@ -35,13 +35,13 @@ class HalSettings:
     rate : float
         Fastest change of the correction [um/s].
     timeout : float
-        The service is lost when it says nothing for so long [s].
+        Time without a message after which the service is treated as disconnected [s].
     hold : float
-        So long the correction then stays where it is [s].
+        Hold time of the correction after a disconnect [s].
     fade : float
-        How fast it goes to zero after that [um/s].
+        Rate at which the correction ramps to zero after the hold time [um/s].
     group : str
-        Whose members may connect; without one only the user that runs LinuxCNC may.
+        User group whose members may connect; without one only the user that runs LinuxCNC may.
     """
 
     pattern: Pattern = "offset"
@@ -69,7 +69,7 @@ class HalSettings:
 
 
 class HalSetup(NamedTuple):
-    """What `prepare` returns."""
+    """Result of `prepare`."""
 
     hal: str  #: text of the HAL file
     component: str  #: text of the component
@@ -79,20 +79,20 @@ class HalSetup(NamedTuple):
 
 
 def prepare(path: Path, folder: Path, settings: HalSettings) -> HalSetup:
-    """Return what corrects a machine; nothing is written.
+    """Return the files and settings for corrections of a machine; nothing is written.
 
     Parameters
     ----------
     path : Path
         INI file of the machine.
     folder : Path
-        Where HAL file, component and socket will be.
+        Folder of the HAL file, the component and the socket.
     settings : HalSettings
 
     Raises
     ------
     InputError
-        The machine cannot be corrected like this; it is told why, and what to do.
+        The machine cannot be corrected with these settings; the message gives the reason and the remedy.
     """
     ini = read_ini(path)
     files = read_hal(ini, HAL_NAME)
@@ -153,7 +153,7 @@ def set_up(path: Path, folder: Path, settings: HalSettings, *, overwrite: bool =
     Returns
     -------
     HalSetup
-        The INI and the machine's own HAL are left alone: what is to be done there is told.
+        The INI and the HAL files of the machine are not changed: the required changes are listed here.
 
     Raises
     ------

@@ -29,10 +29,10 @@ def load_modules(axes: Sequence[HalAxis], joints: int, pattern: str, files: HalF
     ----------
     axes : sequence of HalAxis
     joints : int
-        How many the machine has.
+        Number of joints of the machine.
     pattern : {'offset', 'drive'}
     files : HalFiles
-        Of the machine.
+        HAL files of the machine.
     todo : list of str
         Gets what has to be done where the machine loads a module itself.
     """
@@ -85,10 +85,10 @@ def make_gate(joints: int, pattern: str, files: HalFiles) -> list[str]:
     Parameters
     ----------
     joints : int
-        How many the machine has.
+        Number of joints of the machine.
     pattern : {'offset', 'drive'}
     files : HalFiles
-        Of the machine.
+        HAL files of the machine.
     """
     lines, before = [], ""
     for k in range(-(-joints // _INPUTS)):
@@ -127,7 +127,7 @@ def make_line(axis: HalAxis, files: HalFiles, magnitude: float, micron: float) -
     ----------
     axis : HalAxis
     files : HalFiles
-        Of the machine.
+        HAL files of the machine.
     magnitude : float
         Largest correction [um].
     micron : float
@@ -169,7 +169,7 @@ def make_offset(axis: HalAxis, files: HalFiles, micron: float) -> list[str]:
     ----------
     axis : HalAxis
     files : HalFiles
-        Of the machine.
+        HAL files of the machine.
     micron : float
         In units of the machine.
     """
@@ -193,13 +193,13 @@ def make_offset(axis: HalAxis, files: HalFiles, micron: float) -> list[str]:
 
 
 def make_drive(axis: HalAxis, files: HalFiles) -> list[str]:
-    """Return the HAL that adds a correction to what the drive is told, and takes it off what it answers.
+    """Return the HAL that adds a correction to the command of the drive, and subtracts it from its feedback.
 
     Parameters
     ----------
     axis : HalAxis
     files : HalFiles
-        Of the machine; functions that are added stand in it afterwards.
+        HAL files of the machine; functions that are added are in it afterwards.
     """
     a, command, feedback = axis.letter, f"joint.{axis.joint}.motor-pos-cmd", f"joint.{axis.joint}.motor-pos-fb"
     told, answered = files.signals[command], files.signals[feedback]

@@ -24,7 +24,7 @@ ASIDE = 1.0
 
 
 class AxisReport(NamedTuple):
-    """What is in force at an axis."""
+    """Correction in force at an axis."""
 
     correction: Correction
     in_force: float  #: where the axis stands [um]
@@ -106,7 +106,7 @@ class LinuxCncSink:
         await self._ask({"axes": lines})
 
     async def confirmed(self) -> dict[str, Correction] | None:
-        """Return what is in force, by target; None if it is not known."""
+        """Return the corrections in force, by target; None if unknown."""
         try:
             await self._ask({})
         except ThermocompError:
@@ -120,18 +120,18 @@ class LinuxCncSink:
         return self._connection.now
 
     def suspended(self) -> dict[str, str]:
-        """Return targets that the controller has no correction in force of, and why, as it said last."""
+        """Return targets that have no correction in force at the controller, and the reason, as last reported."""
         return dict.fromkeys(self.axes, f"the controller is {self._why}") if self._why else {}
 
     def alarms(self) -> dict[str, str]:
-        """Return targets whose correction is not in force as it shall be, and why, as was said last."""
+        """Return targets whose correction in force is not the demanded one, and the reason, as last reported."""
         if self._still:
             return dict.fromkeys(self.axes, "the controller stands still")
         found = {t: self._reports[a.upper()].alarm for t, a in self.axes.items() if a.upper() in self._reports}
         return {t: f"axis {self.axes[t].upper()} {alarm}" for t, alarm in found.items() if alarm}
 
     def reports(self) -> dict[str, AxisReport]:
-        """Return what was said last of each axis, by its letter."""
+        """Return the last report of each axis, by its letter."""
         return dict(self._reports)
 
     async def close(self) -> None:
@@ -165,14 +165,14 @@ class LinuxCncSink:
                 await self._ask({})
 
     async def _ask(self, message: dict[str, Any]) -> None:
-        """Say something, and take in what is answered."""
+        """Send a message, and process the answer."""
         async with self._lock:
             self._beat += 1
             limits = {n: v for n in ("magnitude", "rate") if (v := getattr(self, n)) is not None}
             await self._hear(json.dumps({"beat": self._beat, **limits, **message}).encode() + b"\n")
 
     async def _hear(self, line: bytes) -> None:
-        """Say a line, and take in the answer: only a connection that answers in turn is kept."""
+        """Send a line, and process the answer: only a connection that answers in turn is kept."""
         if self._streams is None:
             raise self._fail("not connected")
         reader, writer = self._streams

@@ -37,7 +37,7 @@ MOST = 2_000_000
 
 @dataclass(frozen=True)
 class Expansion:
-    """What `expand` wrote.
+    """Result of `expand`.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class Expansion:
 
 @dataclass(frozen=True)
 class _Around:
-    """What a program is run in; see `expand`."""
+    """Context in which a program is run; see `expand`."""
 
     inch: bool | None
     startup: str | None
@@ -289,7 +289,7 @@ def _first(path: Path) -> str:
 
 
 def _told(calls: Iterator[Canonical], side: Side) -> Iterator[Canonical]:
-    """Yield the calls without the interpreter's own remarks; what stands before the first line is where it starts."""
+    """Yield the calls without the interpreter's remarks; those before the first line give the start."""
     for call in calls:
         if call.line == 0:
             side.begin(call)

@@ -32,7 +32,7 @@ def chosen_system(
     Parameters
     ----------
     sides, words, refuse
-        Of the writer.
+        As for the writer.
     a, b : Canonical
         The calls ``g5x`` of both runs.
     angles : tuple of float or None
@@ -75,12 +75,12 @@ def chosen_system(
 
 
 def plain_g10(sides: Sides, words: Words, refuse: Refuse, source: str) -> str:
-    """Return the line that sets the origin of a system that is not in force: only the source line tells which.
+    """Return the line that sets the origin of a system not in force: only the source line defines which.
 
     Parameters
     ----------
     sides, words, refuse
-        Of the writer.
+        As for the writer.
     source : str
         Line of the program.
     """
@@ -113,7 +113,7 @@ def shift(sides: Sides, words: Words, refuse: Refuse, old: tuple[Place, Place], 
     Parameters
     ----------
     sides, words, refuse
-        Of the writer; the sides have taken the offset.
+        As for the writer; the offset has been applied to the sides.
     old : tuple
         Offsets before, of both runs.
     source : str

@@ -41,7 +41,7 @@ class Writer:
     Parameters
     ----------
     first, second : Stored
-        What is stored in the controllers of the two runs.
+        Values stored in the controllers of the two runs.
     source : callable
         Text of a line of the program, by its number.
     inch : bool or None
@@ -160,7 +160,7 @@ class Writer:
         ], False
 
     def unshifted(self, a: Canonical, b: Canonical) -> bool:
-        """Tell whether G92 stays."""
+        """Return whether G92 stays."""
         old = (*self.sides[0].frame.shift, *self.sides[1].frame.shift)
         return all(agree(x, y) for x, y in zip((*a.values, *b.values), old, strict=True))
 
@@ -259,7 +259,7 @@ class Writer:
         return f"G33.1{words} K{self.words.length(self.pitch)}{scale}"
 
     def still(self, axis: int, first: float, second: float) -> bool:
-        """Tell whether an axis moves in neither run."""
+        """Return whether an axis moves in neither run."""
         a, b = self.sides
         return abs(first - a.program[axis]) < STILL and abs(second - b.program[axis]) < STILL
 

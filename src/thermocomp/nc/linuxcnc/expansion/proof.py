@@ -46,7 +46,7 @@ def compare(asked: Iterator[Canonical], done: Iterator[Canonical]) -> int:
     Parameters
     ----------
     asked, done : iterator of Canonical
-        Of the program, and of what is to do the same.
+        Calls of the program, and of the one that must do the same.
 
     Returns
     -------
@@ -109,7 +109,7 @@ def trace_acts(calls: Iterator[Canonical]) -> Iterator[Act]:
 
 
 def _way(call: Canonical, frame: ProgramFrame, here: Place) -> tuple[Place, tuple[float, ...]]:
-    """Return where a move ends and all that tells its way, in machine coordinates."""
+    """Return the end of a move and all data of its path, in machine coordinates."""
     if call.arc is not None:
         arc = call.arc
         return call.machine, (
@@ -134,7 +134,7 @@ def _pairs(values: Sequence[float]) -> list[tuple[float, float]]:
 
 
 def _sweep(call: Canonical, start: Place) -> float:
-    """Return the length of an arc in its plane [mm]: end points alone do not tell a full circle from none."""
+    """Return the length of an arc in its plane [mm]: end points alone do not distinguish a full circle from none."""
     assert call.arc is not None
     i, j, _ = PLANE_AXES[call.arc.plane]
     x, y = call.arc.centre[i], call.arc.centre[j]

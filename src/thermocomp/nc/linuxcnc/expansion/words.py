@@ -7,7 +7,7 @@ STILL = 1e-8  #: [mm] an axis does not move
 
 
 def agree(first: float, second: float) -> bool:
-    """Tell whether two runs agree."""
+    """Return whether two runs agree."""
     return abs(first - second) < EQUAL
 
 
@@ -52,7 +52,7 @@ class Side:
     Attributes
     ----------
     program, machine : tuple of float
-        Where it stands [mm, deg].
+        Position [mm, deg].
     frame : ProgramFrame
     origins, rotations : dict by work coordinate system
         As they are stored now [mm, deg].
@@ -66,7 +66,7 @@ class Side:
         self.rotations = {i: stored.rotations.get(i, 0.0) for i in stored.origins}
 
     def begin(self, call: Canonical) -> None:
-        """Follow what stands before the first line."""
+        """Process a call before the first line."""
         self.take(call.kind, call.values)
         if call.kind == "rapid":
             self.move(call.program)
@@ -76,6 +76,6 @@ class Side:
         self.program, self.machine = program, self.frame.machine(program)
 
     def take(self, kind: str, values: tuple[float, ...]) -> None:
-        """Take an offset; the machine stays where it is."""
+        """Apply an offset; the machine stays where it is."""
         self.frame.take(kind, values)
         self.program = self.frame.program(self.machine)

@@ -36,15 +36,15 @@ class Calls:
     values : array, calls x 10
         Numbers; of a curve or a tap the first one is its place in `Side.curves`.
     start, end : array, calls x 9
-        Of moves: machine coordinates [mm, deg].
+        Start and end of moves: machine coordinates [mm, deg].
     centre : array, calls x 2
-        Of arcs: machine coordinates in their plane [mm].
+        Centre of arcs: machine coordinates in their plane [mm].
     plane, turns : array of int
-        Of arcs: 17, 18, 19; positive anticlockwise.
+        Plane of arcs: 17, 18, 19; turns positive anticlockwise.
     sweep : array
-        Of arcs [rad].
+        Angle of arcs [rad].
     seconds : array
-        How long a move in feed takes [s].
+        Duration of a move in feed [s].
     """
 
     kind: Integers
@@ -117,7 +117,7 @@ class Side:
             yield kept
 
     def is_kind(self, kinds: Integers, *names: str) -> "np.ndarray[Any, np.dtype[np.bool_]]":
-        """Tell which calls are of some kinds."""
+        """Return a mask of the calls of some kinds."""
         table = np.zeros(len(self.run.codes), bool)
         table[[self.run.codes[name] for name in names]] = True
         return table[kinds]
@@ -168,7 +168,7 @@ class Side:
     # -- where -------------------------------------------------------------------------------------------------------
 
     def _ends(self, block: CallBlock, kind: Integers, values: Floats) -> tuple[Floats, "np.ndarray[Any, Any]"]:
-        """Return where moves end; the frame changes between some of them."""
+        """Return the ends of moves; the frame changes between some of them."""
         end = np.zeros((len(kind), 9))
         moving = self.is_kind(kind, *STRAIGHT)
         bent = self.is_kind(kind, "tap", "curve")
@@ -186,7 +186,7 @@ class Side:
         return end, moving | bent
 
     def _bend(self, block: CallBlock, i: int, kind: Integers, values: Floats, end: Floats) -> None:
-        """Put in what is told by points: a tap, a curve."""
+        """Insert a call defined by points: a tap, a curve."""
         earlier = np.flatnonzero(self.is_kind(kind[:i], *MOVES))
         here = end[earlier[-1]] if len(earlier) else self._here
         there = self._frame.program(tuple(here.tolist()))
@@ -217,7 +217,7 @@ class Side:
     # -- when --------------------------------------------------------------------------------------------------------
 
     def _seconds(self, calls: Calls, moving: "np.ndarray[Any, Any]") -> Floats:
-        """Return how long moves in feed take; while F is per turn and the spindle is stopped, in minutes per 1/min."""
+        """Return the duration of feed moves; while F is per turn and the spindle is stopped, in minutes per 1/min."""
         feed = self._state("feed", calls, "feedrate")
         if self.is_kind(calls.kind, *_SPINDLE).any() or self._states["sync"][0] or self._states["feedmode"][1]:
             mode = self._state("feedmode", calls, "feedmode")[:, 1]

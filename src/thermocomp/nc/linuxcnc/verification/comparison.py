@@ -26,7 +26,7 @@ class RefusedError(Exception):
 
 
 class Found(NamedTuple):
-    """What a comparison has found."""
+    """Result of a comparison."""
 
     moves: int
     largest: float  #: largest difference between a move and what was asked for [um]
@@ -39,7 +39,7 @@ class _Check(NamedTuple):
 
 
 class LineOrigins(NamedTuple):
-    """Where the lines of both programs, as the interpreter has them, come from: lines of the original."""
+    """Origin of the lines of both programs, as the interpreter has them: lines of the original."""
 
     first: Callable[[Integers], Integers]  #: of the original, or of its translation
     second: Callable[[Integers], Integers]  #: of the revised program, or of its translation
@@ -58,9 +58,9 @@ def compare(
     Parameters
     ----------
     first, second : InterpreterRun
-        Of the original, and of the revised program.
+        Runs of the original and of the revised program.
     ledger : Ledger
-        What the lines of the original should be shifted by.
+        Expected shifts of the lines of the original.
     origin : LineOrigins
     progress : callable
         Told lines of the original.
@@ -256,7 +256,7 @@ class _Comparison:
         yield _Check(bad, lambda i: f"makes another {self.sides[0].name(was.kind[i])}")
 
     def _last(self, line: Integers, moving: Mask) -> Mask:
-        """Return which moves are the last ones of their line."""
+        """Return a mask of the moves that are the last ones of their lines."""
         where = np.flatnonzero(moving)
         group = np.concatenate(([0], np.cumsum(line[1:] != line[:-1])))[where]
         last = np.zeros(len(line), bool)

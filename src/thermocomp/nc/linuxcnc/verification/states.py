@@ -1,4 +1,4 @@
-"""States a controller may stand in when a program starts: what is stated is held, all else is drawn."""
+"""Possible states of a controller when a program starts: given settings are held, all others are drawn."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -48,7 +48,7 @@ class ControllerState(NamedTuple):
 
 
 def build_stored(setup: Setup) -> Stored:
-    """Return what stands at the controller, as far as it is stated; all else is 0."""
+    """Return the values stored in the controller, as far as they are given; all others are 0."""
     return Stored(
         origins={system: origin for system, origin in setup.offsets.items() if system in SYSTEMS},
         lengths=setup.tools,
@@ -59,7 +59,7 @@ def build_stored(setup: Setup) -> Stored:
 
 
 def list_unstated(setup: Setup) -> tuple[str, ...]:
-    """Return what is not stated, and so is drawn."""
+    """Return the settings that are not given and therefore drawn at random."""
     held = {
         "rotation": all(system in setup.rotations for system in SYSTEMS),
         "G92": setup.no_shift,
@@ -77,7 +77,7 @@ def state(setup: Setup, number: int, what: frozenset[str] | set[str]) -> Control
     Parameters
     ----------
     setup : Setup
-        What is stated.
+        Given settings.
     number : int
         Its bits tell of G98 or G99, of a rotation and of a G92; so that all of them meet among eight states.
     what : set of str
@@ -123,7 +123,7 @@ def state(setup: Setup, number: int, what: frozenset[str] | set[str]) -> Control
 
 
 def describe_setup(setup: Setup) -> tuple[str, ...]:
-    """Return what is stated, in words."""
+    """Return the given settings, in words."""
     said = [] if setup.inch is None else ["inch" if setup.inch else "mm"]
     said += [f"{system_name(system)} at {_point(origin)}" for system, origin in sorted(setup.offsets.items())]
     said += [f"tool {tool} = {length:g} mm" for tool, length in sorted(setup.tools.items())]

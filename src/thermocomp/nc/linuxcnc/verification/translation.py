@@ -57,7 +57,7 @@ _AXES: Final = "XYZABC"
 
 
 class UntranslatableError(InputError):
-    """A line cannot be said in LinuxCNC's words.
+    """A line cannot be translated into LinuxCNC code.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class UntranslatableError(InputError):
 
 
 def translate(lines: Iterable[str], setup: Setup) -> Iterator[tuple[str, int]]:
-    """Say a Fanuc's program in LinuxCNC's words.
+    """Translate a Fanuc program into LinuxCNC code.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ class Translator:
                 return
 
     def setup(self) -> Setup:
-        """Return what stands at a LinuxCNC that does what the Fanuc does, when the whole program has been translated.
+        """Return the settings of a LinuxCNC that does what the Fanuc does, after the whole program has been translated.
 
         A Fanuc stores no rotation, and begins with G98 and without a tolerance of its path, where nothing else is
         stated. Where the program uses G52 or G68, no G92 may be in force at its start: LinuxCNC has one store for all.
@@ -242,7 +242,7 @@ class Translator:
         return {"G4": f"G4 P{format_number(block.pause)}", "G92.1": once}.get(once, f"{once} {words}")
 
     def _move(self, block: Block, codes: set[str]) -> tuple[list[str], str, list[str]]:
-        """Return lines before, words on the line, and lines after it. Each move says its own motion code."""
+        """Return lines before, words on the line, and lines after it. Each move has its motion code."""
         if block.kind == "cycle":
             return self._cycle(block)
         if block.kind in ("line", "arc"):
@@ -312,7 +312,7 @@ class Translator:
         return before, f"{back}{code} {_words(words, 'XYZRQPL')}", after
 
     def _spindle(self, block: Block) -> tuple[list[str], list[str]]:
-        """Return what makes the spindle turn for a tap, and what comes after: a Fanuc does it by itself."""
+        """Return the codes that turn the spindle for a tap, and those after it: a Fanuc does it automatically."""
         code, turning = block.modal.motion, self._turning
         if code not in ("G74", "G84", "G86"):
             return [], []

@@ -28,7 +28,7 @@ _SPARED = ("rotation", "tool diameters")
 
 
 class Proof(NamedTuple):
-    """What the interpreter has found."""
+    """Result of the verification by the interpreter."""
 
     moves: int  #: that were compared in each state
     largest: float  #: largest difference between a move and what was asked for [um]
@@ -77,7 +77,7 @@ class _Proving(NamedTuple):
         return False
 
     def causes(self, number: int, drawn: set[str]) -> list[str]:
-        """Return what of that is drawn makes them fail: each by itself, or those without which they do not fail.
+        """Return the drawn settings that make them fail: each by itself, or those without which they do not fail.
 
         Nothing if they fail with nothing drawn as well.
         """
@@ -106,7 +106,7 @@ def prove(
     original, revised : Path
         The programs.
     ledger : Ledger
-        What the lines of the original should be shifted by.
+        Expected shifts of the lines of the original.
     setup : Setup
         That of the revision.
     progress : callable, optional
@@ -153,7 +153,7 @@ def prove(
 
 
 def _assumed(setup: Setup, held: Sequence[str]) -> tuple[str, ...]:
-    """Return what is the same in all states, and which of that nobody has stated."""
+    """Return the settings that are the same in all states, and those of them that are not given."""
     if setup.controller == "linuxcnc":
         # all moves of X and all arcs would be others
         return (*held, "G8 and G91.1 at the start (assumed)")
@@ -165,7 +165,7 @@ def _assumed(setup: Setup, held: Sequence[str]) -> tuple[str, ...]:
 
 
 def foresee_sentence(setup: Setup) -> str:
-    """Return what a proof will say of its states, but for what does not run in all of them."""
+    """Return the expected sentence of a proof about its states, except for what does not run in all of them."""
     drawn = setup if setup.controller == "linuxcnc" else Translator(setup).setup()
     return _say_states(states.STATES, _assumed(setup, states.describe_setup(drawn)), states.list_unstated(drawn))
 
@@ -257,7 +257,7 @@ def _fault(proving: _Proving, number: int, drawn: set[str], error: ProgramError)
 
 
 def _spared(proving: _Proving, number: int, drawn: set[str], error: RefusedError) -> str:
-    """Return what a state has to be without so that the original runs in it."""
+    """Return the setting that a state must not have so that the original runs in it."""
     line, reason = error.args
     neutral = InterpreterJob(
         proving.original, states.build_stored(proving.setup), bool(proving.setup.inch), proving.setup.skip_optional
