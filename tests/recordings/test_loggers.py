@@ -165,7 +165,7 @@ ASKED: dict[str, tuple[str, str, str, str]] = {
         "name, "
         'such as "Speed [rpm]", or write a mapping [columns.NAME] with column = "Speed" and unit, or role = "ignore" '
         "if it "
-        "is of no use",
+        "is not needed",
         '[columns.speed_rpm]\ncolumn = "Speed"\nunit = "rpm"\n[columns.t1_C]\ncolumn = "T1"\nunit = "degC"\n',
     ),
     "twins.csv": (

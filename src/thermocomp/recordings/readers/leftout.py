@@ -32,7 +32,7 @@ def refuse_nameless(headings: Sequence[str], source: str) -> None:
         f"{source}: column{'s' * several} {', '.join(map(repr, asked))} {'have' if several else 'has'} no unit: "
         f"{heading!r} may be a {quantity.replace('_', ' ')} in {units}; put the unit behind the name, such as "
         f'"{heading} [{units.split(",")[0].split(" ")[0]}]", or write a mapping [columns.NAME] with column = '
-        f'"{heading}" and unit, or role = "ignore" if it is of no use'
+        f'"{heading}" and unit, or role = "ignore" if it is not needed'
     )
 
 
