@@ -215,7 +215,7 @@ def test_of_a_reading_what_is_no_number_is_missing() -> None:
     ],
 )
 def test_a_start_that_cannot_be_is_said_at_once(start: StartRow, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"live\.db: the journal cannot begin"):
+    with pytest.raises(InputError, match=r"live\.db: the journal cannot be started"):
         opened(tmp_path, start=start)
     assert list(tmp_path.iterdir()) == []
 
