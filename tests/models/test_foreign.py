@@ -136,10 +136,10 @@ def test_a_named_estimator_survives_the_way_to_another_process() -> None:
     ("thing", "message"),
     [
         (Plane, r"Plane is a class: give an instance, Plane\(\)"),
-        (3.0, "float is no regressor: name a method, or give an instance"),
-        (StandardScaler(), "StandardScaler is no regressor"),
+        (3.0, "float is not a regressor: name a method, or give an instance"),
+        (StandardScaler(), "StandardScaler is not a regressor"),
         (DynamicRidge(time="none"), r"DynamicRidge\(time='none'\) takes every row for a machine at rest"),
-        (make_pipeline(PartialF(), DynamicRidge(time="none")), "has a memory, and .* cannot tell it the time here"),
+        (make_pipeline(PartialF(), DynamicRidge(time="none")), "has a memory, and .* cannot pass it the time here"),
         (GridSearchCV(DynamicRidge(time="none"), {"rule": ["minimum"]}), "DynamicRidge .estimator. has a memory"),
         ("oss", "unknown model 'oss'; did you mean ols"),
     ],

@@ -216,7 +216,7 @@ def test_a_scaled_time_or_none_at_all_is_refused(tests: Samples) -> None:
     estimator: Any = make(time="column")
     with pytest.raises(InputError, match=r"ends at 3\.\d+ s, which is no thermal test. It must be seconds"):
         estimator.fit(X.assign(time_s=X["time_s"] / 3600 / 2), y)
-    with pytest.raises(InputError, match="rises nowhere, so it is not the time"):
+    with pytest.raises(InputError, match="never increases, so it is not the time"):
         estimator.fit(X.assign(time_s=0.0), y)
     with pytest.raises(InputError, match=r"at row \d+ a test begins at .* and not at 0"):
         estimator.fit(X.drop(columns="time_s"), y)

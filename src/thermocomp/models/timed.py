@@ -286,7 +286,7 @@ def derive_steps(time: FloatArray, index: object = None, *, fitting: bool = Fals
     step[0] = np.inf
     starts = np.isinf(step)
     if len(time) > 1 and starts.all():
-        raise InputError("time='column': the first column of X rises nowhere, so it is not the time [s]")
+        raise InputError("time='column': the first column of X never increases, so it is not the time [s]")
     late = np.flatnonzero(starts & (np.abs(time) > 1e-6))
     if late.size:
         raise InputError(

@@ -111,7 +111,7 @@ class EstimatorModel(ErrorModel):
         return {}
 
     def _expression(self, change: Sequence[Node]) -> NoReturn:  # noqa: ARG002 - none is made
-        raise InputError(f"{self.estimator.name} is no expression: it cannot be exported")
+        raise InputError(f"{self.estimator.name} is not an expression: it cannot be exported")
 
     def formula(self) -> str:
         """Return what it is, as one line of text."""

@@ -61,7 +61,7 @@ def check_steps(dt: ArrayLike | None, n_rows: int) -> FloatArray:
         return np.full(n_rows, np.inf)
     found = np.asarray(dt, dtype=np.float64)
     if found.shape != (n_rows,) or not (found >= 0).all():
-        raise InputError(f"dt: want {n_rows} time steps that are not negative")
+        raise InputError(f"dt: expected {n_rows} time steps that are not negative")
     return found
 
 

@@ -146,7 +146,7 @@ def _free(tri: Triangle, needed: int) -> int:
     free = tri.n_rows - int(tri.intercept)
     if free <= needed:
         raise FitError(
-            f"{tri.n_rows} rows are too few for {needed} variables: want at least {needed + 1 + int(tri.intercept)}"
+            f"{tri.n_rows} rows are too few for {needed} variables: expected at least {needed + 1 + int(tri.intercept)}"
         )
     return free
 
