@@ -196,11 +196,11 @@ def test_the_uncertainty_is_said_not_to_be_told() -> None:
     ("positions", "up", "down", "told"),
     [
         ([0.0], np.zeros((5, 1)), None, "1 target; positioning needs at least 2"),
-        ([0.0, 0.0], np.zeros((5, 2)), None, "must rise and differ"),
+        ([0.0, 0.0], np.zeros((5, 2)), None, "must increase and differ"),
         ([0.0, 1.0], None, None, "no deviations"),
         ([0.0, 1.0], np.zeros((0, 2)), None, "no run in direction +"),
         ([0.0, 1.0], np.zeros((2, 2)), np.zeros((2, 3)), "direction - have the shape"),
-        ([0.0, 1.0], np.array([[0.0, np.nan], [0, 0]]), None, "not a finite number"),
+        ([0.0, 1.0], np.array([[0.0, np.nan], [0, 0]]), None, "must be finite"),
     ],
 )
 def test_refusals(positions: list[float], up: FloatArray | None, down: FloatArray | None, told: str) -> None:

@@ -104,7 +104,7 @@ def write_klipper(
     ((sensor, factor),) = r.terms
     if abs(factor) > 1e3 * _MOST:
         raise InputError(
-            f"{r.model.target}: {factor:g} um/K, and Klipper takes at most {_MOST:g} mm/K: check the units of the "
+            f"{r.model.target}: {factor:g} um/K, and Klipper accepts at most {_MOST:g} mm/K: check the units of the "
             "recording, or export to another controller"
         )
     first = head(reductions, facts, SIGN, UNITS)
