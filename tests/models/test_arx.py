@@ -234,7 +234,7 @@ def test_no_spindle_speed() -> None:
         ({"interval": 0.0}, "interval 0.0: expected positive"),
         ({"interval": ()}, "expected positive"),
         ({"interval": (60.0, np.nan)}, "expected positive"),
-        ({"interval": 1e-6}, "make it longer"),
+        ({"interval": 1e-6}, "use a longer interval"),
         ({"k": -1}, "order k: -1"),
         ({"m_max": -1}, "order m: -1"),
         ({"criterion": "r2"}, "criterion 'r2'"),

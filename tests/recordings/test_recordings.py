@@ -123,7 +123,7 @@ def test_units_become_house_units_and_old_names_stay_valid(tmp_path: Path) -> No
         ("t1_mym", ["'mym' is no known unit", "the nearest are", "um"]),
         ("mains [Hz]", ["spindle_speed only by a mapping", 'role = "spindle_speed" and unit = "Hz"']),
         ("coolant_in", ["displacement only by a mapping", 'role = "displacement" and unit = "in"']),
-        ("load", ["has no unit", "put it behind the name"]),
+        ("load", ["has no unit", "append it to the name"]),
     ],
 )
 def test_a_column_of_numbers_that_is_left_out_is_warned_of(tmp_path: Path, heading: str, parts: list[str]) -> None:

@@ -62,7 +62,7 @@ def connect(address: str) -> Iterator["Cluster"]:
             # The client would wait for ever for the first word of one that only listens.
             with socket.create_connection((host, port), ANSWERS) as line:
                 if speaks and not line.recv(1):
-                    raise ConnectionError("it hangs up")
+                    raise ConnectionError("the connection was closed")
             client = Client(address, timeout=ANSWERS, set_as_default=False, name="thermocomp")
         except (OSError, ValueError) as e:
             raise ClusterError(

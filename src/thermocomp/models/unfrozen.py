@@ -62,7 +62,8 @@ class UnfrozenRegressor(StaticRegressor):
 
     def _frozen(self, inputs: Sequence[Input], header: dict[str, Any]) -> NoReturn:  # noqa: ARG002 - none is made
         raise FitError(
-            f"{self.name} cannot be frozen to plain numbers: {self._bulk()}; use it in compare, deploy another"
+            f"{self.name} cannot be frozen to plain numbers: {self._bulk()}; use it only in compare, and deploy "
+            "another method"
         )
 
 

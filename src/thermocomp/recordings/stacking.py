@@ -201,7 +201,7 @@ def _refuse_different_inputs(recordings: Sequence[Recording], inputs: Sequence[C
             only = ", ".join(sorted(mine ^ first))
             raise InputError(
                 f"{r.source or r.name} and {recordings[0].source or recordings[0].name} do not have the same sensors: "
-                f"only one of them has {only}. Name what to predict from with --inputs"
+                f"only one of them has {only}. Name the inputs of the model with --inputs"
             )
 
 

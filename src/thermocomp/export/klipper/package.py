@@ -97,7 +97,7 @@ def write_klipper(
     """
     if len(reductions) > 1:
         raise InputError(
-            f"Klipper has one [z_thermal_adjust], and there are {', '.join(r.model.target for r in reductions)}: name "
+            f"Klipper has one [z_thermal_adjust], but there are {', '.join(r.model.target for r in reductions)}: name "
             "one with --axes, such as --axes z_um=Z"
         )
     (r,) = reductions

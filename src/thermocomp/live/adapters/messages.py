@@ -80,7 +80,7 @@ def read_measurement(payload: bytes | str, arrived: float) -> Measurement:
     if wrong:
         raise ReadingError(f"a measurement whose {escape(', '.join(wrong), 80)} cannot be used; expected {example}")
     if why := explain_unfit(str(target)):
-        raise ReadingError(f"a measurement whose target cannot be a name: {why}")
+        raise ReadingError(f"a measurement whose target is not a valid name: {why}")
     if max(abs(found[k] or 0.0) for k in _NUMBERS) > _FAR or (found["repeatability_um"] or 0.0) < 0.0:
         raise ReadingError(
             f"a measurement beyond {_FAR:g} um or mm, or a repeatability below 0: no probe can measure that"

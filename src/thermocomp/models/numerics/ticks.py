@@ -100,7 +100,9 @@ def _run(inputs: FloatArray, dt: FloatArray, rows: slice, h: float) -> TickedRun
     step[0] = 0.0
     time = np.cumsum(step)
     if not time[-1] / h < MOST_TICKS:
-        raise InputError(f"interval {h:g} s: {time[-1] / h:.3g} ticks in one test of {time[-1]:.3g} s; make it longer")
+        raise InputError(
+            f"interval {h:g} s: {time[-1] / h:.3g} ticks in one test of {time[-1]:.3g} s; use a longer interval"
+        )
     share = time / h
     count = np.floor(share + EARLY).astype(np.intp)
     phase = share - count

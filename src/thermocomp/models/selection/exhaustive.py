@@ -129,7 +129,7 @@ def search_members(tri: Triangle, groups: Sequence[Sequence[int]], *, limit: int
     count = math.prod(len(g) for g in groups)
     if count > limit:
         raise FitError(
-            f"the groups that take part have {count} combinations of members, more than {limit}: raise the threshold "
+            f"the groups in use have {count} combinations of members, more than {limit}: raise the threshold "
             "of the correlation, so that the groups are smaller, or leave sensors out"
         )
     free = _free(tri, len(groups))
