@@ -143,7 +143,7 @@ def test_one_where_several_may_be(recording: Recording) -> None:
         tc.compare(recording, "z_um", [])
     with pytest.raises(InputError, match="no model given: name a model file"):
         tc.assess([], recording)
-    with pytest.raises(InputError, match="int is no regressor"):
+    with pytest.raises(InputError, match="int is not a regressor"):
         tc.compare(recording, "z_um", 3)
 
 
@@ -223,7 +223,7 @@ def test_selection(results: dict[str, Result], recording: Recording) -> None:
         assert axes.get_xlabel() == shown
         assert len(axes.get_lines()) == len(axes.get_yticklabels()) > 0
     for wrong, message in (
-        ({"method": "best"}, "method 'best': want pareto"),
+        ({"method": "best"}, "method 'best': expected pareto"),
         ({"threshold": 0.5}, "--threshold is for --method grouping"),
         ({"sensors": 3}, "unexpected keyword argument 'sensors'; the settings are threshold"),
     ):
@@ -252,7 +252,7 @@ def test_recordings_come_as_anything(recording: Recording, tmp_path: Path) -> No
         tc.compare([3])  # type: ignore[list-item]
     with pytest.raises(InputError, match="split and leave_one exclude each other"):
         tc.compare(recording, split="0.5/0.5", leave_one="cycle")
-    with pytest.raises(InputError, match="leave_one 'week': want 'cycle', 'day' or 'file'"):
+    with pytest.raises(InputError, match="leave_one 'week': expected 'cycle', 'day' or 'file'"):
         tc.compare(recording, leave_one="week")  # type: ignore[arg-type]
 
 
@@ -297,12 +297,12 @@ def test_simulate() -> None:
 def test_what_cannot_be_frozen_is_not_fitted(recording: Recording) -> None:
     with pytest.raises(InputError, match="HistGradientBoostingRegressor cannot be frozen to plain numbers"):
         tc.fit(recording, "z_um", HistGradientBoostingRegressor())
-    with pytest.raises(InputError, match="takes every row for a machine at rest"):
+    with pytest.raises(InputError, match="treats every row as a machine at rest"):
         tc.compare(recording, "z_um", [tc.DynamicRidge(time="none")])
     # found out in its fit: the others have their results
     still = make_pipeline(tc.SensorSelector(), tc.DynamicRidge(time="none"))
     table = tc.compare(recording, "z_um", [still, "ols"]).to_frame().set_index("model")
-    assert "takes every row for a machine at rest" in table["reason"]["SensorSelector + DynamicRidge"]
+    assert "treats every row as a machine at rest" in table["reason"]["SensorSelector + DynamicRidge"]
     assert np.isfinite(table["rms"]["ols"])
 
 

@@ -128,10 +128,10 @@ def test_nothing_is_overwritten_and_both_files_come_or_none(tmp_path: Path) -> N
 
 @pytest.mark.parametrize("every", [-60.0, 30.0, 7200.0, float("nan")])
 def test_a_measurement_that_cannot_be_is_refused(every: float) -> None:
-    with pytest.raises(InputError, match="want 1 to 30, or 0 for a logger"):
+    with pytest.raises(InputError, match="expected 1 to 30, or 0 for a logger"):
         write_program(GRID[0], "linuxcnc", every)
 
 
 def test_a_broken_speed_is_refused() -> None:
-    with pytest.raises(InputError, match=r"100\.5 1/min: a program has a whole number"):
+    with pytest.raises(InputError, match=r"100\.5 1/min: a program needs a whole number"):
         write_program(Trial("run", 100.5, ((0.0, 900.0), (100.5, 3600.0))), "fanuc")

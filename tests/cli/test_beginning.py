@@ -150,11 +150,11 @@ def test_cold_is_said(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
         (["--start", "continued"], "needs the earlier file: name it with --continues"),
         (
             ["--start", "cold", "--continues", "a.csv"],
-            "--continues goes with --start continued or rezeroed, not with cold",
+            "--continues requires --start continued or rezeroed, not cold",
         ),
-        (["--start", "rezeroed", "--zero", "t1_C=20"], "--zero goes with --start known, not with rezeroed"),
-        (["--start", "known"], "the known zero does not tell t1_C, t2_C, t3_C"),
-        (["--zero", "t1_C=20"], "the known zero does not tell t2_C, t3_C"),
+        (["--start", "rezeroed", "--zero", "t1_C=20"], "--zero requires --start known, not rezeroed"),
+        (["--start", "known"], "the known zero has no value for t1_C, t2_C, t3_C"),
+        (["--zero", "t1_C=20"], "the known zero has no value for t2_C, t3_C"),
         (["--zero", "t1_C=warm"], "write a channel and its temperature"),
         (["--zero", "t9_C=20"], "no channel is named 't9_C'"),
         (["--continues", "b.csv"], "is the recording itself"),
@@ -195,7 +195,7 @@ def test_fit_and_compare_go_on(folder: Path, capsys: pytest.CaptureFixture[str])
     assert "was re-zeroed on a machine that continued from a" in capsys.readouterr().out
     subsets = ["--target", "z_um", "--method", "subsets", "--jobs", "1"]
     assert run(["select", b, *subsets]) == 2
-    assert "Say how it begins: --continues EARLIER" in told(capsys)
+    assert "Specify its start: --continues EARLIER" in told(capsys)
     assert run(["select", b, *subsets, "--continues", a]) == 0
 
 

@@ -295,7 +295,7 @@ def test_odd_names_are_printed_as_they_are(name: str, tmp_path: Path, capsys: py
         (["compare", "{drift}", "--target", "z_um", "-o", ".", "--overwrite"], "is a folder"),
         (["compare", "{drift}", "--target", "z_um", "--jobs", "0"], "jobs 0"),
         (["demo", "-o", "{drift}"], "is a file; name a folder"),
-        (["compare", "{drift}", "{drift}", "--target", "z_um"], "holds the same test"),
+        (["compare", "{drift}", "{drift}", "--target", "z_um"], "contains the same test"),
     ],
 )
 def test_unusable_input_is_exit_code_two_and_a_message(

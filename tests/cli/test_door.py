@@ -46,7 +46,7 @@ def test_a_recording_from_standard_input(
     assert said["arguments"] == ["check", "-", "--json"]
     assert said["recordings"][0]["rows"] == len(small_machine())
     assert run(["check", "-", "-"]) == 2
-    assert "there is one standard input" in capsys.readouterr().err
+    assert "standard input can be read only once" in capsys.readouterr().err
 
 
 def test_without_a_target_all_displacements_are_predicted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -61,7 +61,7 @@ def test_a_running_test_may_end_or_not(drift: str, capsys: pytest.CaptureFixture
         (("-o", "drift.ngc", "--overwrite"), "drift.csv: is also an input"),
         (("--running", "-o", "test.ngc"), "--running writes no file"),
         (("--top-speed", "-5"), "top speed -5 1/min"),
-        (("--probe-every", "45", "-o", "test.ngc"), "a measurement every 45 min: want 1 to 30"),
+        (("--probe-every", "45", "-o", "test.ngc"), "a measurement every 45 min: expected 1 to 30"),
     ],
 )
 def test_what_cannot_be_is_refused_and_nothing_written(

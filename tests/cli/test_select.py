@@ -57,7 +57,7 @@ def test_refusals(drift: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for extra, told in (
         (["--method", "grouping", "--threshold", "2"], "threshold 2.0"),
         (["--method", "grouping", "--reference", "t9_C"], "no input is named 't9_C'"),
-        (["--max-sensors", "0"], "want at least 1"),
+        (["--max-sensors", "0"], "expected at least 1"),
         (["--models", "gpp"], "unknown model 'gpp'"),
         (["--method", "ace", "--level", "3"], "level 3.0"),
         (["--method", "ace", "--threshold", "0.5"], "--threshold is for --method grouping, not for ace"),

@@ -105,7 +105,7 @@ def test_file_round_trip_is_bit_exact() -> None:
 @pytest.mark.parametrize(
     ("x", "y", "kind", "message"),
     [
-        ((0.0, 0.0), (1.0, 2.0), "linear", "must rise strictly"),
+        ((0.0, 0.0), (1.0, 2.0), "linear", "must increase strictly"),
         ((0.0, np.nan), (1.0, 2.0), "linear", "must be finite"),
         ((0.0, 1.0), (1.0, np.inf), "linear", "must be finite"),
         ((0.0, 1.0), (1.0,), "linear", "equally many"),
@@ -136,7 +136,7 @@ def test_numbers_that_do_not_fit_are_refused(change: dict[str, Any], message: st
     ("name", "weights", "message"),
     [
         ("a", ((0, float("inf")),), "variable a: weights must be finite"),
-        ("none", (), "variable none: is of no input"),
+        ("none", (), "variable none: has no input"),
         ("two\nlines", ((0, 1.0),), r"variable: 'two\\nlines' is not a name"),
     ],
 )

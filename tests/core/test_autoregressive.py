@@ -267,9 +267,9 @@ def test_a_batch_of_known_starts() -> None:
     ("start", "message"),
     [
         ({"deviation": np.nan}, "not finite"),
-        ({"deviation": 1.0, "inputs": [1.0]}, "want 2 inputs"),
+        ({"deviation": 1.0, "inputs": [1.0]}, "expected 2 inputs"),
         ({"deviation": 1.0, "inputs": [1.0, np.inf]}, "not finite"),
-        ({"deviation": 1.0, "reference": [1.0, 2.0, 3.0]}, "want 2 inputs"),
+        ({"deviation": 1.0, "reference": [1.0, 2.0, 3.0]}, "expected 2 inputs"),
     ],
 )
 def test_a_start_that_is_none(start: dict[str, object], message: str) -> None:
@@ -299,9 +299,9 @@ def test_numbers_that_are_none() -> None:
     [
         ({"interval": 0.0}, "interval must be from 0.001 to"),
         ({"interval": np.inf}, "interval must be from 0.001 to"),
-        ({"b": ((1.0,),)}, "equally many, for each of 2 inputs"),
-        ({"b": ((1.0,), (1.0, 2.0))}, "equally many"),
-        ({"b": ((), ())}, "equally many"),
+        ({"b": ((1.0,),)}, "the same number for each of 2 inputs"),
+        ({"b": ((1.0,), (1.0, 2.0))}, "the same number"),
+        ({"b": ((), ())}, "the same number"),
         ({"inputs": (), "b": ()}, "at least one"),
         ({"a": (np.nan,)}, "must be finite"),
         ({"b": ((1.0,), (np.inf,))}, "must be finite"),
@@ -315,10 +315,10 @@ def test_linear_numbers_that_do_not_fit(change: dict[str, object], message: str)
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"k": 1}, "want a net of 5 inputs; found 6"),
+        ({"k": 1}, "need a net of 5 inputs; found 6"),
         ({"interval": -1.0}, "interval must be from 0.001 to"),
         ({"input_scaling": Affine((1.0,), (0.0,))}, "scaling of 1"),
-        ({"output_scaling": Affine((1.0, 1.0), (0.0, 0.0))}, "want one output"),
+        ({"output_scaling": Affine((1.0, 1.0), (0.0, 0.0))}, "expected one output"),
         ({"net": replace(network().net, output="identity")}, "no bounds"),
     ],
 )

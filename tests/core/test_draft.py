@@ -122,7 +122,7 @@ def test_a_file_that_comes_into_being_meanwhile_is_not_replaced(tmp_path: Path) 
             last.write_text("precious")
             started.publish()
 
-    with pytest.raises(InputError, match=r"a\.ngc: has come into being meanwhile; nothing was written"):
+    with pytest.raises(InputError, match=r"a\.ngc: was created in the meantime; nothing was written"):
         meanwhile()
     assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {"a.ngc": "precious"}
     put({first: "new", last: "new"})
@@ -149,7 +149,7 @@ def test_a_disk_without_links(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
             path.write_text("newer")
             last.write_text("precious")
 
-    with pytest.raises(InputError, match="has come into being"):
+    with pytest.raises(InputError, match="was created in the meantime"):
         meanwhile()
     assert last.read_text() == "precious"
     replace = Path.replace
@@ -247,7 +247,7 @@ def test_links_stay_and_their_targets_are_written(tmp_path: Path) -> None:
     assert sorted(p.name for p in elsewhere.iterdir()) == ["2", "model.json", "new"]
     with pytest.raises(InputError, match="link: exists already"):
         put({here / "link": "x"}, overwrite=False)
-    with pytest.raises(InputError, match="two of them are one file"):
+    with pytest.raises(InputError, match="two of these are the same file"):
         put({here / "link": "x", elsewhere / "model.json": "y"})
     assert (elsewhere / "model.json").read_text() == "chain"
 

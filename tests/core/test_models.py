@@ -90,7 +90,7 @@ def test_an_input_that_never_changed_fades_at_once_and_warns_of_nothing() -> Non
 
 
 def test_reference_must_fit() -> None:
-    with pytest.raises(InputError, match="want 1 finite numbers"):
+    with pytest.raises(InputError, match="expected 1 finite numbers"):
         line().init(reference=[20.0, 21.0])
 
 

@@ -109,7 +109,7 @@ def test_what_it_is_made_of_has_names() -> None:
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        ({"temperatures": (LaggedInput(0, 0.5, ()),)}, "want 1 lagged"),
+        ({"temperatures": (LaggedInput(0, 0.5, ()),)}, "expected 1 lagged"),
         ({"temperatures": (LaggedInput(2, 0.5, (1.0,)),)}, "beyond the 2 inputs"),
         ({"states": (SpeedState(1, 2.0, 600.0, 1200.0, 1.0),)}, "must not be the slower"),
         ({"states": (SpeedState(1, 20.0, 3600.0, 1200.0, 1.0),)}, "power"),
@@ -117,9 +117,9 @@ def test_what_it_is_made_of_has_names() -> None:
         ({"states": (SpeedState(1, 2.0, 3600.0, 1200.0, float("inf")),)}, "weight"),
         ({"time_constants": (0.0,)}, "time_constants"),
         ({"top_speed": 0.0}, "top_speed"),
-        ({"spread": ((1.0,),)}, "want 3 numbers in each row"),
+        ({"spread": ((1.0,),)}, "expected 3 numbers in each row"),
         ({"spread": ((1.0, 1.0, float("nan")),)}, "spread"),
-        ({"band": Band(0.9, "conformal", 9, 1.0, 1.0, 1.0, (2,))}, "band is of more inputs"),
+        ({"band": Band(0.9, "conformal", 9, 1.0, 1.0, 1.0, (2,))}, "band has more inputs"),
     ],
 )
 def test_numbers_that_do_not_fit_are_refused(change: dict[str, Any], says: str) -> None:

@@ -67,7 +67,7 @@ def test_an_empty_model_is_zero_and_an_offset_alone_is_the_same_everywhere() -> 
     [
         ({"unit": "mm"}, "unit 'mm': expected um or urad"),
         ({"axis": "A"}, "axis 'A': expected X, Y or Z"),
-        ({"travel": (600.0, 0.0)}, "travel .* must rise"),
+        ({"travel": (600.0, 0.0)}, "travel .* must increase"),
         ({"travel": (0.0, np.inf)}, "travel must be finite"),
         ({"reference_position": np.nan}, "reference_position must be finite"),
         ({"offset": line("EXX", "um/m", {"t": 1.0})}, "k_0 is in um/m, must be in um"),

@@ -133,7 +133,7 @@ def test_polynomials_that_are_none(change: dict[str, object], message: str) -> N
         ({"axis": "U"}, "expected X, Y or Z"),
         ({"knots": (0.0, 1.0, 2.0)}, "3 knots for 1 pieces"),
         ({"knots": (0.0,), "pieces": ()}, "1 knots for 0 pieces"),
-        ({"knots": (1.0, 1.0)}, "knots must rise"),
+        ({"knots": (1.0, 1.0)}, "knots must increase"),
         ({"knots": (0.0, np.inf)}, "knots must be finite"),
         ({"pieces": ((0.0, np.nan, 0.0, 0.0),)}, "pieces must be finite"),
     ],

@@ -129,8 +129,8 @@ def test_formula_and_coefficients() -> None:
     ("change", "message"),
     [
         ({"hidden_weights": ((1.0, 2.0),)}, "weights of 1 hidden nodes and 1 outputs, but thresholds of 2 and 1"),
-        ({"hidden_weights": ((1.0, 2.0), (1.0,))}, "every hidden node wants 2 weights"),
-        ({"output_weights": ((1.0,),)}, "every one of 1 outputs wants 2 weights"),
+        ({"hidden_weights": ((1.0, 2.0), (1.0,))}, "every hidden node needs 2 weights"),
+        ({"output_weights": ((1.0,),)}, "every one of 1 outputs needs 2 weights"),
         ({"output_weights": ((1.0, float("nan")),)}, "must be finite"),
         ({"output_thresholds": (float("inf"),)}, "must be finite"),
         ({"output_thresholds": ()}, "both layers need at least one node"),
@@ -147,7 +147,7 @@ def test_a_net_refuses_numbers_that_do_not_fit(change: dict[str, Any], message: 
     [
         ({"net": net(8, 20, 1)}, "9 inputs, scaling of 9 and a net that takes 8"),
         ({"input_scaling": Affine((1.0,), (0.0,))}, "9 inputs, scaling of 1 and a net that takes 9"),
-        ({"net": net(9, 20, 3)}, "a net of 3 outputs with scaling of 1: want 1"),
+        ({"net": net(9, 20, 3)}, "a net of 3 outputs with scaling of 1: expected 1"),
         ({"intercept": float("nan")}, "intercept must be finite"),
     ],
 )

@@ -109,7 +109,7 @@ def test_recordings_where_they_are_needed(tmp_path: Path, capsys: pytest.Capture
     assert "name recordings to reduce it on" in told("--to", "klipper")
     assert "c99 holds the whole model and takes no recordings" in told(drift, "--to", "c99")
     assert "no such temperature" in told(drift, "--to", "klipper", "--sensors", "t9_C")
-    assert "--axes z_um: want a target and X, Y or Z" in told(drift, "--to", "klipper", "--axes", "z_um")
+    assert "--axes z_um: expected a target and X, Y or Z" in told(drift, "--to", "klipper", "--axes", "z_um")
     assert "no such target" in told(drift, "--to", "klipper", "--axes", "ch5_um=Z")
 
 

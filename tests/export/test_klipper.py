@@ -89,7 +89,7 @@ def test_the_vectors_hold_and_find_a_mistake(tmp_path: Path) -> None:
 
 
 def test_what_klipper_does_not_take() -> None:
-    with pytest.raises(InputError, match=r"one .z_thermal_adjust., and there are z_um, z2_um"):
+    with pytest.raises(InputError, match=r"one .z_thermal_adjust., but there are z_um, z2_um"):
         write_klipper([as_it_is(growing(t, 1.0), "Z") for t in ("z_um", "z2_um")], Limits(), "tc", FACTS)
     with pytest.raises(InputError, match="at most 1 mm/K"):
         write_klipper([as_it_is(growing("z_um", 1200.0), "Z")], Limits(), "tc", FACTS)

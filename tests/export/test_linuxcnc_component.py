@@ -325,7 +325,7 @@ def test_what_cannot_be_an_export() -> None:
     one = Compensator.of([growing("z_um", 2.0)])
     with pytest.raises(InputError, match="too long: a name in HAL has 47"):
         write_package(one, "a" * 40, FACTS)
-    with pytest.raises(InputError, match="want an axis of its own for each target"):
+    with pytest.raises(InputError, match="expected a separate axis for each target"):
         write_package(Compensator.of([growing("bed_um", 2.0)]), "mill", FACTS)
-    with pytest.raises(InputError, match="want an axis of its own for each target"):
+    with pytest.raises(InputError, match="expected a separate axis for each target"):
         write_package(Compensator.of([growing("z_um", 2.0), growing("z2_um", 2.0)]), "mill", FACTS)

@@ -174,18 +174,18 @@ def with_prints(change: dict[str, Any], run: dict[str, Any]) -> str:
     [
         ({}, {"rows": "AA*="}, "not base64"),
         ({}, {"rows": "Äöü="}, "not base64"),
-        ({}, {"rows": "AAAA"}, "3 bytes are no whole number of 32-bit numbers"),
-        ({}, {"rows": pack_marks(np.array([5, 4, 6], dtype=np.uint32))}, "their rows do not rise"),
+        ({}, {"rows": "AAAA"}, "3 bytes are not a whole number of 32-bit numbers"),
+        ({}, {"rows": pack_marks(np.array([5, 4, 6], dtype=np.uint32))}, "their rows do not increase"),
         ({}, {"rows": pack_marks(np.array([5, 6, 810], dtype=np.uint32))}, "of row 810, where 810 rows were recorded"),
         ({}, {"moving": "AAAAAA=="}, "1 of moving for 3 rows"),
-        ({}, {"marks": {}}, "want those of a target at least"),
+        ({}, {"marks": {}}, "expected those of at least one target"),
         ({}, {"marks": {"z_um": "", "t1_C": ""}}, "0 of z_um for 3 rows"),
-        ({"steps": {"z_um": 0.3, "t2_C": 0.1}}, {}, "of z_um, t1_C: want those of z_um, t2_C"),
+        ({"steps": {"z_um": 0.3, "t2_C": 0.1}}, {}, "of z_um, t1_C: expected those of z_um, t2_C"),
         ({"steps": {"z_um": 0.0, "t1_C": 0.1}}, {}, "fingerprints of z_um: a resolution of 0.0"),
         ({}, {"stride": 0}, "a stride of 0 rows"),
         ({"interval": -1.0}, {}, "an interval of -1.0 s"),
-        ({"learned": [[0, 700], [600, 810]]}, {}, "no stretches of rows"),
-        ({"learned": []}, {}, "no stretches of rows"),
+        ({"learned": [[0, 700], [600, 810]]}, {}, "not consecutive stretches of rows"),
+        ({"learned": []}, {}, "not consecutive stretches of rows"),
         ({"surprise": 1}, {}, r"prints\.surprise"),
         ({"steps": None}, {}, r"prints\.steps"),
     ],
@@ -232,7 +232,7 @@ def test_a_verdict_by_older_rules_proves_nothing_today() -> None:
 
 @pytest.mark.parametrize("by", ["M. Weber", ",trial", "M. Weber, ", " , "])
 def test_who_takes_an_unproven_model_gives_name_and_reason(by: str) -> None:
-    with pytest.raises(InputError, match="want a name and a reason"):
+    with pytest.raises(InputError, match="expected a name and a reason"):
         model().taken(by)
 
 

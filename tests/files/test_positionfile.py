@@ -165,7 +165,7 @@ def altered(change: dict[str, Any]) -> str:
         ({"surprise": 1}, "model 1: surprise: "),
         ({"unit": "mm"}, "model 1: unit: "),
         ({"axis": "B"}, "axis 'B': expected X, Y or Z"),
-        ({"travel": [550.0, 0.0]}, "travel .* must rise"),
+        ({"travel": [550.0, 0.0]}, "travel .* must increase"),
         ({"profile": {"kind": "wavelet"}}, "model 1: profile: unknown kind 'wavelet'; known are polynomial, spline"),
         ({"profile": 3}, "model 1: profile: Input should be an object, found 3"),
         ({"profile": {"scale": [0.0, 1.0, 1.0]}}, "profile: scale must be from 1e-06 to 1e\\+07, found 0"),
@@ -178,7 +178,7 @@ def test_wrong_content_is_refused_with_its_place(change: dict[str, Any], message
 
 
 def test_what_is_no_model_at_all() -> None:
-    for body, message in (([], "holds no model"), ([3], "model 1: Input should be an object, found 3")):
+    for body, message in (([], "contains no model"), ([3], "model 1: Input should be an object, found 3")):
         content = {"format": "thermocomp-position-model", "version": 1, "sha256": jsonfile.digest(body), "models": body}
         with pytest.raises(ModelFileError, match=message):
             positionfile.loads(json.dumps(content))

@@ -58,9 +58,9 @@ def test_the_whole_file_is_used() -> None:
         (put("yes", "inputs", 1, "rezero"), "model 1: inputs.1.rezero: Input should be a valid boolean, found 'yes'"),
         (put(1, "inputs", 1, "rezero"), "model 1: inputs.1.rezero: Input should be a valid boolean, found 1"),
         (put(0.0, "signals", 0, 0), "model 1: signals.0.0: Input should be a valid integer, found 0.0"),
-        (put("K", "unit"), "model 1: unit: model of z_um: unit 'K': want um, urad or, along an axis, um/m"),
+        (put("K", "unit"), "model 1: unit: model of z_um: unit 'K': expected um, urad or, along an axis, um/m"),
         (put("K", "inputs", 1, "unit"), "model 1: inputs.1.unit: input t3_C: a temperature is in degC, found 'K'"),
-        (put("banana", "unit"), "model 1: unit: model of z_um: unit 'banana': want um"),
+        (put("banana", "unit"), "model 1: unit: model of z_um: unit 'banana': expected um"),
         (
             put("banana", "inputs", 0, "unit"),
             "inputs.0.unit: input spindle_rpm: a spindle_speed is in 1/min",
@@ -91,10 +91,10 @@ def test_what_a_review_got_through_is_refused(change: Change, message: str) -> N
 def test_a_verdict_that_rests_on_nothing_is_refused() -> None:
     assert MODEL.honest_error is not None
     for change, reason in (
-        ({"units": 0}, "accepted, but judged on nothing"),
-        ({"cycles": {}}, "accepted, but judged on nothing"),
-        ({"verdict": "unproven", "taken": "Bob"}, "taken by 'Bob': want a name and a reason"),
-        ({"verdict": "unproven", "taken": "Bob, "}, "want a name and a reason"),
+        ({"units": 0}, "accepted, but never judged"),
+        ({"cycles": {}}, "accepted, but never judged"),
+        ({"verdict": "unproven", "taken": "Bob"}, "taken by 'Bob': expected a name and a reason"),
+        ({"verdict": "unproven", "taken": "Bob, "}, "expected a name and a reason"),
     ):
         honest = replace(MODEL.honest_error, **{"verdict": "accepted", "rules": RULES, "units": 2, **change})  # type: ignore[arg-type]
         with pytest.raises(ModelFileError, match=reason):
@@ -230,7 +230,7 @@ def test_what_is_no_plain_file_is_refused_and_nothing_waits(tmp_path: Path) -> N
         for read in (modelfile.read, read_machine, read_mapping):
             with pytest.raises(InputError, match=r"it is a folder, a pipe or a device"):
                 read(tmp_path / name)
-    with pytest.raises(ModelFileError, match=r"is not a name of a model file: embedded null"):
+    with pytest.raises(ModelFileError, match=r"is not the name of a model file: embedded null"):
         modelfile.read(f"{tmp_path}/a\0b")
 
 

@@ -119,11 +119,11 @@ def test_refusals(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[st
     model = tmp_path / "no.json"
     for arguments, told in (
         ([], "nothing given"),
-        (["--positioning", str(POSITIONING), "--distance", "100 mm"], "--distance is for recordings"),
+        (["--positioning", str(POSITIONING), "--distance", "100 mm"], "--distance applies to recordings"),
         ([spindle, "--distance", "100"], "--distance '100': write a number and its unit, such as \"100 mm\""),
         ([spindle, "--distance", "100 kg"], "--distance '100 kg': unknown unit"),
         ([spindle, "--distance", "0 mm"], "must be positive"),
-        ([spindle, "--distance", "9 mm", "--pairs", "x1:x2:9mm"], "those of --pairs carry their own"),
+        ([spindle, "--distance", "9 mm", "--pairs", "x1:x2:9mm"], "--pairs specifies its own distances"),
         ([axis, "--distance", "9 mm"], "has no probes named x1 and x2, or y1 and y2"),
         ([spindle, "--pairs", "x1:x2"], "write the probe at the tip"),
         ([spindle, "--pairs", "x1:x9:9mm"], "no channel is named 'x9'"),

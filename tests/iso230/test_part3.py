@@ -409,7 +409,7 @@ def test_what_must_be_said_of_a_model() -> None:
     assert "refused when it was fitted: worse than none" in notes
     assert "z_um: with the model its range grows, from 50 to 90 um" in notes
     assert "the model of nothing_um has nothing to do here" in notes
-    with pytest.raises(InputError, match="none of them a channel here"):
+    with pytest.raises(InputError, match="and no such channel is recorded here"):
         assess(recording, models=[model("nothing_um", 1.0)])
 
 

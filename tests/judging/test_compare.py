@@ -357,7 +357,7 @@ def test_assess_names_the_missing_channel(recording: Recording, samples: Samples
 def test_the_same_test_twice_is_refused(recording: Recording) -> None:
     """However its file was written: it would be learned from and judged on at once."""
     copy = replace(recording, name="copy", source="elsewhere.csv", table=recording.table.copy())
-    with pytest.raises(InputError, match=r"elsewhere\.csv holds the same test as small"):
+    with pytest.raises(InputError, match=r"elsewhere\.csv contains the same test as small"):
         stack([recording, copy], ["z_um"])
 
 

@@ -257,7 +257,7 @@ def test_a_block_without_the_target_is_left_out(crowd: Samples) -> None:
     assert len(found.blocks) == len(judging.splits) - 1
     assert np.isfinite(found.rms).all()
     gone[:, 0] = np.nan
-    with pytest.raises(FitError, match="x_um has no number in any of the blocks"):
+    with pytest.raises(FitError, match="x_um has no value in any of the blocks"):
         budget.budget(replace(crowd, deviations=gone), judging, ["ols"], max_sensors=2)
 
 
@@ -299,7 +299,7 @@ def test_targets_that_are_never_measured_together(crowd: Samples) -> None:
         budget.budget(replace(crowd, deviations=turns), judging, ["ols"])
     blocks = crowd.deviations.copy()
     blocks[crowd.cycle < 2, 0] = blocks[crowd.cycle >= 2, 1] = np.nan
-    with pytest.raises(FitError, match="no block to judge by has a number of each of x_um, z_um"):
+    with pytest.raises(FitError, match="no block to judge by has a value for each of x_um, z_um"):
         budget.budget(replace(crowd, deviations=blocks), judging, ["ols"])
     alone = replace(crowd, targets=crowd.targets[:1], deviations=turns[:, :1])
     assert np.isfinite(budget.budget(alone, judging, ["ols"], max_sensors=1).rms).all()

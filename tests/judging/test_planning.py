@@ -140,8 +140,8 @@ def test_one_cycle_is_enough_to_plan_from() -> None:
         ({"top_speed": -1.0}, "top speed -1 1/min"),
         ({"top_speed": 0.0}, "top speed 0 1/min"),
         ({"top_speed": float("inf")}, "top speed inf"),
-        ({"hours": 1.0}, "a test of 1 h: want 2 to 72"),
-        ({"hours": float("nan")}, "want 2 to 72"),
+        ({"hours": 1.0}, "a test of 1 h: expected 2 to 72"),
+        ({"hours": float("nan")}, "expected 2 to 72"),
         ({"swing": -3.0}, "a room that changes by -3 degC"),
     ],
 )

@@ -115,7 +115,7 @@ def test_a_model_that_was_never_judged_cannot_be_probed(day: Recording, fitted: 
 
 @pytest.mark.parametrize("odd", [2, 7200.0, True, ["every 2 h"]])
 def test_what_is_no_plan_of_probings_is_refused(odd: object) -> None:
-    with pytest.raises(InputError, match="want words such as"):
+    with pytest.raises(InputError, match="expected text such as"):
         Probings.of(odd)
     assert Probings.of(None) is None
     assert Probings.of("every 2 h") == Probings.of(Probings(7200.0))

@@ -142,7 +142,7 @@ def test_bad_input(samples: Samples) -> None:
     with pytest.raises(InputError, match="y_um was not recorded; there are z_um, x_um"):
         sensitivity({"a": replace(model, target="y_um")}, samples, rows)
     for settings in ({"size": -0.1}, {"size": np.nan}, {"draws": 1}, {"law": "cauchy"}):
-        with pytest.raises(InputError, match="want uniform or normal, >= 0, >= 2 draws"):
+        with pytest.raises(InputError, match="expected uniform or normal, >= 0, >= 2 draws"):
             sensitivity({"a": model}, samples, rows, **settings)
     with pytest.raises(FitError, match="z_um does not change in the 0 rows"):
         sensitivity({"a": model}, samples, ~rows)

@@ -141,7 +141,7 @@ def test_a_known_zero_is_counted_from() -> None:
     assert replay_compensated(model, samples, everything).deviation == pytest.approx(full[200:], abs=1e-9)
     assert samples.reference()[0].tolist() == whole.reference()[0].tolist()
     del zero["t2_C"]
-    with pytest.raises(InputError, match="the known zero does not tell t2_C"):
+    with pytest.raises(InputError, match="the known zero has no value for t2_C"):
         stack([second], [TARGET], starts=Start("known", zero=zero))
 
 

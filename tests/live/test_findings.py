@@ -85,12 +85,12 @@ def test_what_is_good_passes_and_nothing_is_written(tmp_path: Path) -> None:
         *(
             ('"machine/7/temperatures"', f'"{topic}"', says)
             for topic, says in (
-                ("machine/#/x", "want it at the end"),
-                ("machine/#x", "a wildcard stands for a whole level: '#x'"),
-                ("machine/x#", "a wildcard stands for a whole level"),
-                ("a+/b", "a wildcard stands for a whole level"),
-                ("##", "a wildcard stands for a whole level"),
-                ("#/", "want it at the end"),
+                ("machine/#/x", "put it at the end"),
+                ("machine/#x", "a wildcard must be a whole level: '#x'"),
+                ("machine/x#", "a wildcard must be a whole level"),
+                ("a+/b", "a wildcard must be a whole level"),
+                ("##", "a wildcard must be a whole level"),
+                ("#/", "put it at the end"),
                 ("", "name one"),
                 ("  ", "name one"),
                 ("a\\u0000b", "cannot be printed"),
@@ -190,7 +190,7 @@ def test_what_is_there_and_what_is_not(old: str, new: str, says: str, tmp_path: 
 @pytest.mark.parametrize("name", ["live.000001.db", "live.000017.db-wal", "live.db.lock", "state.json.lock"])
 def test_what_the_service_itself_writes_is_no_sink(name: str, tmp_path: Path) -> None:
     found = list(find_faults(read_config(lay(tmp_path, GOOD.replace("out.json", name)))))
-    assert any("would be written over" in fault for fault in found)
+    assert any("would be overwritten" in fault for fault in found)
 
 
 def test_a_lock_that_cannot_be_opened(tmp_path: Path) -> None:

@@ -215,7 +215,7 @@ def test_of_a_reading_what_is_no_number_is_missing() -> None:
     ],
 )
 def test_a_start_that_cannot_be_is_said_at_once(start: StartRow, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"live\.db: the journal cannot begin"):
+    with pytest.raises(InputError, match=r"live\.db: the journal cannot be started"):
         opened(tmp_path, start=start)
     assert list(tmp_path.iterdir()) == []
 
@@ -737,7 +737,7 @@ def test_a_newer_version_is_refused_by_name_and_left_alone(tmp_path: Path) -> No
         connection.execute("PRAGMA user_version = 2")
     connection.close()
     before = path.read_bytes()
-    with pytest.raises(InputError, match=r"live\.000001\.db: a journal of version 2, and this thermocomp knows 1"):
+    with pytest.raises(InputError, match=r"live\.000001\.db: a journal of version 2, but this thermocomp supports 1"):
         read(tmp_path)
     journal = opened(tmp_path)
     journal.add(alarm(1))
@@ -753,7 +753,7 @@ def test_what_is_no_journal(tmp_path: Path) -> None:
         JournalReader(tmp_path / "nothing.db")
     text = tmp_path / "notes.txt"
     text.write_text("no database " * 100)
-    with pytest.raises(InputError, match=r"notes\.txt: is not a journal of thermocomp, nor any database"):
+    with pytest.raises(InputError, match=r"notes\.txt: is not a journal of thermocomp, and not a database"):
         JournalReader(text)
     other = tmp_path / "other.db"
     with sqlite3.connect(other) as connection:

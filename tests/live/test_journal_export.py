@@ -285,7 +285,7 @@ def test_journals_that_are_no_recording(tmp_path: Path) -> None:
         export(journal_of(tmp_path / "live.db", other, [ReadingRow(BEGIN, {"t1_C": 1.0})]))
     twice = start._replace(channels=(Channel("z_residual_um", "residual", "um"), Z))
     rows: list[Row] = [ReadingRow(BEGIN, {"z_um": 1.0, "z_residual_um": 1.0})]
-    with pytest.raises(InputError, match="z_residual_um would be there twice"):
+    with pytest.raises(InputError, match="z_residual_um would occur twice"):
         export(journal_of(tmp_path / "twice.db", twice, rows))
 
 

@@ -97,7 +97,7 @@ def test_more_joints_than_a_table_takes(tmp_path: Path) -> None:
         ("MAX_LIMIT = 100", "MAX_LIMIT = \\\n -300", HalSettings(), "MAX_LIMIT = -300"),
         ("trivkins", "5axiskins", HalSettings(pattern="drive"), "must be a joint"),
         ("coordinates=XYZ", "coordinates=XZZ", HalSettings(pattern="drive"), "has 2 joints"),
-        ("HALFILE = mill.hal", "HALFILE = mill.tcl", HalSettings(pattern="drive"), "cannot be seen through"),
+        ("HALFILE = mill.hal", "HALFILE = mill.tcl", HalSettings(pattern="drive"), "cannot be analysed"),
         ("HALFILE = mill.hal", "HALFILE = none.hal", HalSettings(), "cannot be read"),
         ("[AXIS_Z]", "nonsense", HalSettings(), "there is no [AXIS_Z]; there are AXIS_X, AXIS_Y"),
     ],
@@ -115,7 +115,7 @@ def test_refused(tmp_path: Path, old: str, new: str, settings: HalSettings, told
     [
         ("net other => axis.z.eoffset-counts\n", HalSettings(), "is used already (signal other)"),
         ("", HalSettings(pattern="drive", axes="Y"), "no HAL file nets joint.1.motor-pos-cmd"),
-        ("linksp a b\n", HalSettings(pattern="drive"), "cannot be seen through"),
+        ("linksp a b\n", HalSettings(pattern="drive"), "cannot be analysed"),
     ],
 )
 def test_refused_for_its_hal(tmp_path: Path, hal: str, settings: HalSettings, told: str) -> None:

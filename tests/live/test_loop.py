@@ -181,7 +181,7 @@ def test_a_damaged_state_is_a_cold_start_and_is_kept(tmp_path: Path) -> None:
 def test_a_file_of_others_is_not_written_over(content: str | None, tmp_path: Path) -> None:
     path = tmp_path / "state.json"
     path.mkdir() if content is None else path.write_text(content, encoding="ascii")
-    with pytest.raises(InputError, match="not a state file, and would be written over"):
+    with pytest.raises(InputError, match="not a state file and would be overwritten"):
         Service(machine(), [], [], state_path=path)
     assert path.is_dir() if content is None else path.read_text(encoding="ascii") == content
 
@@ -317,7 +317,7 @@ def test_a_real_broker_that_is_killed_and_comes_back(broker: Mosquitto) -> None:
 
     asyncio.run(running(service, work))
     assert source.refused == 3
-    assert "no JSON" in source.last_refusal
+    assert "not JSON" in source.last_refusal
 
 
 def test_a_stop_before_the_first_reading_leaves_what_is_in_force(tmp_path: Path) -> None:

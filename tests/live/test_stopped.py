@@ -60,7 +60,7 @@ asyncio.run(main())
         broker.kill()
     assert process.returncode == 0
     assert second.returncode == 2
-    assert "state.json: another thermocomp uses it now" in second.stderr
+    assert "state.json: another thermocomp process is using it" in second.stderr
     assert looked.returncode == 0
     assert "the state is saved" in out
     last = json.loads(path.read_text())["corrections"]["z_um"]["offset_um"]

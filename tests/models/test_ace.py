@@ -369,8 +369,8 @@ def test_half_window() -> None:
 @pytest.mark.parametrize(
     ("estimator", "message"),
     [
-        (ACE(half_window=0), "half_window 0: want at least 1"),
-        (ACE(window_share=0.4), "window_share 0.4: want more than 0 and at most 0.25"),
+        (ACE(half_window=0), "half_window 0: expected at least 1"),
+        (ACE(window_share=0.4), "window_share 0.4: expected more than 0 and at most 0.25"),
         (ACE(neighbours=0), "neighbours >= 1"),
         (ACE(tolerance=float("nan")), "tolerance >= 0"),
         (MonotoneACE(points=2), "points >= 3"),

@@ -231,10 +231,10 @@ def test_no_spindle_speed() -> None:
 @pytest.mark.parametrize(
     ("settings_", "message"),
     [
-        ({"interval": 0.0}, "interval 0.0: want positive"),
-        ({"interval": ()}, "want positive"),
-        ({"interval": (60.0, np.nan)}, "want positive"),
-        ({"interval": 1e-6}, "make it longer"),
+        ({"interval": 0.0}, "interval 0.0: expected positive"),
+        ({"interval": ()}, "expected positive"),
+        ({"interval": (60.0, np.nan)}, "expected positive"),
+        ({"interval": 1e-6}, "use a longer interval"),
         ({"k": -1}, "order k: -1"),
         ({"m_max": -1}, "order m: -1"),
         ({"criterion": "r2"}, "criterion 'r2'"),
@@ -269,11 +269,11 @@ def test_bad_data(estimator: ARX | NetARX) -> None:
     u, z = series((1, 0), 0, n=50)
     with pytest.raises(FitError, match=r"only [012] ticks have a known past"):
         estimator.fit(u[:3], z[:3], dt=clock(3))
-    with pytest.raises(InputError, match="dt: want 50 time steps"):
+    with pytest.raises(InputError, match="dt: expected 50 time steps"):
         estimator.fit(u, z, dt=[1.0])
     with pytest.raises(InputError, match="not negative"):
         estimator.fit(u, z, dt=-clock(50))
-    with pytest.raises(InputError, match="cycle: want 50"):
+    with pytest.raises(InputError, match="cycle: expected 50"):
         estimator.fit(u, z, dt=clock(50), cycle=[0])
     with pytest.raises(FitError, match="no row to learn from"):
         estimator.fit(u, z, dt=clock(50), cycle=np.full(50, -1))

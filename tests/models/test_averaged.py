@@ -205,20 +205,20 @@ def test_a_spindle_that_turned_before_and_stands_now(samples: Samples) -> None:
 
 @pytest.mark.parametrize("bad", [0, 2.5, float("nan")])
 def test_structures_of_nonsense_are_refused(bad: float, samples: Samples) -> None:
-    with pytest.raises(InputError, match=f"^structures {bad}: want a whole number, at least 1"):
+    with pytest.raises(InputError, match=f"^structures {bad}: expected a whole number, at least 1"):
         fitted(samples, structures=bad)
 
 
 @pytest.mark.parametrize("bad", [-1.0, float("inf"), float("nan")])
 def test_a_noise_of_nonsense_is_refused(bad: float, samples: Samples) -> None:
-    with pytest.raises(InputError, match=f"^noise {bad}: want at least 0 degC"):
+    with pytest.raises(InputError, match=f"^noise {bad}: expected at least 0 degC"):
         fitted(samples, noise=bad)
 
 
 @pytest.mark.parametrize("name", ["lags", "powers", "stopped", "running"])
 @pytest.mark.parametrize("bad", [-5.0, 0.0, float("nan"), float("inf")])
 def test_constants_of_nonsense_are_refused(name: str, bad: float, samples: Samples) -> None:
-    with pytest.raises(InputError, match=rf"^{name} \(600.0, {bad}\): want finite numbers, each more than 0"):
+    with pytest.raises(InputError, match=rf"^{name} \(600.0, {bad}\): expected finite numbers, each more than 0"):
         fitted(samples, **dict[str, Any]({name: (600.0, bad)}))
     values: dict[str, Any] = {name: np.array([1.0, 2.0])}
     assert fitted(samples, structures=np.int64(5), **values).coef_.size  # arrays and their numbers will do

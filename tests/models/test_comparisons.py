@@ -273,21 +273,21 @@ def test_bad_input_is_refused(estimator: ThermalRegressor) -> None:
             estimator.fit(X, y, cycle=np.full(20, -1))
         with pytest.raises(FitError, match="a single row to learn from"):
             estimator.fit(X, y, cycle=np.r_[0, np.full(19, -1)])
-        with pytest.raises(InputError, match="cycle: want 20 numbers"):
+        with pytest.raises(InputError, match="cycle: expected 20 numbers"):
             estimator.fit(X, y, cycle=[0, 1])
 
 
 @pytest.mark.parametrize(
     ("estimator", "text"),
     [
-        (Ridge(strengths=()), "strengths .*: want positive numbers"),
-        (Lasso(strengths=(0.1, -1.0)), "strengths .*: want positive numbers"),
-        (Ridge(strengths=(0.1, float("nan"))), "strengths .*: want positive numbers"),
-        (ElasticNet(l1_ratios=(0.0, 0.5)), "l1_ratios .*: want numbers above 0"),
-        (PrincipalComponents(max_components=0), "max_components 0: want at least 1"),
-        (PartialLeastSquares(max_components=-2), "max_components -2: want at least 1"),
+        (Ridge(strengths=()), "strengths .*: expected positive numbers"),
+        (Lasso(strengths=(0.1, -1.0)), "strengths .*: expected positive numbers"),
+        (Ridge(strengths=(0.1, float("nan"))), "strengths .*: expected positive numbers"),
+        (ElasticNet(l1_ratios=(0.0, 0.5)), "l1_ratios .*: expected numbers above 0"),
+        (PrincipalComponents(max_components=0), "max_components 0: expected at least 1"),
+        (PartialLeastSquares(max_components=-2), "max_components -2: expected at least 1"),
         (Ridge(rule="oracle"), "rule 'oracle'"),  # type: ignore[arg-type]
-        (GaussianProcess(max_rows=1), "max_rows 1: want at least 2"),
+        (GaussianProcess(max_rows=1), "max_rows 1: expected at least 2"),
     ],
     ids=str,
 )

@@ -166,7 +166,7 @@ def test_bad_input(samples: Samples) -> None:
         DynamicRidge(speed=["rpm"], time="none").fit(X, y)
     with pytest.raises(InputError, match="time steps"):
         DynamicRidge(time="routed").fit(X, y, dt=[1.0, 2.0])
-    with pytest.raises(InputError, match="cycle: want 800 numbers"):
+    with pytest.raises(InputError, match="cycle: expected 800 numbers"):
         DynamicRidge(time="none").fit(X, y, cycle=[0, 1])
     with pytest.raises(FitError, match="no row to learn from"):
         DynamicRidge(time="none").fit(X, y, cycle=np.full(len(X), -1))

@@ -136,10 +136,10 @@ def test_a_named_estimator_survives_the_way_to_another_process() -> None:
     ("thing", "message"),
     [
         (Plane, r"Plane is a class: give an instance, Plane\(\)"),
-        (3.0, "float is no regressor: name a method, or give an instance"),
-        (StandardScaler(), "StandardScaler is no regressor"),
-        (DynamicRidge(time="none"), r"DynamicRidge\(time='none'\) takes every row for a machine at rest"),
-        (make_pipeline(PartialF(), DynamicRidge(time="none")), "has a memory, and .* cannot tell it the time here"),
+        (3.0, "float is not a regressor: name a method, or give an instance"),
+        (StandardScaler(), "StandardScaler is not a regressor"),
+        (DynamicRidge(time="none"), r"DynamicRidge\(time='none'\) treats every row as a machine at rest"),
+        (make_pipeline(PartialF(), DynamicRidge(time="none")), "has a memory, and .* cannot pass it the time here"),
         (GridSearchCV(DynamicRidge(time="none"), {"rule": ["minimum"]}), "DynamicRidge .estimator. has a memory"),
         ("oss", "unknown model 'oss'; did you mean ols"),
     ],
@@ -154,7 +154,7 @@ def test_a_pipeline_with_a_model_at_rest_is_refused(samples: Samples) -> None:
     resting = make_pipeline(SensorSelector("partial-f"), DynamicRidge(time="none"))
     found = compare(samples, [resting, "ols"], splits.leave_one_cycle_out(samples), robustness=False).overall()
     assert [bool(a.failure) for a in found] == [True, False, True, False]
-    assert "takes every row for a machine at rest" in found[0].reason
+    assert "treats every row as a machine at rest" in found[0].reason
 
 
 def test_one_number_per_row_or_none() -> None:

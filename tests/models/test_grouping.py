@@ -237,7 +237,7 @@ def test_too_much_to_search() -> None:
         CorrelationGrouping(threshold=0.99).fit(X, y)
     with pytest.raises(FitError, match=r"6 combinations of members, more than 5: raise the threshold"):
         exhaustive.search_members(tri(X, y), [(0, 1, 2), (3, 4)], limit=5)
-    with pytest.raises(FitError, match="2 rows are too few for 1 variables: want at least 3"):
+    with pytest.raises(FitError, match="2 rows are too few for 1 variables: expected at least 3"):
         CorrelationGrouping().fit(X[:2], y[:2])
     with pytest.raises(FitError, match="60 rows are too few for 60"):
         exhaustive.search_members(tri(X, y), [(0,)] * 60)

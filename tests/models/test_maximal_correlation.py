@@ -166,10 +166,10 @@ def test_bad_input_is_refused() -> None:
         maximal_correlations([DataSet("t", T, S[:, 0])])
     with pytest.raises(InputError, match=r"differ in their numbers.*\(3, 2\), \(4, 2\)"):
         maximal_correlations([t, DataSet("t", T[:, :3], S)])
-    with pytest.raises(InputError, match=r"subset \(0, 9\): want indices of the 4"):
+    with pytest.raises(InputError, match=r"subset \(0, 9\): expected indices of the 4"):
         maximal_correlations([t], [(0, 9)])
     with pytest.raises(InputError, match="half_window >= 1"):
         maximal_correlations([t], half_window=0)
     T[7, 2] = np.nan
-    with pytest.raises(FitError, match="hole: row 7 holds a value that is not a number"):
+    with pytest.raises(FitError, match="hole: row 7 contains NaN or infinity"):
         maximal_correlations([DataSet("hole", T, S)])

@@ -115,7 +115,7 @@ def test_three_drifts_with_one_net() -> None:
         model = fitted.freeze(target="xyz"[k], output=k)
         np.testing.assert_allclose(replay(model, X), predicted[:, k], rtol=0, atol=1e-10)
     for wrong in (None, 3, -1):
-        with pytest.raises(InputError, match=r"freeze each on its own, with output=0 \.\. 2"):
+        with pytest.raises(InputError, match=r"freeze each separately, with output=0 \.\. 2"):
             fitted.freeze(target="x", output=wrong)
 
 
@@ -294,7 +294,7 @@ def test_no_row_to_learn_from() -> None:
     X, y = drift(20)
     with pytest.raises(FitError, match="every row has cycle -1"):
         QUICK.fit(X, y, cycle=np.full(20, -1))
-    with pytest.raises(FitError, match="want as many rows"):
+    with pytest.raises(FitError, match="expected the same number of rows"):
         train_net(X, y[:5], 3, rng=np.random.default_rng(0), rates=np.ones(1))
     with pytest.raises(FitError, match="finite"):
         train_net(X * np.nan, y, 3, rng=np.random.default_rng(0), rates=np.ones(1))
@@ -306,7 +306,7 @@ def test_no_row_to_learn_from() -> None:
         ({"hidden": 0}, "0 hidden nodes"),
         ({"hidden": ()}, "no number of hidden nodes to choose from"),
         ({"n_epochs": 0}, "0 epochs"),
-        ({"learning_rate": 0.1, "final_learning_rate": 0.2}, "want at least one epoch and start >= end > 0"),
+        ({"learning_rate": 0.1, "final_learning_rate": 0.2}, "expected at least one epoch and start >= end > 0"),
         ({"schedule": "stepwise"}, "schedule 'stepwise'"),
         ({"update": "online"}, "update 'online'"),
         ({"order": "random"}, "order 'random'"),

@@ -124,7 +124,7 @@ def test_profiles_that_cannot_be_fitted(kind: str) -> None:
         fit_profile(points, values, "X", kind=kind)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="order -1: must not be negative"):
         fit_profile(points, values, "Y", kind=kind, order=-1)  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="name the own axis Y"):
+    with pytest.raises(InputError, match="name the axis Y itself"):
         fit_profile(points, values, "Y", kind=kind, coordinates="XZ")  # type: ignore[arg-type]
     with pytest.raises(InputError, match="choose polynomial or spline"):
         fit_profile(points, values, "Y", kind="wavelet")  # type: ignore[arg-type]

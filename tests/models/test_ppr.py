@@ -177,10 +177,10 @@ def test_bad_input_is_refused() -> None:
         ProjectionPursuit().fit(X[:1], y[:1])
     with pytest.raises(FitError, match="a single row"):
         ProjectionPursuit().fit(X, y, cycle=np.where(np.arange(40) == 5, 0, -1))
-    with pytest.raises(InputError, match="max_terms 0: want at least 1"):
+    with pytest.raises(InputError, match="max_terms 0: expected at least 1"):
         ProjectionPursuit(max_terms=0).fit(X, y)
     for degrees in ((), (2.0,), (99.0,)):
-        with pytest.raises(InputError, match=r"degrees .*: want degrees of freedom above 2 and below 25"):
+        with pytest.raises(InputError, match=r"degrees .*: expected degrees of freedom above 2 and below 25"):
             ProjectionPursuit(degrees=degrees).fit(X, y)
     with pytest.raises(InputError, match="rule 'best'"):
         ProjectionPursuit(rule="best").fit(X, y)  # type: ignore[arg-type]

@@ -83,7 +83,7 @@ def test_cycles_by_routing(crowded: Samples) -> None:
 def test_bad_settings(crowded: Samples) -> None:
     X, y = crowded.frame(), crowded.deviations[:, 0]
     for wrong, message in (
-        (SensorSelector("best"), "method 'best': want one of grouping, partial-f"),
+        (SensorSelector("best"), "method 'best': expected one of grouping, partial-f"),
         (SensorSelector(keep=["t99"]), "keep 't99': the columns are t1_C"),
         (SensorSelector(keep=[70]), "keep 70: there are 7 columns"),
         (SensorSelector(keep=list(X.columns)), "every column is kept"),

@@ -102,7 +102,7 @@ def test_columns_are_counted_in_X(tests: Samples) -> None:
 
 # -- refusals ----------------------------------------------------------------------------------------------------------
 
-REMEDY = r"was not told the time: give it time='column' if the first column .* or time='routed'"
+REMEDY = r"was not given the time: give it time='column' if the first column .* or time='routed'"
 
 
 @each
@@ -133,11 +133,11 @@ def test_without_a_declaration_nothing_of_scikit_learn_gives_a_number(
     X, y, groups = table(tests), tests.deviations[:, 0], tests.test
     leave = LeaveOneGroupOut()
     # scikit-learn puts the errors of all fits into a ValueError of its own
-    with pytest.raises(ValueError, match="was not told the time"):
+    with pytest.raises(ValueError, match="was not given the time"):
         cross_val_score(make(), X, y, groups=groups, cv=leave)
-    with pytest.raises(ValueError, match="was not told the time"):
+    with pytest.raises(ValueError, match="was not given the time"):
         cross_val_score(make(), X, y, groups=groups, cv=leave, params={"dt": tests.dt()})
-    with pytest.raises(ValueError, match="was not told the time"):
+    with pytest.raises(ValueError, match="was not given the time"):
         GridSearchCV(make(), {"time": [None]}, cv=leave).fit(X, y, groups=groups)
     with pytest.raises(InputError, match=REMEDY):
         make_pipeline(StandardScaler(), make()).fit(X, y)
@@ -216,7 +216,7 @@ def test_a_scaled_time_or_none_at_all_is_refused(tests: Samples) -> None:
     estimator: Any = make(time="column")
     with pytest.raises(InputError, match=r"ends at 3\.\d+ s, which is no thermal test. It must be seconds"):
         estimator.fit(X.assign(time_s=X["time_s"] / 3600 / 2), y)
-    with pytest.raises(InputError, match="rises nowhere, so it is not the time"):
+    with pytest.raises(InputError, match="never increases, so it is not the time"):
         estimator.fit(X.assign(time_s=0.0), y)
     with pytest.raises(InputError, match=r"at row \d+ a test begins at .* and not at 0"):
         estimator.fit(X.drop(columns="time_s"), y)
@@ -246,9 +246,9 @@ def test_at_rest_is_for_the_checks_alone(tests: Samples) -> None:
     with pytest.raises(InputError, match="dt was given to DynamicRidge"):
         still.fit(tests.frame(), tests.deviations[:, 0], dt=tests.dt())
     still.fit(tests.frame(), tests.deviations[:, 0])
-    with pytest.raises(FitError, match="takes every row for a machine at rest; fit it with time='column'"):
+    with pytest.raises(FitError, match="treats every row as a machine at rest; fit it with time='column'"):
         still.freeze(target="z")
-    with pytest.raises(InputError, match="takes every row for a machine at rest"):
+    with pytest.raises(InputError, match="treats every row as a machine at rest"):
         still.routed()
 
 
@@ -280,7 +280,7 @@ def test_routed_by_scikit_learn(tests: Samples) -> None:
         # a scorer by name passes nothing on to predict
         nothing, said = scores(requested, X, y, cv=leave, params=params, scoring="neg_root_mean_squared_error")
         assert np.isnan(nothing).all()
-        assert "score with scoring=None, or take time='column'" in said
+        assert "score with scoring=None, or use time='column'" in said
         for cv in (KFold(4), KFold(4, shuffle=True, random_state=0)):
             parts, said = scores(requested, X, y, cv=cv, params={"dt": params["dt"], "cycle": groups})
             assert np.isnan(parts).all()

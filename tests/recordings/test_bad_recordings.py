@@ -49,7 +49,7 @@ GOOD = "time_s,t1_C,drift_um\n0,20.5,0\n15,20.6,1\n"
         ("time_s,t1_C,t2_C\n0,20,21\n15,20,21,22\n", ["line 3 has 4 cells", "decimal commas"]),
         ("time_s,t1_C,t2_C\n0,20,21\n15,20", ["line 3 has 2 cells", "last line", "cut off"]),
         ("time_s,t1_C\n0,20,5\n15,21,5\n", ["line 2 has 3 cells", "decimal commas", "';'"]),
-        ("time_s,t1_C,cycle\n0,20,a\n15,21,b\n30,22,a\n", ["cycle 'a' comes back"]),
+        ("time_s,t1_C,cycle\n0,20,a\n15,21,b\n30,22,a\n", ["cycle 'a' appears again"]),
         ("time_s,t1_C,cycle\n0,20,a\n15,21,\n", ["line 3", "'cycle'", "label"]),
     ],
 )
@@ -128,7 +128,7 @@ def test_a_folder_is_no_file(tmp_path: Path) -> None:
 
 def test_a_pipe_is_no_file(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.csv")
-    with pytest.raises(RecordingError, match=r"pipe\.csv: is a pipe or a device and no file"):
+    with pytest.raises(RecordingError, match=r"pipe\.csv: is a pipe or a device, not a file"):
         read(tmp_path / "pipe.csv")
 
 
@@ -181,14 +181,14 @@ def test_a_mapping_that_does_not_fit_the_file_is_told(tmp_path: Path, mapping: M
     [
         (
             Mapping(columns={"fake_C": ColumnMap("drift_um", "degC", "temperature")}),
-            ["[columns.fake_C]", "a temperature in degC", "'drift_um' says um, a unit of displacement", "correct"],
+            ["[columns.fake_C]", "a temperature in degC", "'drift_um' specifies um, a unit of displacement", "correct"],
         ),
         (Mapping(columns={"fake": ColumnMap("drift_um", unit="rpm", scale=2.0)}), ["[columns.fake]", "in 1/min"]),
-        (Mapping(columns={"fake": ColumnMap("drift_um", role="dimensionless")}), ["[columns.fake]", "says um"]),
-        (Mapping(columns={"a": ColumnMap("drift_um", unit="urad")}), ["[columns.a]", "in urad", "says um"]),
-        (Mapping(columns={"z": ColumnMap("t1_C", unit="um")}), ["a displacement in um", "'t1_C' says degC"]),
-        (Mapping(columns={"z": ColumnMap("time_s", unit="mm")}), ["a displacement in mm", "'time_s' says s"]),
-        (Mapping(TimeColumn("t1_C", unit="min")), ["[time]", "'t1_C' says degC", "not min"]),
+        (Mapping(columns={"fake": ColumnMap("drift_um", role="dimensionless")}), ["[columns.fake]", "specifies um"]),
+        (Mapping(columns={"a": ColumnMap("drift_um", unit="urad")}), ["[columns.a]", "in urad", "specifies um"]),
+        (Mapping(columns={"z": ColumnMap("t1_C", unit="um")}), ["a displacement in um", "'t1_C' specifies degC"]),
+        (Mapping(columns={"z": ColumnMap("time_s", unit="mm")}), ["a displacement in mm", "'time_s' specifies s"]),
+        (Mapping(TimeColumn("t1_C", unit="min")), ["[time]", "'t1_C' specifies degC", "not min"]),
     ],
 )
 def test_a_mapping_that_contradicts_the_unit_of_the_heading_is_refused(
@@ -221,7 +221,7 @@ def test_a_clock_that_was_set_back_is_hinted_at(tmp_path: Path, ending: str, int
 def test_a_mapped_column_needs_a_unit_or_a_role(tmp_path: Path) -> None:
     path = _csv(tmp_path, "time_s,count\n0,1\n")
 
-    with pytest.raises(RecordingError, match=r"\[columns\.z\]: give it a unit or a role; 'count' has none"):
+    with pytest.raises(RecordingError, match=r"\[columns\.z\]: specify a unit or a role; 'count' has none"):
         read(path, Mapping(columns={"z": ColumnMap("count")}))
 
 

@@ -74,12 +74,12 @@ def test_columns_with_another_axis_elsewhere_are_told_and_left_out(tmp_path: Pat
 
 def test_what_is_missing_or_wrong_is_said_with_the_file(tmp_path: Path) -> None:
     both, one = written(tmp_path / "both.csv", *X, *ROLL), written(tmp_path / "one.csv", *X)
-    with pytest.raises(RecordingError, match=r"one\.csv: no column is called after EAX, such as EAX_250_urad"):
+    with pytest.raises(RecordingError, match=r"one\.csv: no column is named after EAX, such as EAX_250_urad"):
         read_components([both, one])
-    with pytest.raises(RecordingError, match=r"one\.csv: no column is called after E9, such as"):
+    with pytest.raises(RecordingError, match=r"one\.csv: no column is named after E9, such as"):
         read_components([one], ["E9"])
     none = written(tmp_path / "none.csv", "x_laser_0_um", "x_laser_1_um", "x_laser_2_um")
-    with pytest.raises(RecordingError, match=r"none\.csv: no column is called after a component, such as EXX_250_um"):
+    with pytest.raises(RecordingError, match=r"none\.csv: no column is named after a component, such as EXX_250_um"):
         read_components([none])
     wrong = written(tmp_path / "wrong.csv", *X[:2], "EXX_200_urad")
     with pytest.raises(UnitError, match=r"'EXX_200_urad' measures angle in urad among displacements"):

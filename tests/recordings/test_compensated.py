@@ -74,11 +74,15 @@ def test_targets_are_what_a_model_can_learn() -> None:
             "x_um",
             'small: compensation: unknown: .* compensation = "off"',
         ),
-        (compensated(), "z_residual_um", "z_residual_um is a residual, .* as the target, z_um"),
-        (compensated(), "z_correction_um", "z_correction_um is a correction, .* as the target, z_um"),
+        (compensated(), "z_residual_um", "z_residual_um is a residual .* as the target, z_um"),
+        (compensated(), "z_correction_um", "z_correction_um is a correction .* as the target, z_um"),
         (compensated("z_um"), "z_um", "there is z_residual_um, .* add a column z_um, which is z_residual_um - z_corr"),
         (compensated("z_residual_um"), "z_um", "z_um was measured while z_correction_um was in force"),
-        (compensated(z_um=np.nan), "z_um", "z_um is empty beside z_residual_um: compensation: unknown: nobody knows"),
+        (
+            compensated(z_um=np.nan),
+            "z_um",
+            "z_um is empty where z_residual_um has a value: compensation: unknown: nobody knows",
+        ),
     ],
 )
 def test_what_is_refused(recording: Recording, target: str, text: str) -> None:

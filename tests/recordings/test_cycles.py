@@ -73,7 +73,7 @@ def test_a_spindle_that_never_starts_anew_gives_one_cycle(speed: np.ndarray[tupl
 def test_labels_become_cycles() -> None:
     assert split_by_labels(["a", "a", "b"]) == (Cycle("a", 0, 2), Cycle("b", 2, 3))
     assert split_by_labels([1.0, 1.0, 2.5]) == (Cycle("1", 0, 2), Cycle("2.5", 2, 3))
-    with pytest.raises(RecordingError, match=r"'a' comes back at row 2"):
+    with pytest.raises(RecordingError, match=r"'a' appears again at row 2"):
         split_by_labels(["a", "b", "a"])
 
 

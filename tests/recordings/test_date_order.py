@@ -169,7 +169,7 @@ def test_a_question_without_a_likely_answer_has_none_beforehand(
     monkeypatch.setattr("builtins.input", lambda: next(answers))
     assert run(["map", str(two_days(tmp_path / "two.csv"))]) == 0
     said = capsys.readouterr()
-    assert "want a number from 0 to 2" in said.err
+    assert "expected a number from 0 to 2" in said.err
     assert "%m/%d/%Y" in said.out
 
 

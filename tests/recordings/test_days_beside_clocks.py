@@ -248,7 +248,7 @@ def test_map_names_the_row_that_check_names(tmp_path: Path, capsys: pytest.Captu
 
 def test_a_time_in_five_columns_is_named(tmp_path: Path) -> None:
     path = write(tmp_path / "p.csv", "Year,Month,Day,Hour,Minute", [f"2026,3,4,8,{k}" for k in range(6)])
-    with pytest.raises(RecordingError, match="stands in 5 columns, Year, Month, Day, Hour, Minute") as caught:
+    with pytest.raises(RecordingError, match="is split over 5 columns, Year, Month, Day, Hour, Minute") as caught:
         read(path)
     assert not caught.value.remedies
 

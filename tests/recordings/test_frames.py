@@ -34,7 +34,7 @@ def test_units_and_time() -> None:
 def test_what_has_no_unit_is_left_out_and_told() -> None:
     found = Recording.from_dataframe(TABLE)
     assert [c.name for c in found.channels] == ["drift_um"]
-    assert "left out: 'T1' has no unit of a channel; tell it by units={'T1': 'degC'}" in found.notes
+    assert "left out: 'T1' has no unit of a channel; give it by units={'T1': 'degC'}" in found.notes
 
 
 @pytest.mark.parametrize(
@@ -113,20 +113,20 @@ def test_there_and_back(recording: Recording) -> None:
 @pytest.mark.parametrize(
     ("table", "more", "error", "message"),
     [
-        (TABLE.drop(columns="time_min"), {}, RecordingError, "which is the time.*no column such as time_s"),
-        (TABLE.assign(t_s=0.0), {}, RecordingError, "there are time_min, t_s: name it by time="),
+        (TABLE.drop(columns="time_min"), {}, RecordingError, "which column is the time.*no column such as time_s"),
+        (TABLE.assign(t_s=0.0), {}, RecordingError, "there are time_min, t_s: give time="),
         (TABLE, {"time": "clock"}, InputError, "no column is named 'clock'"),
-        (TABLE, {"time": [1, 2]}, InputError, "want 3 values"),
-        (TABLE, {"time": [0, 2, 1]}, RecordingError, "time does not rise at row 2"),
+        (TABLE, {"time": [1, 2]}, InputError, "expected 3 values"),
+        (TABLE, {"time": [0, 2, 1]}, RecordingError, "time does not increase at row 2"),
         (TABLE, {"time": [BERLIN[0], pd.NaT, BERLIN[2]]}, RecordingError, "time is missing in row 1"),
         (TABLE, {"time": [BERLIN[0], pd.Timestamp(0), 3]}, RecordingError, "neither a number nor a datetime"),
         (TABLE, {"time": list("abc")}, RecordingError, "neither a number nor a datetime"),
         (TABLE, {"time": [0, np.nan, 1]}, RecordingError, "time is missing in row 1"),
-        (TABLE, {"units": {"T9": "degC"}}, InputError, "units tells of 'T9'"),
+        (TABLE, {"units": {"T9": "degC"}}, InputError, "units: no column is named 'T9'"),
         (TABLE, {"units": {"T1": "degX"}}, UnitError, "unknown unit 'degX'"),
         (TABLE, {"cycles": "day"}, InputError, "no column is named 'day'"),
         (TABLE, {"cycles": [1]}, InputError, "1 labels for 3 rows"),
-        (TABLE[["time_min", "n"]], {}, RecordingError, "none of the columns time_min, n is understood"),
+        (TABLE[["time_min", "n"]], {}, RecordingError, "none of the columns time_min, n is recognized"),
         (TABLE.assign(T1="warm"), {"units": UNITS}, RecordingError, "column 'T1' contains a non-numeric value"),
         (TABLE.iloc[:0], {}, RecordingError, "has no row"),
         (TABLE.assign(drift_um=0.0), {}, RecordingError, "two columns would become the same channel"),

@@ -112,7 +112,7 @@ def test_columns_of_one_name_are_told_apart_by_number(tmp_path: Path) -> None:
         read(path)
     both = Mapping(columns={"front_C": ColumnMap(3), "rear_C": ColumnMap(4)})
     same(read(path, both))
-    with pytest.raises(RecordingError, match=r"\[columns.side_C\]: there are 5 columns, and no number 6"):
+    with pytest.raises(RecordingError, match=r"\[columns.side_C\]: the file has 5 columns, but no column number 6"):
         read(path, Mapping(columns={**both.columns, "side_C": ColumnMap(6)}))
 
 

@@ -161,11 +161,11 @@ ASKED: dict[str, tuple[str, str, str, str]] = {
     "no_units.csv": (
         "full",
         "",
-        "columns 'Speed', 'T1' have no unit: 'Speed' may be a spindle speed in rpm or Hz; put the unit behind the "
+        "columns 'Speed', 'T1' have no unit: 'Speed' may be a spindle speed in rpm or Hz; append the unit to the "
         "name, "
         'such as "Speed [rpm]", or write a mapping [columns.NAME] with column = "Speed" and unit, or role = "ignore" '
         "if it "
-        "is of no use",
+        "is not needed",
         '[columns.speed_rpm]\ncolumn = "Speed"\nunit = "rpm"\n[columns.t1_C]\ncolumn = "T1"\nunit = "degC"\n',
     ),
     "twins.csv": (

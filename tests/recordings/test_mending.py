@@ -192,7 +192,7 @@ def test_an_error_offers_a_mapping_that_reads_the_file(content: str, message: st
 
 
 @pytest.mark.parametrize(
-    ("heading", "message"), [("elapsed", "says no unit: seconds"), ("nr", "no time column"), ("time", "says no unit")]
+    ("heading", "message"), [("elapsed", "has no unit: seconds"), ("nr", "no time column"), ("time", "has no unit")]
 )
 def test_units_of_time_are_offered_to_choose_from_and_never_taken(heading: str, message: str, tmp_path: Path) -> None:
     path = tmp_path / "drift.csv"
@@ -296,7 +296,7 @@ def test_the_command_asks_and_writes(
     monkeypatch.setattr("builtins.input", lambda: next(answers))
     assert run(["map", str(path), "-o", str(tmp_path / "plain.toml")]) == 0
     said = capsys.readouterr()
-    assert "want a number from 0 to 5" in said.err
+    assert "expected a number from 0 to 5" in said.err
     assert "unknown unit 'banana'" in said.err
     mapping = read_mapping(tmp_path / "plain.toml")
     assert {n: (c.role, c.unit, c.scale) for n, c in mapping.columns.items()} == {

@@ -83,11 +83,11 @@ def test_states_by_a_column_by_time_or_by_positions_that_come_again(tmp_path: Pa
     same(read(tmp_path / "labelled.csv", "EYY"), again)
     labelled.rename(columns={"state": "run no"}).to_csv(tmp_path / "named.csv", index=False)
     same(read(tmp_path / "named.csv", ProfileOptions(target="EYY", state="run no"), layout="long"), again)
-    with pytest.raises(InputError, match="there is no column 'other' that tells the state"):
+    with pytest.raises(InputError, match="there is no column 'other' for the states"):
         read(tmp_path / "named.csv", ProfileOptions(target="EYY", state="other"), layout="long")
     back = pd.concat([labelled, labelled.iloc[:n].assign(time_s=1e6)])
     back.to_csv(tmp_path / "back.csv", index=False)
-    with pytest.raises(RecordingError, match=r"back\.csv: line \d+: state 's0' comes back after another one"):
+    with pytest.raises(RecordingError, match=r"back\.csv: line \d+: state 's0' appears again after another state"):
         read(tmp_path / "back.csv", "EYY")
 
 
@@ -133,7 +133,7 @@ def test_columns_by_pattern_by_places_and_by_name(tmp_path: Path) -> None:
         same(read(tmp_path / "both.csv", ProfileOptions(target="EYY", columns=pattern)), _with_zeros(found))
     with pytest.raises(RecordingError, match=r"no column is called 'x_\*'; state which .* There are y_laser_0_um"):
         read(tmp_path / "both.csv", ProfileOptions(target="EYY", columns="x_*"))
-    with pytest.raises(InputError, match="put \\* where the position stands"):
+    with pytest.raises(InputError, match="put \\* where the position is"):
         read(tmp_path / "both.csv", ProfileOptions(target="EYY", columns="y_laser"))
     toml = tmp_path / "places.toml"
     keys = "".join(f'y_laser_{p:g}_um = {{ y = "{p / 10:g} m", x = "0.3 m" }}\n' for p in found.position)
@@ -163,7 +163,7 @@ def test_columns_that_nobody_named_must_suit_the_component(tmp_path: Path) -> No
         read(tmp_path / "wide.csv", "EAY")
     with pytest.raises(InputError, match="X0C: spindle drift in X does not depend on a position; name a c"):
         read(tmp_path / "wide.csv", "X0C")
-    with pytest.raises(InputError, match="laser: it is no component's code"):
+    with pytest.raises(InputError, match="laser: it is not the code of a component"):
         read(tmp_path / "wide.csv", "laser")
     own = ProfileOptions(target="laser", axis="Y", unit="um")
     assert read(tmp_path / "wide.csv", own).target == "laser"
@@ -186,7 +186,7 @@ def test_an_angle_among_displacements_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UnitError, match=said):
         read(tmp_path / "two.csv", "EYY")
     long(made()).to_csv(tmp_path / "long.csv", index=False)
-    with pytest.raises(UnitError, match="column 'error_um' measures displacement, no angle in urad"):
+    with pytest.raises(UnitError, match="column 'error_um' measures displacement, not angle in urad"):
         read(tmp_path / "long.csv", ProfileOptions(target="EAY", columns="error_um"))
 
 
@@ -219,7 +219,7 @@ def test_columns_out_of_order_and_too_few(tmp_path: Path) -> None:
     table = wide(found)
     first = ["time_s", "t1_C", "y_laser_0_um", "y_laser_100_um"]
     table[[*first, "y_laser_50_um"]].to_csv(tmp_path / "a.csv", index=False)
-    with pytest.raises(RecordingError, match=r"a\.csv: profiles of EYY: positions along Y must rise, but 50 mm"):
+    with pytest.raises(RecordingError, match=r"a\.csv: profiles of EYY: positions along Y must increase, but 50 mm"):
         read(tmp_path / "a.csv", "EYY")
     table[first].to_csv(tmp_path / "b.csv", index=False)
     with pytest.raises(RecordingError, match=r"b\.csv: profiles of EYY: 2 positions along Y \(0, 100 mm\); a"):
@@ -229,7 +229,7 @@ def test_columns_out_of_order_and_too_few(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("rows", "message"),
     [
-        ("0,20,0,1\n0,20,100,1\n0,20,50,1", r"line 4, column 'y_mm': 50 mm comes behind 100 mm in one thermal state"),
+        ("0,20,0,1\n0,20,100,1\n0,20,50,1", r"line 4, column 'y_mm': 50 mm follows 100 mm in one thermal state"),
         ("0,20,0,1\n0,20,50,1\n0,20,50,2", r"line 4, column 'y_mm': 50 mm comes twice in one thermal state, but"),
         ("0,20,0,1\n0,20,,1\n0,20,50,2", r"line 3, column 'y_mm': the position is missing"),
         ("0,20,0,1\n0,20,50,1\n9,20,0,2\n9,20,50,2", r"2 positions along Y \(0, 50 mm\)"),
@@ -256,7 +256,9 @@ def test_columns_of_a_long_table(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no column is called 'errors'; there are t1_C"):
         read(path, ProfileOptions(target="EYY", columns="errors"))
     table.drop(columns="error_um").to_csv(path, index=False)
-    with pytest.raises(RecordingError, match="want one column of displacements; there is none: name one like error_um"):
+    with pytest.raises(
+        RecordingError, match="expected one column of displacements; there is none: name one like error_um"
+    ):
         read(path, "EYY")
     table.rename(columns={"y_mm": "x_mm"}).to_csv(path, index=False)
     with pytest.raises(
@@ -279,8 +281,8 @@ def test_columns_of_a_long_table(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "want one table \\[positions\\]"),
-        ("[positions]\n[more]\na = 1", "want one table \\[positions\\]"),
+        ("", "expected one table \\[positions\\]"),
+        ("[positions]\n[more]\na = 1", "expected one table \\[positions\\]"),
         ("[positions]\na = 250", r"\[positions\] a = 250: write the axes' positions"),
         ("[positions]\na = { q = '1 mm' }", r"write the axes' positions"),
         ("[positions]\na = { y = 250 }", r'a\.y = 250: write a position with its unit, such as "250 mm"'),
@@ -303,7 +305,7 @@ def test_places_must_tell_the_own_position_and_be_there(tmp_path: Path) -> None:
     found = made()
     wide(found).to_csv(tmp_path / "wide.csv", index=False)
     places = {f"y_laser_{p:g}_um": {"X": p} for p in found.position}
-    with pytest.raises(InputError, match="column 'y_laser_0_um': its place does not tell the position of Y"):
+    with pytest.raises(InputError, match="column 'y_laser_0_um': its entry does not specify the position of Y"):
         read(tmp_path / "wide.csv", ProfileOptions(target="EYY", places=places))
     with pytest.raises(ThermocompError, match="no channel is named 'lost'"):
         read(tmp_path / "wide.csv", ProfileOptions(target="EYY", places={"lost": {"Y": 1.0}}))

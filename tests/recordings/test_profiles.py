@@ -20,7 +20,7 @@ def at(positions: list[float], values: np.ndarray | None = None) -> Profiles:
     ("positions", "message"),
     [
         ([0.0, 100.0], r"made: profiles of EYY: 2 positions along Y \(0, 100 mm\); a profile needs at least 3"),
-        ([0.0, 100.0, 50.0], "positions along Y must rise, but 50 mm comes behind 100 mm: sort them"),
+        ([0.0, 100.0, 50.0], "positions along Y must increase, but 50 mm follows 100 mm: sort them"),
         ([0.0, 50.0, 50.0, 100.0], "two values of a state at X 0, Y 50, Z 0 mm: take their mean, or read the two dir"),
         ([0.0, np.nan, 100.0], "point 2 at .* must be finite"),
     ],
@@ -34,7 +34,7 @@ def test_lines_beside_each_other_rise_one_by_one() -> None:
     points = np.array([[x, y, 0.0] for x in (0.0, 300.0) for y in (0.0, 100.0, 200.0)])
     made = replace(profiles(), points=points, values=np.zeros((len(profiles()), 6)))
     assert made.varying == "YX"
-    with pytest.raises(RecordingError, match="100 mm comes behind 200 mm"):
+    with pytest.raises(RecordingError, match="100 mm follows 200 mm"):
         replace(made, points=points[[0, 2, 1, 3, 4, 5]])
 
 

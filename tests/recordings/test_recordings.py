@@ -123,7 +123,7 @@ def test_units_become_house_units_and_old_names_stay_valid(tmp_path: Path) -> No
         ("t1_mym", ["'mym' is no known unit", "the nearest are", "um"]),
         ("mains [Hz]", ["spindle_speed only by a mapping", 'role = "spindle_speed" and unit = "Hz"']),
         ("coolant_in", ["displacement only by a mapping", 'role = "displacement" and unit = "in"']),
-        ("load", ["has no unit", "put it behind the name"]),
+        ("load", ["has no unit", "append it to the name"]),
     ],
 )
 def test_a_column_of_numbers_that_is_left_out_is_warned_of(tmp_path: Path, heading: str, parts: list[str]) -> None:
@@ -154,7 +154,7 @@ def test_another_unit_of_the_same_quantity_in_the_mapping_is_obeyed_and_told(tmp
 
     assert recording.notes == (
         "t: the heading 't [degF]' says degF, the mapping says degC; the mapping is obeyed",
-        "time: the heading 'time_s' says s, the mapping says min; the mapping is obeyed",
+        "time: the heading 'time_s' specifies s, the mapping says min; the mapping is obeyed",
     )
     assert recording.time.tolist() == [0.0, 60.0]
     assert recording.table["t"].tolist() == [20.0, 21.0]
@@ -209,7 +209,7 @@ def test_a_long_file_is_read_in_parts(tmp_path: Path, monkeypatch: pytest.Monkey
 def test_numbers_without_a_unit_of_time_are_asked_for(tmp_path: Path) -> None:
     path = _csv(tmp_path, "time,t1_C\n0,1\n1,2\n")
     with pytest.raises(
-        RecordingError, match=r"'time' holds numbers from 0 to 1 and says no unit.*time \[s\].*unit = \"s\""
+        RecordingError, match=r"'time' holds numbers from 0 to 1 and has no unit.*time \[s\].*unit = \"s\""
     ):
         read(path)
     assert read(path, Mapping(TimeColumn("time", unit="min"))).time.tolist() == [0.0, 60.0]

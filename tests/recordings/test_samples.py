@@ -169,8 +169,8 @@ def test_a_recording_finds_its_channels_by_any_of_their_names() -> None:
     ("time", "cycles", "says"),
     [
         ([0.0], make_single_cycle(2), "1 times for 2 rows"),
-        ([0.0, 0.0], make_single_cycle(2), "time does not rise at row 1"),
-        ([0.0, np.nan], make_single_cycle(2), "time does not rise at row 1"),
+        ([0.0, 0.0], make_single_cycle(2), "time does not increase at row 1"),
+        ([0.0, np.nan], make_single_cycle(2), "time does not increase at row 1"),
         ([0.0, 1.0], make_single_cycle(1), "do not cover the 2 rows"),
         ([0.0, 1.0], (), "do not cover the 2 rows"),
     ],

@@ -81,8 +81,8 @@ def test_what_only_one_reading_fits_is_read(
         ("Date", ["03/04/2024 8:00:00 PM", "03/04/2024 8:00:10 PM"], "%d/%m/%Y %I:%M:%S %p"),
         ("Zeit", ["00:10", "00:20"], "hours and minutes or as minutes and seconds.*%H:%M.*%M:%S"),
         ("Zeit", ["2024-05-27 08:00:00 EST", "2024-05-27 08:00:10 EST"], "state how it is written"),
-        ("Time", ["45439.3333333333", "45439.3334490741"], "holds numbers from 45439.333333333 .* says no unit"),
-        ("Time [m]", ["0", "1"], "'m' stands for metres; minutes are min"),
+        ("Time", ["45439.3333333333", "45439.3334490741"], "holds numbers from 45439.333333333 .* has no unit"),
+        ("Time [m]", ["0", "1"], "'m' denotes metres; write min for minutes"),
         ("T", ["0", "1"], "no time column"),
         ("Zeit", ["23:59:40", "23:59:50", "05:00:00"], "05:00:00 is before 23:59:50"),
     ],
@@ -247,7 +247,9 @@ def test_infinity_of_instruments_is_missing(tmp_path: Path) -> None:
 def test_kelvins_that_are_differences_are_asked_for(tmp_path: Path) -> None:
     path = tmp_path / "kelvin.csv"
     path.write_text("time_s,T1 [K]\n0,0.5\n1,0.7\n", encoding="utf-8")
-    with pytest.raises(InputError, match=r"'T1 \[K\]': values about 0.6 K are no temperatures but differences"):
+    with pytest.raises(
+        InputError, match=r"'T1 \[K\]': values about 0.6 K cannot be temperatures: they are differences"
+    ):
         read(path)
     path.write_text("time_s,dT1 [K],T2 [K],Charge [C]\n0,1,293.15,1\n1,1,294.15,1\n", encoding="utf-8")
     assert read(path).table.columns.tolist() == ["T2_C"]

@@ -122,7 +122,7 @@ def test_a_time_of_numbers_takes_its_unit(unit: str, factor: float, tmp_path: Pa
 
 def test_a_time_of_numbers_takes_no_label(tmp_path: Path) -> None:
     body = "".join(f"{k},{20 + k / 8},{k / 4}\n" for k in range(30))
-    with pytest.raises(InputError, match=r"column 'Time' holds numbers .* says no unit"):
+    with pytest.raises(InputError, match=r"column 'Time' holds numbers .* has no unit"):
         read(write(tmp_path, f"Time,T1,Z\nUnit,degC,um\n{body}"))
 
 

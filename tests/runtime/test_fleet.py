@@ -84,10 +84,12 @@ def test_what_a_fleet_cannot_run_is_refused() -> None:
     ):
         with pytest.raises(InputError, match=why):
             Fleet(wrong, zeros)  # type: ignore[arg-type]
-    for odd in (zeros[0], zeros[:, 1:], np.full((2, CHANNELS), np.nan)):
-        with pytest.raises(InputError, match="finite numbers per machine"):
+    for odd in (zeros[0], zeros[:, 1:]):
+        with pytest.raises(InputError, match=r"zeros: expected finite values of shape \(n_machines, "):
             Fleet(good, odd)
+    with pytest.raises(InputError, match="zeros: contains NaN or infinity"):
+        Fleet(good, np.full((2, CHANNELS), np.nan))
     fleet = Fleet(good, zeros)
     for readings, dt in ((zeros, 1.0), (zeros.T, -1.0), (zeros.T, np.nan), (zeros.T, np.inf)):
-        with pytest.raises(InputError, match="want"):
+        with pytest.raises(InputError, match="expected"):
             fleet.tick(readings, dt)

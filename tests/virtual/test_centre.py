@@ -281,7 +281,7 @@ def test_unusable_steps_are_refused(centre: MachiningCentre) -> None:
     for drives, given in (([], air), ([FeedDrive()] * 2, air), ([FeedDrive()], air[:, :2])):
         with pytest.raises(InputError, match="three numbers per"):
             centre.run(state, drives, given, 1.0)
-    with pytest.raises(InputError, match="air: a number is not finite"):
+    with pytest.raises(InputError, match="air: temperatures must be finite"):
         centre.run(state, [FeedDrive()], air * np.nan, 1.0)
     for wrong in (
         {"speed": float("nan")},

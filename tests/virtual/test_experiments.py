@@ -149,7 +149,7 @@ def test_unusable_requests_are_refused() -> None:
     for noise in (-0.1, float("nan"), float("inf")):
         with pytest.raises(InputError, match="sensor noise"):
             simulate(experiment, sensor_noise=noise)
-    with pytest.raises(InputError, match="no multiple"):
+    with pytest.raises(InputError, match="not a multiple"):
         programme(segments=(SteadySegment(50.0),))
 
 

@@ -162,12 +162,12 @@ def test_the_soak_hears_nothing_of_the_test() -> None:
         ({"places": (), "probes": ()}, ("places",), "nothing is recorded"),
         ({"duration": None}, ("duration",), "missing"),
         ({"duration": -60.0}, ("duration",), "positive"),
-        ({"duration": 25.0}, ("duration",), "25 s is no multiple of the 10 s"),
-        ({"duration": Lot(one_of=(20.0, 25.0))}, ("duration",), "25 s is no multiple"),
-        ({"segments": (Stretch(), Stretch(duration=5.0))}, ("segments", 1, "duration"), "5 s is no multiple"),
+        ({"duration": 25.0}, ("duration",), "25 s is not a multiple of the 10 s"),
+        ({"duration": Lot(one_of=(20.0, 25.0))}, ("duration",), "25 s is not a multiple"),
+        ({"segments": (Stretch(), Stretch(duration=5.0))}, ("segments", 1, "duration"), "5 s is not a multiple"),
         ({"soak": Stretch(speed=100.0)}, ("soak", "duration"), "missing"),
         ({"copies": 0}, ("copies",), "from 1 to"),
-        ({"weight": 2.0}, ("weight",), "counts only"),
+        ({"weight": 2.0}, ("weight",), "applies only"),
     ],
 )
 def test_an_impossible_test_is_refused(wrong: dict[str, Any], path: tuple[str | int, ...], message: str) -> None:

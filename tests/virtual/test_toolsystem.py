@@ -187,7 +187,7 @@ def test_a_room_that_changes_is_felt_in_its_own_step(tool: RestingTool) -> None:
 
 @pytest.mark.parametrize("load", ["coolant", "surface", "t1"])
 def test_heat_without_a_place_is_refused(tool: RestingTool, load: str) -> None:
-    with pytest.raises(InputError, match=f"no heat can be put in at '{load}' but at heater, tip$"):
+    with pytest.raises(InputError, match=f"no heat can be applied at '{load}', only at heater, tip$"):
         tool.run(tool.init(AIR), [FeedDrive(loads={load: 5.0})], AIR.values[None], 1.0)
 
 

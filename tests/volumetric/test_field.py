@@ -245,7 +245,7 @@ def test_missing_channels_are_named() -> None:
         model.replay(time, {"T3": time})
     with pytest.raises(InputError, match="channel T3: 2 numbers for 3 times"):
         model.replay(time, dict.fromkeys(model.inputs, time[:2]))
-    with pytest.raises(InputError, match="times of the recording must rise"):
+    with pytest.raises(InputError, match="times of the recording must increase"):
         model.replay(time[::-1], dict.fromkeys(model.inputs, time))
     two = {"EXX": line("EXX", "um", {"T1": 1.0}), "EYY": line("EYY", "um", {"T1": 1.0})}
     odd = replace(two["EYY"], inputs=(replace(temperature("T1"), quantity="spindle_speed", unit="1/min"),))

@@ -93,7 +93,7 @@ def test_a_refused_model_is_written_with_its_refusal(
     [
         (["--component", "EXX"], "seem to be of Y, not of EXX"),
         (["--component", "EAY"], "no column is like y_laser_250_urad"),
-        (["--component", "E"], "E: it is no component's code; name a component such as EYY"),
+        (["--component", "E"], "E: it is not the code of a component; name a component such as EYY"),
         (["--component", "EYY", "--columns", "x_*"], "no column is called 'x_*'"),
         (["--component", "EYY", "--model", "gp"], "gp cannot be frozen"),
         (["--component", "EYY", "--model", "magic"], "magic"),
@@ -208,7 +208,7 @@ def test_long_formulas_and_many_cycles_are_shortened(
     [
         (["all", "--columns", "y_*"], "are for one component"),
         (["EYY", "EXY", "--layout", "long"], "are for one component"),
-        (["EYY", "EBY"], "no column is called after EBY, such as EBY_250_urad"),
+        (["EYY", "EBY"], "no column is named after EBY, such as EBY_250_urad"),
         (["all", "--jobs", "0"], "--jobs 0"),
         (["all", "--split", "0.5/0.5", "--leave-one-cycle-out"], "exclude each other"),
     ],

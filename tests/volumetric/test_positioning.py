@@ -96,7 +96,7 @@ def changed(number: int, line: str) -> list[str]:
         (
             [f"{line},1" for line in rows()],
             f"{HEADING},deviation_mm",
-            "columns 'deviation_um' and 'deviation_mm' are all a deviation: keep one, in one unit",
+            "columns 'deviation_um' and 'deviation_mm' all contain a deviation: keep one, in one unit",
         ),
         (changed(1, "100,0.003 mm,+,1"), HEADING, "line 3, column 'deviation_um': '0.003 mm' is not a number"),
         (changed(1, "100,,+,1"), HEADING, "line 3, column 'deviation_um': is missing"),

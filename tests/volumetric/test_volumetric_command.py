@@ -180,7 +180,7 @@ def test_a_page(mill: tuple[str, str], tmp_path: Path, capsys: pytest.CaptureFix
     [
         (["--at", "0", "201", "0"], "Y 201 mm: outside the travel of Y, -200 to 200 mm"),
         (["--at", "nan", "0", "0"], "X nan mm: outside the travel of X"),
-        (["--grid", "1"], "a grid of 1 points along an axis has no extent: want at least 2"),
+        (["--grid", "1"], "a grid of 1 points along an axis has no extent: expected at least 2"),
         (["--tool-length", "-1"], "--tool-length -1: must not be negative"),
         (["--time", "1"], "without a recording there is no time"),
         (["--mapping", "a.toml"], "--mapping is for a recording"),
@@ -200,7 +200,7 @@ def test_a_recording_that_does_not_fit(mill: tuple[str, str], capsys: pytest.Cap
     text = Path(recording).read_text(encoding="utf-8")
     for new, message in (
         ("t9_C", "no channel is named 't1_C'; the nearest are t9_C"),
-        ("t1_C [um]", "channel 't1_C' is a displacement; the models of Mill [7] want a temperature"),
+        ("t1_C [um]", "channel 't1_C' is a displacement; the models of Mill [7] need a temperature"),
     ):
         Path(recording).write_text(text.replace("t1_C", new, 1), encoding="utf-8")
         assert run(["volumetric", machine, "--recording", recording]) == 2

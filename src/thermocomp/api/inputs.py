@@ -257,7 +257,7 @@ def judging_of(samples: Samples, *, split: str | None = None, leave_one: LeaveOn
         "file": splits.leave_one_file_out,
     }
     if leave_one is not None and leave_one not in ways:
-        raise InputError(f"leave_one {leave_one!r}: want 'cycle', 'day' or 'file'")
+        raise InputError(f"leave_one {leave_one!r}: expected 'cycle', 'day' or 'file'")
     return ways[leave_one or "cycle"](samples)
 
 

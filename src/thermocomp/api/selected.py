@@ -80,10 +80,13 @@ class Selected(Result, Paged):
 
         mine = [c for c in self.choices if target in (None, c.target)]
         if not mine:
-            raise InputError(f"no choice for {target!r}; there are {', '.join(c.target for c in self.choices)}")
+            raise InputError(
+                f"no sensor selection for target {target!r}; available targets: "
+                f"{', '.join(c.target for c in self.choices)}"
+            )
         drawn = selections.draw(mine[0])
         if drawn is None:
-            raise InputError(f"{mine[0].method} has nothing to draw: see {mine[0].reason}")
+            raise InputError(f"{mine[0].method} has no figure: see {mine[0].reason}")
         return drawn[0].figure
 
     def __str__(self) -> str:

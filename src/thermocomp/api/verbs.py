@@ -391,7 +391,7 @@ def select(
     among the members of 3 of 4 groups).>
     """
     if method not in ("pareto", "subsets", "grouping", "partial-f", "stepwise", "ace"):
-        raise InputError(f"method {method!r}: want pareto, subsets, grouping, partial-f, stepwise or ace")
+        raise InputError(f"method {method!r}: expected pareto, subsets, grouping, partial-f, stepwise or ace")
     chosen = settings_of(Settings, settings, "select")
     chosen.check(method)
     listener = Listener(progress)

@@ -51,9 +51,9 @@ class Beginning:
         if self.gap is not None and not self.continues:
             raise InputError("--gap is the time between two files: name the earlier one with --continues")
         if self.zero is not None and self.start not in (None, "known"):
-            raise InputError(f"--zero goes with --start known, not with {self.start}")
+            raise InputError(f"--zero requires --start known, not {self.start}")
         if self.continues and self.start not in (None, "continued", "rezeroed"):
-            raise InputError(f"--continues goes with --start continued or rezeroed, not with {self.start}")
+            raise InputError(f"--continues requires --start continued or rezeroed, not {self.start}")
         if self.continues and len(tests) != 1:
             raise InputError(f"--continues: {len(tests)} recordings are given; name the one that continues")
         word = self.start or ("continued" if self.continues else "known" if self.zero is not None else None)

@@ -116,7 +116,7 @@ def _ask(question: "Question") -> Remedy | None:
             said = input().strip()
         except EOFError as e:
             way = "--yes takes the best guess" if question.may_guess else "write it into a mapping"
-            raise InputError(f"there is no answer to come on the input; {way}") from e
+            raise InputError(f"standard input ended before an answer was given; {way}") from e
         said = {"": best, "y": "1", "yes": "1", "n": "0", "no": "0"}.get(said.lower(), said)
         if said.isdigit() and int(said) <= len(question.options):
             return question.options[int(said) - 1] if int(said) else None
@@ -128,4 +128,4 @@ def _ask(question: "Question") -> Remedy | None:
                 return {"columns": {own: {**place, **keys}}}
         except (tomllib.TOMLDecodeError, InputError) as e:
             _stderr.print(f"  {words(e)}", soft_wrap=True)
-        _stderr.print(f"  want a number from 0 to {len(question.options)}{' or keys' if own else ''}")
+        _stderr.print(f"  expected a number from 0 to {len(question.options)}{' or keys' if own else ''}")

@@ -14,7 +14,8 @@ def files_of(program: Path) -> list[Path]:
     """Return the program and the files written next to it."""
     if program.suffix.lower() in ("", ".csv", ".png"):
         raise InputError(
-            f"{program}: name the NC program, such as test.ngc; sheet and figure beside it end in .csv and .png"
+            f"{program}: name the NC program, such as test.ngc; the sheet and the figure next to it end in .csv and "
+            ".png"
         )
     return [program, sheet_of(program), picture_of(program)]
 

@@ -53,7 +53,7 @@ def _read_all(paths: list[Path], read: "Callable[[list[Path]], list[Recording]]"
     from thermocomp.recordings.readers.streams import spooled
 
     if paths.count(STDIN) > 1:
-        raise InputError("-: there is one standard input")
+        raise InputError("-: standard input can be read only once")
     with spooled(sys.stdin.buffer, "standard input") as typed:
         return read([typed if p == STDIN else p for p in paths])
 

@@ -45,11 +45,13 @@ class Curve:
         check_finite(f"{self.kind} curve", x=self.x, y=self.y)
         if len(self.y) != len(self.x) + (self.kind == "step") or not self.y:
             more = ", one y more than x" if self.kind == "step" else ", equally many"
-            raise SettingError(f"{self.kind} curve of {len(self.x)} x and {len(self.y)} y: want at least one y{more}")
+            raise SettingError(
+                f"{self.kind} curve of {len(self.x)} x and {len(self.y)} y: expected at least one y{more}"
+            )
         if any(not a < b for a, b in pairwise(self.x)):
-            raise SettingError(f"{self.kind} curve: x must rise strictly")
+            raise SettingError(f"{self.kind} curve: x must increase strictly")
         if not np.isfinite(self._pieces[2]).all():
-            raise SettingError(f"{self.kind} curve: two x are so close that the slope between them is not a number")
+            raise SettingError(f"{self.kind} curve: two x are so close that the slope between them is not finite")
 
     @cached_property
     def _pieces(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:

@@ -33,7 +33,9 @@ def alone(path: Path) -> Iterator[None]:
 
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as e:
-            raise InputError(f"{path}: another thermocomp uses it now; end that one, or name another file") from e
+            raise InputError(
+                f"{path}: another thermocomp process is using it; stop that process, or name another file"
+            ) from e
         except (ImportError, OSError):  # the system, or the disk, knows no locks
             pass
         yield

@@ -110,7 +110,7 @@ class Ticking(ErrorModel):
         given = zero if inputs is None else np.asarray(inputs, dtype=np.float64)
         known = np.asarray(deviation, dtype=np.float64)
         if zero.shape != (len(self.inputs),) or given.shape[-1:] != zero.shape:
-            raise InputError(f"start of the model of {self.target}: want {len(self.inputs)} inputs and references")
+            raise InputError(f"start of the model of {self.target}: expected {len(self.inputs)} inputs and references")
         if not (np.isfinite(zero).all() and np.isfinite(given).all() and np.isfinite(known).all()):
             raise InputError(f"start of the model of {self.target}: deviation, inputs or reference not finite")
         low, high = self._bounds
@@ -224,17 +224,18 @@ class Autoregressive(Ticking):
         self._check_interval()
         if len(self.b) != len(self.inputs) or not self.b or len({len(b) for b in self.b}) != 1 or not self.b[0]:
             raise SettingError(
-                f"{owner}: want b_0 .. b_m, equally many, for each of {len(self.inputs)} inputs: at least one"
+                f"{owner}: expected b_0 .. b_m, the same number for each of {len(self.inputs)} inputs: at least one"
             )
         check_count(owner, ORDER, past_deviations=self.a, past_inputs=self.b[0][1:])
         check_finite(owner, a=self.a, b=self.b, intercept=self.intercept)
         largest = find_largest_root(self.a)
         if not largest < 1:
             raise SettingError(
-                f"{owner}: its free run does not decay: the largest root of its polynomial is {largest:.6g}, want < 1"
+                f"{owner}: its free run does not decay: the largest root of its polynomial is {largest:.6g}, "
+                "expected < 1"
             )
         if not 1.0 - sum(self.a) > SETTLES:
-            raise SettingError(f"{owner}: its free run settles nowhere: its coefficients a add up to 1")
+            raise SettingError(f"{owner}: its free run has no steady state: its coefficients a add up to 1")
 
     @property
     def orders(self) -> tuple[int, int]:
@@ -310,11 +311,11 @@ class AutoregressiveNet(Ticking):
         n_inputs, _, n_outputs = self.net.shape
         if not self.inputs or not n_inputs == wanted == len(self.input_scaling.gain):
             raise SettingError(
-                f"{owner}: k = {self.k}, m = {self.m} and {len(self.inputs)} inputs want a net of {wanted} inputs; "
+                f"{owner}: k = {self.k}, m = {self.m} and {len(self.inputs)} inputs need a net of {wanted} inputs; "
                 f"found {n_inputs}, and scaling of {len(self.input_scaling.gain)}"
             )
         if n_outputs != 1 or len(self.output_scaling.gain) != 1:
-            raise SettingError(f"{owner}: want one output, found {n_outputs}")
+            raise SettingError(f"{owner}: expected one output, found {n_outputs}")
         if self.net.output == "identity":
             raise SettingError(f"{owner}: an identity output has no bounds: its free run could run away")
 

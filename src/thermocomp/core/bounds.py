@@ -213,4 +213,4 @@ def check_name(what: str, name: str, most: int = NAME) -> None:
     for c in name:
         kind = unicodedata.category(c)
         if kind[0] == "C" or kind in ("Zl", "Zp"):
-            raise SettingError(f"{what}: {name[:40]!a} is not a name: it holds the character {c!a}")
+            raise SettingError(f"{what}: {name[:40]!a} is not a name: it contains the character {c!a}")

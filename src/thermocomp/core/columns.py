@@ -83,5 +83,5 @@ def read_clock(table: Columns, time: ArrayLike | str | None, owner: str, *, need
         named = f"the time in column {time!r}" if isinstance(time, str) else "the time"
         raise InputError(f"{owner}: {named} must be numbers [s] or datetimes: {e}") from e
     if not np.isfinite(clock).all():
-        raise InputError(f"{owner}: the time must be finite numbers")
+        raise InputError(f"{owner}: the time must be finite; remove NaN and infinity")
     return clock

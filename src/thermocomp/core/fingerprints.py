@@ -30,7 +30,9 @@ def unpack_marks(text: str) -> Marks:
     except (binascii.Error, UnicodeEncodeError) as e:
         raise SettingError(f"fingerprints {text[:12]!r}...: not base64 text: {e}") from e
     if len(content) % 4:
-        raise SettingError(f"fingerprints {text[:12]!r}...: {len(content)} bytes are no whole number of 32-bit numbers")
+        raise SettingError(
+            f"fingerprints {text[:12]!r}...: {len(content)} bytes are not a whole number of 32-bit numbers"
+        )
     return np.frombuffer(content, dtype="<u4").astype(np.uint32)
 
 
@@ -58,10 +60,10 @@ class Runs:
         if self.stride < 1:
             raise SettingError(f"fingerprints: a stride of {self.stride} rows must be 1 or more")
         if not self.marks:
-            raise SettingError("fingerprints: want those of a target at least")
+            raise SettingError("fingerprints: expected those of at least one target")
         rows = unpack_marks(self.rows)
         if not (np.diff(rows.astype(np.int64)) > 0).all():
-            raise SettingError("fingerprints: their rows do not rise")
+            raise SettingError("fingerprints: their rows do not increase")
         for name, text in (("moving", self.moving), *self.marks.items()):
             if (n := len(unpack_marks(text))) != len(rows):
                 raise SettingError(f"fingerprints: {n} of {name} for {len(rows)} rows")
@@ -93,12 +95,12 @@ class Prints:
             raise SettingError(f"fingerprints: an interval of {self.interval} s between rows must be a positive number")
         ends = [row for stretch in self.learned for row in stretch]
         if not ends or ends != sorted(ends) or ends[0] < 0 or any(a == b for a, b in self.learned):
-            raise SettingError(f"fingerprints: {self.learned} are no stretches of rows one after the other")
+            raise SettingError(f"fingerprints: {self.learned} are not consecutive stretches of rows")
         for name, step in self.steps.items():
             if not 0 < step < np.inf:
                 raise SettingError(f"fingerprints of {name}: a resolution of {step} must be a positive number")
         for run in self.runs:
             if list(run.marks) != list(self.steps):
-                raise SettingError(f"fingerprints of {', '.join(run.marks)}: want those of {', '.join(self.steps)}")
+                raise SettingError(f"fingerprints of {', '.join(run.marks)}: expected those of {', '.join(self.steps)}")
             if (rows := unpack_marks(run.rows)).size and rows[-1] >= ends[-1]:
                 raise SettingError(f"fingerprints: of row {rows[-1]}, where {ends[-1]} rows were recorded")

@@ -59,9 +59,9 @@ class JointSupport:
         positive = {"scale": self.scale, "tolerances": self.tolerances, "limit": self.limit}
         check_between("joint support", LEAST, COEFFICIENT, **positive)
         if len(self.scale) != len(self.columns) or any(len(p) != len(self.columns) for p in self.points):
-            raise SettingError("joint support: a scale and a number in each point for every column is wanted")
+            raise SettingError("joint support: expected a scale, and a number in each point, for every column")
         if not len(self.speeds) == len(self.levels) == len(self.tolerances) or not all(self.levels):
-            raise SettingError("joint support: levels and a tolerance for every speed are wanted")
+            raise SettingError("joint support: expected levels and a tolerance for every speed")
         if self.columns and not self.points:
             raise SettingError("joint support: no point")
         if min([*self.columns, *self.speeds], default=0) < 0:

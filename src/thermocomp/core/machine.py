@@ -68,7 +68,7 @@ class Axis:
         if self.name not in ("X", "Y", "Z"):
             raise SettingError(f"axis name {self.name!r}: expected X, Y or Z")
         if not low < high:
-            raise SettingError(f"goes from {low:g} to {high:g} mm: must rise", ("travel",))
+            raise SettingError(f"lower limit {low:g} mm must be less than upper limit {high:g} mm", ("travel",))
         for key in ("travel", "measured_at", "measured_tool"):
             numbers = getattr(self, key)
             if not all(math.isfinite(v) for v in numbers):
@@ -164,7 +164,7 @@ class Machine:
         for name in self.structure.axes:
             if there.count(name) != 1:
                 raise SettingError(
-                    f"axis {name} of the structure {self.structure.code!r} is there {there.count(name)} times",
+                    f"axis {name} of the structure {self.structure.code!r} occurs {there.count(name)} times",
                     ("axes", name),
                 )
         for code, source in self.components.items():
@@ -201,7 +201,7 @@ class Machine:
             if component.is_scalar:
                 raise SettingError(f"{component.description} does not depend on a position; its model does")
             if source.axis != component.depends_on:
-                raise SettingError(f"{component.description}: the model is one along {source.axis}")
+                raise SettingError(f"{component.description}: the model is along {source.axis}")
             self._check_ranges(component, source)
 
     def _check_ranges(self, component: ErrorComponent, source: PositionModel) -> None:
@@ -211,7 +211,8 @@ class Machine:
         for what, name, (low, high) in source.ranges():
             if name not in self.structure.axes:
                 raise SettingError(
-                    f"{component.description}: its {what} depends on {name}: the machine has no axis {name}"
+                    f"{component.description}: its {what} depends on axis {name}, which this machine does not have; "
+                    f"use a model for the axes of this machine, or add axis {name} to the machine file"
                 )
             first, last = self.axis(name).travel
             if high < first or low > last:

@@ -108,14 +108,14 @@ class ErrorModel(ABC):
         check_name("target", self.target)
         owner, names = f"model of {self.target}", [i.name for i in self.inputs]
         if not _UNIT.fullmatch(self.unit):
-            raise SettingError(f"{owner}: unit {self.unit!r}: want um, urad or, along an axis, um/m", ("unit",))
+            raise SettingError(f"{owner}: unit {self.unit!r}: expected um, urad or, along an axis, um/m", ("unit",))
         check_count(owner, INPUTS, inputs=self.inputs)
         if len(set(names)) != len(names):
             raise SettingError(f"{owner}: an input is named twice in {names}")
         if self.joint is not None and self.joint.n_inputs > len(names):
-            raise SettingError(f"{owner}: its joint support is of more inputs than its {len(names)}")
+            raise SettingError(f"{owner}: its joint support has more inputs than the model, which has {len(names)}")
         if self.band is not None and max(self.band.speeds, default=-1) >= len(names):
-            raise SettingError(f"{owner}: its band is of more inputs than its {len(names)}")
+            raise SettingError(f"{owner}: its band has more inputs than the model, which has {len(names)}")
         self._check()
 
     # -- what a family fills in --------------------------------------------------------------------------------------
@@ -187,7 +187,7 @@ class ErrorModel(ABC):
         else:
             zero = np.asarray(reference, dtype=np.float64)
             if zero.shape != (len(self.inputs),) or not np.isfinite(zero).all():
-                raise InputError(f"reference of the model of {self.target}: want {len(self.inputs)} finite numbers")
+                raise InputError(f"reference of the model of {self.target}: expected {len(self.inputs)} finite numbers")
         return State(zero, None, np.zeros(()), np.zeros(len(self.inputs), dtype=np.bool_))
 
     def step(self, state: State, inputs: FloatArray, dt: float) -> tuple[State, FloatArray]:
@@ -480,7 +480,9 @@ class ErrorModel(ABC):
             return self
         name, _, reason = by.partition(",")
         if not (name.strip() and reason.strip()):
-            raise InputError(f"{by!r} takes an unproven model: want a name and a reason, such as 'M. Weber, trial'")
+            raise InputError(
+                f"{by!r} accepts an unproven model: expected a name and a reason, such as 'M. Weber, trial'"
+            )
         found = self.honest_error
         if found is None or found.word != "unproven":
             return self
@@ -508,8 +510,8 @@ class ErrorModel(ABC):
             raise InputError(f"model of {self.target} is unproven and runs in shadow only: {found.why}; fit it again")
         if not found.taken:
             raise InputError(
-                f"model of {self.target} is unproven and runs in shadow only: {found.why}. To take it anyway: "
-                '--accept-unproven "NAME, REASON", in Python taken("NAME, REASON") of the model'
+                f"model of {self.target} is unproven and runs in shadow only: {found.why}. To approve its use "
+                'nevertheless: --accept-unproven "NAME, REASON", or model.taken("NAME, REASON") in Python'
             )
 
 

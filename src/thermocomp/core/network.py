@@ -98,9 +98,9 @@ class Perceptron:
                 f"thresholds of {n_hidden} and {n_outputs}; both layers need at least one node"
             )
         if any(len(w) != n_inputs for w in self.hidden_weights):
-            raise SettingError(f"net: every hidden node wants {n_inputs} weights, one per input")
+            raise SettingError(f"net: every hidden node needs {n_inputs} weights, one per input")
         if len(self.output_weights) != n_outputs or any(len(w) != n_hidden for w in self.output_weights):
-            raise SettingError(f"net: every one of {n_outputs} outputs wants {n_hidden} weights, one per hidden node")
+            raise SettingError(f"net: every one of {n_outputs} outputs needs {n_hidden} weights, one per hidden node")
         for layer in (self.hidden, self.output):
             if layer not in _FUNCTIONS:
                 raise SettingError(f"net: unknown activation function {layer!r}; known are {', '.join(_FUNCTIONS)}")
@@ -243,8 +243,8 @@ class Network(ErrorModel):
             )
         if n_outputs != 1 or len(self.output_scaling.gain) != 1:
             raise SettingError(
-                f"{owner}: a net of {n_outputs} outputs with scaling of {len(self.output_scaling.gain)}: want 1; make "
-                "one model of each output"
+                f"{owner}: a net of {n_outputs} outputs with scaling of {len(self.output_scaling.gain)}: expected 1; "
+                "make one model for each output"
             )
         check_finite(owner, intercept=self.intercept)
 

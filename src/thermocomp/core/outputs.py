@@ -68,9 +68,9 @@ def find_place(target: Path) -> Path:
         raise InputError(f"{target}: is a folder; name a file")
     if place.exists():
         if not place.is_file():
-            raise InputError(f"{target}: is a pipe or a device and no file; choose another name")
+            raise InputError(f"{target}: is a pipe or a device, not a file; choose another name")
         if not os.access(place, os.W_OK):
-            raise InputError(f"{target}: is read-only; choose another name, or let it be written")
+            raise InputError(f"{target}: is read-only; choose another name, or make it writable")
     return place
 
 

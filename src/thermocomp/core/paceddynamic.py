@@ -110,7 +110,7 @@ class PacedDynamic(ErrorModel):
         owner, temperatures, states = f"model of {self.target}", self.temperatures, self.states
         wrong = [t.input for t in temperatures if len(t.lagged) != len(self.time_constants)]
         if wrong:
-            raise SettingError(f"{owner}: input {wrong[0]}: want {len(self.time_constants)} lagged, one per lag")
+            raise SettingError(f"{owner}: input {wrong[0]}: expected {len(self.time_constants)} lagged, one per lag")
         if any(not 0 <= k < len(self.inputs) for k in [t.input for t in temperatures] + [s.input for s in states]):
             raise SettingError(f"{owner}: a temperature or a speed state is beyond the {len(self.inputs)} inputs")
         slower = [s for s in states if s.running > s.stopped]
@@ -122,7 +122,7 @@ class PacedDynamic(ErrorModel):
         check_count(owner, ENTRIES, lags=range(len(temperatures) * len(self.time_constants)), states=states)
         parts = len(temperatures) * (1 + len(self.time_constants)) + len(states)
         if any(len(row) != parts for row in self.spread):
-            raise SettingError(f"{owner}: want {parts} numbers in each row of its spread, one per part")
+            raise SettingError(f"{owner}: expected {parts} numbers in each row of its spread, one per part")
         check_count(owner, ENTRIES, spread=[w for row in self.spread for w in row])
         check_between(owner, LEAST, RANGE, top_speed=self.top_speed)
         check_between(

@@ -63,7 +63,7 @@ class PositionModel:
             raise SettingError(f"{owner}: axis {self.axis!r}: expected X, Y or Z")
         check_finite(owner, POSITION, travel=self.travel, reference_position=self.reference_position)
         if not self.travel[0] < self.travel[1]:
-            raise SettingError(f"{owner}: travel {self.travel} mm must rise")
+            raise SettingError(f"{owner}: travel {self.travel} mm must increase")
         check_count(owner, DEGREE, slopes=self.slopes)
         for power, model in self._by_power:
             wanted = slope_unit(self.unit, power)

@@ -58,7 +58,7 @@ class PolynomialProfile:
         if len(self.exponents) != len(self.coefficients):
             raise SettingError(f"profile: {len(self.exponents)} terms but {len(self.coefficients)} coefficients")
         if any(len(term) != 3 or not 0 <= min(term) <= max(term) <= EXPONENT for term in self.exponents):
-            raise SettingError(f"profile: a term wants three exponents from 0 to {EXPONENT}")
+            raise SettingError(f"profile: a term needs three exponents from 0 to {EXPONENT}")
         check_count("profile", NODES, terms=self.exponents)
         check_between("profile", LEAST, POSITION, scale=self.scale)
         check_finite("profile", coefficients=self.coefficients)
@@ -66,7 +66,7 @@ class PolynomialProfile:
         _check_range(self.low, self.high)
         corner = np.abs([self.low, self.high] - np.array(self.centre)).max(axis=0) / self.scale
         if any(np.dot(term, np.log10(np.maximum(corner, 1.0))) > POWER_OF_TEN for term in self.exponents):
-            raise SettingError("profile: a term is beyond all numbers at the border: check centre and scale")
+            raise SettingError("profile: a term overflows at the border: check centre and scale")
 
     @cached_property
     def _axes(self) -> tuple[int, ...]:
@@ -154,7 +154,7 @@ class SplineProfile:
         if len(self.knots) != len(self.pieces) + 1 or len(self.pieces) < 1:
             raise SettingError(f"profile: {len(self.knots)} knots for {len(self.pieces)} pieces")
         if any(not b > a for a, b in zip(self.knots, self.knots[1:], strict=False)):
-            raise SettingError("profile: knots must rise")
+            raise SettingError("profile: knots must increase")
         check_finite("profile", POSITION, knots=self.knots)
         check_finite("profile", pieces=self.pieces)
 

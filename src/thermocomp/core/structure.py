@@ -44,7 +44,7 @@ class Structure:
                     f"axis {name}: only the linear axes X, Y and Z and the rotary axes A, B and C can be in a structure"
                 )
             if self.axes.count(name) > 1:
-                raise SettingError(f"axis {name} is there twice")
+                raise SettingError(f"axis {name} occurs twice")
         if not self.axes:
             raise SettingError("has no axis")
 
@@ -78,7 +78,7 @@ class Structure:
         found = _LONG.fullmatch(text)
         if not found:
             raise SettingError(
-                f"{code!r} is no structure code; write it from the workpiece over the bed to the tool, such as "
+                f"{code!r} is not a structure code; write it from the workpiece over the bed to the tool, such as "
                 '"w X\' b Z Y (C1) t", or short, such as "XFZY"'
             )
         return _made(_axes(found["workpiece"], code, primed=True), _axes(found["tool"], code, primed=False))
@@ -112,7 +112,7 @@ def _made(workpiece: Sequence[str], tool: Sequence[str]) -> Structure:
     rotary = dict(turning)
     if len(rotary) < len(turning):
         twice = next(a for a in rotary if [b for b, _ in turning].count(a) > 1)
-        raise SettingError(f"axis {twice} is there twice")
+        raise SettingError(f"axis {twice} occurs twice")
     first, second = (tuple(a for a in side if a not in _ROTARY) for side in (workpiece, tool))
     return Structure(first, second, rotary)
 
@@ -125,10 +125,10 @@ def _axes(text: str, code: str, *, primed: bool) -> tuple[str, ...]:
             raise SettingError(f"{word} in {code!r}: a spindle on the workpiece's side is not supported")
         match = _AXIS.fullmatch(word)
         if not match:
-            raise SettingError(f"{word!r} in {code!r} is not an axis: want X, Y, Z, A, B or C")
+            raise SettingError(f"{word!r} in {code!r} is not an axis: expected X, Y, Z, A, B or C")
         if primed and not match[2]:
-            raise SettingError(f"{word!r} in {code!r} stands on the {side}'s side and needs a prime: {word}'")
+            raise SettingError(f"{word!r} in {code!r} is on the {side}'s side and needs a prime: {word}'")
         if match[2] and not primed:
-            raise SettingError(f"{word!r} in {code!r} stands on the {side}'s side and has no prime: {match[1]}")
+            raise SettingError(f"{word!r} in {code!r} is on the {side}'s side and must have no prime: {match[1]}")
         found.append(match[1])
     return tuple(found)

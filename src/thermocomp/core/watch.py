@@ -107,12 +107,12 @@ class Watch:
             raise SettingError(f"watch: an input is named twice in {names}")
         heat = [k for k, i in enumerate(self.inputs) if i.quantity == "temperature"]
         if [s.input for s in self.sensors] != heat:
-            raise SettingError("watch: want one sensor per temperature, in the order of the inputs")
+            raise SettingError("watch: expected one sensor per temperature, in the order of the inputs")
         if any(not 0 <= s[0] < len(names) or self.inputs[s[0]].quantity != "spindle_speed" for s in self.states):
-            raise SettingError("watch: a speed state is of no spindle speed")
+            raise SettingError("watch: a speed state does not follow a spindle speed")
         parts = len(heat) * (1 + len(self.time_constants)) + len(self.states)
         if any(len(s.weights) != parts for s in self.sensors):
-            raise SettingError(f"watch: want {parts} weights per sensor, one per part")
+            raise SettingError(f"watch: expected {parts} weights per sensor, one per part")
         lagged = len(heat) * (1 + len(self.time_constants))
         if any(any(s.weights[k : lagged : len(heat)]) for k, s in enumerate(self.sensors)):
             raise SettingError("watch: a temperature is predicted by itself")

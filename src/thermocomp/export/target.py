@@ -57,5 +57,5 @@ def find_target(name: str) -> Target:
         raise InputError(f"--to {name!r}: no such target{hint} Known are {', '.join(known)}")
     found = load_plugin(known[name])
     if not isinstance(found, Target):
-        raise InputError(f"--to {name}: {known[name].value} is no thermocomp.export.target.Target")
+        raise InputError(f"--to {name}: {known[name].value} is not a thermocomp.export.target.Target")
     return found

@@ -224,25 +224,25 @@ def _export_whole(order: ExportOrder, models: Models, dialect: Dialect | None) -
 def _check(to: str, target: Target, name: str, date: str | None, limits: Limits) -> None:
     """Reject settings that yield no file, or a file that no controller supports."""
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
-        raise InputError(f"--name {name!r}: want letters, digits and _, a letter first, such as mill_3")
+        raise InputError(f"--name {name!r}: expected letters, digits and _, a letter first, such as mill_3")
     most = {"magnitude": target.magnitude, "rate": RANGE, "hold": GAP, "fade": GAP, "reading_age": GAP}
     for option, end in most.items():
         value, named = getattr(limits, option), f"--{option.replace('_', '-')}"
         if not math.isfinite(value):
-            raise InputError(f"{named} {value}: {to} wants a finite number")
+            raise InputError(f"{named} {value}: {to} needs a finite number")
         if not LEAST <= value <= end:
-            raise InputError(f"{named} {value:g}: {to} takes {LEAST:g} to {end:g}: give a number between them")
+            raise InputError(f"{named} {value:g}: {to} accepts {LEAST:g} to {end:g}: give a number in this range")
     if date is not None:
         try:
             datetime.strptime(date, "%Y-%m-%d").astimezone()
         except ValueError as e:
-            raise InputError(f"--date {date}: want a date such as 2026-01-31") from e
+            raise InputError(f"--date {date}: expected a date such as 2026-01-31") from e
 
 
 def _check_options(to: str, target: Target, found: ReductionOptions, dialect: Dialect | None) -> None:
     """Reject options that a target ignores."""
     if dialect is not None and dialect not in target.dialects:
-        raise InputError(f"--dialect {dialect}: {to} does not take it; --to st does")
+        raise InputError(f"--dialect {dialect}: {to} does not support it; --to st does")
     if target.shape is not None:
         return
     plain = ReductionOptions(axes=found.axes if target.axes else None)
@@ -267,7 +267,7 @@ def _writer(
 def _constant(models: Models, to: str) -> list[ErrorModel]:
     """Return models with the same output at every position."""
     if along := [m.target for m in models if isinstance(m, PositionModel)]:
-        raise InputError(f"{to} supports position-independent corrections only, unlike {along[0]} does")
+        raise InputError(f"{to} supports position-independent corrections only, but {along[0]} depends on position")
     return [m for m in models if isinstance(m, ErrorModel)]
 
 

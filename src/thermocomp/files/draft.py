@@ -65,7 +65,7 @@ class Drafts(dict[Path, Path]):
                     move.replace() if self._overwrite else move.add()
                 except FileExistsError as e:
                     raise InputError(
-                        f"{target}: has come into being meanwhile; nothing was written: use --overwrite"
+                        f"{target}: was created in the meantime; nothing was written: use --overwrite"
                     ) from e
             for folder in dict.fromkeys(move.place.parent for move in moves):
                 _flush_folder(folder)
@@ -168,7 +168,7 @@ def drafts(targets: Sequence[Path], *, overwrite: bool) -> Iterator[Drafts]:
             if not overwrite and _status(place) is not None:
                 raise InputError(f"{target}: exists already; {OTHERWISE}")
         if len(set(places.values())) < len(places):
-            raise InputError(f"{', '.join(map(str, targets))}: two of them are one file; choose other names")
+            raise InputError(f"{', '.join(map(str, targets))}: two of these are the same file; choose other names")
         with _telling(places):
             for place in places.values():
                 if place.parent not in folders:

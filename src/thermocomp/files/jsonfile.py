@@ -76,7 +76,7 @@ def pack(kind: Format, body: list[Any], shared: dict[str, Any] | None = None) ->
     content = {"format": kind.name, "version": kind.version, "sha256": digest(body, shared), "models": body, **shared}
     text = _lay_out(content) + "\n"
     if len(text) > MOST:
-        raise InputError(f"{kind.words}: {len(text):,} characters, more than the {MOST:,} that can be read again")
+        raise InputError(f"{kind.words}: {len(text):,} characters, more than the limit of {MOST:,} for reading it back")
     return text
 
 
@@ -117,7 +117,7 @@ def unpack(kind: Format, entry: Any, text: str, source: str, **shared: Any) -> A
     _check_kind(kind, content, source)
     body = content.get("models")
     if not isinstance(body, list) or not body:
-        raise ModelFileError(f"{source}: holds no model")
+        raise ModelFileError(f"{source}: contains no model")
     try:
         found_digest = digest(body, {k: content[k] for k in kind.shared if k in content})
     except (ValueError, RecursionError) as e:  # 1e999, half a character, a hundred brackets

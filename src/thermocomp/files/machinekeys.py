@@ -87,7 +87,7 @@ def measure(quantity: str) -> Convert:
                 f'{shown}: write a{"n" * (what[0] in "a")} {what} with its unit, such as "{example}"', where
             )
         if abs(number) > RANGE:
-            raise SettingError(f'"{value}": more than any machine has', where)
+            raise SettingError(f'"{value}": larger than on any machine; check the unit', where)
         return number
 
     return convert

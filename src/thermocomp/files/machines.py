@@ -130,7 +130,7 @@ def _machine(content: dict[str, Any], source: Path) -> Machine:
 def _axis(name: str, tables: Mapping[str, Any], structure: Structure) -> Axis:
     where: Keys = ("axes", name)
     if name in structure.rotary:
-        raise SettingError(f"{name} is a rotary axis: it has no table, the structure tells all", where)
+        raise SettingError(f"{name} is a rotary axis, which the structure defines completely: remove its table", where)
     if name not in structure.axes:
         raise SettingError(f"there is no axis {name!r} in the structure {structure.code!r}", where)
     if name not in tables:
@@ -141,7 +141,7 @@ def _axis(name: str, tables: Mapping[str, Any], structure: Structure) -> Axis:
         )
     table = tables[name]
     if "travel" not in table:
-        raise SettingError('is missing: write from where to where it goes, such as ["0 mm", "600 mm"]', where + TRAVEL)
+        raise SettingError('is missing: write its lower and upper limit, such as ["0 mm", "600 mm"]', where + TRAVEL)
     try:
         return Axis(name, **table)
     except SettingError as e:
@@ -220,14 +220,14 @@ class _Sources:
         for row in rows:
             if not isinstance(row, list) or len(row) != 2:
                 raise SettingError(
-                    f'{row!r}: want position and error, such as ["300 mm", "1.5 {component.unit}"]', where
+                    f'{row!r}: expected position and error, such as ["300 mm", "1.5 {component.unit}"]', where
                 )
             points.append((length(row[0], where), error(row[1], where)))
         if len(points) < 2:
-            raise SettingError(f"has {len(points)} points: want at least two", where)
+            raise SettingError(f"has {len(points)} points: expected at least two", where)
         for (before, _), (p, _) in pairwise(points):
             if not p > before:
-                raise SettingError(f"{p:g} mm stands behind {before:g} mm: positions must rise", where)
+                raise SettingError(f"{p:g} mm follows {before:g} mm: positions must increase", where)
         pieces = tuple((a, b - a, 0.0, 0.0) for (_, a), (_, b) in pairwise(points))
         if axis is None:
             return 0.0  # what is wrong with the axis is told
@@ -253,7 +253,7 @@ class _Sources:
             raise explain_unknown(f"model in {path} of", target, models, (*where, "target"))
         wanted = target or (component.code if component.code in models else None)
         if wanted is None and len(models) > 1:
-            raise SettingError(f"{path} holds models of {', '.join(models)}: state which by target", where)
+            raise SettingError(f"{path} holds models of {', '.join(models)}: select one with target", where)
         model = models[wanted] if wanted is not None else next(iter(models.values()))
         if target is None and model.target in BY_CODE and model.target != component.code:
             raise SettingError(f"{path} holds a model of {model.target}, not of {component.code}", here)

@@ -41,9 +41,7 @@ def dumps(models: Sequence[ErrorModel]) -> str:
     _check_judged(models, "model file")
     watch = next((m.watch for m in models if m.watch is not None), None)
     if any(m.watch != watch for m in models):
-        raise ModelFileError(
-            "model file: its models are watched over in different ways; write them to files of their own"
-        )
+        raise ModelFileError("model file: its models have different watches; write them to separate files")
     shared = None if watch is None else {"watch": asdict(watch)}
     return jsonfile.pack(jsonfile.MODELS, [entry_of(m) for m in models], shared)
 
@@ -64,7 +62,7 @@ def loads(text: str, source: str = "model") -> tuple[ErrorModel, ...]:
     """
     found = jsonfile.unpack(jsonfile.MODELS, Entry, text, source, watch=Watch)
     if any(m.watch is not None for m in found.models):
-        raise ModelFileError(f"{source}: a watch stands in a model: it stands once in the file, beside its models")
+        raise ModelFileError(f"{source}: a watch is inside a model: it must be once in the file, next to the models")
     models = tuple(replace(m, watch=found.watch) for m in found.models) if found.watch else tuple(found.models)
     _check_judged(models, source)
     return models
@@ -102,7 +100,7 @@ def entry_of(model: ErrorModel) -> dict[str, Any]:
     """
     if model.family not in FAMILIES:
         raise ModelFileError(
-            f"model of {model.target}: the family {model.family!r} cannot be written, it is not plain numbers; "
+            f"model of {model.target}: the family {model.family!r} cannot be written, as it is not plain numbers; "
             f"a file may hold {', '.join(FAMILIES)}"
         )
     entry = asdict(replace(model, watch=None))
@@ -117,13 +115,13 @@ def _check_judged(models: Sequence[ErrorModel], source: str) -> None:
         if found is None:
             continue
         if found.verdict == "accepted" and found.current and not (found.units and found.cycles):
-            raise ModelFileError(f"{source}: model {k}: honest_error: accepted, but judged on nothing: it was altered")
+            raise ModelFileError(f"{source}: model {k}: honest_error: accepted, but never judged: the file was altered")
         if found.taken and not all(part.strip() for part in (*found.taken.split(",", 1), "")[:2]):
             raise ModelFileError(
-                f"{source}: model {k}: honest_error: taken by {found.taken[:60]!a}: want a name and a reason"
+                f"{source}: model {k}: honest_error: taken by {found.taken[:60]!a}: expected a name and a reason"
             )
         if found.verdict == "accepted" and found.rms > found.none_rms:
             raise ModelFileError(
                 f"{source}: model {k}: honest_error: accepted with an RMS of {found.rms:g} {model.unit}, above the "
-                f"{found.none_rms:g} {model.unit} without compensation: it was altered"
+                f"{found.none_rms:g} {model.unit} without compensation: the file was altered"
             )

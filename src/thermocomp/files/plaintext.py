@@ -53,7 +53,7 @@ def read_text(path: str | Path, what: str, most: int, failure: type[InputError] 
     except OSError as e:
         raise failure(f"{source}: cannot be read as a {what}: {e}") from e
     except ValueError as e:  # a null character
-        raise failure(f"{str(source)!a}: is not a name of a {what}: {e}") from e
+        raise failure(f"{str(source)!a}: is not the name of a {what}: {e}") from e
 
 
 def list_errors(source: str | Path, errors: Sequence[str]) -> str:

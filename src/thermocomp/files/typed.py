@@ -73,7 +73,7 @@ def want(right: bool, value: Any, place: str, what: str) -> None:
         Location, and expected value.
     """
     if not right:
-        raise ValueError(f"{place}: want {what}" + ("" if value is None else f", found {value!r:.40}"))
+        raise ValueError(f"{place}: expected {what}" + ("" if value is None else f", found {value!r:.40}"))
 
 
 def _several(origin: Any, parts: tuple[Any, ...], value: Any, place: str) -> Any:

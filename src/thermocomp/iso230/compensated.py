@@ -89,6 +89,7 @@ def replay_models(
             notes.append(f"the model of {target}: {share} are outside the range it was trained in")
     if models and not found:
         raise InputError(
-            f"{recording.name}: the models are of {', '.join(m.target for m in models)}, none of them a channel here"
+            f"{recording.name}: the models are of {', '.join(m.target for m in models)}, and no such channel is "
+            "recorded here"
         )
     return found, notes

@@ -25,12 +25,12 @@ from thermocomp.volumetric.positioning import Positioning
 
 FloatArray = NDArray[np.float64]
 
-#: what ISO 230-2 wants of an axis up to 2 m: targets per axis, targets per metre, runs in each direction
+#: what ISO 230-2 requires of an axis up to 2 m: targets per axis, targets per metre, runs in each direction
 TARGETS, TARGETS_PER_METRE, RUNS = 5, 5.0, 5
 #: an axis is long from here on; it wants one run in each direction, targets so far apart on average [mm]
 LONG, LONG_INTERVAL = 2000.0, 250.0
 #: what every report of these values has to say
-UNCERTAINTY = "The measurement uncertainty is not given: ISO 230-2:2014 wants it stated with these values."
+UNCERTAINTY = "The measurement uncertainty is not given: ISO 230-2:2014 requires it stated with these values."
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,16 +188,16 @@ def _shortfalls(test: Positioning) -> tuple[str, ...]:
     else:
         wanted = max(TARGETS, int(np.ceil(TARGETS_PER_METRE * travel / 1e3)))
     if n < wanted:
-        notes.append(f"{n} targets over {travel / 1e3:g} m; ISO 230-2 wants at least {wanted}")
+        notes.append(f"{n} targets over {travel / 1e3:g} m; ISO 230-2 requires at least {wanted}")
     for name, deviations in test.directions.items():
         runs = len(deviations)
         if runs == 1:
             notes.append(
                 f"a single run in direction {name}: s, R and A take more"
-                + ("; ISO 230-2 wants no more over 2 m" if long else f", ISO 230-2 wants {RUNS}")
+                + ("; ISO 230-2 requires no more over 2 m" if long else f", ISO 230-2 requires {RUNS}")
             )
         elif runs < RUNS and not long:
-            notes.append(f"{runs} runs in direction {name}; ISO 230-2 wants {RUNS}")
+            notes.append(f"{runs} runs in direction {name}; ISO 230-2 requires {RUNS}")
     if len(test.directions) == 1:
         notes.append("approached from one direction only: reversal and bidirectional values are unknown")
     return tuple(notes)

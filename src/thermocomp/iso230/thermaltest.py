@@ -56,7 +56,7 @@ class Pair:
             raise InputError(f"probes {self.tip} and {self.spindle}: distance {self.distance:g} mm must be positive")
         if self.axis not in ("x", "y") or self.spindle[:1].lower() != self.axis or self.tip == self.spindle:
             raise InputError(
-                f"probes {self.tip} and {self.spindle}: a tilt comes of two different probes along X, or along Y, "
+                f"probes {self.tip} and {self.spindle}: a tilt needs two different probes along X, or along Y, "
                 "whose names begin with that letter, such as x1 and x2"
             )
 

@@ -133,9 +133,9 @@ def iso230(
     if recordings is None:
         asked = {"--test": test, "--distance": distance, "--pairs": pairs, "--ambient": ambient, "--model": model}
         for option in (o for o, value in asked.items() if value is not None):
-            raise InputError(f"{option} is for recordings of thermal tests: name one")
+            raise InputError(f"{option} applies to recordings of thermal tests: name one")
     if distance is not None and pairs:
-        raise InputError("--distance is for probes named x1, x2, y1, y2; those of --pairs carry their own")
+        raise InputError("--distance is for probes named x1, x2, y1, y2; --pairs specifies its own distances")
     models = models_of(model) if model is not None else ()
     tests = recordings_of(recordings, mapping) if recordings is not None else []
     begun, trouble = starts_of(starts, tests) or (None,) * len(tests), trouble_of(tests)

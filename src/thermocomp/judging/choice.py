@@ -90,7 +90,7 @@ class Settings:
             The number is below 1.
         """
         if self.max_sensors is not None and self.max_sensors < 1:
-            raise InputError(f"--max-sensors {self.max_sensors}: want at least 1")
+            raise InputError(f"--max-sensors {self.max_sensors}: expected at least 1")
         return self.max_sensors if self.max_sensors is not None else {"ace": 3, "pareto": 6}.get(method, 10)
 
 

@@ -62,11 +62,11 @@ def connect(address: str) -> Iterator["Cluster"]:
             # The client would wait for ever for the first word of one that only listens.
             with socket.create_connection((host, port), ANSWERS) as line:
                 if speaks and not line.recv(1):
-                    raise ConnectionError("it hangs up")
+                    raise ConnectionError("the connection was closed")
             client = Client(address, timeout=ANSWERS, set_as_default=False, name="thermocomp")
         except (OSError, ValueError) as e:
             raise ClusterError(
-                f"{address}: no Dask scheduler answers there ({explain(e)}); see that 'dask scheduler' runs"
+                f"{address}: no Dask scheduler answers there ({explain(e)}); check that 'dask scheduler' is running"
             ) from e
         try:
             yield Cluster(client, address)
@@ -97,7 +97,7 @@ def _read_address(address: str) -> tuple[str, int, bool]:
     except ValueError:  # of the port
         pass
     raise ClusterError(
-        f"scheduler {address!r}: want the address that 'dask scheduler' prints, such as tcp://192.168.1.20:8786"
+        f"scheduler {address!r}: expected the address that 'dask scheduler' prints, such as tcp://192.168.1.20:8786"
     )
 
 
@@ -190,7 +190,7 @@ class Cluster:
                 except (CancelledError, OSError) as e:
                     raise self._lost() from e
                 except Exception as e:
-                    raise ClusterError(f"{self._address}: a worker cannot take the work: {explain(e)}") from e
+                    raise ClusterError(f"{self._address}: a worker cannot accept the task: {explain(e)}") from e
                 del futures[k]  # its worker forgets the result
                 yield k, found
         finally:
@@ -265,5 +265,5 @@ def _check_versions(here: Mapping[str, str | None], there: Mapping[str, str | No
     other = [f"{name} {there[name] or 'is missing'} (here {here[name]})" for name in ALIKE if here[name] != there[name]]
     if other:
         raise ClusterError(
-            f"worker {worker}: {', '.join(other)}; install the same there as here, then start the worker again"
+            f"worker {worker}: {', '.join(other)}; install the same versions there as here, then start the worker again"
         )

@@ -44,7 +44,7 @@ class Probings:
     def __post_init__(self) -> None:
         if not 0.0 < self.every < np.inf or not 0.0 <= self.repeatability < np.inf:
             raise InputError(
-                f"probings every {self.every:g} s, repeatability {self.repeatability:g} um: want a time above 0 "
+                f"probings every {self.every:g} s, repeatability {self.repeatability:g} um: expected a time above 0 "
                 "and at least 0 um"
             )
 
@@ -79,7 +79,7 @@ class Probings:
             return given
         if isinstance(given, str):
             return cls.parse(given)
-        raise InputError(f"probing {given!r}: want words such as 'every 2 h', or Probings(every=7200.0)")
+        raise InputError(f"probing {given!r}: expected text such as 'every 2 h', or Probings(every=7200.0)")
 
     def find_rows(self, time: FloatArray, usable: BoolArray) -> NDArray[np.intp]:
         """Return the rows in which probings are made.

@@ -105,9 +105,7 @@ def select(
         Failure of the method, if it fails for all targets.
     """
     if elsewhere.get() is not None and method not in SHARED:
-        raise InputError(
-            f"{method} is one search, on this machine: a scheduler is for {' and '.join(SHARED)}; leave it out"
-        )
+        raise InputError(f"{method} does not support a scheduler (only {' and '.join(SHARED)} do); omit the scheduler")
     if method == "pareto":
         refuse_leaks(samples, judging)
     if method == "ace":

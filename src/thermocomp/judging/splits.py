@@ -75,7 +75,7 @@ def by_rows(samples: Samples, train: float, test: float) -> Judging:
         A share is not between 0 and 1, or their sum is above 1.
     """
     if not (0 < train < 1 and 0 < test < 1 and train + test <= 1 + 1e-9):
-        raise InputError(f"split {train:g}/{test:g}: want two shares between 0 and 1 whose sum is at most 1")
+        raise InputError(f"split {train:g}/{test:g}: expected two shares between 0 and 1 whose sum is at most 1")
     own = np.flatnonzero(samples.cycle >= 0)  # not those of earlier files, which tests continue from
     n = len(own)
     ends = [*own.tolist(), len(samples)]
@@ -201,7 +201,7 @@ def leave_one_day_out(samples: Samples) -> Judging:
     if unknown.any():
         name = samples.test_names[samples.test[int(np.argmax(unknown))]]
         raise InputError(
-            f"leaving one day out: {name} has no time stamps, so nobody knows its days; write date and time into its "
+            f"leaving one day out: {name} has no time stamps, so its days are unknown; write date and time into its "
             "time column, or leave out cycles or files"
         )
     own = samples.cycle >= 0  # not those of earlier files, which tests continue from

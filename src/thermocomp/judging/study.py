@@ -254,8 +254,8 @@ def assess(
         raise InputError("no model given: name a model file, or give at least one model")
     if probings and (unknown := [m.target for m in models if m.honest_error is None]):
         raise InputError(
-            f"model of {', '.join(unknown)} was never judged on cycles it has not seen: how much a probing says beside "
-            "it is not known; 'thermocomp fit' judges what it fits"
+            f"model of {', '.join(unknown)} was never judged on cycles it has not seen: how informative a probing is "
+            "next to it is not known; 'thermocomp fit' judges what it fits"
         )
     found: list[Assessment] = []
     covered = None

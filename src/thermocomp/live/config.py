@@ -59,9 +59,9 @@ class Page:
             if why := explain_host_name(host):
                 raise SettingError(f"{key} = {host[:200]!r}: {why}")
         if not self.settled > 0.0:
-            raise SettingError(f"settled = {self.settled:g}: want more than 0 um in ten minutes")
+            raise SettingError(f"settled = {self.settled:g}: expected more than 0 um in ten minutes")
         if not 0 <= self.port <= 65535:
-            raise SettingError(f"port = {self.port}: want a port from 0 (any that is free) to 65535")
+            raise SettingError(f"port = {self.port}: expected a port from 0 (any free port) to 65535")
         known = find_plugins("pages") if self.pages else {}
         for name in self.pages:
             if name not in known:
@@ -110,9 +110,11 @@ class JournalOut:
 
     def __post_init__(self) -> None:
         if unknown := set(self.channels.values()) - HOUSE_UNITS.keys():
-            raise SettingError(f"channels: {', '.join(sorted(unknown))}: want one of {', '.join(HOUSE_UNITS)}")
+            raise SettingError(f"channels: {', '.join(sorted(unknown))}: expected one of {', '.join(HOUSE_UNITS)}")
         if not 0.1 <= self.size_mb <= 1e6 or not self.files >= 2:
-            raise SettingError(f"size_mb = {self.size_mb:g}, files = {self.files}: want 0.1 or more, and 2 or more")
+            raise SettingError(
+                f"size_mb = {self.size_mb:g}, files = {self.files}: expected at least 0.1 and at least 2"
+            )
 
 
 Probings = Annotated[MqttProbing | SimulatedProbing, Discriminator("kind")]
@@ -181,7 +183,7 @@ class Config:
         controlled = any(isinstance(s, LinuxCncOut) for s in self.sinks)
         if self.own_compensation == "unknown" and (self.journal or self.probes or controlled):
             yield (
-                'own_compensation = "unknown": write "off" or "on"; what is measured at the machine means nothing '
+                'own_compensation = "unknown": write "off" or "on"; measurements at the machine cannot be used '
                 "unless it is known whether the controller compensates for temperature by itself"
             )
         for what, many in (("source", self.sources), ("sink", self.sinks), ("probe", self.probes)):
@@ -197,10 +199,10 @@ class Config:
                     )
         machine = any(isinstance(s, SimulatedIn) for s in self.sources)
         if not machine and any(isinstance(p, SimulatedProbing) for p in self.probes):
-            yield 'a probe of kind = "simulated" wants a source of kind = "simulated"'
+            yield 'a probe of kind = "simulated" needs a source of kind = "simulated"'
         if self.speed != 1.0 and any(isinstance(s, MqttIn) and not s.virtual for s in self.sources):
             yield (
-                f"speed = {self.speed:g}: a machine that MQTT tells of runs at the speed of the world, 1, unless it is "
+                f"speed = {self.speed:g}: a machine that is read by MQTT runs in real time, speed = 1, unless it is "
                 "a virtual one (virtual = true)"
             )
 
@@ -331,6 +333,6 @@ def _tell(error: dict[str, Any]) -> str:
         return str(context["error"]) if place == "file" else f"{place}: {context['error']}"
     if error["type"] == "union_tag_invalid":
         known = next((", ".join(map(repr, find_plugins(g))) for g in _KINDS if place.startswith(g)), "")
-        return f"{place}: kind = {context['tag']!r} is none of {known or context['expected_tags']}"
+        return f"{place}: kind = {context['tag']!r} is not one of {known or context['expected_tags']}"
     message = _PLAIN.get(error["type"])
     return f"{place} {message}" if message else f"{place}: {error['msg']}, found {error['input']!r:.60}"

@@ -42,14 +42,14 @@ def find_faults(settings: ServiceSettings) -> Iterator[str]:
         parts = re.compile(rf"{re.escape(journal.stem)}\.\d+{re.escape(journal.suffix)}(-wal|-shm)?")
         for path in (folder / name for name in sent):
             if path.parent.resolve() == journal.parent.resolve() and parts.fullmatch(path.name):
-                yield f"{path}: may be a part of the journal {journal}, and would be written over; name another file"
+                yield f"{path}: may be a part of the journal {journal} and would be overwritten; name another file"
     for name in dict.fromkeys(written):
         if name in locks and not (folder / name).parent.is_dir():  # said of the file itself
             continue
         if why := _unwritable(folder / name):
             yield f"{folder / name}: {why}"
         if names[(folder / name).resolve()] > 1:
-            yield f"{folder / name}: is named more than once, and would be written over; name another file"
+            yield f"{folder / name}: is named more than once and would be overwritten; name another file"
     for one in config.sinks:
         if isinstance(one, LinuxCncOut) and len(os.fsencode(folder / one.socket)) > LONGEST:
             yield f"{folder / one.socket}: a socket has a path of at most {LONGEST} bytes"

@@ -54,7 +54,7 @@ class StateKeeper:
             saved = statefile.read(self._path, self._compensator)
         except ThermocompError as e:
             if not statefile.is_ours(self._path):
-                raise InputError(f"{self._path}: is not a state file, and would be written over; name another") from e
+                raise InputError(f"{self._path}: is not a state file and would be overwritten; name another") from e
             self._say(f"cold start: {e}")
             self._refused = self._path
             return cold

@@ -32,7 +32,7 @@ def minutes_until(times: Sequence[float], deviations: Sequence[float], below: fl
         `below` is not positive.
     """
     if not below > 0:
-        raise ValueError(f"below = {below}: want more than 0 um")
+        raise ValueError(f"below = {below}: expected more than 0 um")
     if not times or times[-1] - times[0] < 2 * WINDOW:
         return math.nan
     now, middle, begin = (_at(times, deviations, times[-1] - k * WINDOW) for k in range(3))

@@ -109,7 +109,7 @@ def loads(text: str, compensator: Compensator, source: str = "state") -> Saved:
         state = decode(CompensatorState, stored.state, "state")
         _check(state, compensator)
     except (ValueError, InputError) as e:
-        raise ModelFileError(f"{source}: no state that these models can be in: {e}") from e
+        raise ModelFileError(f"{source}: not a possible state of these models: {e}") from e
     return Saved(stored.written, compensator.share(state.models, state))
 
 

@@ -193,7 +193,7 @@ class ACE(TransformRegressor):
     def _fit(self, change: FloatArray, deviation: FloatArray) -> None:
         if self.neighbours < 1 or self.max_sweeps < 1 or not self.tolerance >= 0:
             raise InputError(
-                f"ACE: want neighbours >= 1, max_sweeps >= 1 and tolerance >= 0, "
+                f"ACE: expected neighbours >= 1, max_sweeps >= 1 and tolerance >= 0, "
                 f"found {self.neighbours}, {self.max_sweeps} and {self.tolerance}"
             )
         self.half_window_ = half_window(len(deviation), self.half_window, self.window_share)
@@ -236,11 +236,13 @@ def half_window(n_rows: int, fixed: int, share: float | None) -> int:
     """
     if share is None:
         if fixed < 1:
-            raise InputError(f"half_window {fixed}: want at least 1")
+            raise InputError(f"half_window {fixed}: expected at least 1")
         wanted = fixed
     else:
         if not 0 < share <= 0.25:
-            raise InputError(f"window_share {share}: want more than 0 and at most 0.25, a window of half of the rows")
+            raise InputError(
+                f"window_share {share}: expected more than 0 and at most 0.25, a window of half of the rows"
+            )
         wanted = round(share * n_rows)
     return max(1, min(wanted, (n_rows - 1) // 4))
 

@@ -95,12 +95,12 @@ class MonotoneACE(TransformRegressor):
     def _fit(self, change: FloatArray, deviation: FloatArray) -> None:
         if self.points < 3 or self.max_sweeps < 1 or self.max_rows < 2:
             raise InputError(
-                f"MonotoneACE: want points >= 3, max_sweeps >= 1 and max_rows >= 2, "
+                f"MonotoneACE: expected points >= 3, max_sweeps >= 1 and max_rows >= 2, "
                 f"found {self.points}, {self.max_sweeps} and {self.max_rows}"
             )
         if not (self.smoothing > 0 and self.shrinkage > 0 and self.extend >= 0 and self.tolerance >= 0):
             raise InputError(
-                f"MonotoneACE: want smoothing > 0, shrinkage > 0, extend >= 0 and tolerance >= 0, "
+                f"MonotoneACE: expected smoothing > 0, shrinkage > 0, extend >= 0 and tolerance >= 0, "
                 f"found {self.smoothing}, {self.shrinkage}, {self.extend} and {self.tolerance}"
             )
         run = -(-len(deviation) // self.max_rows)

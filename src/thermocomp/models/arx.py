@@ -139,7 +139,7 @@ class ARX(ClockedRegressor):
 
     def _learn(self, inputs: FloatArray, deviation: FloatArray, step: FloatArray, folds: IntArray) -> None:
         if self.criterion not in ("fpe", "aic", "bic", "free-run"):
-            raise InputError(f"criterion {self.criterion!r}: want fpe, aic, bic or free-run")
+            raise InputError(f"criterion {self.criterion!r}: expected fpe, aic, bic or free-run")
         ks, ms = self._orders(self.k, self.k_max, "k"), self._orders(self.m, self.m_max, "m")
         data = [
             Clocked(interval=h, runs=ticks.put_on_clock(inputs, step, h), y=deviation, dt=step, folds=folds)
@@ -227,7 +227,7 @@ class ARX(ClockedRegressor):
         if chosen is None:
             raise FitError(
                 f"k = {', '.join(map(str, ks))} at an interval of {data.interval:g} s: the largest root is "
-                f"{min(o.largest_root for o in found):.6g}, so the free run does not decay within the data; take "
+                f"{min(o.largest_root for o in found):.6g}, so the free run does not decay within the data; use "
                 "another interval, leave the order to be chosen, or let criterion free-run find the coefficients"
             )
         k, m = chosen.k, chosen.m

@@ -170,7 +170,7 @@ class NetARX(ClockedRegressor):
     def _learn(self, inputs: FloatArray, deviation: FloatArray, step: FloatArray, folds: IntArray) -> None:
         sizes = tuple(int(h) for h in np.atleast_1d(self.hidden))
         if not sizes or min(sizes) < 1:
-            raise InputError(f"hidden = {self.hidden}: want numbers of nodes, at least 1")
+            raise InputError(f"hidden = {self.hidden}: expected numbers of nodes, at least 1")
         h = self._intervals(self.interval, step)[0]
         data = Clocked(interval=h, runs=ticks.put_on_clock(inputs, step, h), y=deviation, dt=step, folds=folds)
         self.k_, self.m_ = (0, 0) if self.time == "none" else self._chosen_orders(inputs, deviation, step, folds)

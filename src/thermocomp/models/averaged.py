@@ -151,13 +151,13 @@ class AveragedDynamic(TimedRegressor):
 
     def _check(self) -> None:
         if not hasattr(self.structures, "__index__") or self.structures < 1:
-            raise InputError(f"structures {self.structures}: want a whole number, at least 1")
+            raise InputError(f"structures {self.structures}: expected a whole number, at least 1")
         if not 0 <= self.noise < np.inf:
-            raise InputError(f"noise {self.noise}: want at least 0 degC")
+            raise InputError(f"noise {self.noise}: expected at least 0 degC")
         for name, unit in (("lags", " s"), ("powers", ""), ("stopped", " s"), ("running", " s")):
             values = getattr(self, name)
             if not all(0 < v < np.inf for v in values):
-                raise InputError(f"{name} {tuple(values)}: want finite numbers, each more than 0{unit}")
+                raise InputError(f"{name} {tuple(values)}: expected finite numbers, each more than 0{unit}")
 
     def lay_out(
         self, rows: FloatArray, step: FloatArray, folds: IntArray, speeds: Sequence[int]

@@ -187,7 +187,7 @@ class ClockedRegressor(TimedRegressor):
             return [ticks.median_step(dt)]
         found = [float(h) for h in np.atleast_1d(interval)]
         if not found or not all(0 < h < math.inf for h in found):
-            raise InputError(f"interval {interval}: want positive, finite seconds")
+            raise InputError(f"interval {interval}: expected positive, finite seconds")
         return found
 
     @staticmethod

@@ -129,7 +129,7 @@ def find_doubt(samples: Samples, settings: AveragedDynamic | None = None) -> Dou
         names = ", ".join(c.name for c in complete.inputs)
         raise InputError(
             f"the inputs {names}: a test is planned from one spindle speed and at least one temperature; name them "
-            "with --inputs, or say in a mapping which column is the speed"
+            "with --inputs, or specify the speed column in a mapping"
         )
     learned = np.isfinite(complete.deviations).all(axis=1) & (complete.cycle >= 0)
     if learned.sum() < 20:

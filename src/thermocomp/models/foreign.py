@@ -141,13 +141,13 @@ def adopt_estimator(estimator: Any) -> Any:
         return PipelineRegressor(estimator)
     if not isinstance(estimator, BaseEstimator) or not (is_regressor(estimator) or hasattr(estimator, "freeze")):
         raise InputError(
-            f"{type(estimator).__name__} is no regressor: name a method, or give an instance of a class derived from "
-            "sklearn.base.RegressorMixin and BaseEstimator, with fit(X, y) and predict(X)"
+            f"{type(estimator).__name__} is not a regressor: name a method, or give an instance of a class derived "
+            "from sklearn.base.RegressorMixin and BaseEstimator, with fit(X, y) and predict(X)"
         )
     for name, part in estimator.get_params().items():
         if isinstance(part, TimedRegressor):
             raise InputError(
-                f"{type(part).__name__} ({name}) has a memory, and {title(estimator)} cannot tell it the time here: "
+                f"{type(part).__name__} ({name}) has a memory, and {title(estimator)} cannot pass it the time here: "
                 "give it alone, or in a Pipeline of selectors and one method that freezes"
             )
     return estimator if hasattr(estimator, "freeze") else ForeignRegressor(estimator)

@@ -59,7 +59,7 @@ class GaussianProcess(UnfrozenRegressor):
 
     def _fit(self, change: FloatArray, deviation: FloatArray) -> None:
         if self.max_rows < 2:
-            raise InputError(f"max_rows {self.max_rows}: want at least 2")
+            raise InputError(f"max_rows {self.max_rows}: expected at least 2")
         rows = np.linspace(0, len(change) - 1, min(self.max_rows, len(change))).round().astype(np.intp)
         self.n_rows_ = len(rows)
         self._centre, self._scale = scaling(change[rows])

@@ -168,5 +168,5 @@ class ElasticNet(_Sparse):
     def _ratios(self) -> tuple[float, ...]:
         ratios = tuple(float(r) for r in self.l1_ratios)
         if not ratios or not all(0 < r <= 1 for r in ratios):
-            raise InputError(f"l1_ratios {self.l1_ratios}: want numbers above 0 and up to 1")
+            raise InputError(f"l1_ratios {self.l1_ratios}: expected numbers above 0 and up to 1")
         return ratios

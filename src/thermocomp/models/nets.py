@@ -70,7 +70,7 @@ class NetRegressor(MemorylessRegressor):
             output = 0
         if output is None or not 0 <= output < n_outputs:
             raise InputError(
-                f"output {output}: the net has {n_outputs}; freeze each on its own, with output=0 .. {n_outputs - 1}"
+                f"output {output}: the net has {n_outputs}; freeze each separately, with output=0 .. {n_outputs - 1}"
             )
         # an input of gain 0 is as good as a part of the thresholds
         kept = [i for i, gain in enumerate(into.gain) if gain != 0 and out_of.gain[output] != 0]
@@ -121,5 +121,5 @@ class NetRegressor(MemorylessRegressor):
 def thin_rows(n_rows: int, n_most: int) -> IntArray:
     """Return the indices of at most `n_most` of `n_rows` rows, spread evenly, the first and the last among them."""
     if n_most < 2:
-        raise InputError(f"at most {n_most} patterns: want at least 2")
+        raise InputError(f"at most {n_most} patterns: expected at least 2")
     return np.linspace(0, n_rows - 1, min(n_rows, n_most)).round().astype(np.intp)

@@ -76,7 +76,9 @@ def freeze(
     header: dict[str, Any] = {"target": target, "unit": unit, "support": support, "provenance": provenance}
     if not isinstance(estimator, Pipeline):
         if not hasattr(estimator, "freeze"):
-            raise FitError(f"{type(estimator).__name__} has no 'freeze': compare it, deploy another")
+            raise FitError(
+                f"{type(estimator).__name__} has no 'freeze': use it only in compare, and deploy another method"
+            )
         frozen: ErrorModel = estimator.freeze(inputs=inputs, **header)
         return frozen
     if not freezes(estimator):

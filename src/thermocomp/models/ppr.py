@@ -114,9 +114,9 @@ class ProjectionPursuit(CycledRegressor):
     def _settings(self) -> tuple[float, ...]:
         degrees = tuple(float(d) for d in self.degrees)
         if self.max_terms < 1:
-            raise InputError(f"max_terms {self.max_terms}: want at least 1")
+            raise InputError(f"max_terms {self.max_terms}: expected at least 1")
         if not degrees or not all(2 < d < _KNOTS for d in degrees):
-            raise InputError(f"degrees {self.degrees}: want degrees of freedom above 2 and below {_KNOTS}")
+            raise InputError(f"degrees {self.degrees}: expected degrees of freedom above 2 and below {_KNOTS}")
         return degrees
 
     def _frozen(self, inputs: Sequence[Input], header: dict[str, Any]) -> Additive:

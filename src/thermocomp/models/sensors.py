@@ -136,7 +136,7 @@ class SensorSelector(SelectorMixin, BaseEstimator):
         if isinstance(self.method, ThermalRegressor):
             return clone(self.method)
         if self.method not in SELECTORS:
-            raise InputError(f"SensorSelector: method {self.method!r}: want one of {', '.join(SELECTORS)}")
+            raise InputError(f"SensorSelector: method {self.method!r}: expected one of {', '.join(SELECTORS)}")
         return SELECTORS[self.method]()
 
     def __sklearn_tags__(self) -> Any:

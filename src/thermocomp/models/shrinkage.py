@@ -53,7 +53,7 @@ def choose(rms: FloatArray, rule: Rule) -> tuple[int, int]:
     which_set, setting : int
     """
     if rule not in ("one-standard-error", "minimum"):
-        raise InputError(f"rule {rule!r}: want 'one-standard-error' or 'minimum'")
+        raise InputError(f"rule {rule!r}: expected 'one-standard-error' or 'minimum'")
     mean = rms.mean(axis=2)
     i, j = (int(k) for k in np.unravel_index(np.argmin(mean), mean.shape))
     if rule == "one-standard-error":
@@ -206,7 +206,7 @@ def sorted_strengths(strengths: ArrayLike) -> FloatArray:
     """
     values = np.atleast_1d(np.asarray(strengths, dtype=np.float64))
     if values.size == 0 or not (values > 0).all() or not np.isfinite(values).all():
-        raise InputError(f"strengths {strengths!r}: want positive numbers")
+        raise InputError(f"strengths {strengths!r}: expected positive numbers")
     return np.sort(values)[::-1]
 
 
@@ -219,5 +219,5 @@ def most_components(max_components: int | None, n_features: int) -> int:
         `max_components` is less than 1.
     """
     if max_components is not None and max_components < 1:
-        raise InputError(f"max_components {max_components}: want at least 1, or None for as many as inputs")
+        raise InputError(f"max_components {max_components}: expected at least 1, or None for as many as inputs")
     return n_features if max_components is None else min(max_components, n_features)

@@ -175,7 +175,8 @@ class BestSubset(TermRegressor):
         criterion = self.criterion or ("bic" if cycle is None else "cycles")
         if criterion not in {"mse", "adjr2", "cp", "bic", "cycles"} or (self.size is not None and self.size < 1):
             raise InputError(
-                f"criterion {criterion!r}, size {self.size}: want mse, adjr2, cp, bic or cycles, and a size from 1 on"
+                f"criterion {criterion!r}, size {self.size}: expected mse, adjr2, cp, bic or cycles, and a size from "
+                "1 on"
             )
         change, deviation, folds, left_out = self._learned(X, y, cycle)
         sizes = self.size or self.max_size

@@ -65,7 +65,7 @@ class TimedRegressor(ThermalRegressor):
         """
         if self.time == "none":
             raise InputError(
-                f"{type(self).__name__}(time='none') takes every row for a machine at rest; give it {REMEDY}"
+                f"{type(self).__name__}(time='none') treats every row as a machine at rest; give it {REMEDY}"
             )
         named = getattr(self, self.columns)
         if named is not None:
@@ -173,7 +173,7 @@ class TimedRegressor(ThermalRegressor):
         """
         if self.time == "none":
             raise FitError(
-                f"{type(self).__name__}(time='none') takes every row for a machine at rest; fit it with {REMEDY}"
+                f"{type(self).__name__}(time='none') treats every row as a machine at rest; fit it with {REMEDY}"
             )
         return super().freeze(**header)
 
@@ -183,7 +183,7 @@ class TimedRegressor(ThermalRegressor):
         """Refuse to work without a declaration of time, or with another than in `fit`."""
         name = type(self).__name__
         if self.time is None:
-            raise InputError(f"{name} has a memory and was not told the time: give it {REMEDY}")
+            raise InputError(f"{name} has a memory and was not given the time: give it {REMEDY}")
         if self.time not in ("column", "routed", "none"):
             raise InputError(f"{name}: time={self.time!r} is not known; give it {REMEDY}")
         fitted = getattr(self, "_time", self.time)
@@ -208,12 +208,12 @@ class TimedRegressor(ThermalRegressor):
             return rows, _routed(dt, len(rows), type(self).__name__)
         if dt is not None:
             raise InputError(
-                f"dt was given to {type(self).__name__}(time={self.time!r}): it takes it with time='routed'"
+                f"dt was given to {type(self).__name__}(time={self.time!r}): dt is accepted only with time='routed'"
             )
         if self.time == "none":
             return rows, np.full(len(rows), np.inf)
         if rows.shape[1] < 2:
-            raise InputError("time='column': X has one column, the time, and no input beside it")
+            raise InputError("time='column': X has one column, the time, and no input")
         return rows[:, 1:], derive_steps(rows[:, 0], getattr(X, "index", None), fitting=fitting)
 
     def _cycles(self, cycle: ArrayLike | None, step: FloatArray) -> ArrayLike | None:
@@ -286,7 +286,7 @@ def derive_steps(time: FloatArray, index: object = None, *, fitting: bool = Fals
     step[0] = np.inf
     starts = np.isinf(step)
     if len(time) > 1 and starts.all():
-        raise InputError("time='column': the first column of X rises nowhere, so it is not the time [s]")
+        raise InputError("time='column': the first column of X never increases, so it is not the time [s]")
     late = np.flatnonzero(starts & (np.abs(time) > 1e-6))
     if late.size:
         raise InputError(
@@ -315,7 +315,7 @@ def _routed(dt: ArrayLike | None, n_rows: int, name: str) -> FloatArray:
         raise InputError(
             f"{name}(time='routed') was given no dt. Under scikit-learn: set_config(enable_metadata_routing=True) and "
             ".set_fit_request(dt=True).set_predict_request(dt=True).set_score_request(dt=True); a scorer by name "
-            "passes none to predict: score with scoring=None, or take time='column'"
+            "passes none to predict: score with scoring=None, or use time='column'"
         )
     step = checked_steps(dt, n_rows)
     if n_rows and not np.isinf(step[0]):
@@ -342,5 +342,5 @@ def _refuse_holes(index: Any, starts: NDArray[np.bool_]) -> None:
         row = int(np.flatnonzero(~starts)[np.argmax(apart != usual)])
         raise InputError(
             f"rows are missing between index {labels[row - 1]} and {labels[row]}: {_WHOLE}; {_OURS}. "
-            "If they never were there: reset_index(drop=True)"
+            "If these rows never existed: reset_index(drop=True)"
         )

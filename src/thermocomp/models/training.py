@@ -235,7 +235,7 @@ def _refuse_unknown_counts(samples: Samples, seen: BoolArray) -> None:
         if start.word == "rezeroed" and start.earlier:
             raise FitError(
                 f"{samples.test_names[test]} was re-zeroed on a machine that continued from {start.earlier[-1].name}: "
-                "its displacements miss what had come until then. Such a test can judge (assess), not teach"
+                "its displacements lack the drift before that. Use such a test to assess, not to fit"
             )
 
 

@@ -62,7 +62,8 @@ class UnfrozenRegressor(StaticRegressor):
 
     def _frozen(self, inputs: Sequence[Input], header: dict[str, Any]) -> NoReturn:  # noqa: ARG002 - none is made
         raise FitError(
-            f"{self.name} cannot be frozen to plain numbers: {self._bulk()}; use it in compare, deploy another"
+            f"{self.name} cannot be frozen to plain numbers: {self._bulk()}; use it only in compare, and deploy "
+            "another method"
         )
 
 
@@ -111,7 +112,7 @@ class EstimatorModel(ErrorModel):
         return {}
 
     def _expression(self, change: Sequence[Node]) -> NoReturn:  # noqa: ARG002 - none is made
-        raise InputError(f"{self.estimator.name} is no expression: it cannot be exported")
+        raise InputError(f"{self.estimator.name} is not an expression: it cannot be exported")
 
     def formula(self) -> str:
         """Return the description of the model, as one line of text."""

@@ -88,7 +88,7 @@ class Cut(Step):
         listed = _listed([rows.place(int(k)) for k in at], at)
         if not self.channels:
             if hit.all():
-                raise InputError(f"{rows.source}: {self.name}: nothing would be left of the {len(hit)} rows")
+                raise InputError(f"{rows.source}: {self.name}: this would remove all {len(hit)} rows")
             kept = rows.kept(np.flatnonzero(~hit))
             return kept.noted(f"cut: {len(at)} of {len(hit)} rows{self._why()}: {listed}")
         table = rows.table.copy()
@@ -219,7 +219,9 @@ class Swap(Step):
         kinds = {c.name: c.quantity for c in rows.channels}
         if kinds[a] != kinds[b]:
             unlike = f"{a} is a {kinds[a]} and {b} a {kinds[b]}"
-            raise InputError(f"{rows.source}: {self.name}: {unlike}: no two plugs change")
+            raise InputError(
+                f"{rows.source}: {self.name}: {unlike}: only channels of the same quantity can be exchanged"
+            )
         begin = rows.seconds(self.at, self.name)
         moved = rows.time >= begin - _SAME
         x, y = rows.table[a], rows.table[b]

@@ -66,7 +66,7 @@ def _refuse(recording: Recording, target: str, where: str) -> None:
     if channel.quantity in ("residual", "correction"):
         own = channel.name.replace(f"_{channel.quantity}_um", "_um")
         raise RecordingError(
-            f"{where}: {channel.name} is a {channel.quantity}, of a machine under compensation: name the uncompensated "
+            f"{where}: {channel.name} is a {channel.quantity} of a machine under compensation: name the uncompensated "
             f"deviation as the target, {own}"
         )
     if not recording.has(correction):
@@ -75,13 +75,13 @@ def _refuse(recording: Recording, target: str, where: str) -> None:
     if not recording.has(residual):
         if (c != 0.0).any():
             raise RecordingError(
-                f"{where}: {name} was measured while {correction} was in force, and is taken for neither: call it "
-                f"{residual}, and add {name}, which is {residual} - {correction}"
+                f"{where}: {name} was measured while {correction} was in force, so it may be compensated or not: "
+                f"name it {residual}, and add {name}, which is {residual} - {correction}"
             )
         return
     d, r = _values(recording, name), _values(recording, residual)
     if not np.isfinite(d).any() and np.isfinite(r).any():
-        raise RecordingError(f"{where}: {name} is empty beside {residual}: {UNKNOWN}")
+        raise RecordingError(f"{where}: {name} is empty where {residual} has a value: {UNKNOWN}")
     off = d - uncompensated(r, c)
     known = np.flatnonzero(np.isfinite(off))
     if not known.size or recording.changed:

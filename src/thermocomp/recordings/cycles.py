@@ -101,7 +101,7 @@ def split_by_labels(labels: Sequence[object]) -> tuple[Cycle, ...]:
     seen: set[str] = set()
     for k, name in zip(starts, names, strict=True):
         if name in seen:
-            raise RecordingError(f"cycle {name!r} comes back at row {k} after another cycle: rename one of them")
+            raise RecordingError(f"cycle {name!r} appears again at row {k} after another cycle: rename one of them")
         seen.add(name)
     return tuple(Cycle(n, a, b) for n, a, b in zip(names, starts, [*starts[1:], len(text)], strict=True))
 

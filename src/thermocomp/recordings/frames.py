@@ -32,7 +32,7 @@ def parts_of(
         raise RecordingError(f"{name}: two columns are named {twice[0]!r}; rename one of them")
     for column in units:
         if column not in columns:
-            raise InputError(f"{name}: units tells of {column!r}, and the columns are {', '.join(columns)}")
+            raise InputError(f"{name}: units: no column is named {column!r}; there are {', '.join(columns)}")
     if not len(table):
         raise RecordingError(f"{name}: the table has no row")
     plain = table.set_axis(columns, axis=1)
@@ -48,7 +48,7 @@ def parts_of(
             continue
         meaning = _meaning(column, units)
         if meaning is None or meaning.unit.quantity == "time":
-            notes.append(f"left out: {column!r} has no unit of a channel; tell it by units={{{column!r}: 'degC'}}")
+            notes.append(f"left out: {column!r} has no unit of a channel; give it by units={{{column!r}: 'degC'}}")
             continue
         values = _numbers(plain[column], f"{name}: column {column!r}")
         data[meaning.name] = values * meaning.unit.scale + meaning.unit.shift
@@ -56,8 +56,8 @@ def parts_of(
         aliases |= {alias: meaning.name for alias in (column, meaning.base) if alias != meaning.name}
     if not channels:
         raise RecordingError(
-            f"{name}: none of the columns {', '.join(columns)} is understood as a channel: name them like t1_C, "
-            "drift_um or spindle_rpm, or tell their units by units={'T1': 'degC'}"
+            f"{name}: none of the columns {', '.join(columns)} is recognized as a channel: name them like t1_C, "
+            "drift_um or spindle_rpm, or give their units, such as units={'T1': 'degC'}"
         )
     if len(data) < len(channels):
         raise RecordingError(f"{name}: two columns would become the same channel; rename one of them")
@@ -87,7 +87,7 @@ def _time(table: pd.DataFrame, given: Any, units: Mapping[str, str], name: str) 
         else:
             found = f"there are {', '.join(named)}" if named else "no column such as time_s and no index of times"
             raise RecordingError(
-                f"{name}: which is the time? {found}: name it by time=, the name of a column or an array"
+                f"{name}: which column is the time? {found}: give time=, the name of a column or an array"
             )
     if isinstance(given, str):
         if given not in table.columns:
@@ -97,11 +97,11 @@ def _time(table: pd.DataFrame, given: Any, units: Mapping[str, str], name: str) 
         given = table[given]
     values = np.asarray(given)
     if values.shape != (len(table),):
-        raise InputError(f"{name}: time: want {len(table)} values, found an array of shape {values.shape}")
+        raise InputError(f"{name}: time: expected {len(table)} values, found an array of shape {values.shape}")
     try:
         passed = seconds(values)
     except (TypeError, ValueError) as e:
-        raise RecordingError(f"{name}: the time holds something that is neither a number nor a datetime: {e}") from e
+        raise RecordingError(f"{name}: the time contains a value that is neither a number nor a datetime: {e}") from e
     wrong = np.flatnonzero(~np.isfinite(passed))
     if wrong.size:
         raise RecordingError(f"{name}: the time is missing in row {wrong[0]}")

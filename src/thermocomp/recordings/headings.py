@@ -142,7 +142,7 @@ def _in_brackets(heading: str) -> tuple[str, Unit] | None:
         return None
     symbol = SUFFIXES.get(symbol, symbol)
     if symbol == "m" and is_time_name(base):
-        raise UnitError("'m' stands for metres; minutes are min")
+        raise UnitError("'m' denotes metres; write min for minutes")
     if is_unit(symbol):
         with suppress(UnitError):  # a share of degC
             return base, find_unit(symbol)

@@ -98,7 +98,7 @@ class Profiles:
             if component.unit != self.unit:
                 raise InputError(f"{owner}: {component.description} is in {component.unit}; these are in {self.unit}")
         if self.points.ndim != 2 or self.points.shape[1] != 3:
-            raise RecordingError(f"{owner}: points of shape {self.points.shape}: want x, y, z of each")
+            raise RecordingError(f"{owner}: points of shape {self.points.shape}: expected x, y, z of each")
         wanted = (len(self.states), len(self.points))
         if self.values.shape != wanted:
             raise RecordingError(
@@ -106,7 +106,9 @@ class Profiles:
             )
         if not np.isfinite(self.points).all():
             k = int(np.flatnonzero(~np.isfinite(self.points).all(axis=1))[0])
-            raise RecordingError(f"{owner}: point {k + 1} at {self.points[k].tolist()} mm: must be finite numbers")
+            raise RecordingError(
+                f"{owner}: point {k + 1} at {self.points[k].tolist()} mm: must be finite; remove NaN and infinity"
+            )
         if np.isinf(self.values).any():
             state, k = np.argwhere(np.isinf(self.values))[0]
             raise RecordingError(
@@ -135,7 +137,7 @@ class Profiles:
             before, here = last.get(line, -np.inf), float(point[self._own])
             if here < before:
                 raise RecordingError(
-                    f"{owner}: positions along {self.axis} must rise, but {here:g} mm comes behind {before:g} mm: sort "
+                    f"{owner}: positions along {self.axis} must increase, but {here:g} mm follows {before:g} mm: sort "
                     "them"
                 )
             last[line] = here

@@ -87,7 +87,7 @@ class Recording:
             raise RecordingError(f"{self.name}: table columns and channels differ")
         if len(self.time) > 1 and not (np.diff(self.time) > 0).all():
             row = int(np.flatnonzero(~(np.diff(self.time) > 0))[0]) + 1
-            raise RecordingError(f"{self.name}: time does not rise at row {row}")
+            raise RecordingError(f"{self.name}: time does not increase at row {row}")
         covered = [row for c in self.cycles for row in (c.start, c.stop)]
         if covered != sorted(covered) or covered[:1] != [0] or covered[-1:] != [len(self.time)]:
             raise RecordingError(f"{self.name}: cycles {self.cycles} do not cover the {len(self.time)} rows")

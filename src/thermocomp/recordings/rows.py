@@ -112,8 +112,8 @@ class Rows:
             return (stamp - datetime.fromisoformat(self.start)).total_seconds()
         except (ValueError, TypeError) as e:
             raise InputError(
-                f"{self.source}: {owner}: {at}: want seconds since the first row of the file, or a timestamp like that "
-                f"of the first row, {self.start}"
+                f"{self.source}: {owner}: {at}: expected seconds since the first row of the file, or a timestamp "
+                f"like that of the first row, {self.start}"
             ) from e
 
     def columns(self, names: Sequence[str], owner: str) -> list[str]:

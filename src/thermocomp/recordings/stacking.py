@@ -177,7 +177,7 @@ def _known(starts: Sequence[Start], inputs: Sequence[Channel], rezero: bool) -> 
         if start.word == "known":
             missing = [c.name for c in inputs if c.quantity == "temperature" and c.name not in start.zero]
             if missing:
-                raise InputError(f"the known zero does not tell {', '.join(missing)}: give every temperature used")
+                raise InputError(f"the known zero has no value for {', '.join(missing)}: give every temperature used")
             zero[k] = [start.zero[c.name] if c.quantity == "temperature" else 0.0 for c in inputs]
     return zero
 
@@ -188,7 +188,7 @@ def _refuse_twins(recordings: Sequence[Recording]) -> None:
     for r in recordings:
         twin = seen.setdefault(r.fingerprint, r)
         if twin is not r:
-            raise InputError(f"{r.source or r.name} holds the same test as {twin.source or twin.name}: give it once")
+            raise InputError(f"{r.source or r.name} contains the same test as {twin.source or twin.name}: give it once")
 
 
 def _refuse_different_inputs(recordings: Sequence[Recording], inputs: Sequence[Channel]) -> None:
@@ -201,7 +201,7 @@ def _refuse_different_inputs(recordings: Sequence[Recording], inputs: Sequence[C
             only = ", ".join(sorted(mine ^ first))
             raise InputError(
                 f"{r.source or r.name} and {recordings[0].source or recordings[0].name} do not have the same sensors: "
-                f"only one of them has {only}. Name what to predict from with --inputs"
+                f"only one of them has {only}. Name the inputs of the model with --inputs"
             )
 
 

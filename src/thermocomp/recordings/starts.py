@@ -77,11 +77,11 @@ class Start:
         if self.word == "continued" and not self.earlier:
             raise InputError("a test that is continued needs the earlier file: name it with --continues, or earlier=")
         if self.earlier and self.word not in ("continued", "rezeroed"):
-            raise InputError(f"an earlier file goes with a start that is continued or rezeroed, not {self.word}")
+            raise InputError(f"an earlier file requires a start that is continued or rezeroed, not {self.word}")
         if self.zero and self.word != "known":
-            raise InputError(f"temperatures of the zero go with a start that is known, not {self.word}")
+            raise InputError(f"temperatures of the zero require a start that is known, not {self.word}")
         if self.gap is not None and not 0 < self.gap < np.inf:
-            raise InputError(f"a gap of {self.gap:g} s between two files: must be longer than nothing")
+            raise InputError(f"a gap of {self.gap:g} s between two files: must be more than 0 s")
 
     def content(self, name: str) -> dict[str, object]:
         """Return it for a program to read."""
@@ -248,7 +248,7 @@ def _found(recording: Recording, others: Sequence[Recording], targets: Sequence[
     name = max(far, key=lambda n: abs(levels[n]))
     raise InputError(
         f"{recording.source or recording.name}: {name} begins at {levels[name]:.1f} {far[name].unit}, so it was not "
-        "zeroed at the start of this file. Say how it begins: --continues EARLIER (the file before it), --start "
+        "zeroed at the start of this file. Specify its start: --continues EARLIER (the file before it), --start "
         "rezeroed (count from its start), --start known --zero FILE or t1_C=20.1,t2_C=20.4 (the temperatures of its "
         "zero), or --start cold if it was zeroed at rest all the same. In Python: starts=Start(...)"
     )

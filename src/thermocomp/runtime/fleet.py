@@ -59,8 +59,12 @@ class Fleet:
             raise InputError(f"model of {model.target}: a fleet runs models whose signals are single inputs")
         model.check_may_run()
         zero = np.array(self.zeros, dtype=np.float64)
-        if zero.ndim != 2 or zero.shape[1] != len(model.inputs) or not np.isfinite(zero).all():
-            raise InputError(f"zeros of shape {zero.shape}: want {len(model.inputs)} finite numbers per machine")
+        if zero.ndim != 2 or zero.shape[1] != len(model.inputs):
+            raise InputError(
+                f"zeros: expected finite values of shape (n_machines, {len(model.inputs)}), got shape {zero.shape}"
+            )
+        if not np.isfinite(zero).all():
+            raise InputError("zeros: contains NaN or infinity")
         n, kind = len(zero), self.dtype
         ranges = [[find_plausible_range(i, z) for z in column] for i, column in zip(model.inputs, zero.T, strict=True)]
         bounds = np.array(ranges).reshape(len(model.inputs), n, 2)
@@ -106,7 +110,7 @@ class Fleet:
             `readings` are of another shape, or `dt` is negative or not finite.
         """
         if np.shape(readings) != self._values.shape or not 0.0 <= dt < np.inf:
-            raise InputError(f"readings of shape {np.shape(readings)} after {dt} s: want {self._values.shape}")
+            raise InputError(f"readings of shape {np.shape(readings)} after {dt} s: expected {self._values.shape}")
         values, followed, memory = self._values, self._followed, self._memory
         with np.errstate(invalid="ignore", over="ignore"):
             values[...] = readings

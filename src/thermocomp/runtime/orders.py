@@ -50,9 +50,9 @@ def order(compensator: Compensator, state: CompensatorState, target: str, status
         There is no such target, a word is none of these, or its models may not run.
     """
     if target not in compensator.lines:
-        raise InputError(f"{target}: want one of {', '.join(compensator.lines)}")
+        raise InputError(f"{target}: expected one of {', '.join(compensator.lines)}")
     if status is not None and status.word not in ("holding", "shadow", "suspended"):
-        raise InputError(f"{target}: nobody can order {status.word}: want holding, shadow or suspended")
+        raise InputError(f"{target}: {status.word} cannot be ordered: expected holding, shadow or suspended")
     if target in compensator.shadow and (status is None or status.word != "suspended"):
         raise InputError(f"{target} runs in shadow only: {compensator.shadow[target].reason}")
     orders = {t: s for t, s in state.orders.items() if t != target} | ({} if status is None else {target: status})
@@ -97,9 +97,9 @@ def rezero(
         There is no such target, or its zero is still being averaged.
     """
     if target not in compensator.lines:
-        raise InputError(f"{target}: want one of {', '.join(compensator.lines)}")
+        raise InputError(f"{target}: expected one of {', '.join(compensator.lines)}")
     if target not in state.references:
-        raise InputError(f"{target}: its zero is still being averaged; wait until that is known")
+        raise InputError(f"{target}: its zero is still being averaged; wait until the zero is known")
     now, correction = state.raw[target], in_force or state.corrections[target]
     at = now.reference_position
     shift = Deviation(now.offset + correction.at(at), now.slope + correction.slope, at)

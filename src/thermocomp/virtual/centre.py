@@ -213,7 +213,7 @@ class MachiningCentre:
         for place in drive.loads:
             if place not in self.model.inputs:
                 near = get_close_matches(place, self.model.inputs, n=3, cutoff=0.4) or self.model.inputs
-                raise InputError(f"no heat can be put in at {place!r}; the nearest are {', '.join(near)}")
+                raise InputError(f"no heat can be applied at {place!r}; the nearest are {', '.join(near)}")
 
     def _observable(self, name: str) -> FloatArray:
         row: FloatArray = self.model.observable[self.observables.index(name)]

@@ -54,7 +54,7 @@ def find_experiment(experiment: str | Path) -> Experiment:
         return read_protocol(experiment)
     if str(experiment) not in EXPERIMENTS:
         message = explain_unknown("experiment", str(experiment), EXPERIMENTS)
-        raise InputError(f"{message}; a protocol of your own is named by its file, such as my_test.toml")
+        raise InputError(f"{message}; name a custom protocol by its file, such as my_test.toml")
     return EXPERIMENTS[str(experiment)]
 
 

@@ -124,7 +124,7 @@ class Kit:
             There is no such place, or it cannot be measured.
         """
         if name in self.inner and not perfect:
-            raise SettingError(f"{name!r} turns: it can only be calculated, with perfect = true")
+            raise SettingError(f"{name!r} is a rotation: it can only be calculated, with perfect = true")
         known = {**self.places, **self.inner} if perfect else self.places
         if name not in known:
             raise explain_unknown("place", name, [*known, *self.outfits])

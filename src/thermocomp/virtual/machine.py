@@ -160,10 +160,10 @@ def check(drives: Sequence[FeedDrive], air: FloatArray, dt: float) -> None:
         raise InputError(f"step of {dt} s: must be positive")
     if not drives or np.shape(air) != (len(drives), 3):
         raise InputError(
-            f"{len(drives)} drives and air of shape {np.shape(air)}: want one row of three numbers per drive"
+            f"{len(drives)} drives and air of shape {np.shape(air)}: expected one row of three numbers per drive"
         )
     if not np.isfinite(air).all():
-        raise InputError("air: a number is not finite")
+        raise InputError("air: temperatures must be finite; remove NaN and infinity")
 
 
 def stretches(drives: Sequence[FeedDrive]) -> Iterator[tuple[int, int]]:

@@ -147,7 +147,7 @@ class PlannedTest(RecordingSetup, Stretch):
         if not 1 <= self.copies <= MOST_COPIES:
             raise SettingError(f"must be from 1 to {MOST_COPIES}", ("copies",))
         if self.weight != 1.0:
-            raise SettingError('counts only inside segments whose order is "drawn"', ("weight",))
+            raise SettingError('applies only inside segments whose order is "drawn"', ("weight",))
         for path, given in self.leaves():
             _check_duration(values(given.get("duration")), (*path, "duration"), self.sampling)
         for path, given in self.soak.leaves():
@@ -274,4 +274,4 @@ def _check_duration(durations: tuple[float, ...], path: Path, sampling: float | 
         if not 0 < duration < math.inf:
             raise SettingError(f"{duration:g} s: must be positive", path)
         if sampling and abs(duration / sampling - round(duration / sampling)) > 1e-9:
-            raise SettingError(f"{duration:g} s is no multiple of the {sampling:g} s between two rows", path)
+            raise SettingError(f"{duration:g} s is not a multiple of the {sampling:g} s between two rows", path)

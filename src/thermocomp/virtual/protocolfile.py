@@ -111,7 +111,7 @@ def _check_types(value: Any, path: Keys) -> None:
         if key in SWITCHES and not isinstance(value, bool):
             raise SettingError("must be true or false, without quotes", path)
         if isinstance(value, bool) and key not in SWITCHES:
-            raise SettingError("true and false say nothing here", path)
+            raise SettingError("must not be true or false", path)
         if isinstance(value, str) and key not in TEXTS and re.fullmatch(r"[-+]?[\d.]+(e[-+]?\d+)?", value):
             raise SettingError("write a number without quotes", path)
 

@@ -114,7 +114,7 @@ class Stroke:
         for axis in AXES:
             stroke, travel = getattr(self, axis), TRAVEL[axis]
             if stroke and not 0.0 <= stroke[0] <= stroke[1] <= travel:
-                raise SettingError(f"must rise, within the travel from 0 to {travel:g} mm", (axis,))
+                raise SettingError(f"must increase, within the travel from 0 to {travel:g} mm", (axis,))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -166,12 +166,12 @@ class Stretch:
             raise SettingError(f"must be from 1 to {MOST_REPEATS}", ("repeat",))
         if not self.segments and (self.repeat > 1 or self.order != "given"):
             key = "repeat" if self.repeat > 1 else "order"
-            raise SettingError("needs segments = [...], which it says how to do", (key,))
+            raise SettingError("needs segments = [...], to which it applies", (key,))
         if not self.weight > 0:
             raise SettingError("must be positive", ("weight",))
         for k, s in enumerate(self.segments):
             if s.weight != 1.0 and self.order != "drawn":
-                raise SettingError('counts only where the order is "drawn"', ("segments", k, "weight"))
+                raise SettingError('applies only where the order is "drawn"', ("segments", k, "weight"))
 
     @property
     def longest(self) -> float:

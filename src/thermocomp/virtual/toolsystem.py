@@ -144,10 +144,10 @@ class RestingTool:
 
     def _given(self, drive: FeedDrive) -> FloatArray:
         if drive.speed or any(drive.feed):
-            raise InputError("the resting tool cannot turn or move: its protocol takes loads only")
+            raise InputError("the resting tool cannot turn or move: its protocol supports loads only")
         given = np.zeros(len(self.model.inputs))
         for place, load in drive.loads.items():
             if place not in LOADS:
-                raise InputError(f"no heat can be put in at {place!r} but at {', '.join(LOADS)}")
+                raise InputError(f"no heat can be applied at {place!r}, only at {', '.join(LOADS)}")
             given[self.model.inputs.index(place)] = load if drive.powered else 0.0
         return given

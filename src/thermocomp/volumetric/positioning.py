@@ -50,21 +50,23 @@ class Positioning:
     def __post_init__(self) -> None:
         where = ": ".join(part for part in (self.source, self.axis, self.state) if part) or "positioning"
         if len(self.positions) < 2:
-            raise InputError(f"{where}: {len(self.positions)} target; positioning needs at least 2, ISO 230-2 wants 5")
+            raise InputError(
+                f"{where}: {len(self.positions)} target; positioning needs at least 2, ISO 230-2 requires 5"
+            )
         if not (np.diff(self.positions) > 0).all():
-            raise InputError(f"{where}: target positions must rise and differ, found {self.positions.tolist()} mm")
+            raise InputError(f"{where}: target positions must increase and differ, found {self.positions.tolist()} mm")
         if not self.directions:
             raise InputError(f"{where}: no deviations")
         for name, deviations in self.directions.items():
             if deviations.ndim != 2 or deviations.shape[1] != len(self.positions):
                 raise InputError(
-                    f"{where}: deviations in direction {name} have the shape {deviations.shape}; want (runs, "
+                    f"{where}: deviations in direction {name} have the shape {deviations.shape}; expected (runs, "
                     f"{len(self.positions)} targets)"
                 )
             if len(deviations) < 1:
-                raise InputError(f"{where}: no run in direction {name}; ISO 230-2 wants 5, over more than 2 m one")
+                raise InputError(f"{where}: no run in direction {name}; ISO 230-2 requires 5, over more than 2 m one")
             if not np.isfinite(deviations).all():
-                raise InputError(f"{where}: a deviation in direction {name} is not a finite number")
+                raise InputError(f"{where}: a deviation in direction {name} must be finite; remove NaN and infinity")
 
     @property
     def directions(self) -> dict[str, FloatArray]:

@@ -97,14 +97,14 @@ def write_klipper(
     """
     if len(reductions) > 1:
         raise InputError(
-            f"Klipper has one [z_thermal_adjust], and there are {', '.join(r.model.target for r in reductions)}: name "
+            f"Klipper has one [z_thermal_adjust], but there are {', '.join(r.model.target for r in reductions)}: name "
             "one with --axes, such as --axes z_um=Z"
         )
     (r,) = reductions
     ((sensor, factor),) = r.terms
     if abs(factor) > 1e3 * _MOST:
         raise InputError(
-            f"{r.model.target}: {factor:g} um/K, and Klipper takes at most {_MOST:g} mm/K: check the units of the "
+            f"{r.model.target}: {factor:g} um/K, and Klipper accepts at most {_MOST:g} mm/K: check the units of the "
             "recording, or export to another controller"
         )
     first = head(reductions, facts, SIGN, UNITS)

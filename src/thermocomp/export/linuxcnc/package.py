@@ -104,7 +104,7 @@ def write_package(
     name = identifier(name)
     letters = {t: find_axis(t, dict(axes or {})) for t in tables.targets}
     if not all(letters.values()) or len(set(letters.values())) < len(letters):
-        raise InputError(f"want an axis of its own for each target, found {letters}")
+        raise InputError(f"expected a separate axis for each target, found {letters}")
     component = name_component(name)
     about = describe(compensator, tables)
     about["corrections"] = str(about["corrections"]).replace("[um]", "[mm]")  # as pins

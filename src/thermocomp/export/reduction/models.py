@@ -91,7 +91,7 @@ class LinearReduction(TermRegressor):
             A setting is out of its range.
         """
         if self.max_sensors < 1 or not 1 <= self.digits <= 17:
-            raise InputError(f"max_sensors {self.max_sensors}, digits {self.digits}: want at least 1, and 1 to 17")
+            raise InputError(f"max_sensors {self.max_sensors}, digits {self.digits}: expected at least 1, and 1 to 17")
         change, deviation, folds, self.chosen_by_ = self._learned(X, y, cycle)
         self.selected_, self.unseen_ = self._choose(change, deviation, folds)
         self._regress(change, deviation, self.selected_)

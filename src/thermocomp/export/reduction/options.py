@@ -36,6 +36,6 @@ class ReductionOptions:
         for text in self.axes or ():
             target, _, axis = text.rpartition("=")
             if not target or axis.upper() not in ("X", "Y", "Z"):
-                raise InputError(f"--axes {text}: want a target and X, Y or Z, such as z_um=Z")
+                raise InputError(f"--axes {text}: expected a target and X, Y or Z, such as z_um=Z")
             found[target] = axis.upper()
         return found

@@ -153,9 +153,9 @@ def make_grid(top_speed: float, hours: float) -> tuple[Trial, ...]:
         No such speed, or less than two hours.
     """
     if not 0 < top_speed < np.inf:
-        raise InputError(f"top speed {top_speed:g} 1/min: want the machine's highest, above 0")
+        raise InputError(f"top speed {top_speed:g} 1/min: expected the highest of the machine, above 0")
     if not 2 <= hours <= 72:
-        raise InputError(f"a test of {hours:g} h: want 2 to 72")
+        raise InputError(f"a test of {hours:g} h: expected 2 to 72")
     length = hours * 3600.0
     times = round(length / (2 * SHORT))
     found = []
@@ -201,7 +201,7 @@ def plan(samples: Samples, top_speed: float | None = None, *, hours: float = 12.
         Too few rows are complete.
     """
     if not 0 <= swing <= 50:
-        raise InputError(f"a room that changes by {swing:g} degC: want 0 to 50")
+        raise InputError(f"a room that changes by {swing:g} degC: expected 0 to 50")
     doubt = find_doubt(samples)
     recorded = float(np.nanmax(np.abs(samples.values[:, doubt.speed])))
     if not recorded:

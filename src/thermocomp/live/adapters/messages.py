@@ -47,7 +47,7 @@ def read_message(payload: bytes | str, arrived: float, names: Mapping[str, str])
         raise ReadingError(f"a message of {len(content):,} values; at most {MOST_VALUES:,}")
     stamp = content.pop("time", None)
     if stamp is not None and _number(stamp) is None:
-        raise ReadingError(f"a message whose time is {escape(stamp, 40)!r}: want seconds since 1970")
+        raise ReadingError(f"a message whose time is {escape(stamp, 40)!r}: expected seconds since 1970")
     values = {names.get(name, name): v for name, raw in content.items() if (v := _number(raw)) is not None}
     return Reading(arrived if stamp is None else float(stamp), values)
 
@@ -78,11 +78,13 @@ def read_measurement(payload: bytes | str, arrived: float) -> Measurement:
     wrong += ["id"] * (type(own) not in (str, int) or len(str(own)) > _LONG or ("id" in content and own == ""))
     wrong += ["under_correction"] * (not isinstance(left, bool)) + sorted(content.keys() - _KNOWN)
     if wrong:
-        raise ReadingError(f"a measurement whose {escape(', '.join(wrong), 80)} cannot be used; want {example}")
+        raise ReadingError(f"a measurement whose {escape(', '.join(wrong), 80)} cannot be used; expected {example}")
     if why := explain_unfit(str(target)):
-        raise ReadingError(f"a measurement whose target cannot be a name: {why}")
+        raise ReadingError(f"a measurement whose target is not a valid name: {why}")
     if max(abs(found[k] or 0.0) for k in _NUMBERS) > _FAR or (found["repeatability_um"] or 0.0) < 0.0:
-        raise ReadingError(f"a measurement beyond {_FAR:g} um or mm, or a repeatability below 0: no probe can say that")
+        raise ReadingError(
+            f"a measurement beyond {_FAR:g} um or mm, or a repeatability below 0: no probe can measure that"
+        )
     at, measured, spread, position = (v or 0.0 for v in map(found.get, ("time", *_NUMBERS)))
     keys = [f"id {own}"] * ("id" in content) + [f"time {at!r}"] * ("time" in content)
     keys = keys or [f"content {measured} um at {position} mm, give or take {spread} um, {left}"]
@@ -112,9 +114,9 @@ def _table(payload: bytes | str, example: str) -> dict[str, Any]:
     try:
         content = parse_json(payload)
     except ValueError as e:
-        raise ReadingError(f"a message that is no JSON: {escape(e, 80)}") from e
+        raise ReadingError(f"a message that is not JSON: {escape(e, 80)}") from e
     if not isinstance(content, dict):
-        raise ReadingError(f"a message that is not a table of values: {escape(content, 40)}; want {example}")
+        raise ReadingError(f"a message that is not a table of values: {escape(content, 40)}; expected {example}")
     for name, value in content.items():
         if why := explain_unfit(name) or (isinstance(value, str) and not _is_text(value) and explain_unfit(value)):
             raise ReadingError(f"a message with text that cannot be used: {why}")

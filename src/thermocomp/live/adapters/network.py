@@ -37,7 +37,7 @@ class OnBroker:
         if why := explain_host_name(self.host):
             raise SettingError(f"host = {self.host[:200]!r}: {why}")
         if not 0 < self.port <= 65535:
-            raise SettingError(f"port = {self.port}: want one from 1 to 65535")
+            raise SettingError(f"port = {self.port}: expected a port from 1 to 65535")
 
     def hears(self, other: "OnBroker") -> bool:
         """Return whether messages published to another's topic come back on this one, judged by the names."""
@@ -70,7 +70,7 @@ class MqttIn(OnBroker):
     def __post_init__(self) -> None:
         super().__post_init__()
         if twice := [name for name, count in Counter(self.names.values()).items() if count > 1]:
-            raise SettingError(f"names: several values for {', '.join(sorted(twice))}: want one for each channel")
+            raise SettingError(f"names: several values for {', '.join(sorted(twice))}: expected one for each channel")
 
     def open(self, folder: Path, speed: float) -> Source:  # noqa: ARG002 - of a section
         """Make the source."""
@@ -152,29 +152,29 @@ def _faults_of_topic(topic: str, *, published: bool) -> Iterator[str]:
         yield "topics that begin with $ are the broker's own"
     if levels[0] == "$share":
         if len(levels) < 3 or not levels[1] or set(levels[1]) & set("+#") or not any(levels[2:]):
-            yield "want '$share/GROUP/TOPIC', the group without wildcards"
+            yield "expected '$share/GROUP/TOPIC', with no wildcards in the group"
         levels = levels[2:]
     for level in levels:
         if len(level) > 1 and set(level) & set("+#"):
-            yield f"a wildcard stands for a whole level: {level!r} has more; want such as 'machine/+/spindle'"
+            yield f"a wildcard must be a whole level: {level!r} has more; write it like 'machine/+/spindle'"
     if "#" in levels[:-1]:
-        yield "the wildcard # stands for all that follows: want it at the end, such as 'machine/#'"
+        yield "the wildcard # covers all further levels: put it at the end, such as 'machine/#'"
 
 
 def _faults_of_name(host: str) -> Iterator[str]:
     if not host.strip():
         yield "name one, such as '127.0.0.1'"
     if "/" in host:
-        yield "want the host alone, such as 'mill7' or '192.0.2.7'"
+        yield "expected only the host, such as 'mill7' or '192.0.2.7'"
     if ":" in host:
-        yield "want the host alone, and port = ... for its port"
+        yield "expected only the host; give its port as port = ..."
     if host.replace(".", "").isdigit():
-        yield "want an address of four numbers from 0 to 255"
+        yield "expected an address of four numbers from 0 to 255"
     try:
         labels = host.removesuffix(".").encode("idna").decode("ascii").split(".")
     except UnicodeError:
         labels = [""]
     if len(".".join(labels)) > _HOST or not all(0 < len(label) <= _LABEL for label in labels):
-        yield "want names between dots, of 1 to 63 characters each"
+        yield "expected names of 1 to 63 characters, separated by dots"
     if not all(c.isalnum() or c in "-_" for label in labels for c in label):
         yield "a host name has letters, digits, '-' and '.' alone"

@@ -221,7 +221,7 @@ def _rows_of(path: Path, file: BinaryIO) -> Generator[tuple[float, dict[str, flo
         try:
             names = next(table, [])
             if "time_s" not in names:
-                raise InputError(f"{path}: has no column time_s; want a recording that thermocomp wrote")
+                raise InputError(f"{path}: has no column time_s; expected a recording written by thermocomp")
             if why := next(filter(None, map(explain_unfit, names)), ""):
                 raise InputError(f"{path}: line {line}: {why}")
             place = names.index("time_s")
@@ -255,6 +255,6 @@ def find_experiment(name: str, folder: Path) -> Experiment:
     home = files("thermocomp.virtual") / "protocols"
     known = sorted(p.name.removesuffix(".toml") for p in home.iterdir() if p.name.endswith(".toml"))
     if name not in known:
-        raise InputError(f"experiment {name!r}: want a path that ends in .toml, or one of {', '.join(known)}")
+        raise InputError(f"experiment {name!r}: expected a path that ends in .toml, or one of {', '.join(known)}")
     with as_file(home / f"{name}.toml") as path:
         return read_protocol(path)

@@ -63,7 +63,7 @@ class SimulatedIn:
 
     def __post_init__(self) -> None:
         if self.seed < 0:
-            raise SettingError(f"seed = {self.seed}: want 0 or more")
+            raise SettingError(f"seed = {self.seed}: expected 0 or more")
 
     def open(self, folder: Path, speed: float) -> Source:
         """Make the source."""
@@ -112,7 +112,10 @@ class SimulatedProbing:
 
     def __post_init__(self) -> None:
         if not self.every > 0 or not self.repeatability >= 0:
-            raise SettingError(f"every = {self.every:g}, repeatability = {self.repeatability:g}: want more than 0 s")
+            raise SettingError(
+                f"every = {self.every:g}, repeatability = {self.repeatability:g}: expected more than 0 s and at "
+                "least 0 um"
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,7 +138,7 @@ class LinuxCncOut:
     def __post_init__(self) -> None:
         letters = [a.upper() for a in self.axes.values()]
         if not letters or set(letters) - set("XYZUVW") or len(set(letters)) < len(letters):
-            raise SettingError(f'axes = {self.axes}: want a straight axis per target, such as {{z_um = "Z"}}')
+            raise SettingError(f'axes = {self.axes}: expected a linear axis for each target, such as {{z_um = "Z"}}')
 
     def open(self, folder: Path) -> Sink:
         """Make the sink."""

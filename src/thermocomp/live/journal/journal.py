@@ -46,7 +46,7 @@ class JournalLimits:
     def __post_init__(self) -> None:
         for name, least in (("size_bytes", 2**16), ("files", 2), ("waiting_bytes", 2**10)):
             if not getattr(self, name) >= least:
-                raise SettingError(f"journal {name} = {getattr(self, name)}: want at least {least}")
+                raise SettingError(f"journal {name} = {getattr(self, name)}: expected at least {least}")
 
 
 class JournalStatus(NamedTuple):
@@ -78,7 +78,7 @@ class Journal:
         try:
             self._start = dumps(start, start)
         except (ValueError, InputError) as e:
-            raise InputError(f"{path}: the journal cannot begin: {e}") from e
+            raise InputError(f"{path}: the journal cannot be started: {e}") from e
         self._described, self._begun = start, start.time
         self._waiting: deque[tuple[int, float, str, str]] = deque()
         self._bytes = self._seq = self._confirmed = self._lost = self._refused = 0

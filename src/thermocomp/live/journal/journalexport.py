@@ -123,7 +123,7 @@ def export(reader: JournalReader, every: float = 0.0) -> Exported:
             parts = parts[1:]
         for channel, values in parts:
             if channel.name in table:
-                raise InputError(f"{reader.paths[0]}: {channel.name} would be there twice; rename a channel or target")
+                raise InputError(f"{reader.paths[0]}: {channel.name} would occur twice; rename a channel or target")
             listed.append(channel)
             table[channel.name] = values
         if (unknown := told[-1].measured - told[-1].known) > 0:

@@ -183,7 +183,7 @@ class JournalReader:
         try:
             return StoredRun(run, seq, loads(kind, time, text, self.starts.get(run)))
         except (ValueError, TypeError, InputError) as e:
-            raise InputError(f"{where} cannot be understood: {e}") from e
+            raise InputError(f"{where} cannot be interpreted: {e}") from e
 
 
 _OTHERS = "and read the others"
@@ -235,7 +235,7 @@ def telling(path: Path) -> Iterator[None]:
     except sqlite3.Error as e:
         code = getattr(e, "sqlite_errorcode", 0) & 0xFF
         if code == sqlite3.SQLITE_NOTADB:
-            raise InputError(f"{path}: is not a journal of thermocomp, nor any database") from e
+            raise InputError(f"{path}: is not a journal of thermocomp, and not a database") from e
         if code == sqlite3.SQLITE_CANTOPEN:
             hint = "may it be read? Else copy it, and what is named like it, into a folder where files may be made"
             raise InputError(f"{path}: cannot be opened; {hint}") from e
@@ -266,6 +266,7 @@ def reading(path: Path) -> Iterator[sqlite3.Connection | None]:
             raise InputError(f"{path}: is not a journal of thermocomp but another database")
         if version > VERSION:
             raise InputError(
-                f"{path}: a journal of version {version}, and this thermocomp knows {VERSION}: read it with a newer one"
+                f"{path}: a journal of version {version}, but this thermocomp supports {VERSION}: read it with a "
+                "newer one"
             )
         yield connection if version else None

@@ -54,7 +54,7 @@ def read_order(body: bytes) -> PageOrder:
     try:
         content = parse_json(body)
     except ValueError as e:
-        raise HTTPException(400, f"body: want JSON in UTF-8: {escape(e, 200)}") from e
+        raise HTTPException(400, f"body: expected JSON in UTF-8: {escape(e, 200)}") from e
     try:
         return PageOrder.model_validate(content)
     except ValidationError as e:

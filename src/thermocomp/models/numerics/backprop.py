@@ -78,7 +78,8 @@ def learning_rates(n_epochs: int, start: float, end: float, schedule: str) -> Fl
     """
     if n_epochs < 1 or not 0 < end <= start < np.inf:
         raise InputError(
-            f"{n_epochs} epochs with learning rates from {start} to {end}: want at least one epoch and start >= end > 0"
+            f"{n_epochs} epochs with learning rates from {start} to {end}: expected at least one epoch and start >= "
+            "end > 0"
         )
     part = np.linspace(0.0, 1.0, n_epochs)
     if schedule == "geometric":
@@ -158,14 +159,17 @@ def train_net(
 
     inputs, targets = (np.ascontiguousarray(a, dtype=np.float64) for a in (inputs, targets))
     if inputs.ndim != 2 or targets.ndim != 2 or not 0 < len(inputs) == len(targets) or targets.shape[1] == 0:
-        raise FitError(f"net: inputs of shape {inputs.shape} and targets of shape {targets.shape}; want as many rows")
+        raise FitError(
+            f"net: inputs of shape {inputs.shape} and targets of shape {targets.shape}; expected the same number of "
+            "rows"
+        )
     if not (np.isfinite(inputs).all() and np.isfinite(targets).all()):
         raise FitError("net: inputs and targets must be finite numbers")
     if n_hidden < 1:
-        raise InputError(f"{n_hidden} hidden nodes: want at least one")
+        raise InputError(f"{n_hidden} hidden nodes: expected at least one")
     if update not in ("pattern", "batch") or order not in ("shuffled", "fixed") or not 0 <= momentum < 1:
         raise InputError(
-            f"update {update!r}, order {order!r}, momentum {momentum}: want 'pattern' or 'batch', 'shuffled' or "
+            f"update {update!r}, order {order!r}, momentum {momentum}: expected 'pattern' or 'batch', 'shuffled' or "
             "'fixed', and 0 <= momentum < 1"
         )
     n_inputs, n_outputs = inputs.shape[1], targets.shape[1]

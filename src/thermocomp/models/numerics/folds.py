@@ -28,7 +28,7 @@ def number_folds(cycle: ArrayLike | None, n_rows: int) -> tuple[IntArray, str]:
         return np.arange(n_rows) * min(5, n_rows) // n_rows, "five stretches of equal length, left out in turn"
     given = np.asarray(cycle)
     if given.shape != (n_rows,):
-        raise InputError(f"cycle: want {n_rows} numbers, found {given.shape}")
+        raise InputError(f"cycle: expected {n_rows} numbers, found {given.shape}")
     learned = np.flatnonzero(given >= 0)
     if learned.size == 0:
         raise FitError("no row to learn from: every row has cycle -1")

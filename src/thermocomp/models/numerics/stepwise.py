@@ -66,7 +66,7 @@ class FThresholds:
     def __post_init__(self) -> None:
         if not self.enter >= self.delete >= 0:
             raise InputError(
-                f"F-to-enter {self.enter} and F-to-delete {self.delete}: want enter >= delete >= 0, "
+                f"F-to-enter {self.enter} and F-to-delete {self.delete}: expected enter >= delete >= 0, "
                 "else a term could enter and leave for ever"
             )
 
@@ -107,7 +107,7 @@ class AlphaThresholds:
     def __post_init__(self) -> None:
         if not 0 < self.enter <= self.remove <= 1:
             raise InputError(
-                f"alpha-to-enter {self.enter} and alpha-to-remove {self.remove}: want 0 < enter <= remove <= 1, "
+                f"alpha-to-enter {self.enter} and alpha-to-remove {self.remove}: expected 0 < enter <= remove <= 1, "
                 "else a term could enter and leave for ever"
             )
 

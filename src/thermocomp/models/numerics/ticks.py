@@ -61,7 +61,7 @@ def check_steps(dt: ArrayLike | None, n_rows: int) -> FloatArray:
         return np.full(n_rows, np.inf)
     found = np.asarray(dt, dtype=np.float64)
     if found.shape != (n_rows,) or not (found >= 0).all():
-        raise InputError(f"dt: want {n_rows} time steps that are not negative")
+        raise InputError(f"dt: expected {n_rows} time steps that are not negative")
     return found
 
 
@@ -100,7 +100,9 @@ def _run(inputs: FloatArray, dt: FloatArray, rows: slice, h: float) -> TickedRun
     step[0] = 0.0
     time = np.cumsum(step)
     if not time[-1] / h < MOST_TICKS:
-        raise InputError(f"interval {h:g} s: {time[-1] / h:.3g} ticks in one test of {time[-1]:.3g} s; make it longer")
+        raise InputError(
+            f"interval {h:g} s: {time[-1] / h:.3g} ticks in one test of {time[-1]:.3g} s; use a longer interval"
+        )
     share = time / h
     count = np.floor(share + EARLY).astype(np.intp)
     phase = share - count

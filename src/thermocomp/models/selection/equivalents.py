@@ -117,16 +117,16 @@ def equivalents(
     """
     sets = tuple(tuple(s) for s in subsets)
     if not 0 < level < 1:
-        raise InputError(f"level {level}: want a significance between 0 and 1, such as 0.05")
+        raise InputError(f"level {level}: expected a significance between 0 and 1, such as 0.05")
     if not psi or not sets:
-        raise InputError("psi: want at least one displacement and one set of sensors")
+        raise InputError("psi: expected at least one displacement and one set of sensors")
     summed, p_values = np.empty((2, len(psi), len(sets)))
     equivalent = np.empty((len(psi), len(sets)), dtype=np.bool_)
     best, notes = [], []
     for d, given in enumerate(psi):
         values = np.asarray(given, dtype=np.float64)
         if values.ndim != 2 or len(values) != len(sets) or values.shape[1] == 0:
-            raise InputError(f"psi of displacement {d}: want {len(sets)} sets by data sets, found {values.shape}")
+            raise InputError(f"psi of displacement {d}: expected {len(sets)} sets by data sets, found {values.shape}")
         if not np.isfinite(values).all():
             k, test = np.argwhere(~np.isfinite(values))[0]
             raise InputError(

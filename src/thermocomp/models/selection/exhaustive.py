@@ -129,7 +129,7 @@ def search_members(tri: Triangle, groups: Sequence[Sequence[int]], *, limit: int
     count = math.prod(len(g) for g in groups)
     if count > limit:
         raise FitError(
-            f"the groups that take part have {count} combinations of members, more than {limit}: raise the threshold "
+            f"the groups in use have {count} combinations of members, more than {limit}: raise the threshold "
             "of the correlation, so that the groups are smaller, or leave sensors out"
         )
     free = _free(tri, len(groups))
@@ -146,7 +146,7 @@ def _free(tri: Triangle, needed: int) -> int:
     free = tri.n_rows - int(tri.intercept)
     if free <= needed:
         raise FitError(
-            f"{tri.n_rows} rows are too few for {needed} variables: want at least {needed + 1 + int(tri.intercept)}"
+            f"{tri.n_rows} rows are too few for {needed} variables: expected at least {needed + 1 + int(tri.intercept)}"
         )
     return free
 

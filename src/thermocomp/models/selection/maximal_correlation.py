@@ -124,7 +124,7 @@ def maximal_correlations(
         raise InputError("maximal correlation: no test given")
     if half_window < 1 or max_sweeps < 1 or (tolerance is not None and not tolerance >= 0):
         raise InputError(
-            "maximal correlation: want half_window >= 1, max_sweeps >= 1 and tolerance >= 0, "
+            "maximal correlation: expected half_window >= 1, max_sweeps >= 1 and tolerance >= 0, "
             f"found {half_window}, {max_sweeps} and {tolerance}"
         )
     tables = [_checked(t, half_window) for t in tests]
@@ -159,7 +159,7 @@ def _checked(test: DataSet, half_window: int) -> tuple[FloatArray, FloatArray]:
     S = np.asarray(test.displacements, dtype=np.float64)
     if T.ndim != 2 or S.ndim != 2 or len(T) != len(S):
         raise InputError(
-            f"{test.name}: want temperatures and displacements as tables of equally many rows, "
+            f"{test.name}: expected temperatures and displacements as tables with the same number of rows, "
             f"found the shapes {T.shape} and {S.shape}"
         )
     if len(T) < 2 * half_window + 1:
@@ -168,9 +168,7 @@ def _checked(test: DataSet, half_window: int) -> tuple[FloatArray, FloatArray]:
         )
     bad = ~(np.isfinite(T).all(axis=1) & np.isfinite(S).all(axis=1))
     if bad.any():
-        raise FitError(
-            f"{test.name}: row {int(np.argmax(bad))} holds a value that is not a number; leave such rows out"
-        )
+        raise FitError(f"{test.name}: row {int(np.argmax(bad))} contains NaN or infinity; leave such rows out")
     return T, S
 
 
@@ -178,7 +176,7 @@ def _membership(subsets: Sequence[tuple[int, ...]], n_temperatures: int) -> NDAr
     members = np.zeros((len(subsets), n_temperatures), dtype=np.bool_)
     for row, subset in zip(members, subsets, strict=True):
         if not subset or any(not 0 <= j < n_temperatures for j in subset):
-            raise InputError(f"subset {subset}: want indices of the {n_temperatures} temperatures, at least one")
+            raise InputError(f"subset {subset}: expected indices of the {n_temperatures} temperatures, at least one")
         row[list(subset)] = True
     return members
 

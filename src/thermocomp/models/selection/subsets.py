@@ -164,7 +164,7 @@ def best_subsets(
         A setting makes no sense, or the sets cannot be searched that way.
     """
     if n_best < 1 or jobs < 1 or (max_size is not None and max_size < 1):
-        raise InputError(f"n_best {n_best}, jobs {jobs}, max_size {max_size}: want at least 1")
+        raise InputError(f"n_best {n_best}, jobs {jobs}, max_size {max_size}: expected at least 1")
     tri = triangle(join_columns(X, y), intercept=intercept)
     kept, same = _distinct(X, tri)
     if not kept:

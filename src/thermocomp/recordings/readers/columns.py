@@ -51,9 +51,9 @@ class PlannedColumn:
         valid = np.abs(raw[np.isfinite(raw)])
         if self.unit.symbol == "K" and not self.rule.unit and valid.size and float(np.median(valid)) < _COLDEST:
             raise RecordingError(
-                f"{source}: column {heading!r}: values about {float(np.median(valid)):.3g} K are no temperatures but "
-                f'differences, or in degC; state which in a mapping, [columns.NAME] column = "{heading}" and unit = '
-                '"degC", or role = "ignore"',
+                f"{source}: column {heading!r}: values about {float(np.median(valid)):.3g} K cannot be temperatures: "
+                f'they are differences, or in degC; state which in a mapping, [columns.NAME] column = "{heading}" and '
+                'unit = "degC", or role = "ignore"',
                 [{"columns": {self.channel.name: {"column": heading, **said}}} for said in _DOUBTFUL],
             )
 
@@ -205,7 +205,7 @@ def _plan_mapped(
         other = tables.setdefault(index, name)
         if other != name:
             raise RecordingError(
-                f"{source}: mapping: [columns.{other}] and [columns.{name}] both take the column {heading!r}; "
+                f"{source}: mapping: [columns.{other}] and [columns.{name}] both use the column {heading!r}; "
                 "delete one of the two tables"
             )
         if rule.role == "cycle":
@@ -221,7 +221,7 @@ def _meant(rule: ColumnMap, meaning: Meaning | None, where: str, heading: str) -
     meant = rule.conversion
     if meaning is None:
         if meant is None:
-            raise RecordingError(f"{where}: give it a unit or a role; {heading!r} has none")
+            raise RecordingError(f"{where}: specify a unit or a role; {heading!r} has none")
         return meant, ""
     said = meaning.unit
     if meant is None:
@@ -232,7 +232,7 @@ def _meant(rule: ColumnMap, meaning: Meaning | None, where: str, heading: str) -
         if rule.unit and rule.scale != 1 and {said.quantity, meant.quantity} <= set(_GEOMETRY):
             return meant, ""
         raise UnitError(
-            f"{where}: it is to be a {meant.quantity} in {meant.symbol}, but the heading {heading!r} says "
+            f"{where}: expected a {meant.quantity} in {meant.symbol}, but the heading {heading!r} specifies "
             f"{said.symbol}, a unit of {said.quantity}; correct role and unit in the mapping, or the heading in the "
             "file if that is wrong"
         ) from e
@@ -266,8 +266,8 @@ def _time_unit(heading: str, meaning: Meaning | None, mapping: Mapping, source: 
     said = meaning.unit
     if said.quantity != "time":
         raise UnitError(
-            f"{source}: mapping [time]: the heading {heading!r} says {said.symbol}, a unit of {said.quantity}, not "
-            f"{given or 's'}; take the column that holds the time, or correct the heading"
+            f"{source}: mapping [time]: the heading {heading!r} specifies {said.symbol}, a unit of {said.quantity}, "
+            f"not {given or 's'}; name the column that contains the time, or correct the heading"
         )
     if given in ("", "timestamp") or find_unit(given, "time") == said:
         return given or said.symbol, ""
@@ -326,8 +326,8 @@ def _numbered(heading: str, *places: int) -> dict[str, dict[str, object]]:
 def _check_names(columns: Sequence[PlannedColumn], headings: Sequence[str], source: str) -> None:
     if not columns:
         raise RecordingError(
-            f"{source}: none of the columns {', '.join(h for h in headings if h)} is understood as a channel; put the "
-            "unit behind the name (t1_C, drift_um, spindle_rpm) or give a mapping with a table [columns.NAME] for each"
+            f"{source}: none of the columns {', '.join(h for h in headings if h)} is recognized as a channel; append "
+            "the unit to the name (t1_C, drift_um, spindle_rpm) or give a mapping with a table [columns.NAME] for each"
         )
     seen: dict[str, PlannedColumn] = {}
     for column in columns:

@@ -95,7 +95,7 @@ def join_halves(
         row = int(unknown[0])
         says = "is empty" if pd.isna(halves.iloc[row]) else f"{str(halves.iloc[row])!r} is neither AM nor PM"
         raise RecordingError(
-            f"{table.path}: {table.place(row)}, column {half!r}: {says}, beside the time {clocks.iloc[row]}; fill it "
+            f"{table.path}: {table.place(row)}, column {half!r}: {says}, where the time is {clocks.iloc[row]}; fill it "
             "in, or if it has nothing to do with the time, leave it out by a mapping: "
             f'[columns."{half}"] role = "ignore"',
             [skip_row(table, row)] if 4 * unknown.size <= len(clocks) else [],
@@ -109,7 +109,7 @@ def join_halves(
             return clocks, ()
         row = int(wrong[0])
         raise TwoReadingsError(
-            f"{table.path}: {table.place(row)}: {half!r} says {halves.iloc[row]}, and {time!r} {clocks.iloc[row]}"
+            f"{table.path}: {table.place(row)}: {half!r} specifies {halves.iloc[row]}, and {time!r} {clocks.iloc[row]}"
             + (
                 ", of 24 hours, as other rows show: correct the one or the other, "
                 if whole_day

@@ -30,9 +30,9 @@ def refuse_nameless(headings: Sequence[str], source: str) -> None:
     several = len(asked) > 1
     raise RecordingError(
         f"{source}: column{'s' * several} {', '.join(map(repr, asked))} {'have' if several else 'has'} no unit: "
-        f"{heading!r} may be a {quantity.replace('_', ' ')} in {units}; put the unit behind the name, such as "
+        f"{heading!r} may be a {quantity.replace('_', ' ')} in {units}; append the unit to the name, such as "
         f'"{heading} [{units.split(",")[0].split(" ")[0]}]", or write a mapping [columns.NAME] with column = '
-        f'"{heading}" and unit, or role = "ignore" if it is of no use'
+        f'"{heading}" and unit, or role = "ignore" if it is not needed'
     )
 
 
@@ -43,7 +43,7 @@ def why_left_out(heading: str) -> str:
     mapped = f'a mapping [columns.NAME] with column = "{heading}" and'
     ignore = 'role = "ignore" if it is of no use'
     if not found and "_" not in heading:
-        return f"{heading!r} has no unit; put it behind the name (t1_C), or write {mapped} role and unit, or {ignore}"
+        return f"{heading!r} has no unit; append it to the name (t1_C), or write {mapped} role and unit, or {ignore}"
     try:
         meant = find_unit(symbol)
     except UnitError:

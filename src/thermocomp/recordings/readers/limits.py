@@ -96,7 +96,7 @@ class FileLimits:
         if found > most:
             counts = next(f.metadata["counts"] for f in fields(self) if f.name == name)
             raise RecordingError(
-                f"{where}: over {most:,} {counts} (at least {found:,}), which are not read: delete what is no part of "
+                f"{where}: over {most:,} {counts} (at least {found:,}), more than are read: delete what is not part of "
                 f"the recording, or raise the limit in a mapping, [limits] {name} = {2 * found}"
             )
 
@@ -149,5 +149,5 @@ def check_file(path: Path, limits: FileLimits) -> None:
     """
     found = path.stat()
     if not (stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)):  # opening a folder says what it is
-        raise RecordingError(f"{path}: is a pipe or a device and no file; write what comes from it into a file")
+        raise RecordingError(f"{path}: is a pipe or a device, not a file; save its output to a file")
     limits.check("file_bytes", found.st_size, path)

@@ -116,12 +116,12 @@ def _error_column(rows: Rows, wanted: str, unit: str, owner: str) -> str:
             there = ", ".join(c.name for c in rows.channels)
             raise InputError(f"{owner}: no column is called {wanted!r}; there are {there}")
         if found[0].quantity != QUANTITY[unit]:
-            raise UnitError(f"{owner}: column {name!r} measures {found[0].quantity}, no {QUANTITY[unit]} in {unit}")
+            raise UnitError(f"{owner}: column {name!r} measures {found[0].quantity}, not {QUANTITY[unit]} in {unit}")
         return name
     names = [c.name for c in rows.channels if c.quantity == QUANTITY[unit]]
     if len(names) != 1:
         said = f"there are {', '.join(names)}: state which" if names else f"there is none: name one like error_{unit}"
-        raise RecordingError(f"{owner}: want one column of {QUANTITY[unit]}s; {said}")
+        raise RecordingError(f"{owner}: expected one column of {QUANTITY[unit]}s; {said}")
     _refuse_mixed(rows, names[0], unit, owner)
     return names[0]
 
@@ -136,7 +136,7 @@ def _refuse_mixed(rows: Rows, column: str, unit: str, owner: str) -> None:
     if gaps.size:
         raise UnitError(
             f"{owner}: {rows.place(int(gaps[0]))}: there is a value in {twin!r} and none in {column!r}: correct the "
-            f"unit, or say that {column!r} is meant"
+            f"unit, or select {column!r} explicitly"
         )
 
 
@@ -158,7 +158,7 @@ def _place_columns(rows: Rows, position: str, axis: str, owner: str) -> dict[str
 def _states(rows: Rows, column: str, at: FloatArray) -> IntArray:
     """Return the number of the thermal state of each row, from 0."""
     if column and column not in rows.extra:
-        raise InputError(f"{rows.source}: there is no column {column!r} that tells the state")
+        raise InputError(f"{rows.source}: there is no column {column!r} for the states")
     labels = next(iter(rows.extra.values()), None)
     if labels is not None:
         begins = [k == 0 or labels[k] != labels[k - 1] for k in range(len(labels))]
@@ -166,8 +166,8 @@ def _states(rows: Rows, column: str, at: FloatArray) -> IntArray:
         for k in np.flatnonzero(begins):
             if labels[k] in seen:
                 raise RecordingError(
-                    f"{rows.source}: {rows.place(int(k))}: state {labels[k]!r} comes back after another one; rename "
-                    "it, or sort the rows"
+                    f"{rows.source}: {rows.place(int(k))}: state {labels[k]!r} appears again after another state; "
+                    "rename it, or sort the rows"
                 )
             seen.add(labels[k])
     elif (np.diff(rows.time) == 0).any():
@@ -188,11 +188,11 @@ def _refuse_unsorted(rows: Rows, at: FloatArray, state: IntArray, own: int, colu
         line = tuple(np.delete(point, own).tolist())
         before = last.get(line, -np.inf)
         if point[own] <= before:
-            what = "comes twice" if point[own] == before else f"comes behind {before:g} mm"
+            what = "comes twice" if point[own] == before else f"follows {before:g} mm"
             raise RecordingError(
                 f"{rows.source}: {rows.place(k)}, column {column!r}: {point[own]:g} mm {what} in one thermal state, "
-                "but positions must rise: sort the rows, take the mean of what was measured twice, or tell states "
-                "apart by a column 'state'"
+                "but positions must increase: sort the rows, average repeated measurements, or separate the states "
+                "by a column 'state'"
             )
         last[line] = point[own]
 

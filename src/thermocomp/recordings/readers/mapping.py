@@ -349,7 +349,7 @@ def _check_start(stamp: str) -> None:
             datetime.fromisoformat(stamp)
     except ValueError as e:
         raise InputError(
-            f"[time]: start = {stamp!r} is no ISO timestamp: write year, month, day and time of day, such as "
+            f"[time]: start = {stamp!r} is not an ISO timestamp: write year, month, day and time of day, such as "
             '"2024-03-01T08:00:00" or, with its offset from UTC, "2024-03-01T08:00:00+01:00"'
         ) from e
 
@@ -372,5 +372,5 @@ def _check_encoding(name: str) -> None:
         raise InputError(f"[read]: encoding = {name!r} is not known; use utf-8, latin-1 or cp1252") from e
     if not plain:
         raise InputError(
-            f"[read]: encoding = {name!r}: save the file as UTF-8; only encodings that hold ASCII are read"
+            f"[read]: encoding = {name!r}: save the file as UTF-8; only encodings that contain ASCII are supported"
         )

@@ -114,7 +114,7 @@ class ParquetTable:
                         parts[k].append(cells)
                 row = stop
         if row != self.n_rows:
-            raise RecordingError(f"{self.path}: says it has {self.n_rows} rows, and has {row}; write it again")
+            raise RecordingError(f"{self.path}: declares {self.n_rows} rows but contains {row}; write it again")
         columns = {k: pd.concat(p, ignore_index=True) for k, p in parts.items()}
         numbered, notes = convert_all(self, {k: columns[k] for k in written}, self.decimal)
         data = {**columns, **values, **numbered}
@@ -167,7 +167,7 @@ def open_parquet(path: Path, options: ReadOptions, limits: FileLimits) -> FileTa
         packed = sum(about.row_group(k).total_byte_size for k in range(about.num_row_groups))
         limits.check_unpacked(max(packed, 8 * about.num_rows * about.num_columns), path)
         if len(set(schema.names)) < len(schema.names):
-            raise RecordingError(f"{path}: two columns have one name; rename one of them")
+            raise RecordingError(f"{path}: two columns have the same name; rename one of them")
         names = _names(file)
         others = [k for k, name in enumerate(names) if not _is_number(schema.field(name).type)]
         texts = [f.name for f in schema if str(f.type) in _TEXTS]

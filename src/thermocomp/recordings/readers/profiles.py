@@ -81,9 +81,11 @@ class ProfileOptions:
         unit = self.unit or (component.unit if component else "")
         if not axis:
             hint = (
-                f"{component.description} does not depend on a position" if component else "it is no component's code"
+                f"{component.description} does not depend on a position"
+                if component
+                else "it is not the code of a component"
             )
-            raise InputError(f"{self.target}: {hint}; name a component such as EYY, or say the axis")
+            raise InputError(f"{self.target}: {hint}; name a component such as EYY, or specify the axis")
         if unit not in QUANTITY:
             raise InputError(f"{self.target}: unit {unit!r}: state whether it is in um or urad")
         return axis, cast(Literal["um", "urad"], unit)
@@ -167,7 +169,7 @@ def read_components(
             if code not in codes(r):
                 like = f"{code or 'EXX'}_250_{BY_CODE[code].unit if code in BY_CODE else 'um'}"
                 raise RecordingError(
-                    f"{r.source}: no column is called after {code or 'a component'}, such as {like} (position in mm, "
+                    f"{r.source}: no column is named after {code or 'a component'}, such as {like} (position in mm, "
                     "unit); columns of other names are read one component at a time"
                 )
     return {code: tuple(from_recording(r, code) for r in recordings) for code in wanted}
@@ -227,7 +229,7 @@ def from_recording(recording: Recording, options: ProfileOptions | str) -> Profi
         )
     for channel, place in found:
         if axis not in place:
-            raise InputError(f"{owner}: column {channel.name!r}: its place does not tell the position of {axis}")
+            raise InputError(f"{owner}: column {channel.name!r}: its entry does not specify the position of {axis}")
     points = np.array([[place.get(a, 0.0) for a in "XYZ"] for _, place in found])
     taken = [c for c, _ in found]
     rest = tuple(c for c in recording.channels if c not in taken and not (called and is_profile(c)))
@@ -262,7 +264,7 @@ def read_places(path: str | Path) -> dict[str, Place]:
     content = read_toml(source, "file of positions")
     table = content.get("positions")
     if not isinstance(table, dict) or not table or len(content) > 1:
-        raise InputError(f"{source}: want one table [positions] with a key per column, and nothing else")
+        raise InputError(f"{source}: expected one table [positions] with a key per column, and nothing else")
     return {name: _read_place(value, f"{source}: [positions] {name}") for name, value in table.items()}
 
 
@@ -285,7 +287,7 @@ def _matching(recording: Recording, pattern: str) -> list[tuple[Channel, float]]
     """Return the channels whose name, or another name they answer to, is like `pattern`, and their positions."""
     shape = re.compile(re.escape(pattern).replace(r"\*", r"(-?\d+(?:\.\d+)?)", 1).replace(r"\*", ".*"))
     if "*" not in pattern:
-        raise InputError(f"columns {pattern!r}: put * where the position stands in the name, such as y_laser_*")
+        raise InputError(f"columns {pattern!r}: put * where the position is in the name, such as y_laser_*")
     found = []
     for c in recording.channels:
         names = [c.name, *(alias for alias, name in recording.aliases.items() if name == c.name)]
@@ -306,7 +308,7 @@ def _by_name(recording: Recording, quantity: str, owner: str) -> list[tuple[Chan
     bases = list(dict.fromkeys(m["base"] for _, m in found))
     if len(bases) > 1:
         raise RecordingError(
-            f"{owner}: there are profiles {', '.join(f'{b}_*' for b in bases)}; state which columns to take, such "
+            f"{owner}: there are profiles {', '.join(f'{b}_*' for b in bases)}; state which columns to use, such "
             f"as '{bases[0]}_*'"
         )
     there = {m["position"] for _, m in found}
@@ -321,5 +323,5 @@ def _refuse_another_axis(target: str, axis: str, found: Sequence[tuple[Channel, 
         if called and target in BY_CODE and called[1].upper() not in (axis, target[1]):
             raise RecordingError(
                 f"{owner}: columns like {c.name!r} seem to be of {called[1].upper()}, not of {target}; state which "
-                "columns to take if they are meant"
+                "columns to use if they are meant"
             )

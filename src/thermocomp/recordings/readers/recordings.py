@@ -307,7 +307,7 @@ def _times(file: FileCells, *, rising: bool) -> tuple[FloatArray, str, tuple[str
             f"{where}: the times cannot be read ({e}); correct [time] format in the mapping or in the file's first line"
         ) from e
     if not np.isfinite(time).all():
-        raise RecordingError(f"{where}: the times are too far apart for a number; correct them")
+        raise RecordingError(f"{where}: the times are too far apart to be represented; correct them")
     return time, start, notes
 
 

@@ -127,7 +127,7 @@ class CsvTable:
             ) as chunks:
                 frame: pd.DataFrame = pd.concat(chunks, ignore_index=True)
         except IndexError as e:  # pandas meets an end of the file within a cell
-            raise ValueError("no row is found in it") from e
+            raise ValueError("it contains no rows") from e
         except UnicodeDecodeError as e:
             raise RecordingError(
                 f"{self.path}: is not written in {self.encoding} ({e.reason}); give the right one in a mapping, "
@@ -136,7 +136,7 @@ class CsvTable:
         if len(frame) != self.n_rows:
             raise RecordingError(
                 f"{self.path}: {self.n_rows} lines give {len(frame)} rows: a quotation mark opens a cell that "
-                "goes over the end of its line; close it, or delete the mark"
+                "extends beyond the end of its line; close it, or delete the mark"
             )
         return frame
 

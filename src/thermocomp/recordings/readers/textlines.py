@@ -72,7 +72,7 @@ class Lines:
                 # pandas would count lines otherwise than we do
                 if self.returns and line.count(b"\r") > line.endswith(b"\r\n"):
                     raise RecordingError(
-                        f"{self.path}: line {number + 1} holds a carriage return that does not end it, as in files of "
+                        f"{self.path}: line {number + 1} contains a carriage return within the line, as in files of "
                         "old Macintoshes; save the file with the line ends of Unix or Windows"
                     )
                 if number and line[:1].isalnum() and line[:1] != comment[:1] and not options.skip:

@@ -112,7 +112,9 @@ def find_position(place: Place, headings: Sequence[str], table: str, source: str
     if isinstance(place, int):
         if 1 <= place <= len(headings):
             return place - 1
-        raise RecordingError(f"{source}: mapping {table}: there are {len(headings)} columns, and no number {place}")
+        raise RecordingError(
+            f"{source}: mapping {table}: the file has {len(headings)} columns, but no column number {place}"
+        )
     if place in headings:
         return list(headings).index(place)
     hint = tell_nearest(place, filter(None, headings), cutoff=0.5)
@@ -162,8 +164,8 @@ def _by_name(
         return index, None, [f"{headings[index]!r} is taken as the time"]
     if len(parts := find_parts(headings)) > 1:
         raise RecordingError(
-            f"{source}: the time stands in {len(parts)} columns, {', '.join(parts)}: write it into one, such as "
-            "2024-03-13 08:00:00 below the heading timestamp"
+            f"{source}: the time is split over {len(parts)} columns, {', '.join(parts)}: combine them into one, such "
+            "as 2024-03-13 08:00:00 below the heading timestamp"
         )
     if held := _by_cells(headings, kinds):
         return held

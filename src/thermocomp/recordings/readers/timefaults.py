@@ -59,12 +59,12 @@ def refuse_falling(wrong: IntArray, time: FloatArray, shown: "pd.Series[Any]", s
         )
     if is_stamp and not start and never_again:
         raise TwoReadingsError(
-            f"{text}, and no later row comes up to it: the next day, or a clock of twelve hours without AM and PM, "
+            f"{text}, and no later row reaches it: the next day, or a clock of twelve hours without AM and PM, "
             "or one that was set? Write dates beside the times, or split the file into tests",
             [skip_row(table, row)],
         )
     raise RecordingError(
-        f"{text}; time must rise: delete or correct the row, or split the file into tests", [skip_row(table, row)]
+        f"{text}; time must increase: delete or correct the row, or split the file into tests", [skip_row(table, row)]
     )
 
 

@@ -58,7 +58,7 @@ def read_times(file: FileCells, *, rising: bool) -> tuple[FloatArray, str, tuple
             raise RecordingError(
                 f"{source}: columns {times.time + 1} and {k + 1} are both named {file.heading!r} and hold different "
                 f"times, such as {shown.iloc[row]} and {other.iloc[row]} in {table.place(int(row))}; channels that "
-                "were sampled at different times are no recording: resample them to one time"
+                "were sampled at different times do not make one recording: resample them to one time"
             )
     notes: tuple[str, ...] = ()
     if beside:
@@ -226,8 +226,8 @@ def _read_numbers(raw: FloatArray, file: FileCells) -> tuple[FloatArray, str, tu
     if compact := raw.min() > 19e12 and raw.max() < 21e12:  # written without signs: 20240305080010
         ways = [{"format": "%Y%m%d%H%M%S"}]
     raise (RecordingError if compact else TwoReadingsError)(
-        f"{file.source}: column {heading!r} holds numbers from {raw[0]:.14g} to {raw[-1]:.14g} and says no unit: "
-        f'seconds, minutes, hours or milliseconds? Put it behind the name, such as "{heading} [s]", or write a '
+        f"{file.source}: column {heading!r} holds numbers from {raw[0]:.14g} to {raw[-1]:.14g} and has no unit: "
+        f'seconds, minutes, hours or milliseconds? Append it to the name, such as "{heading} [s]", or write a '
         f'mapping: [time] column = "{heading}" and unit = "s"',
         [{"time": {"column": heading, **way}} for way in ways],
     )

@@ -79,7 +79,9 @@ class _Survey:
         elif self.elements - self.begun > self.limits.row_elements:
             self.limits.check("row_elements", self.elements - self.begun, self.where)
         if len(attributes.get("r", "")) > _PLACE:
-            raise RecordingError(f"{self.where}: a cell cannot stand in {attributes['r'][:40]!r}; save the file again")
+            raise RecordingError(
+                f"{self.where}: {attributes['r'][:40]!r} is not the address of a cell; save the file again"
+            )
 
     def _doctype(self, *_: object) -> None:
         raise RecordingError(

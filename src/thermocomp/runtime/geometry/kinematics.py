@@ -41,8 +41,8 @@ class Kinematics:
         if machine.structure.rotary:
             raise InputError(
                 f"{machine.name}: rotary axis {', '.join(machine.structure.rotary)} in the structure "
-                f"{machine.structure.code!r}: only machines of the linear axes X, Y and Z are computed; take "
-                "the rotary axes out of the structure if they stand still"
+                f"{machine.structure.code!r}: only machines of the linear axes X, Y and Z are computed; remove "
+                "the rotary axes from the structure if they are stationary"
             )
         self.machine = machine
         self.structure = machine.structure

@@ -140,7 +140,7 @@ class VolumetricModel:
         """
         times = np.asarray(time, dtype=np.float64)
         if not np.isfinite(times).all() or (np.diff(times) <= 0).any():
-            raise InputError(f"machine {self.machine.name}: the times of the recording must rise")
+            raise InputError(f"machine {self.machine.name}: the times of the recording must increase")
         for name in self.inputs:
             if name not in table:
                 there = ", ".join(table) or "none"

@@ -183,7 +183,7 @@ def _find(table: CsvTable, role: str) -> int | None:
         fitting = [k for k, h in enumerate(table.headings) if role == "position" and _axis(h)]
     if len(fitting) > 1:
         named = " and ".join(repr(table.headings[k]) for k in fitting)
-        raise RecordingError(f"{table.path}: heading line: columns {named} are all a {role}: keep one, in one unit")
+        raise RecordingError(f"{table.path}: heading line: columns {named} all contain a {role}: keep one, in one unit")
     if not fitting and role in _REQUIRED:
         raise RecordingError(
             f"{table.path}: heading line: no column {role!r} among {', '.join(h for h in table.headings if h)}; a "
@@ -211,7 +211,7 @@ def _unit(table: CsvTable, column: int, role: str) -> Unit:
     symbol = found[1].strip() if found else heading.rpartition("_")[2] if "_" in heading else ""
     if not symbol or symbol.casefold() in NAMES[role]:
         raise RecordingError(
-            f"{table.path}: heading line, column {heading!r}: no unit; write it behind the name, such as {_EXAMPLE}"
+            f"{table.path}: heading line, column {heading!r}: no unit; append it to the name, such as {_EXAMPLE}"
         )
     for quantity in _QUANTITIES[role]:
         try:

@@ -240,8 +240,8 @@ def _splits(
 ) -> tuple[Samples, Judging]:
     if (states := sum(len(test) for test in tests)) < FEWEST:
         raise InputError(
-            f"{tests[0].target}: {states} thermal state(s): one is the cold profile, slopes are learned from others "
-            f"and judged on others again; measure in {FEWEST} states or more, better in 20"
+            f"{tests[0].target}: {states} thermal state(s): one gives the cold profile, the others are needed to fit "
+            f"and validate the slopes; measure at least {FEWEST} states, preferably 20"
         )
     samples, _ = slope_samples(tests, options)
     return samples, judging(samples)

@@ -218,11 +218,11 @@ def study(
     """
     tip = machine.tool if tool is None else tool
     if grid > FINEST:
-        raise InputError(f"a grid of {grid} points along each axis: at most {FINEST}, that tells the same")
+        raise InputError(f"a grid of {grid} points along each axis: at most {FINEST} are supported")
     if grid < 2:
-        raise InputError(f"a grid of {grid} points along an axis has no extent: want at least 2")
+        raise InputError(f"a grid of {grid} points along an axis has no extent: expected at least 2")
     if recording is None and hours:
-        raise InputError("without a recording there is no time: name one, or leave the times out")
+        raise InputError("without a recording there is no time: name one, or omit the times")
     time, table, missing = _inputs(machine, recording) if recording is not None else (np.zeros(1), {}, 0)
     replayed = machine if recording is not None else in_reference_state(machine)
     point = middle(machine) if at is None else _inside(machine, at)
@@ -316,7 +316,7 @@ def _inputs(machine: Machine, recording: Recording) -> tuple[FloatArray, dict[st
         if channel.quantity != model_input.quantity:
             raise InputError(
                 f"{recording.source or recording.name}: channel {name!r} is a {channel.quantity}; the models of "
-                f"{machine.name} want a {model_input.quantity}"
+                f"{machine.name} need a {model_input.quantity}"
             )
         table[name] = recording.table[channel.name].to_numpy(dtype=np.float64)
     missing = np.zeros(len(recording), dtype=np.bool_)

@@ -201,7 +201,7 @@ def _suited(points: FloatArray, axis: str, kind: Kind, coordinates: str | None) 
     if kind not in ("polynomial", "spline"):
         raise InputError(f"profile {kind!r}: choose polynomial or spline")
     if any(a not in "XYZ" for a in used) or (coordinates is not None and axis not in used):
-        raise InputError(f"coordinates {used!r}: name the own axis {axis} and, if wanted, others of X, Y, Z")
+        raise InputError(f"coordinates {used!r}: name the axis {axis} itself and, if required, others of X, Y, Z")
     others = "".join(a for a in used if a != axis and a in varying)
     if kind == "spline" and others and coordinates is not None:
         raise InputError(f"a spline is one along {axis} alone: for {used} choose a polynomial")

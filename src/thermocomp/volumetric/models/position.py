@@ -246,7 +246,7 @@ def _cold_inputs(samples: Samples, rows: NDArray[np.intp]) -> FloatArray:
     if missing.size:
         raise RecordingError(
             f"{samples.test_names[int(samples.test[rows[0]])]}: {samples.inputs[missing[0]].name} has no value in the "
-            "reference state: take another state, or leave the channel out"
+            "reference state: choose another state, or omit the channel"
         )
     return np.asarray(np.where(there, values, 0.0).sum(axis=0) / np.maximum(there.sum(axis=0), 1))
 

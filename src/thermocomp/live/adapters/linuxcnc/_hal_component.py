@@ -242,7 +242,7 @@ class Server:
             if letter not in self.axes:
                 raise ValueError(f"there is no axis {letter} here, only {', '.join(self.axes)}")
             if len(line) != 3 or not all(map(math.isfinite, line)):
-                raise ValueError(f"axis {letter}: want three finite numbers")
+                raise ValueError(f"axis {letter}: expected three finite numbers")
         beat = int(message["beat"])
         self.heard = time.monotonic()
         self.magnitude, self.rate = limits["magnitude"], limits["rate"]

@@ -58,7 +58,7 @@ class HalSettings:
             if not 0.0 < getattr(self, name) < float("inf"):
                 raise SettingError(f"{name} = {getattr(self, name)}: must be positive and finite")
         if not self.axes or set(self.axes.upper()) - set("XYZUVW") or len(set(self.axes.upper())) != len(self.axes):
-            raise SettingError(f"axes = {self.axes!r}: want letters of straight axes, each once, such as XZ")
+            raise SettingError(f"axes = {self.axes!r}: expected letters of linear axes, each once, such as XZ")
         if self.group:
             import grp  # not on every system
 
@@ -101,7 +101,7 @@ def prepare(path: Path, folder: Path, settings: HalSettings) -> HalSetup:
     folder = folder.resolve()
     socket = folder / SOCKET_NAME
     if len(str(socket).encode()) > LONGEST or any(c.isspace() or c in "\"'#[]$()" for c in str(socket)):
-        raise InputError(f"{folder}: HAL and a socket want a short path without spaces: choose another folder with -o")
+        raise InputError(f"{folder}: HAL and a socket need a short path without spaces: choose another folder with -o")
     todo: list[str] = []
     joints = round(ini.number("KINS", "JOINTS"))
     lines = ["# written by thermocomp linuxcnc setup; write it again rather than change it"]
@@ -206,8 +206,8 @@ def _joint(ini: Ini, letter: str) -> int:
     letters = (given[0] if given else "XYZABCUVW").upper()
     if letters.count(letter) != 1:
         raise InputError(
-            f"{ini.path}: [KINS] coordinates={letters}: axis {letter} has {letters.count(letter)} joints, want one; "
-            "use --pattern offset"
+            f"{ini.path}: [KINS] coordinates={letters}: axis {letter} has {letters.count(letter)} joints, expected "
+            "one; use --pattern offset"
         )
     return letters.index(letter)
 
@@ -216,8 +216,8 @@ def _check_free(ini: Ini, files: HalFiles, axes: Sequence[HalAxis], pattern: Pat
     if pattern == "drive":
         if files.unread:
             raise InputError(
-                f"{ini.path}: HAL in {files.unread[0]} cannot be seen through (Tcl, or old commands); on the drive "
-                "side it must be known what hangs on the drive: use --pattern offset"
+                f"{ini.path}: HAL in {files.unread[0]} cannot be analysed (Tcl, or old commands); on the drive "
+                "side all connections of the drive must be known: use --pattern offset"
             )
         if not {"motion-command-handler", "motion-controller"} <= set(files.functions):
             raise InputError(f"{ini.path}: no HAL file adds motion-command-handler and motion-controller to a thread")

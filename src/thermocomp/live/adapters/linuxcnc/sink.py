@@ -71,7 +71,7 @@ class LinuxCncSink:
     def __post_init__(self) -> None:
         letters = [a.upper() for a in self.axes.values()]
         if not letters or set(letters) - set("XYZUVW") or len(set(letters)) < len(letters):
-            raise SettingError(f'axes = {self.axes}: want a straight axis per target, such as {{"z_um": "Z"}}')
+            raise SettingError(f'axes = {self.axes}: expected a linear axis for each target, such as {{"z_um": "Z"}}')
 
     async def connect(self, timeout: float) -> None:
         """Connect, or raise `ThermocompError` with the reason after `timeout` seconds."""
@@ -82,10 +82,12 @@ class LinuxCncSink:
                 self._streams = await asyncio.open_unix_connection(self.path, limit=1 << 20)
         except FileNotFoundError as e:
             raise self._fail(
-                "there is no socket: does LinuxCNC run, with what 'thermocomp linuxcnc setup' wrote?"
+                "there is no socket: start LinuxCNC with the files that 'thermocomp linuxcnc setup' wrote"
             ) from e
         except PermissionError as e:
-            raise self._fail("this user may not connect: set it up with --group, and be a member of that") from e
+            raise self._fail(
+                "this user may not connect: set it up with --group, and make this user a member of that group"
+            ) from e
         except (OSError, TimeoutError, ValueError) as e:
             raise self._fail(str(e) or "no answer") from e
         self._beat = 0
