@@ -129,7 +129,7 @@ def test_what_both_read_alike_is_not_asked_for(text: str) -> None:
         ("G08", "G8 takes X as a radius in LinuxCNC, and looks ahead in a Fanuc"),
         *((f"M{n}", f"M{n} is for LinuxCNC: ") for n in (*range(50, 54), 60, *range(62, 66), *range(70, 74))),
         ("M53 P1", "on a Fanuc or Haas it does what the machine's maker has made of it (pallets, clamps, outputs)"),
-        ("M61 Q1", "M61 is for LinuxCNC: tells the number of the tool; on a Fanuc"),
+        ("M61 Q1", "M61 is for LinuxCNC: sets the number of the current tool; on a Fanuc"),
         ("M66 P1 L0", "M66 is for LinuxCNC: inputs and outputs"),
         ("M67 E1 Q1.", "M67 is for LinuxCNC"),
         ("M68 E0 Q1.", "M68 is for LinuxCNC"),

@@ -17,7 +17,7 @@ from thermocomp.core.model import ErrorModel
     [
         ("G90\nG0 X1\nM2\n", "part.ngc: line 2: X1 before G20 or G21: inches or millimetres?"),
         ("G90\nG0 X1\nM2\n", "state which unit the control starts with (--units)"),
-        ("G21\nM3\nG0 X1\nM2\n", "part.ngc: line 2: M3 and no spindle speed was stated"),
+        ("G21\nM3\nG0 X1\nM2\n", "part.ngc: line 2: M3 without a spindle speed"),
         (
             "G21\nG0 X1\nG1 X2 F100\nM2\n",
             "part.ngc: line 3: the program cuts, but has not said how fast the spindle turns",
