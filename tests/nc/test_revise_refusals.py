@@ -82,7 +82,9 @@ def test_whose_a_program_with_a_number_is_has_to_be_said(
     program = f"%\n{number}\nG21 G90 G17 G94\nT1 M6\nS4000 M3\nG0 G54 X0. Y0. Z5.\nG4 P3000\nG1 Z-1. F300.\nM30\n%\n"
     Path("part.nc").write_text(program, encoding="ascii")
     assert revise(program="part.nc", out="out.nc", dialect=False) == 2
-    assert f"line 2: '{number}' is how a Fanuc's or Haas's programs begin: give --controller fanuc" in said(capsys)
+    assert f"line 2: '{number}' is the beginning of a Fanuc's or Haas's program: give --controller fanuc" in said(
+        capsys
+    )
     assert revise("--controller", "fanuc", program="part.nc", out="out.nc") in (0, 1)
 
 
