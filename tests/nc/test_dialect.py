@@ -318,10 +318,10 @@ def test_habits_answer_for_a_radius_and_stored_codes_but_not_for_the_makers_code
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
-        ("G1 X1O.", "column 6: an O-word has to be at the beginning of the line; in a number write the digit 0"),
+        ("G1 X1O.", "column 6: an O-word must be at the beginning of the line; in a number write the digit 0"),
         ("G1 XO.", ""),
-        ("G1 X1,5", "column 6: found ',', which begins no word; numbers have a decimal point"),
-        ("X50\nG1 X1O. G4 P5", "column 6: an O-word has to be at the beginning"),
+        ("G1 X1,5", "column 6: found ',', which is not the start of a word; numbers have a decimal point"),
+        ("X50\nG1 X1O. G4 P5", "column 6: an O-word must be at the beginning"),
     ],
 )
 def test_a_slip_of_the_pen_is_no_word_with_two_readings(text: str, fault: str) -> None:

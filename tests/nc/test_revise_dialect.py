@@ -54,7 +54,12 @@ def test_a_word_with_two_readings_is_not_taken_for_linuxcnc(
 def test_what_makers_and_fanuc_have_made_of_a_code_is_asked_and_may_be_stated(
     job_folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for word, shown in [("G07 X0.", "G7 makes"), ("M50", "M50 belongs"), ("M65 P1", "M65 belongs"), ("M19 R90.", "M19 R90. has")]:
+    for word, shown in [
+        ("G07 X0.", "G7 makes"),
+        ("M50", "M50 belongs"),
+        ("M65 P1", "M65 belongs"),
+        ("M19 R90.", "M19 R90. has"),
+    ]:
         Path("part.nc").write_text(BODY.format(word + "\n"), encoding="ascii")
         assert revise(program="part.nc", dialect=False) == 2
         message = said(capsys)
