@@ -1,4 +1,4 @@
-"""What a line of an NC program makes the machine do: the state it runs in, and its moves."""
+"""Effect of a line of an NC program on the machine: the state it runs in, and its moves."""
 
 from dataclasses import dataclass, field
 from typing import Final, Literal, NamedTuple
@@ -87,7 +87,7 @@ PLANES: Final = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
 
 
 class Arc(NamedTuple):
-    """How a move turns."""
+    """Centre, plane and direction of an arc move."""
 
     plane: int  #: 17, 18, 19
     centre: tuple[float, float]  #: in the plane's own axes (17: X Y, 18: Z X, 19: Y Z), machine coordinates [mm]
@@ -124,7 +124,7 @@ class Move:
 
 @dataclass(slots=True)
 class Block:
-    """What one line does.
+    """Effect of one line.
 
     Parameters
     ----------
@@ -186,7 +186,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Setup:
-    """What stands at the controller and not in the program.
+    """State of the controller that is not in the program.
 
     Parameters
     ----------

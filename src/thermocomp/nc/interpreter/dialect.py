@@ -77,7 +77,7 @@ class Place(NamedTuple):
 
 @dataclass
 class Judgement:
-    """What a program shows.
+    """Signs of the dialect of a program.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def check_dialect(lines: Iterable[str], *, whole: bool = False, startup: str = "
 
 
 def judge_dialect(lines: Iterable[str], *, whole: bool = False, startup: str = "") -> Judgement:
-    """Return what a whole program shows of its dialect; see `check_dialect`."""
+    """Return the signs of the dialect in a whole program; see `check_dialect`."""
     scan = _Scan(InForce(whole))
     words = _WORD.findall(_squeeze(startup.upper()))
     scan.force.take(

@@ -1,4 +1,4 @@
-"""What a Fanuc does in its own way: G80 with words, G0 beside G28, G68, and what its makers leave open in cycles."""
+"""Codes specific to a Fanuc: G80 with words, G0 with G28, G68, and cycles that its models read differently."""
 
 from typing import Final
 

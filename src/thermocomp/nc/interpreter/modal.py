@@ -1,4 +1,4 @@
-"""What a line sets before anything moves: units, feed, spindle, tool, modal codes, in LinuxCNC's order."""
+"""Settings of a line before any motion: units, feed, spindle, tool, modal codes, in LinuxCNC's order."""
 
 from typing import Final
 

@@ -63,7 +63,7 @@ def in_machine(state: InterpreterState, words: BlockWords, block: Block) -> None
 
 
 def _doubt(state: InterpreterState, axes: dict[int, float]) -> Known:
-    """Return what is still known after machine coordinates of some axes were reached."""
+    """Return the axes that are still known after machine coordinates of some axes were reached."""
     known = mark_axes(state.known, axes, to=False)
     turned = state.offsets.rotation and (0 in axes or 1 in axes)
     return (False, False, known[2]) if turned else known

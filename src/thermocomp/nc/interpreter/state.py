@@ -1,4 +1,4 @@
-"""What a controller knows while it runs a program."""
+"""State of a controller while it runs a program."""
 
 import math
 from dataclasses import replace

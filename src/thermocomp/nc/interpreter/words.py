@@ -1,4 +1,4 @@
-"""What a line words: its codes by modal group, and the values of its words, checked as far as they stand alone."""
+"""Words of a line: its codes by modal group, and the values of its words, each checked by itself."""
 
 from dataclasses import dataclass
 

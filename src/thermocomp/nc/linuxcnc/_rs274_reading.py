@@ -1,4 +1,4 @@
-"""What LinuxCNC's interpreter reads: no file outside the folders of the job, and nothing without end.
+"""Reading by LinuxCNC's interpreter: no file outside the folders of the job, and nothing endless.
 
 Part of the script `_rs274_child.py`: standard library only.
 """

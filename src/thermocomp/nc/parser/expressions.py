@@ -158,7 +158,7 @@ _REFUSED_BY_FANUC = {
 
 
 class Parameters:
-    """What parameters are known to be, local and global ones in one table.
+    """Known values of parameters, local and global ones in one table.
 
     Parameters
     ----------
@@ -257,7 +257,7 @@ def evaluate(text: str, parameters: Parameters, *, word: bool = True) -> float:
 def _read_simple(
     text: str, controller: Literal["linuxcnc", "fanuc"]
 ) -> tuple[float | int, Binary | None, float | int] | None:
-    """Return what a simple expression does to what: numbers, or the numbers (int) of parameters; None: it is none."""
+    """Return operator and operands of a simple expression: numbers, or numbers (int) of parameters; else None."""
     found = _SIMPLE.fullmatch(_BLANKS.sub("", text).lower())
     if found is None or bool(found[1]) != bool(found[7]) or not (found[1] or controller == "fanuc" or not found[4]):
         return None

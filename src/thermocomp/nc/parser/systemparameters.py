@@ -1,4 +1,4 @@
-"""What the parameters are that belong to the machine and not to the program (LinuxCNC and Fanuc)."""
+"""Parameters that belong to the machine and not to the program (LinuxCNC and Fanuc)."""
 
 from typing import Literal
 
@@ -72,7 +72,7 @@ _NAMED = {
 
 
 def machine_meaning(key: int | str, controller: Literal["linuxcnc", "fanuc"] = "linuxcnc") -> str:
-    """Return what a parameter of the machine is; empty if it belongs to the program.
+    """Return the meaning of a parameter of the machine; empty if it belongs to the program.
 
     Parameters
     ----------

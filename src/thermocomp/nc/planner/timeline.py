@@ -52,7 +52,7 @@ HALTS = frozenset(
 
 @dataclass(frozen=True)
 class MotionLimits:
-    """How fast a machine and its controller are.
+    """Dynamics of a machine and its controller.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def time_blocks(blocks: Iterable[Block], kinematics: MotionLimits) -> Iterator[T
 
 
 class _Plan:
-    """What lies ahead of the controller, and what it has done."""
+    """Moves ahead of the controller, and those it has completed."""
 
     def __init__(self, kinematics: MotionLimits) -> None:
         self.kinematics = kinematics

@@ -16,7 +16,7 @@ Field = Callable[[Point], Vector]
 
 
 class DriftSource(Protocol):
-    """What a machine's drift is asked for."""
+    """Interface of a machine's drift."""
 
     @property
     def by_position(self) -> bool:
@@ -29,12 +29,12 @@ class DriftSource(Protocol):
         """Return by how much the tool point deviates now [um], at a place in machine coordinates [mm]."""
 
     def field(self) -> Field:
-        """Return what `deviation` gives now, as a function of the place that time does not change any more."""
+        """Return the present `deviation` as a function of position that time no longer changes."""
 
 
 @dataclass
 class Demand:
-    """What the axes should carry.
+    """Corrections required of the axes.
 
     A correction is renewed when it is due: every `every` seconds (P-06), or as soon as the drift has moved by
     `tolerance` since. Renewed every so often, it still follows the place by `tolerance`, where it depends on it.
@@ -108,7 +108,7 @@ def oppose_deviation(deviation: Vector) -> Vector:
 
 
 class CutErrors(NamedTuple):
-    """What was met in a block in which the tool cuts, at its ends and inside: lowest and highest of each axis [um]."""
+    """Deviations in a block in which the tool cuts, at its ends and inside: lowest and highest of each axis [um]."""
 
     drift: tuple[Vector, Vector]
     left: tuple[Vector, Vector]  #: what the correction leaves of it
@@ -116,7 +116,7 @@ class CutErrors(NamedTuple):
 
 @dataclass
 class Left:
-    """What a correction leaves of the drift that it was computed from, in the cuts.
+    """Remainder of the drift in the cuts, after the correction that was computed from it.
 
     Parameters
     ----------

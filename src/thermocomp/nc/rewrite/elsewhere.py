@@ -1,4 +1,4 @@
-"""What a program revised for some work offsets would be wrong by with others, where the drift depends on the place."""
+"""Error of a program, revised for some work offsets, with others, where the drift depends on the position."""
 
 import math
 from dataclasses import dataclass, field

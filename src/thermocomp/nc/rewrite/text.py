@@ -18,7 +18,7 @@ Shifts = Mapping[str, float]
 
 @dataclass(frozen=True)
 class Digits:
-    """How many decimals a written length has.
+    """Number of decimals of a written length.
 
     Parameters
     ----------

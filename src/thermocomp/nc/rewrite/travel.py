@@ -1,4 +1,4 @@
-"""Whether a program stays where the machine can go: if it does not, it is wrong, or what was told of its origins."""
+"""Check that a program stays within the travel of the machine: if not, the program or its stated origins are wrong."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

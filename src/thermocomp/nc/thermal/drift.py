@@ -39,7 +39,7 @@ class Outside(NamedTuple):
 
 
 class Drift:
-    """How far the tool point has drifted, at any moment of a program and anywhere.
+    """Drift of the tool point at any moment and position of a program.
 
     Parameters
     ----------
@@ -83,7 +83,9 @@ class Drift:
         if not 0 < step < math.inf:
             raise InputError(f"drift: step {step} s must be positive and finite")
         if zero == "last" and start.zeros is None:
-            raise InputError("drift: it cannot count from the zero of the last job: no state of one is carried over")
+            raise InputError(
+                "drift: counting from the zero of the last job needs a state that is carried over; found none"
+            )
         if check_stations(stations) != list(stations) or len(start.states) != len(stations):
             raise InputError("drift: stations must be ordered by axis and position, as 'stations' gives them")
         self.stations = tuple(stations)
@@ -219,7 +221,7 @@ class Drift:
         return (found[0], found[1], found[2])
 
     def field(self) -> Callable[[Point], Point]:
-        """Return what `deviation` gives now, as a function of the place that time does not change any more."""
+        """Return the present `deviation` as a function of position that time no longer changes."""
         everywhere = self._everywhere
         if not self._ladders:
             return lambda _: everywhere
@@ -282,7 +284,7 @@ class Drift:
         return {n: h for n, s in self._others.items() if n in used and (h := s.held(self.time)) > 0}
 
     def uncertainty(self) -> tuple[float, float, float]:
-        """Return how wrong the models may be.
+        """Return the error bounds of the models.
 
         Per axis, of its stations the greatest of: the greatest error on cycles the method had not seen, twice if the
         zero itself is a prediction; and, since an input has left the trained range, all that the model says on top.
@@ -303,7 +305,7 @@ class Drift:
     # -- the next job ------------------------------------------------------------------------------------------------
 
     def state(self) -> JobState:
-        """Return what the next job can start from; the models are stepped up to now."""
+        """Return the state from which the next job can start; the models are stepped up to now."""
         if self._pending:
             self._flush()
         return hand_over_state(self.stations, self._states, self._zeros, self._doubts, zero_known=self._zero_known)

@@ -1,4 +1,4 @@
-"""What every line of a revised program should be shifted by, and where its lines come from."""
+"""Required shift of every line of a revised program, and the origin of its lines."""
 
 from array import array
 from typing import Any, NamedTuple
@@ -64,7 +64,7 @@ class _Track:
 
 
 class Ledger:
-    """What every line of a program should be shifted by; as long as that stays the same it takes no room."""
+    """Required shift of every line of a program; stored only where it changes."""
 
     def __init__(self) -> None:
         self._carried, self._inner, self._other = _Track(3), _Track(3), _Track(3)
@@ -99,7 +99,7 @@ class Ledger:
         self._other.take(line, (x, y, z))
 
     def of(self, lines: Integers) -> Shifts:
-        """Return what lines of the original should be shifted by."""
+        """Return the required shifts of lines of the original."""
         after = self._carried.at(lines)
         inverse = self._inverse.at(lines)[:, 0] > 0
         before, loose = self._carried.at(lines - 1), self._loose.at(lines)[:, 0]
@@ -116,7 +116,7 @@ class Ledger:
         )
 
     def at(self, line: int) -> LineShift:
-        """Return what a line of the original should be shifted by."""
+        """Return the required shift of a line of the original."""
         found = self.of(np.array([line]))
         before, after, inner, inverse = (row[0].tolist() for row in found[:4])
         other = tuple(found.others[1][0].tolist()) if found.others else tuple(after)
