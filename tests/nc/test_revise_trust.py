@@ -108,7 +108,7 @@ def test_models_along_an_axis(job_folder: Path, capsys: pytest.CaptureFixture[st
     along = ["--model", "along.json", "--axis", "a=Z at Z 0 mm", "b=Z at Z 40 mm", "--origin", "G54=0 mm, 0 mm, 0 mm"]
     axis, warnings = bound(along, capsys)
     assert axis["axis"] == "Z"
-    assert any("Z was asked for 10.0 mm beyond its outermost station" in w for w in warnings)
+    assert any("Z was needed 10.0 mm beyond its outermost station" in w for w in warnings)
     rows = table()
     assert float(rows[11]["drift_z_um"]) > 1.5 * float(rows[10]["drift_z_um"])
 
