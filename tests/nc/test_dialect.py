@@ -72,102 +72,105 @@ def test_what_both_read_alike_is_not_asked_for(text: str) -> None:
             "G04P500",
             "G4 P500 is 500 s for LinuxCNC, and 0.5 s for a Fanuc: give --controller, or for a Fanuc write G4 X, which",
         ),
-        ("G4 P500.", "G4 P500. is 500 s for LinuxCNC and a Haas, and a Fanuc takes P in milliseconds without a point"),
+        ("G4 P500.", "G4 P500. is 500 s for LinuxCNC and a Haas, a Fanuc expects milliseconds without a decimal point"),
         ("G98 G82 X1. Z-1. R1. P2.", "G82 P2. is 2 s for LinuxCNC and a Haas"),
         ("g4 p [#1*2]", "G4 P[..] is in seconds for LinuxCNC"),
         (
             "X 1 0 0",
-            "X100 is 100 mm for LinuxCNC, and 0.1 mm for a Fanuc that counts least increments: write the point",
+            "X100 is 100 mm for LinuxCNC, and 0.1 mm for a Fanuc that uses least increments: write the decimal point",
         ),
         ("G20\nY-2", "Y-2 is -2 in for LinuxCNC, and -0.0002 in"),
         ("A90", "A90 is 90 deg for LinuxCNC, and 0.09 deg"),
         ("G2 X10. I5", "I5 is 5 mm"),
         ("G98 G81 X1. Z-5 R1.", "Z-5 is -5 mm"),
         ("G98 G82 X1. Z-1. R1. P500", "G82 P500 is 500 s for LinuxCNC, and 0.5 s"),
-        ("G81 X1. Z-1. R1.", "G81 before G98 or G99 goes back to R in LinuxCNC (G99)"),
+        ("G81 X1. Z-1. R1.", "G81 before G98 or G99 returns to R in LinuxCNC (G99)"),
         ("G98 G81 X1. Z-1. R1. L3", "G81 L3 repeats"),
         ("G98 G81 X1. Z-1. R1.\nX2. K3", "G81 K3 repeats"),
-        ("G98 G83 X1. Z-1. R1. Q1.", "G83 stays 0.254 mm off the ground"),
+        ("G98 G83 X1. Z-1. R1. Q1.", "G83 stops 0.254 mm above the last depth"),
         ("G99 G84 X1. Z-1. R1.", "G84 needs a turning spindle"),
-        ("G76 X1. Z-1. R1.", "G76 is another cycle"),
-        ("G92 X0", "G92 is kept by LinuxCNC in one store"),
-        ("G52 X1.", "G52 is kept by LinuxCNC in one store"),
+        ("G76 X1. Z-1. R1.", "G76 is a different cycle"),
+        ("G92 X0", "G92 shares one store"),
+        ("G52 X1.", "G52 shares one store"),
         ("G10 L20 P1 X0", "G10 L20 P1 sets other offsets"),
         ("G10 L2 P0 X1.", "G10 L2 P0 sets other offsets"),
         ("G91 G10 L2 P1 X1.\nG90", "G10 L2 P1 sets other offsets"),
-        ("G53 Z0", "G53 moves by the feed in LinuxCNC under G1"),
-        ("G43", "G43 without H is the tool in the spindle"),
-        ("G61", "G61 goes through the corners exactly"),
-        ("G61.1", "G61.1 stops in the corners"),
-        ("U5.", "U5. is an axis of its own"),
-        ("M98 P1000", "M98 is taken by LinuxCNC from files of its own"),
-        ("X[#1 AND 3]", "AND, OR or XOR takes bits"),
+        ("G53 Z0", "G53 moves at feed rate in LinuxCNC under G1"),
+        ("G43", "G43 without H uses the tool in the spindle"),
+        ("G61", "G61 follows corners exactly"),
+        ("G61.1", "G61.1 stops in corners"),
+        ("U5.", "U5. is a separate axis"),
+        ("M98 P1000", "M98 is read by LinuxCNC from separate files"),
+        ("X[#1 AND 3]", "AND, OR or XOR works on bits"),
         ("G10 L2 P1 X1. R5.", "G10 L2 P1 sets other offsets"),
-        ("G#1 P500", "G#1 is a code that only the run tells"),
-        ("G [4] P500", "G[..] is a code that only the run tells"),
+        ("G#1 P500", "G#1 is a code that is computed at run time"),
+        ("G [4] P500", "G[..] is a code that is computed at run time"),
         ("M#2", "M#2 is a code"),
-        ("G4 P1. X5.", "X5. beside G4 moves in LinuxCNC"),
-        ("G4 P0 A5.", "A5. beside G4 moves"),
+        ("G4 P1. X5.", "X5. with G4 moves in LinuxCNC"),
+        ("G4 P0 A5.", "A5. with G4 moves"),
         ("G99", "G99 without cycles is feed per turn"),
         ("T0202", "T0202 without M6 changes the tool"),
         ("G18 G90 X4. Z-3. F0.2", "G90 with X and Z is a turning cycle"),
         ("G96 S200\nG94 X4. Z-3. F0.2", "G94 with X and Z is a turning cycle"),
-        ("G95 F1", "F1 is 1 mm per turn for LinuxCNC, and may be in least increments"),
-        ("G20\nF10", "F10 is 10 in per minute for LinuxCNC"),
-        ("X[FIX[#1/2]]", "FIX, FUP, MOD or ROUND rounds other numbers"),
+        ("G95 F1", "F1 is 1 mm per turn in LinuxCNC, maybe in least increments"),
+        ("G20\nF10", "F10 is 10 in per minute in LinuxCNC"),
+        ("X[FIX[#1/2]]", "FIX, FUP, MOD or ROUND rounds differently"),
         ("X[#1 MOD 3]", "FIX, FUP, MOD or ROUND"),
-        ("#101=ASIN[-0.5]", "ASIN or ATAN below zero is such an angle in LinuxCNC, and 360 degrees more in a Fanuc"),
+        ("#101=ASIN[-0.5]", "ASIN or ATAN below zero is a negative angle in LinuxCNC, and 360 degrees more in a Fanuc"),
         ("#101 = atan [-1.] / [1.]", "ASIN or ATAN below zero"),
         ("X[2.*asin[#1]]", "ASIN or ATAN below zero"),
-        ("X#5221", "#5221 from #1000 on has other meanings"),
+        ("X#5221", "#5221 from #1000 on has different meanings"),
         ("# 3001 = 0", "#3001 from #1000 on"),
         ("X#[#1+5000]", "#[..] from #1000 on"),
         ("X##1", "##1 from #1000 on"),
         ("X1. ; G4 P1", "';G4P1' is a comment for LinuxCNC, and the next block for a Fanuc"),
-        ("G07 X0.", "G7 takes X as a diameter in LinuxCNC, and begins or ends hypothetical-axis interpolation"),
-        ("G7", "G7 takes X as a diameter"),
-        ("G08", "G8 takes X as a radius in LinuxCNC, and looks ahead in a Fanuc"),
-        *((f"M{n}", f"M{n} is for LinuxCNC: ") for n in (*range(50, 54), 60, *range(62, 66), *range(70, 74))),
-        ("M53 P1", "on a Fanuc or Haas it does what the machine's maker has made of it (pallets, clamps, outputs)"),
-        ("M61 Q1", "M61 is for LinuxCNC: tells the number of the tool; on a Fanuc"),
-        ("M66 P1 L0", "M66 is for LinuxCNC: inputs and outputs"),
-        ("M67 E1 Q1.", "M67 is for LinuxCNC"),
-        ("M68 E0 Q1.", "M68 is for LinuxCNC"),
-        ("M19 R90.", "M19 R90. has R for the angle"),
-        ("M19 P1", "M19 P1 has R for the angle"),
-        ("G28", "G28 without axes moves all in LinuxCNC, and none in a Fanuc"),
+        ("G07 X0.", "G7 makes X a diameter in LinuxCNC, and begins or ends hypothetical-axis interpolation"),
+        ("G7", "G7 makes X a diameter"),
+        ("G08", "G8 makes X a radius in LinuxCNC, and looks ahead in a Fanuc"),
+        *((f"M{n}", f"M{n} belongs to LinuxCNC: ") for n in (*range(50, 54), 60, *range(62, 66), *range(70, 74))),
+        ("M53 P1", "on a Fanuc or Haas the machine builder defines it (pallets, clamps, outputs)"),
+        ("M61 Q1", "M61 belongs to LinuxCNC: sets the number of the current tool; on a Fanuc"),
+        ("M66 P1 L0", "M66 belongs to LinuxCNC: inputs and outputs"),
+        ("M67 E1 Q1.", "M67 belongs to LinuxCNC"),
+        ("M68 E0 Q1.", "M68 belongs to LinuxCNC"),
+        ("M19 R90.", "M19 R90. has the angle in R"),
+        ("M19 P1", "M19 P1 has the angle in R"),
+        ("G28", "G28 without axes moves all axes in LinuxCNC, and none in a Fanuc"),
         ("G30", "G30 without axes"),
-        ("G28.1", "G28.1 stores in LinuxCNC where the tool is"),
-        ("G30.1 Z0", "G30.1 stores in LinuxCNC where the tool is, and moves in a Fanuc"),
-        ("G33 Z-1. K1.", "G33 takes the way per turn from K in LinuxCNC, and from F in a Fanuc"),
-        ("G41.1 D1.", "G41.1 takes D for the cutter's diameter in LinuxCNC, and turns an axis"),
-        ("G43.1 Z1.", "G43.1 makes its words the tool's length in LinuxCNC"),
-        ("G43.2 H1", "G43.2 adds a tool's length"),
-        ("G43 H00", "G43 H00 is the length of the tool in the spindle for LinuxCNC, and none for a Fanuc"),
-        ("G41 X5.", "G41 without D is the radius of the tool in the spindle for LinuxCNC, and the last D for a Fanuc"),
-        ("G42", "G42 without D is the radius"),
-        ("G42 D00 X5.", "G42 D00 is the radius of the tool in the spindle for LinuxCNC, and none for a Fanuc"),
+        ("G28.1", "G28.1 stores the tool position in LinuxCNC"),
+        ("G30.1 Z0", "G30.1 stores the tool position in LinuxCNC, and moves in a Fanuc"),
+        ("G33 Z-1. K1.", "G33 takes the distance per turn from K in LinuxCNC, and from F in a Fanuc"),
+        ("G41.1 D1.", "G41.1 takes the cutter diameter from D in LinuxCNC, and turns an axis"),
+        ("G43.1 Z1.", "G43.1 sets the tool length offset to its words in LinuxCNC"),
+        ("G43.2 H1", "G43.2 adds a tool length"),
+        ("G43 H00", "G43 H00 uses the length of the tool in the spindle in LinuxCNC, and none in a Fanuc"),
+        ("G41 X5.", "G41 without D uses the radius of the tool in the spindle in LinuxCNC, and the last D in a Fanuc"),
+        ("G42", "G42 without D uses the radius"),
+        ("G42 D00 X5.", "G42 D00 uses the radius of the tool in the spindle in LinuxCNC, and none in a Fanuc"),
         *((f"G18 G98 G8{n} X1. Y2. Z-1. R1. P0", f"G8{n} in G18 or G19 drills across") for n in (1, 2, 5, 9)),
         (
             "G98 G19 G81 X1. Y2. Z-1. R1.",
             "G81 in G18 or G19 drills across that plane in LinuxCNC, and along Z in a Fanuc",
         ),
-        ("G98 G81 X1. Y2. Z-1. R1.\nG91 X3.", "G81 in G91 continues with R and depth of lines before"),
+        ("G98 G81 X1. Y2. Z-1. R1.\nG91 X3.", "G81 in G91 continues with R and depth of earlier lines"),
         (
             "M48",
-            "M48 is for LinuxCNC: overrides on; on a Fanuc or Haas it does what the machine's maker has made of it",
+            "M48 belongs to LinuxCNC: overrides on; on a Fanuc or Haas the machine builder defines it",
         ),
-        ("M49", "M49 is for LinuxCNC: overrides off"),
-        ("G70 P1 Q2", "G70 is another cycle"),
-        ("G71 P1 Q2", "G71 is another cycle"),
-        ("G72 I5. J0 L6.", "G72 is another cycle"),
+        ("M49", "M49 belongs to LinuxCNC: overrides off"),
+        ("G70 P1 Q2", "G70 is a different cycle"),
+        ("G71 P1 Q2", "G71 is a different cycle"),
+        ("G72 I5. J0 L6.", "G72 is a different cycle"),
         ("G98 G86 X1. Z-1. R1. P1.", "G86 P1. dwells in LinuxCNC, and a Fanuc's G86 has no dwell"),
-        ("G98 G86 X1. Z-1. R1.", "G86 without P is refused by LinuxCNC where the cycle begins"),
+        ("G98 G86 X1. Z-1. R1.", "G86 without P is refused by LinuxCNC on the first line of a cycle"),
         ("G98 G89 X1. Z-1. R1.", "G89 without P is refused by LinuxCNC"),
-        ("G2 I5. J0 P2", "P2 counts the turns of an arc in LinuxCNC"),
+        ("G2 I5. J0 P2", "P2 is the number of turns of an arc in LinuxCNC"),
         ("G64 G4 P500", "G4 P500 is 500 s for LinuxCNC, and 0.5 s for a Fanuc"),
-        ("G54 P3 G64", "P3 is G64's in LinuxCNC, and may be G54's in a Fanuc: put the two on lines of their own"),
-        ("G64 M98 P1000", "M98 is taken by LinuxCNC from files of its own"),
+        (
+            "G54 P3 G64",
+            "P3 belongs to G64 in LinuxCNC, and may belong to G54 in a Fanuc: put the two on separate lines",
+        ),
+        ("G64 M98 P1000", "M98 is read by LinuxCNC from separate files"),
     ],
 )
 def test_a_word_with_two_readings_is_asked_for(text: str, asked: str) -> None:
@@ -176,7 +179,7 @@ def test_a_word_with_two_readings_is_asked_for(text: str, asked: str) -> None:
     assert asked in found
     line = 5 + text.count("\n") - (text.endswith("\nG90"))
     assert found.startswith(f"line {line}: ")
-    assert found.endswith("write it so that both read the same, or give --controller linuxcnc or --controller fanuc")
+    assert found.endswith("write it so that both read it alike, or give --controller linuxcnc or --controller fanuc")
     # LinuxCNC's own word anywhere decides it
     assert question(f"o100 sub\no100 endsub\n{program}") == ""
 
@@ -204,7 +207,7 @@ def test_every_kind_of_word_is_named_with_its_first_line() -> None:
     found = question(f"{BEGIN}X100\nX200\nG4 P5\nG92 X0\n{END}")
     assert found.startswith("line 5: X100 is 100 mm")
     assert "(and 1 more); line 7: G4 P5 is 5 s" in found
-    assert "; line 8: G92 is kept" in found
+    assert "; line 8: G92 shares one store" in found
 
 
 @pytest.mark.parametrize(
@@ -234,8 +237,8 @@ def test_every_kind_of_word_is_named_with_its_first_line() -> None:
 def test_what_only_linuxcnc_takes_decides(text: str) -> None:
     assert question(f"{BEGIN}{text}\nG4 P500\nX100\n{END}") == ""
     both = question(f"{BEGIN}{text}\n{END}N1 O2000\n")
-    assert both.startswith("line 9: 'N1 O2000' is how a Fanuc's or Haas's programs begin, and line 5: ")
-    assert "take away the one that is not meant" in both
+    assert both.startswith("line 9: 'N1 O2000' is the beginning of a Fanuc's or Haas's program, and line 5: ")
+    assert "remove the wrong one" in both
 
 
 @pytest.mark.parametrize(
@@ -273,7 +276,7 @@ def test_what_only_linuxcnc_takes_decides(text: str) -> None:
 def test_what_only_a_fanuc_takes_is_named(text: str) -> None:
     found = question(f"{BEGIN}{text}\n{END}")
     assert found.startswith(f"line 5: {text!r} is ")
-    assert "give --controller fanuc (dwells, cycles and lengths are others there), or --controller linuxcnc" in found
+    assert "give --controller fanuc (its dwells, cycles and lengths differ), or --controller linuxcnc" in found
 
 
 @pytest.mark.parametrize(
@@ -292,7 +295,7 @@ def test_what_only_a_fanuc_takes_is_named(text: str) -> None:
 )
 def test_a_program_number_behind_words_is_a_fanucs(text: str) -> None:
     found = question(f"{text}\n{BEGIN}{END}")
-    assert f"line 1: {text!r} is how a Fanuc's or Haas's programs begin: give --controller fanuc" in found
+    assert f"line 1: {text!r} is the beginning of a Fanuc's or Haas's program: give --controller fanuc" in found
 
 
 def test_habits_answer_for_lengths_only() -> None:
@@ -308,23 +311,23 @@ def test_habits_answer_for_lengths_only() -> None:
 def test_habits_answer_for_a_radius_and_stored_codes_but_not_for_the_makers_codes() -> None:
     comment = f"; the plate\n{BEGIN}"
     assert question(f"{comment}G8\nM70\nM72\n{END}") == ""
-    assert "G7 takes X as a diameter" in question(f"{comment}G7\n{END}")
-    assert "M62 is for LinuxCNC" in question(f"{comment}M62 P1\n{END}")
+    assert "G7 makes X a diameter" in question(f"{comment}G7\n{END}")
+    assert "M62 belongs to LinuxCNC" in question(f"{comment}M62 P1\n{END}")
 
 
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
-        ("G1 X1O.", "column 6: an O-word has to be at the beginning of the line; in a number write the digit 0"),
+        ("G1 X1O.", "column 6: an O-word must be at the beginning of the line; in a number write the digit 0"),
         ("G1 XO.", ""),
-        ("G1 X1,5", "column 6: found ',', which begins no word; numbers have a decimal point"),
-        ("X50\nG1 X1O. G4 P5", "column 6: an O-word has to be at the beginning"),
+        ("G1 X1,5", "column 6: found ',', which is not the start of a word; numbers have a decimal point"),
+        ("X50\nG1 X1O. G4 P5", "column 6: an O-word must be at the beginning"),
     ],
 )
 def test_a_slip_of_the_pen_is_no_word_with_two_readings(text: str, fault: str) -> None:
     found = question(f"{BEGIN}{text}\n{END}")
     assert fault in found
-    assert "write the point" not in found
+    assert "write the decimal point" not in found
     if fault:
         assert found.startswith(f"line {5 + text.count(chr(10))}: column ")
 

@@ -147,28 +147,28 @@ def test_plain_lines(plain: Plain, text: str, lines: list[str]) -> None:
     ("text", "line", "reason"),
     [
         ("G0 X1\nM2\n", 1, "no unit"),
-        ("G21\nG91\nG0 X1\nM2\n", 3, "where X.* goes depends on what is stored"),
-        ("G21\nG0 X[#5221 + 1]\nM2\n", 2, "where X.* goes depends"),
-        ("G21\nT1 M6\nG0 Z#5403\nM2\n", 3, "where Z goes depends"),
-        ("G21\nG0 X#100\nM2\n", 2, "where X.* goes depends"),
-        ("G21\nG0 X1\no1 if [#5422 GT 0]\nG0 X2\no1 endif\nG0 X3\nM2\n", 4, "what is run depends"),
-        ("G21\no1 if [#<_task>]\nG0 X2\no1 endif\nM2\n", 3, "what is run depends"),
-        ("G21\nG0 X0\nG2 X10 Y0 R5 F100\nM2\n", 3, "arc starts or ends depends|refuses it"),
+        ("G21\nG91\nG0 X1\nM2\n", 3, "the end position in X.* depends on what is stored"),
+        ("G21\nG0 X[#5221 + 1]\nM2\n", 2, "the end position in X.* depends"),
+        ("G21\nT1 M6\nG0 Z#5403\nM2\n", 3, "the end position in Z depends"),
+        ("G21\nG0 X#100\nM2\n", 2, "the end position in X.* depends"),
+        ("G21\nG0 X1\no1 if [#5422 GT 0]\nG0 X2\no1 endif\nG0 X3\nM2\n", 4, "the path of execution depends"),
+        ("G21\no1 if [#<_task>]\nG0 X2\no1 endif\nM2\n", 3, "the path of execution depends"),
+        ("G21\nG0 X0\nG2 X10 Y0 R5 F100\nM2\n", 3, "start or end of this arc depends|refuses it"),
         ("G21\nG1 X1 F[#5221*0 + #5222 + 1000]\nM2\n", 2, "the feed depends"),
         ("G21\nG38.2 Z-500 F10\nM2\n", 2, "it probes|refuses it"),
         ("G21\nM66 P0 L0\nM2\n", 2, "waits for an input"),
         ("G21\nM19 R5 Q1\nM2\n", 2, "orients the spindle"),
         ("G21\nG0 X1\nm 19 (orient)\nM2\n", 3, "orients the spindle"),
         ("G21\no<turn> sub\nM19\no<turn> endsub\no<turn> call\nM2\n", 3, "orients the spindle"),
-        ("G21\nG0 X[#5400/10]\nM2\n", 2, "where X.* goes depends"),
+        ("G21\nG0 X[#5400/10]\nM2\n", 2, "the end position in X.* depends"),
         ("G21\nT1\nG43\n#1=#5400\nM6\nG43 H#1\nG0 Z5\nM2\n", 7, "plain lines would do"),
-        ("G21\nM101\nM2\n", 2, "M101 is a code of the user's own"),
+        ("G21\nM101\nM2\n", 2, "M101 is a user-defined code"),
         ("G21\nG10 L1 P1 Z5\nM2\n", 2, "writes the tool table"),
         ("G21\n#1=5\nG10 L2 P3 X#1\nM2\n", 3, "more than plain numbers"),
         ("G21\nG92 X#5221\nM2\n", 2, "shift of X by G92 depends"),
         ("G21\nG0 X1\nG28.1\nM2\n", 1, "another parameter #5161|#516"),
         ("G21\nG0 X0 Y0\nT1 M6\nG41\nG1 X10 F100\nX20\nM2\n", 5, "depends on what is stored"),
-        ("G21\nG0 Z5\nG98 G81 X1 Y1 Z-1 R1 F100\nM2\n", 3, "puts the path mode back"),
+        ("G21\nG0 Z5\nG98 G81 X1 Y1 Z-1 R1 F100\nM2\n", 3, "restores the path mode"),
         ("G21 G64\nG0 Z5\nG81 X1 Y1 Z-1 R1 F100\nM2\n", 3, "G98 or G99"),
         ("G21\n(DEBUG,#5221)\nM2\n", 2, "this message depends"),
         ("G21\n\nG1 X1\nM2\n", 3, "zero feed"),
@@ -300,9 +300,9 @@ def test_the_proof_tells_a_full_circle_from_none(tmp_path: Path) -> None:
 def test_the_proof_looks_at_what_is_left_in_the_controller() -> None:
     compare_parameters({5221: 1.0, 100: 5.0, 5162: 0.0}, {5221: 1.0})
     compare_parameters({5210: 1.0}, {})
-    with pytest.raises(ProgramError, match="another parameter #5210"):
+    with pytest.raises(ProgramError, match="a different value in parameter #5210"):
         compare_parameters({5210: 1.0, 5211: 2.0}, {5211: 2.0})
-    with pytest.raises(ProgramError, match="another parameter #5221"):
+    with pytest.raises(ProgramError, match="a different value in parameter #5221"):
         compare_parameters({5221: 1.0}, {5221: 1.00001})
 
 
@@ -352,14 +352,19 @@ def test_random_programs_expand_and_stay_as_they_are_when_expanded_again(plain: 
 
 def test_a_loop_that_writes_too_many_lines_is_refused(plain: Plain, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(expanding, "MOST", 5000)
-    with pytest.raises(ProgramError, match=r"line [2-5]: more than 5,000 plain lines come out: does a loop never end"):
+    with pytest.raises(
+        ProgramError,
+        match=r"line [2-5]: more than 5,000 plain lines would be written: check the program for an endless loop",
+    ):
         plain("G21\no1 repeat [4000]\nG0 X1\nX0\no1 endrepeat\nM2\n")
 
 
 def test_the_radii_of_a_subprogram_are_refused(tmp_path: Path) -> None:
     (tmp_path / "part.ngc").write_text("G21\no<sub> call\nM2\n")
     (tmp_path / "sub.ngc").write_text("o<sub> sub\nG7 G0 X2\no<sub> endsub\nM2\n")
-    with pytest.raises(ProgramError, match=r"a subprogram says G7 or G8 .*write G8 at its top \(line 2 of sub.ngc\)"):
+    with pytest.raises(
+        ProgramError, match=r"a subprogram has G7 or G8 .*write G8 at the start of the program \(line 2 of sub.ngc\)"
+    ):
         expand(tmp_path / "part.ngc", tmp_path / "out.ngc")
 
 

@@ -84,7 +84,7 @@ def test_lines_without_a_move_are_run_if_they_end(tmp_path: Path) -> None:
 
 def test_a_subprogram_that_calls_itself_is_refused(refusal: Refusal) -> None:
     error = refusal(f"o<r> sub\no<r> call\no<r> endsub\n{HEAD}o<r> call\nM30\n")
-    assert "a subprogram that calls itself has no end" in error.reason
+    assert "a subprogram that calls itself does not end" in error.reason
 
 
 @pytest.mark.parametrize(
@@ -132,7 +132,7 @@ def test_a_main_program_that_repeats_itself_is_refused(refusal: Refusal, end: st
         f"{HEAD}G1 X5 F100\n{end}\n",
     )
     assert error.line == 5 + (end[0] in "#o")
-    assert "M99 in a main program repeats it without end: end it with M2 or M30" in error.reason
+    assert "M99 in a main program repeats it endlessly: end it with M2 or M30" in error.reason
 
 
 @pytest.mark.long

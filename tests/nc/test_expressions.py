@@ -89,7 +89,7 @@ def test_values(text: str, value: float) -> None:
         ("sin[10**12]", "an angle of 1e.12 degrees"),
         ("exp[1000]", "no value"),
         ("9" * 400, "too large"),
-        ("[" * 2000, "brackets inside each other"),
+        ("[" * 2000, "nested brackets"),
         ("bin[3]", "BIN is not supported"),
         ("bcd[3]", "BCD is not supported"),
         ("sin 30", "found 'sin30'"),

@@ -11,7 +11,7 @@ from thermocomp.core.exceptions import InputError, ProgramError, Unprovable
 from thermocomp.nc.linuxcnc.verification.verify import prove
 
 #: why a random program is refused
-FOR_A_REASON = ("uses the offset that the correction is put in", "has not been positioned", "is no thermal drift")
+FOR_A_REASON = ("uses the offset that holds the correction", "has not been positioned", "is no thermal drift")
 
 pytestmark = pytest.mark.usefixtures("interpreter")
 
@@ -87,7 +87,7 @@ def test_a_cycle_that_goes_up_in_a_line_of_its_own_is_not_divided(trial: Trial) 
         (12, "X", 1.0, "moves X by"),
         (13, "Y", 0.005, "moves"),
         (15, "F", 5.0, "gives 'feedrate'|takes"),
-        (16, "A", 1.0, "moves another axis|rotary"),
+        (16, "A", 1.0, "moves an axis other than|rotary"),
         (17, "J", 0.002, "centre|moves"),
         (18, "Z", 1.0, "moves Z by"),
         (21, "Z", 0.5, "moves|taps|goes"),
@@ -119,7 +119,7 @@ def test_what_is_wrong_is_found_in_its_line(trial: Trial, line: int, letter: str
 def test_a_line_too_many_is_found(trial: Trial) -> None:
     text = trial.revised.read_text("ascii")
     trial.revised.write_text(text.replace("G80\n", "G80\nG0 X1.\n", 1), "ascii")
-    with pytest.raises(ProgramError, match=r"in the revised program|in place of|moves|belongs"):
+    with pytest.raises(ProgramError, match=r"in the revised program|instead of|moves|belongs"):
         proved(trial)
     trial.revised.write_text(text.replace("G54 G0", "G55 G0", 1), "ascii")
     with pytest.raises(ProgramError, match="moves"):
@@ -130,6 +130,6 @@ def test_what_cannot_be_said_cannot_be_proved(tmp_path: Path) -> None:
     path = tmp_path / "program.nc"
     path.write_text("G21 G90 S1 M3\nG92 X0. Y0. Z5.\nG0 X1. Y1. Z5.\nG92.1 X0. Y0. Z0.\nG52 X1.\nM30\n", "ascii")
     trial = revise(path, tmp_path, "coordinates")
-    with pytest.raises(Unprovable, match=r"line 5 cannot be said in LinuxCNC's words: G92 beside G52 or G68"):
+    with pytest.raises(Unprovable, match=r"line 5 cannot be translated for LinuxCNC: G92 with G52 or G68"):
         proved(trial)
     assert issubclass(Unprovable, InputError)

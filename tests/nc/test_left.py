@@ -83,7 +83,7 @@ def test_a_dwell_in_the_cut_is_in_what_is_left(tmp_path: Path) -> None:
 
 
 def test_an_origin_that_is_unknown_is_asked_for(tmp_path: Path) -> None:
-    with pytest.raises(ProgramError, match=r"line 4: .*where G54 begins is unknown: --origin"):
+    with pytest.raises(ProgramError, match=r"line 4: .*the origin of G54 is unknown: --origin"):
         tried(tmp_path, "G1 Z-1\n", Bent())
     setup = Setup(inch=False, speed=3000.0, offsets={1: (0.0, 0.0, 0.0)})
     with pytest.raises(ProgramError, match=r"line 7: .*the length of tool 2 is unknown: --tool"):

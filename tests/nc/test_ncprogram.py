@@ -20,7 +20,7 @@ def test_any_bytes_come_through(tmp_path: Path) -> None:
 def test_what_cannot_be_opened(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"a\.ngc: no such file"):
         ncprogram.open_to_read(tmp_path / "a.ngc")
-    with pytest.raises(InputError, match="is a folder; name an NC program"):
+    with pytest.raises(InputError, match="is a directory; give an NC program"):
         ncprogram.open_to_read(tmp_path)
 
 

@@ -23,7 +23,7 @@ def oracle() -> Iterator[Oracle]:
 #: refused by LinuxCNC too
 WRONG = [
     ("X1", "no motion code"),
-    ("G80 X1", "axis words beside G80"),
+    ("G80 X1", "axis words with G80"),
     ("G0 G1 X1", "exclude each other"),
     ("G0 G92 X1", "both would use the axis words"),
     ("G4", "G4 needs P"),
@@ -35,7 +35,7 @@ WRONG = [
     ("G2 X1", "needs its centre"),
     ("G2 X1 R1 I1", "needs its centre"),
     ("G2 X1 I0.5 K1", "the centre is in I and J"),
-    ("G2 X0 R1", "ends where it starts"),
+    ("G2 X0 R1", "ends at its start point"),
     ("G2 X2 R0.9", "too small"),
     ("G2 X2 I1.03", "check centre and end"),
     ("G2 X0 Y0 I0.001", "no radius"),
@@ -51,7 +51,7 @@ WRONG = [
     ("G81 X1 Z-1 R1 A1", "rotary"),
     ("G81 X1 Z-1 R1\nR2", "no code that uses it"),
     ("G84 X1 Z-1 R1", "spindle is stopped"),
-    ("M4\nG84 X1 Z-1 R1", "the other way"),
+    ("M4\nG84 X1 Z-1 R1", "the wrong direction"),
     ("G93 G1 X1 F1\nX2", "needs F"),
     ("G93 F1 G81 X1 Z-1 R1", "G93"),
     ("G94\nG1 X1", "no F is in force"),
@@ -63,7 +63,7 @@ WRONG = [
     ("G5 X1", "needs P and Q"),
     ("G10 L2 X1", "G10 L2"),
     ("G10 P1 X1", "is not supported"),
-    ("G10 L2 P11 X1", "9 coordinate systems"),
+    ("G10 L2 P11 X1", "9 work coordinate systems"),
     ("G10 L20 P1 X1 R5", "only"),
     ("G92", "without axis words"),
     ("G41 D1\nG92 X1", "cutter compensation"),
@@ -92,7 +92,7 @@ NOT_FOLLOWED = [
     ("M99", "subprogram"),
     (
         "M101",
-        "a code of the user): nobody knows what it does; if it leaves axes and spindle as they are: --harmless M101",
+        "a code of the user): its effect is unknown; if it does not affect axes and spindle: --harmless M101",
     ),
     ("M70", "M70"),
     ("G28.1", "G28"),
@@ -168,7 +168,7 @@ def test_nothing_is_needed_before_lengths_that_are_none() -> None:
 
 
 def test_a_speed_that_was_never_told() -> None:
-    with pytest.raises(ProgramError, match="no spindle speed was stated"):
+    with pytest.raises(ProgramError, match="without a spindle speed"):
         run("M3")
     assert run("S0 M3")[0].speed == 0.0
 
@@ -188,8 +188,8 @@ def test_a_speed_that_was_never_told() -> None:
         ("G28", "without axis words"),
         ("G10 L50", "is not supported"),
         ("G52 X1\nG92 X2", "G52 and G92"),
-        ("M10", "if it leaves axes and spindle as they are: --harmless M10"),
-        ("G999", "unknown (fanuc): nobody knows what it does; say it in codes that are followed"),
+        ("M10", "if it does not affect axes and spindle: --harmless M10"),
+        ("G999", "unknown (fanuc): its effect is unknown; replace it by supported codes"),
         ("T0101", "a lathe program: X is a diameter"),
         ("T1212\nG0 X1.\nG1 X2. F100", "T1212 before, and no M6: a lathe program"),
         ("G50 S2500", "a lathe program"),
@@ -198,26 +198,26 @@ def test_a_speed_that_was_never_told() -> None:
         ("G64 G54 P1", "write G54.1 P1"),
         (
             "G17 G54 G64 P0.01",
-            "G64 with P is LinuxCNC's, and a Fanuc's G64 has none: remove P, or give --controller linuxcnc",
+            "LinuxCNC's G64 has P, a Fanuc's has none: remove P, or give --controller linuxcnc",
         ),
-        ("G2 X1. Y0. I0.5 P2", "G2 with P is LinuxCNC's"),
-        ("M19 R90.", "M19 with R90. turns the spindle to an angle, in the way that the machine's maker has chosen"),
-        ("M19 P90", "revise the program without P90, and write it back behind M19 in the revised one"),
+        ("G2 X1. Y0. I0.5 P2", "LinuxCNC's G2 has P"),
+        ("M19 R90.", "M19 with R90. turns the spindle to an angle in a way that the machine builder has defined"),
+        ("M19 P90", "revise the program without P90, and put it back after M19 in the revised program"),
         ("G107 C10", "cylindrical"),
-        ("G0 X1.\nG5.1 Q1 X5.", "on a line of its own"),
-        ("G0 G8 P1 X5.", "on a line of its own"),
-        ("G99 G81 X1. Z-1. R1. F100 K0", "X beside K0"),
-        ("G0 X2. Y0\nG99 G81 X1. Z-1. R1. F100 L0", "X beside L0"),
+        ("G0 X1.\nG5.1 Q1 X5.", "on a separate line"),
+        ("G0 G8 P1 X5.", "on a separate line"),
+        ("G99 G81 X1. Z-1. R1. F100 K0", "X with K0"),
+        ("G0 X2. Y0\nG99 G81 X1. Z-1. R1. F100 L0", "X with L0"),
         ("G0 Z5.\nG81 X1. Z-1. R2. F100\nG91", "G91 while G81 is in force"),
         ("G0 Z5.\nG81 X1. Z-1. R2. F100\nG91 X1. K3", "G91 while G81 is in force"),
         ("G0 Z5.\nG91 G81 X1. Z-1. R-2. F100\nG90 G82 X1. Z-1. R2.", "G90 while G81 is in force"),
         ("G0 Z5.\nG81 X1. Z-1. R2. F100\nG91 G28 Z0", "G91 while G81 is in force"),
-        ("G0 Z5.\nG98 G81 X1. Z-1. R6. F100", "R is 1 mm above the level"),
-        ("G0 Z5.\nG91 G81 X1. Z-1. R2. F100", "R is 2 mm above the level"),
+        ("G0 Z5.\nG98 G81 X1. Z-1. R6. F100", "R is 1 mm above the initial level"),
+        ("G0 Z5.\nG91 G81 X1. Z-1. R2. F100", "R is 2 mm above the initial level"),
         ("G2 X1. Y0. R5. F100\nG81 X1. Z-3. R-2.\nG80 Z5.", "neither G0 nor G1"),
         ("G92.1 X0", "G92.1 without X, Y and Z"),
-        ("G12 I5. D1 F100", "mill or place holes"),
-        ("G70 I5. J15. L12", "mill or place holes"),
+        ("G12 I5. D1 F100", "milling cycles and hole patterns"),
+        ("G70 I5. J15. L12", "milling cycles and hole patterns"),
         ("G154", "G154 needs P"),
         ("G0 G52 X1.", "both would use the axis words"),
         ("G18 G68 X0 Z0 R30.", "G68 in G18"),
@@ -230,7 +230,7 @@ def test_a_speed_that_was_never_told() -> None:
         ("G0 X0\nG68 X0 Y0 R30.\nX5.", "to X and Y in G90"),
         ("G0 X0\nG68 X0 Y0 R30.\nG91 X5. Y5.", "to X and Y in G90"),
         ("G0 X0\nG68 X0 Y0 R30.\nG81 Z-5. R-1. F100", "to X and Y in G90"),
-        ("G0 X0\nG68 X0 Y0 R30.\nX1. Y1.\nG69\nY5.", "first move behind G69"),
+        ("G0 X0\nG68 X0 Y0 R30.\nX1. Y1.\nG69\nY5.", "first move after G69"),
         ("G68 X0 Y0 R30.\nG68 X0 Y0 R60.", "G69 before"),
         ("G68 X0 Y0 R30.\nG55", "G69 before"),
         ("G68 X0 Y0 R30.\nG52 X5.", "G69 before"),
@@ -263,8 +263,8 @@ def test_fanuc_refusals_that_expand_helps_with(text: str) -> None:
     ("text", "reason"),
     [
         ("G4 X2000", "G4 X2000 has no decimal point"),
-        ("G4 P600.", "P600. for a dwell: with a decimal point it counts seconds for a Haas"),
-        ("G4 P600.", "write G4 X600. for seconds, or P without a point for milliseconds"),
+        ("G4 P600.", "P600. for a dwell: with a decimal point it is in seconds for a Haas"),
+        ("G4 P600.", "write G4 X600. for seconds, or P without a decimal point for milliseconds"),
         ("G0 Z5.\nG82 X1. Z-1. R1. P2. F100.", "P2. for a dwell"),
     ],
 )

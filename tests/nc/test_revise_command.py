@@ -56,7 +56,7 @@ def test_nothing_of_the_header_is_cut(job_folder: Path) -> None:
         ["REVISED", "thermocomp", "program", "model", "model", "start", "drift", "method", "bound", "UNPROVED:"]
     )
     assert header[5].endswith("start 2 days after out.ngc.job.json)")
-    assert header[6].endswith("from where the last job counted it)")
+    assert header[6].endswith("from the zero of the last job)")
     assert header[7].endswith("steps 1 um)")
     assert all(f"{axis} " in header[8] for axis in "XYZ")
     assert header[8].endswith(" um)")
@@ -167,7 +167,7 @@ def test_a_job_begins_where_the_last_one_ended(job_folder: Path, capsys: pytest.
     capsys.readouterr()
     assert revise("--carried", "out.ngc.job.json", out="next.ngc", start="") == 0
     text = " ".join(capsys.readouterr().out.split())
-    assert "as out.ngc.job.json left it, drift counts from where the last job counted it" in text
+    assert "as out.ngc.job.json left it, drift counts from the zero of the last job" in text
     rows = table("next.ngc.csv")
     assert float(rows[0]["drift_z_um"]) == pytest.approx(ended, abs=0.01)
     # the first word already carries the drift that the last job has left
@@ -177,7 +177,7 @@ def test_a_job_begins_where_the_last_one_ended(job_folder: Path, capsys: pytest.
     assert float(table("late.ngc.csv")[0]["drift_z_um"]) == pytest.approx(0.0, abs=0.1)
     header = Path("late.ngc").read_text(encoding="ascii").splitlines()
     assert f"({MARK} start 8 h after out.ngc.job.json)" in header
-    assert f"({MARK} drift counts from where the last job counted it)" in header
+    assert f"({MARK} drift counts from the zero of the last job)" in header
     assert revise("--carried", "out.ngc.job.json", "--zero", "start", out="again.ngc", start="") == 0
     assert float(table("again.ngc.csv")[0]["drift_z_um"]) == 0.0
 
@@ -190,13 +190,13 @@ def test_a_measured_start(job_folder: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ([], "it is not stated: give one of --cold, --carried JOB.json and --measured"),
-        (["--cold", "--measured", "z=12um"], "it is stated 2 times"),
+        ([], "machine is not stated: give one of --cold, --carried JOB.json and --measured"),
+        (["--cold", "--measured", "z=12um"], "machine is stated 2 times"),
         (["--cold", "--pause", "3 min"], "--pause is the time since the last job"),
         (["--carried", "gone.json"], "gone.json: no such state file of a job"),
         (["--carried", "model.json"], "model.json: not a state file of a job"),
         (["--measured", "z=12"], "expected an axis or target, and a value with its unit"),
-        (["--cold", "--zero", "last"], "no state of one is carried over"),
+        (["--cold", "--zero", "last"], "needs a state that is carried over"),
     ],
 )
 def test_the_start_has_to_be_stated(

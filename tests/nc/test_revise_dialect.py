@@ -38,7 +38,7 @@ def test_a_program_number_counts_wherever_it_is(
     line = next(n for n, text in enumerate(head.splitlines(), 1) if "1000" in text or "<" in text)
     message = said(capsys)
     assert f"part.nc: line {line}: " in message
-    assert "how a Fanuc's or Haas's programs begin: give --controller fanuc" in message
+    assert "the beginning of a Fanuc's or Haas's program: give --controller fanuc" in message
     assert set(job_folder.iterdir()) == before
 
 
@@ -54,7 +54,12 @@ def test_a_word_with_two_readings_is_not_taken_for_linuxcnc(
 def test_what_makers_and_fanuc_have_made_of_a_code_is_asked_and_may_be_stated(
     job_folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for word, shown in [("G07 X0.", "G7 takes"), ("M50", "M50 is"), ("M65 P1", "M65 is"), ("M19 R90.", "M19 R90. has")]:
+    for word, shown in [
+        ("G07 X0.", "G7 makes"),
+        ("M50", "M50 belongs"),
+        ("M65 P1", "M65 belongs"),
+        ("M19 R90.", "M19 R90. has"),
+    ]:
         Path("part.nc").write_text(BODY.format(word + "\n"), encoding="ascii")
         assert revise(program="part.nc", dialect=False) == 2
         message = said(capsys)

@@ -39,7 +39,7 @@ def test_what_was_there_stays(job_folder: Path) -> None:
 @pytest.mark.parametrize(
     ("program", "options", "reason"),
     [
-        (CUT.format(""), [], "there is no safe point: give --safe-z, or take --method coordinates"),
+        (CUT.format(""), [], "there is no safe point: give --safe-z, or use --method coordinates"),
         (
             CUT.format("G0 Z5\n"),
             ["--safe-z", "20 mm"],

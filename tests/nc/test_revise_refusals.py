@@ -17,10 +17,10 @@ from thermocomp.core.model import ErrorModel
     [
         ("G90\nG0 X1\nM2\n", "part.ngc: line 2: X1 before G20 or G21: inches or millimetres?"),
         ("G90\nG0 X1\nM2\n", "state which unit the control starts with (--units)"),
-        ("G21\nM3\nG0 X1\nM2\n", "part.ngc: line 2: M3 and no spindle speed was stated"),
+        ("G21\nM3\nG0 X1\nM2\n", "part.ngc: line 2: M3 without a spindle speed"),
         (
             "G21\nG0 X1\nG1 X2 F100\nM2\n",
-            "part.ngc: line 3: the program cuts, but has not said how fast the spindle turns",
+            "part.ngc: line 3: the program cuts, but has not set the spindle speed",
         ),
         ("G21 S100 M3\nG0 X1\nG77 X2\nM2\n", "part.ngc: line 3:"),  # unknown code
         ("G21 S100 M3\nG0 X1\nM123\nM2\n", "part.ngc: line 3:"),
@@ -82,7 +82,9 @@ def test_whose_a_program_with_a_number_is_has_to_be_said(
     program = f"%\n{number}\nG21 G90 G17 G94\nT1 M6\nS4000 M3\nG0 G54 X0. Y0. Z5.\nG4 P3000\nG1 Z-1. F300.\nM30\n%\n"
     Path("part.nc").write_text(program, encoding="ascii")
     assert revise(program="part.nc", out="out.nc", dialect=False) == 2
-    assert f"line 2: '{number}' is how a Fanuc's or Haas's programs begin: give --controller fanuc" in said(capsys)
+    assert f"line 2: '{number}' is the beginning of a Fanuc's or Haas's program: give --controller fanuc" in said(
+        capsys
+    )
     assert revise("--controller", "fanuc", program="part.nc", out="out.nc") in (0, 1)
 
 
@@ -91,7 +93,7 @@ def test_a_cut_with_a_standing_spindle_is_told(job_folder: Path, capsys: pytest.
     assert revise(program="bad.ngc") == 0
     Path("bad.ngc").write_text(PLATE.replace("G1 Z-1", "M5\nG1 Z-1"), encoding="ascii")
     assert revise("--overwrite", program="bad.ngc") in (0, 1)
-    assert "the spindle is stopped at line 9, and the tool moves in feed: is that right?" in " ".join(
+    assert "the spindle is stopped at line 9, but the tool moves at feed rate: check the program" in " ".join(
         capsys.readouterr().out.split()
     )
 
@@ -116,11 +118,15 @@ def test_a_refusal_leaves_an_earlier_run_as_it_was(job_folder: Path) -> None:
         (judged(lags("yaw")), [], "give --axis yaw=Z, or --axis"),
         (judged(lags("z_um")), ["--axis", "zz=Z"], "there is no model of 'zz'"),
         (judged(lags("z_um")), ["--constant", "t3=20degC"], "driven by the spindle speed alone"),
-        (judged(lags("z_um")), ["--origin", "G60=1 mm, 2 mm, 3 mm"], "want a work coordinate system"),
+        (judged(lags("z_um")), ["--origin", "G60=1 mm, 2 mm, 3 mm"], "expected a work coordinate system"),
         (judged(lags("z_um")), ["--origin", "G54=1 mm, 2 mm"], "expected X, Y and Z"),
-        (judged(lags("z_um")), ["--tool", "one=1 mm"], "want the number of a tool"),
+        (judged(lags("z_um")), ["--tool", "one=1 mm"], "expected the number of a tool"),
         (judged(lags("z_um")), ["--harmless", "M88"], "LinuxCNC has no such code; a user's own are M100 to M199"),
-        (judged(lags("z_um")), ["--harmless", "M3"], "M3 is known (spindle on, clockwise), and is followed as that"),
+        (
+            judged(lags("z_um")),
+            ["--harmless", "M3"],
+            "M3 is a known code (spindle on, clockwise) and is followed as such",
+        ),
         (judged(lags("z_um")), ["--tolerance", "0 um"], "must be positive"),
         (judged(lags("z_um")), ["--largest", "5 um"], "more than 5 um is no thermal drift"),
         (judged(lags("z_um")), ["--every", "10"], "write a value with its unit, such as"),
@@ -129,16 +135,24 @@ def test_a_refusal_leaves_an_earlier_run_as_it_was(job_folder: Path) -> None:
         (
             judged(lags("z_um")),
             ["--method", "offset"],
-            "G52, which wipes a G92 or G52 that is in force when the program",
+            "G52, which cancels a G92 or G52 that is in force when the program",
         ),
         (
             judged(lags("z_um")),
             ["--method", "offset"],
-            "make sure that none is, and give --no-g92; or take --method coord",
+            "make sure that none is, and give --no-g92; or use --method coord",
         ),
         (judged(lags("z_um")), ["--rotation", "G54=12"], "--rotation 'G54=12': write an angle in degrees, such as"),
-        (judged(lags("z_um")), ["--rotation", "none", "G54=1 deg"], "--rotation 'none': want a work coordinate system"),
-        (judged(lags("z_um")), ["--rotation", "G60=1 deg"], "--rotation 'G60=1 deg': want a work coordinate system"),
+        (
+            judged(lags("z_um")),
+            ["--rotation", "none", "G54=1 deg"],
+            "--rotation 'none': expected a work coordinate system",
+        ),
+        (
+            judged(lags("z_um")),
+            ["--rotation", "G60=1 deg"],
+            "--rotation 'G60=1 deg': expected a work coordinate system",
+        ),
         (judged(lags("z_um")), ["--controller", "fanuc", "--expand", "--diameter", "1=8 mm"], "are for LinuxCNC"),
         (judged(lags("z_um")), ["--machine", "gone.toml"], "gone.toml"),
     ],

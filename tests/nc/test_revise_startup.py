@@ -23,7 +23,7 @@ def written(text: str) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--startup", "G7"], "--startup 'G7': want G61, G61.1 or G64, and G98 or G99"),
+        (["--startup", "G7"], "--startup 'G7': startup codes may only be G61, G61.1 or G64, and G98 or G99"),
         (["--startup", "G64 P0.1", "--controller", "fanuc"], "--startup 'G64 P0.1': P and Q are tolerances"),
         (["--diameter", "1=10 mm"], "--diameter is for --expand"),
         (["--subroutines", "."], "--subroutines is for --expand"),
@@ -43,9 +43,9 @@ def test_what_is_told_has_to_make_sense(
     ("options", "message"),
     [
         (["--diameter", "1=10"], "write a value with its unit"),
-        (["--diameter", "one=10 mm"], "--diameter 'one=10 mm': want the number of a tool"),
-        (["--subroutines", "gone"], "--subroutines gone: no such folder"),
-        (["--subroutines", *["."] * 9], "9 folders of subprograms; the interpreter takes 8"),
+        (["--diameter", "one=10 mm"], "--diameter 'one=10 mm': expected the number of a tool"),
+        (["--subroutines", "gone"], "--subroutines gone: no such directory"),
+        (["--subroutines", *["."] * 9], "found 9 folders of subprograms; the interpreter reads up to 8"),
     ],
 )
 def test_what_is_told_for_the_expansion_has_to_make_sense(
@@ -83,7 +83,7 @@ def test_where_cycles_go_back_to_can_be_told(job_folder: Path, proved: bool, req
 def test_a_loop_of_cycles_is_unrolled_as_told(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     written(LOOP)
     assert revise("--expand") == 2
-    assert "part.ngc: line 6: it cannot be expanded: where Z goes depends on" in said(capsys)
+    assert "part.ngc: line 6: it cannot be expanded: the end position in Z depends on" in said(capsys)
     plain = {}
     for code in ("G98", "G99"):
         options = ["--startup", f"G64 P0.01 {code}", "--tolerance", "0.1 um", "--json", "--overwrite"]
@@ -100,7 +100,7 @@ def test_cutter_compensation_is_worked_out_for_diameters(job_folder: Path, capsy
     written(POCKET)
     for options in ([], ["--diameter", "2=10 mm"]):
         assert revise("--expand", *options) == 2
-        assert "part.ngc: line 8: it cannot be expanded: where X, Y goes depends on" in said(capsys)
+        assert "part.ngc: line 8: it cannot be expanded: the end position in X, Y depends on" in said(capsys)
     assert revise("--expand", "--diameter", "1=10 mm", "T2=8 mm", proved=True) == 0
     plain = Path("out.ngc.expanded").read_text(encoding="ascii").splitlines()
     assert "G1 X25 Y15 Z-1" in plain

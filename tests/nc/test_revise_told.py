@@ -22,8 +22,8 @@ TURNED = PLATE.replace("G0 X0 Y0 Z50\n", "G0 X0 Y0 Z50 A90\n")
     ("structure", "message"),
     [
         ("w A' X' b Z Y (C1) t", ""),
-        ("w X' b Z Y A (C1) t", "line 6: A is at 90 deg, and it is in the head"),
-        ("w X' b Z Y (C1) t", "line 6: A is at 90 deg, and does it turn the spindle or the workpiece?"),
+        ("w X' b Z Y A (C1) t", "line 6: A is at 90 deg: it is in the head"),
+        ("w X' b Z Y (C1) t", "line 6: A is at 90 deg: state whether it turns the spindle or the workpiece"),
     ],
 )
 def test_the_machine_file_tells_where_rotary_axes_are(

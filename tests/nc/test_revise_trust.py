@@ -68,7 +68,7 @@ def test_temperatures_can_be_given(job_folder: Path, capsys: pytest.CaptureFixtu
     heated = judged(lags("z_um", room=True))
     write_models([heated], "room.json")
     assert revise("--model", "room.json", "--constant", "t3=20degC", "--overwrite") == 2
-    assert "will not stand still while this program runs" in said(capsys)
+    assert "will not stay constant while this program runs" in said(capsys)
     known = Validity(4, 4, 0.5, (), (10.0, 30.0), "t3_C", None, 1, 9.0)
     Path("room.json").unlink()
     write_models([replace(heated, validity=known)], "room.json")
@@ -82,7 +82,7 @@ def test_temperatures_can_be_given(job_folder: Path, capsys: pytest.CaptureFixtu
     assert "room.csv: other_C is no input of the models" in told["notes"]
     given = ["--model", "room.json", "--forecast", "room.csv", "--constant", "t3=20degC"]
     assert revise(*given, "--overwrite") == 2
-    assert "t3_C is given by --constant too" in said(capsys)
+    assert "t3_C is also given by --constant" in said(capsys)
 
 
 def test_who_takes_an_unproven_model_stands_in_the_program(
@@ -108,7 +108,7 @@ def test_models_along_an_axis(job_folder: Path, capsys: pytest.CaptureFixture[st
     along = ["--model", "along.json", "--axis", "a=Z at Z 0 mm", "b=Z at Z 40 mm", "--origin", "G54=0 mm, 0 mm, 0 mm"]
     axis, warnings = bound(along, capsys)
     assert axis["axis"] == "Z"
-    assert any("Z was asked for 10.0 mm beyond its outermost station" in w for w in warnings)
+    assert any("Z was needed 10.0 mm beyond its outermost station" in w for w in warnings)
     rows = table()
     assert float(rows[11]["drift_z_um"]) > 1.5 * float(rows[10]["drift_z_um"])
 
@@ -171,7 +171,7 @@ def test_a_fanuc_program(job_folder: Path, capsys: pytest.CaptureFixture[str]) -
     )
     before = set(job_folder.iterdir())
     assert revise("--controller", "fanuc", program="odd.nc", out="out.nc", proved=True) == 2
-    assert "line 11 cannot be said in LinuxCNC's words: G92 beside G52" in said(capsys)
+    assert "line 11 cannot be translated for LinuxCNC: G92 with G52" in said(capsys)
     assert set(job_folder.iterdir()) == before
     assert revise("--controller", "fanuc", program="50%.nc", out="out.nc") == 0
     assert "but no interpreter has judged it (--unproved)" in " ".join(capsys.readouterr().out.split())

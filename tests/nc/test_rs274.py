@@ -152,7 +152,7 @@ def test_subprograms_in_other_files(run: Run, tmp_path: Path) -> None:
     (folder / "far.ngc").write_text("o<far> sub\n\nG0 Y[#1/0]\no<far> endsub\nM2\n", encoding="ascii")
     calls = run("G21\no<beside> call [4]\nG0 Z1\nM2\n")
     assert [(c.line, c.file) for c in calls if c.kind == "rapid"] == [(2, "beside.ngc"), (3, "")]
-    with pytest.raises(ProgramError, match=r"line 1: .*refuses it: o<far> is not there: .*\(--subroutines\)"):
+    with pytest.raises(ProgramError, match=r"line 1: .*refuses it: o<far> was not found: .*\(--subroutines\)"):
         run("o<far> call [1]\nM2\n")
     with pytest.raises(ProgramError, match="line 1: the interpreter refuses it: Attempt to divide by zero"):
         run("o<far> call [1]\nM2\n", subroutines=[folder])
@@ -190,7 +190,7 @@ def test_refused_with_line_and_words(run: Run, text: str, line: int, reason: str
 
 
 def test_an_endless_loop_ends(run: Run) -> None:
-    with pytest.raises(ProgramError, match="takes more than 1 s to interpret: has it an endless loop"):
+    with pytest.raises(ProgramError, match="takes more than 1 s to interpret: check it for an endless loop"):
         run("G21\n#1 = 1\no1 while [#1 GT 0]\nG0 X#1\no1 endwhile\nM2\n", seconds=1)
 
 
@@ -204,7 +204,7 @@ def test_a_crash_is_an_error(run: Run, tmp_path: Path, monkeypatch: pytest.Monke
     told = "RECORD.pack(RAPID, 9, 7, *(0.0,) * 10)"
     child.write_text(f"{TELLS}tell({told})\nos.kill(os.getpid(), 11)\n", encoding="ascii")
     monkeypatch.setattr(rs274process, "CHILD", child)
-    with pytest.raises(ProgramError, match="line 7: the interpreter died of signal 11"):
+    with pytest.raises(ProgramError, match="line 7: the interpreter was ended by signal 11"):
         run("M2\n")
     child.write_text("raise RuntimeError('of a version that is not known')\n", encoding="ascii")
     with pytest.raises(InputError, match="ended with code 1: RuntimeError: of a version that is not known"):
@@ -241,7 +241,7 @@ def test_why_it_cannot_be_used(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) 
     end = "os.write(1, struct.pack('<II', 0, 3) + b'[0]')"
     child.write_text(f"{TELLS}tell({rows})\n{end}\n", encoding="ascii")
     monkeypatch.setattr(rs274process, "CHILD", child)
-    assert "does not tell of end, m3, m5, speed" in str(rs274.find_obstacle.__wrapped__())
+    assert "does not report end, m3, m5, speed" in str(rs274.find_obstacle.__wrapped__())
 
 
 def test_no_such_file(tmp_path: Path) -> None:
@@ -315,7 +315,7 @@ def test_nothing_beside_a_program_is_run(tmp_path: Path, monkeypatch: pytest.Mon
 @pytest.mark.parametrize("comment", [";py,open({!r}, 'w')", "(py,open{{{!r}}})", "(PY,import os)"])
 def test_python_in_a_comment_is_not_run(run: Run, tmp_path: Path, comment: str) -> None:
     mark = tmp_path / "mark"
-    with pytest.raises(ProgramError, match=r"line 3: the interpreter refuses it: it holds Python code \(py, ...\)"):
+    with pytest.raises(ProgramError, match=r"line 3: the interpreter refuses it: it contains Python code \(py, ...\)"):
         run(f"G21\nG0 X1\n{comment.format(str(mark))}\nG0 X2\nM2\n")
     assert not mark.exists()
 

@@ -191,9 +191,9 @@ def test_under_a_tolerance_lines_become_one() -> None:
 
 
 def test_a_move_in_feed_without_a_feed_is_refused() -> None:
-    with pytest.raises(ProgramError, match="line 1: it moves in feed, and no feed is in force: write F before it"):
+    with pytest.raises(ProgramError, match="line 1: a feed move, but no feed is in force: write F before it"):
         lasting(block(Move(False, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))))
-    with pytest.raises(ProgramError, match="line 1: an arc around its own start or end: check its centre"):
+    with pytest.raises(ProgramError, match="line 1: the centre of the arc is at its start or end"):
         lasting(block(Move(False, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), Arc(17, (0.0, 0.0), True, 1), 60.0)))
 
 

@@ -209,19 +209,19 @@ REFUSED = [
     ("M98 P5", 1, "O0005 is not in this file"),
     ("M98", 1, "M98 needs P"),
     ("M98 P2 L0\nM30\nO2\nM99", 1, "0 times"),
-    ("M98 P2 L2 K2\nM30\nO2\nM99", 1, "L or K at most"),
+    ("M98 P2 L2 K2\nM30\nO2\nM99", 1, "at most one of L and K"),
     ("M98 P20002\nM30\nO2\nM99\nO20002\nM99", 1, "or O0002 2 times"),
     ("M98 P2\nM30\nO2\nM99\nO2\nM99", 1, "O2 appears in lines 3 and 5"),
     ("M98 P2\nM30\nO2\nX1.", 4, "without M99"),
     ("M98 P2\nO2\nX1.\nM99", 1, "no M30 or M2"),
-    ("M98 P2\nM30\nO2\nM98 P2\nM99", 4, "more than 4 calls"),
+    ("M98 P2\nM30\nO2\nM98 P2\nM99", 4, "more than 4 nested calls"),
     ("X1.\nM99", 2, "M99 in the main program"),
     ("/M98 P2\nM30\nO2\nM99", 1, "--block-delete"),
     ("/GOTO5\nN5 M30", 1, "--block-delete"),
     ("G65 P9000 X1.", 1, "O9000 is not in this file"),
     ("G65 P2 X1\nM30\nO2\nM99", 1, "no decimal point"),
     ("G65 P2 K1. I2.\nM30\nO2\nM99", 1, "in this order"),
-    ("G65 P2 G5 X1.\nM30\nO2\nM99", 1, "no argument"),
+    ("G65 P2 G5 X1.\nM30\nO2\nM99", 1, "not an argument"),
     ("G65 X1.", 1, "G65 needs P"),
     ("G65 P2\nM30\nO2\nX[#24+1]\nM99", 4, "#24 is unknown"),
     ("#500=1", 1, "stay in the control"),
@@ -229,7 +229,7 @@ REFUSED = [
     ("#1=#500", 1, "#500 is unknown"),
     ("X#5021", 1, "present position"),
     ("#1=#150", 1, "#150 is unknown"),
-    ("#1=#0", 1, "made empty"),
+    ("#1=#0", 1, "set to empty"),
     ("IF[#1EQ#0]GOTO5\nN5", 1, "whether #1 is empty"),
     ("IF[#3003EQ1]GOTO5\nN5", 1, "unknown"),
     ("GOTO5", 1, "there is no N5"),
@@ -239,13 +239,13 @@ REFUSED = [
     ("WHILE[1EQ1]DO1\nX1.", 1, "DO1 without END1"),
     ("END1", 1, "without its DO1"),
     ("DO1\nDO1\nEND1\nEND1", 2, "inside DO1"),
-    ("DO1\nDO2\nEND1\nEND2", 3, "across each other"),
+    ("DO1\nDO2\nEND1\nEND2", 3, "overlapping loops"),
     ("GOTO5\nDO1\nN5 X1.\nEND1", 1, "leads into a loop"),
-    ("#1=0.1+0.2\nIF[#1EQ0.3]GOTO5\nN5", 2, "same but for rounding"),
-    ("#1=0.1*3*10\nX[FIX[#1]]", 2, "whole but for rounding"),
+    ("#1=0.1+0.2\nIF[#1EQ0.3]GOTO5\nN5", 2, "differ by rounding only"),
+    ("#1=0.1*3*10\nX[FIX[#1]]", 2, "within rounding of a whole number"),
     ("T[1.5]", 1, "whole number"),
-    ("IF[1EQ1]X5.", 1, "not understood"),
-    ("#1=5 X1.", 1, "not understood|has no value|found"),
+    ("IF[1EQ1]X5.", 1, "not supported"),
+    ("#1=5 X1.", 1, "not supported|has no value|found"),
 ]
 
 
@@ -312,7 +312,7 @@ def test_a_loop_without_end_is_refused_where_it_begins(text: str, line: int, rea
 
 
 def test_a_subprogram_that_calls_itself_is_refused() -> None:
-    with pytest.raises(ProgramError, match="more than 4 calls inside each other"):
+    with pytest.raises(ProgramError, match="more than 4 nested calls"):
         written("M98 P2\nM30\nO2\nM98 P2\nM99\n")
 
 

@@ -57,7 +57,7 @@ class Program:
             raise ProgramError(line, f"{who}: there is no N{number} in this program")
         if len(places) > 1:
             lines = " and ".join(str(i + 1) for i in places[:2])
-            raise ProgramError(line, f"{who}: N{number} appears in lines {lines}: number the lines again")
+            raise ProgramError(line, f"{who}: N{number} appears in lines {lines}: renumber the lines")
         return places[0]
 
     def closing(self, begin: int, loop: int) -> int:
@@ -77,7 +77,7 @@ class Program:
                 if found and int(found.group(1)) == loop:
                     self._closing[begin, loop] = i
                     return i
-        raise ProgramError(begin + 1, f"DO{loop} without END{loop} behind it in this program")
+        raise ProgramError(begin + 1, f"DO{loop} without END{loop} after it in this program")
 
 
 class File:
@@ -118,8 +118,8 @@ class File:
             raise ProgramError(line, f"{who}: O{number} appears in lines {lines}; delete the duplicate")
         raise ProgramError(
             line,
-            f"{who}: O{number:04d} is not in this file; put it behind the program, with its O number and M99, or have "
-            "the CAM system write the moves out",
+            f"{who}: O{number:04d} is not in this file; put it after the program, with its O number and M99, or have "
+            "the CAM system output its moves",
         )
 
     def called(self, number: int, line: int, *, told: bool) -> tuple[Program, int]:
@@ -143,7 +143,8 @@ class File:
         if number < FOUR or told or number in self._programs:
             if times and not told and last in self._programs:
                 raise ProgramError(
-                    line, f"{who}: O{number}, or O{last:04d} {times} times? write how often with L on the line"
+                    line,
+                    f"{who}: O{number}, or O{last:04d} {times} times? write the number of calls with L on the line",
                 )
             return self.find(number, line, who), 1
         return self.find(last, line, who), times

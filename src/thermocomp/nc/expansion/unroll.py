@@ -155,7 +155,7 @@ class _Unroller:
             for assignment in line.assignments:
                 frame.variables.assign(line.number, assignment)
             if line.words:
-                raise ProgramError(line.number, "words beside a variable that is set; put them on a line of their own")
+                raise ProgramError(line.number, "words on a line that sets a variable; put them on a separate line")
             return None
         codes = {(w.letter, w.number) for w in line.words if w.letter in "GM"}
         if ("G", 65.0) in codes:
@@ -166,7 +166,7 @@ class _Unroller:
             self._refuse_optional(line)
             self._acted = True
         if back and not frame.called:
-            raise ProgramError(line.number, "M99 in the main program begins it again without end; write M30")
+            raise ProgramError(line.number, "M99 in the main program repeats it endlessly; write M30")
         head = line.label[:1] in ("O", ":")
         if not (head and frame.called and not line.words):
             text = self._plain(frame, line, "MPLK" if call else "MP" if back else "")
@@ -185,7 +185,10 @@ class _Unroller:
         number = self._count(frame, line, "P", 0)
         told = [letter for letter in "LK" if any(w.letter == letter for w in line.words)]
         if not number or len(told) > 1:
-            raise ProgramError(line.number, f"M{code} needs P, what is called, and L or K at most, how often")
+            raise ProgramError(
+                line.number,
+                f"M{code} needs P, the target of the call, and at most one of L and K, the number of calls",
+            )
         times = self._count(frame, line, told[0], 1) if told else 1
         if code == 97:
             program, place = frame.program, frame.program.label(number, line.number, f"M97 P{number}")
@@ -210,7 +213,7 @@ class _Unroller:
         self, frame: _Frame, line: Line, program: Program, place: int, times: int, given: dict[Key, float] | None
     ) -> Generator[tuple[str, int], None, int | None]:
         if frame.depth >= DEEPEST:
-            raise ProgramError(line.number, f"more than {DEEPEST} calls inside each other, which controls refuse")
+            raise ProgramError(line.number, f"more than {DEEPEST} nested calls, which controls refuse")
         if times < 1:
             raise ProgramError(line.number, "a call that is made 0 times; remove it")
         for _ in range(times):
@@ -242,13 +245,13 @@ class _Unroller:
         elif found := _END.fullmatch(flow):
             number, index = int(found.group("loop")), line.number - 1
             if not frame.loops or (frame.loops[-1][0], frame.loops[-1][2]) != (number, index):
-                raise ProgramError(line.number, f"END{number} without its DO{number}, or loops across each other")
+                raise ProgramError(line.number, f"END{number} without its DO{number}, or overlapping loops")
             frame.place = frame.loops.pop()[1]
             self._go_back(frame)
         else:
             raise ProgramError(
                 line.number,
-                f"{line.flow}: not understood; IF [..] GOTO, IF [..] THEN #i=.., GOTO, WHILE [..] DO, END are",
+                f"{line.flow}: not supported; IF [..] GOTO, IF [..] THEN #i=.., GOTO, WHILE [..] DO, END are",
             )
 
     def _begin(self, frame: _Frame, line: Line, condition: str | None, number: int) -> None:
@@ -264,7 +267,7 @@ class _Unroller:
     def _then(self, frame: _Frame, line: Line, text: str) -> None:
         found = _SET.fullmatch(text)
         if found is None:
-            raise ProgramError(line.number, "IF [..] THEN needs a variable that is set")
+            raise ProgramError(line.number, "IF [..] THEN needs an assignment, such as #1=2")
         frame.variables.assign(line.number, Assignment(found.group(1).lower(), found.group(2), 0, 0))
 
     def _go(self, frame: _Frame, line: Line, goal: str) -> None:
@@ -331,7 +334,7 @@ class _Unroller:
             if word.letter == "G" and abs(value * 10 - round(value * 10)) < 1e-6:  # G54.1
                 return f"{word.letter}{round(value, 1):g}"
             if abs(value - round(value)) > 1e-6:
-                raise ProgramError(line.number, f"{word.letter} is {value:g}, and has to be a whole number")
+                raise ProgramError(line.number, f"{word.letter} must be a whole number; found {value:g}")
             return f"{word.letter}{round(value)}"
         # the control rounds what a variable puts into a word to its least increment
         decimals = max(0, round(-math.log10(self._setup.least))) + self._inch
@@ -346,14 +349,14 @@ class _Unroller:
                 if value is None:
                     value = frame.variables.value(line.number, word.value, letter)
                 if value != int(value) or value < 0:
-                    raise ProgramError(line.number, f"{letter} is {value:g}, and has to be a whole number")
+                    raise ProgramError(line.number, f"{letter} must be a whole number; found {value:g}")
                 return int(value)
         return default
 
     def _refuse_optional(self, line: Line) -> None:
         if line.optional:
             raise ProgramError(
-                line.number, "an optional line (/) that calls, jumps or sets a variable: decide with --block-delete on"
+                line.number, "an optional line (/) that calls, jumps or sets a variable: give --block-delete on"
             )
 
     def _step(self, line: int) -> None:

@@ -64,11 +64,11 @@ class Variables:
             if key not in _LOCAL and key not in _COMMON:
                 raise InputError(
                     f"{assignment.target} is set, and only #1 to #33 and #100 to #199 are the program's own: the "
-                    "others stay in the control, and in plain lines nobody would set them; use one of those, or leave "
-                    "--expand away where no loop or subprogram needs it"
+                    "others stay in the control, and plain lines would not set them; use one of those, or omit "
+                    "--expand if no loop or subprogram needs it"
                 )
             if squeezed_is_empty(assignment.value):
-                raise InputError(f"{assignment.target} is made empty (#0), which is not followed; give it a value")
+                raise InputError(f"{assignment.target} is set to empty (#0), which is not followed; give it a value")
             same = key in self._parameters and self._parameters[key]
             self._parameters.assign([assignment])
             self.changes += same is False or self._parameters[key] != same
@@ -116,7 +116,7 @@ class Variables:
         if key in _LOCAL and self.macro:
             return True
         raise ProgramError(
-            line, f"whether #{key} is empty is not certain: the program has not set it, and another one may have"
+            line, f"whether #{key} is empty is uncertain: the program has not set it, and another program may have"
         )
 
 
@@ -148,14 +148,14 @@ def arguments(
     found: dict[Key, float] = {}
     order = [word.letter for word in line.words if word.letter in "IJK"]
     if order != sorted(order):
-        raise ProgramError(line.number, "I J K of G65 have to be in this order: else they set other variables")
+        raise ProgramError(line.number, "I J K of G65 must be in this order: otherwise they set other variables")
     for word in line.words:
         letter = word.letter
         if letter in "PL" or (letter == "G" and word.number == 65.0):
             continue
         if letter not in ARGUMENTS:
             raise ProgramError(
-                line.number, f"{letter} on the line of G65, which is no argument; put it on its own line"
+                line.number, f"{letter} on the line of G65 is not an argument; put it on a separate line"
             )
         if variables.leaves_out(line.number, word):
             continue
@@ -166,7 +166,7 @@ def arguments(
             if integers == "refuse":
                 raise ProgramError(
                     line.number,
-                    f"{letter}{word.value} has no decimal point: whether it counts units or least increments depends "
+                    f"{letter}{word.value} has no decimal point: whether it is in units or least increments depends "
                     "on the control; state which with --integers",
                 )
             value *= least if integers == "least" else 1.0

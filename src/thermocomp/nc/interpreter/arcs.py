@@ -65,7 +65,7 @@ def centre_of_radius(start: Flat, end: Flat, radius: float, clockwise: bool) -> 
     """
     chord = math.dist(start, end)
     if not chord:
-        raise ArcError("an arc with R ends where it starts: its centre can be anywhere; write I J K")
+        raise ArcError("an arc with R ends at its start point: its centre is undefined; write I J K")
     half, size = chord / 2.0, abs(radius)
     if half - size > _SMALLEST:
         raise ArcError(f"R{size:g} mm is too small: start and end are {chord:g} mm apart")

@@ -1,4 +1,4 @@
-"""Effect of a line of an NC program on the machine: the state in which it runs, and its moves."""
+"""Effect of a line of an NC program on the machine: the state it runs in, and its moves."""
 
 from dataclasses import dataclass, field
 from typing import Final, Literal, NamedTuple
@@ -87,7 +87,7 @@ PLANES: Final = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
 
 
 class Arc(NamedTuple):
-    """Direction and turns of an arc."""
+    """Centre, plane and direction of an arc move."""
 
     plane: int  #: 17, 18, 19
     centre: tuple[float, float]  #: in the plane's own axes (17: X Y, 18: Z X, 19: Y Z), machine coordinates [mm]
@@ -186,7 +186,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Setup:
-    """Settings of the controller that are not in the program.
+    """State of the controller that is not in the program.
 
     Parameters
     ----------

@@ -31,12 +31,12 @@ class Code(NamedTuple):
     refused: str = ""  #: why, and what to do; empty if it is supported
 
 
-_EXPAND = "--expand lets the interpreter write it out"
-_LATHE = "a lathe's cycle; write its moves out"
+_EXPAND = "--expand lets the interpreter unroll it"
+_LATHE = "a turning cycle; replace it by its moves"
 
 _COMMON_G: Final = (
     Code("G0", "motion", "rapid move"),
-    Code("G1", "motion", "straight move in feed"),
+    Code("G1", "motion", "linear move at feed rate"),
     Code("G2", "motion", "arc, clockwise"),
     Code("G3", "motion", "arc, counterclockwise"),
     Code("G4", "once", "dwell"),
@@ -46,8 +46,8 @@ _COMMON_G: Final = (
     Code("G19", "plane", "plane YZ"),
     Code("G20", "units", "inches"),
     Code("G21", "units", "millimetres"),
-    Code("G28", "once", "goes home"),
-    Code("G30", "once", "goes to the second reference point"),
+    Code("G28", "once", "returns to the first reference point"),
+    Code("G30", "once", "returns to the second reference point"),
     Code("G40", "cutter", "cutter compensation off"),
     Code("G41", "cutter", "cutter compensation, left"),
     Code("G42", "cutter", "cutter compensation, right"),
@@ -65,13 +65,13 @@ _COMMON_G: Final = (
     Code("G82", "motion", "drilling with dwell"),
     Code("G83", "motion", "peck drilling"),
     Code("G84", "motion", "tapping"),
-    Code("G85", "motion", "boring, out in feed"),
-    Code("G86", "motion", "boring, out with the spindle stopped"),
-    Code("G88", "motion", "boring", "boring with G88 goes out by hand: where and when is not known; use G82 or G86"),
+    Code("G85", "motion", "boring, retract at feed rate"),
+    Code("G86", "motion", "boring, retract with the spindle stopped"),
+    Code("G88", "motion", "boring", "G88 retracts by hand: position and time are unknown; use G82 or G86"),
     Code("G89", "motion", "boring with dwell"),
     Code("G90", "distance", "absolute"),
     Code("G91", "distance", "incremental"),
-    Code("G92", "once", "gives the place a name"),
+    Code("G92", "once", "shifts the coordinate system to the words"),
     Code("G94", "feed mode", "feed per minute"),
     Code("G95", "feed mode", "feed per turn"),
     Code(
@@ -81,8 +81,8 @@ _COMMON_G: Final = (
         "the spindle's speed follows the diameter (constant surface speed), which is not supported; use G97",
     ),
     Code("G97", "spindle mode", "constant spindle speed"),
-    Code("G98", "retract", "cycles go back to the level they came from"),
-    Code("G99", "retract", "cycles go back to R"),
+    Code("G98", "retract", "cycles return to the initial level"),
+    Code("G99", "retract", "cycles return to R"),
     Code("G93", "feed mode", "inverse time"),
 )
 
@@ -93,15 +93,25 @@ _LINUXCNC_G: Final = (
     Code("G5.3", "once", "end of a NURBS", "NURBS are not supported; write them as G1, G2, G3 or G5"),
     Code("G7", "diameter", "X is a diameter"),
     Code("G8", "diameter", "X is a radius"),
-    Code("G28.1", "once", "stores the home", "it changes where G28 goes, which is not followed; remove it"),
-    Code("G30.1", "once", "stores the home", "it changes where G30 goes, which is not followed; remove it"),
-    Code("G33", "motion", "move in step with the spindle"),
+    Code(
+        "G28.1",
+        "once",
+        "stores the reference point",
+        "it changes the reference point of G28, which is not followed; remove it",
+    ),
+    Code(
+        "G30.1",
+        "once",
+        "stores the reference point",
+        "it changes the reference point of G30, which is not followed; remove it",
+    ),
+    Code("G33", "motion", "move synchronised with the spindle"),
     Code("G33.1", "motion", "rigid tapping"),
     *(Code(f"G38.{n}", "motion", "probing") for n in range(2, 6)),
     Code("G41.1", "cutter", "cutter compensation, left"),
     Code("G42.1", "cutter", "cutter compensation, right"),
-    Code("G43.1", "tool length", "tool length compensation by the words"),
-    Code("G43.2", "tool length", "one more tool length"),
+    Code("G43.1", "tool length", "tool length offset given by axis words"),
+    Code("G43.2", "tool length", "additional tool length offset"),
     *(Code(f"G59.{n}", "system", f"work coordinate system {6 + n}") for n in range(1, 4)),
     Code("G61.1", "path", "exact path"),
     *(Code(f"G{n}", "motion", "lathe cycle", _LATHE) for n in ("70", "71", "71.1", "71.2", "72", "72.1", "72.2")),
@@ -109,21 +119,21 @@ _LINUXCNC_G: Final = (
     Code("G87", "motion", "back boring"),
     Code("G90.1", "arc distance", "centres of arcs are absolute"),
     Code("G91.1", "arc distance", "centres of arcs are relative"),
-    Code("G92.1", "once", "no G92, forgotten"),
-    Code("G92.2", "once", "no G92, kept"),
-    Code("G92.3", "once", "G92 again"),
+    Code("G92.1", "once", "G92 off, offsets cleared"),
+    Code("G92.2", "once", "G92 off, offsets kept"),
+    Code("G92.3", "once", "G92 restored"),
 )
 
-_NO_SCALING = "scaling is not supported; write the coordinates out"
-_NO_MIRROR = "mirroring is not supported; write the coordinates out"
+_NO_SCALING = "scaling is not supported; write the scaled coordinates"
+_NO_MIRROR = "mirroring is not supported; write the mirrored coordinates"
 _NO_POLAR = "polar coordinates are not supported; write X and Y"
 #: a Haas's codes for the first of them
 HAAS_SYSTEMS: Final = {f"G{109 + n}": n for n in range(1, 21)}
 #: codes of the additional work coordinate systems
 ADDITIONAL_SYSTEMS: Final = frozenset({"G54.1", "G154", *HAAS_SYSTEMS})
-_NO_POCKET = "cycles of the control that mill or place holes are not followed; write the moves out in the CAM system"
-_WRITTEN = "--expand writes it into the program"
-_NO_TCP = "with tool centre point control the axes do not follow the words alone; not supported"
+_NO_POCKET = "milling cycles and hole patterns of the control are not followed; output single moves from the CAM system"
+_WRITTEN = "--expand writes it as plain lines"
+_NO_TCP = "tool centre point control moves the axes by more than their words; not supported"
 
 _FANUC_G: Final = (
     Code("G5", "high speed", "high precision contour control"),
@@ -135,12 +145,12 @@ _FANUC_G: Final = (
     Code("G13.1", "polar plane", "polar interpolation off"),
     Code("G15", "polar", "polar coordinates off"),
     Code("G16", "polar", "polar coordinates", _NO_POLAR),
-    Code("G22", "stroke", "stored stroke check", "it takes the axis words as limits, which is not followed; remove it"),
+    Code("G22", "stroke", "stored stroke check", "its axis words are limits, which is not followed; remove it"),
     Code("G23", "stroke", "stored stroke check off"),
     Code("G31", "motion", "skip"),
     Code("G43.4", "tool length", "tool centre point control", _NO_TCP),
     Code("G43.5", "tool length", "tool centre point control", _NO_TCP),
-    Code("G44", "tool length", "tool length, negative", "lengths with the sign turned are not supported; use G43"),
+    Code("G44", "tool length", "tool length, negative", "negated tool lengths are not supported; use G43"),
     Code("G50", "scaling", "scaling off"),
     Code("G50.1", "mirror", "mirror image off"),
     Code("G51", "scaling", "scaling", _NO_SCALING),
@@ -148,7 +158,12 @@ _FANUC_G: Final = (
     Code("G54.1", "system", "one of the additional work coordinate systems"),
     Code("G61.1", "path", "high accuracy"),
     Code("G65", "once", "macro call", f"macros are not followed; {_WRITTEN}"),
-    Code("G66", "call", "modal macro call", "modal macro calls are not supported; write G65 on every line that calls"),
+    Code(
+        "G66",
+        "call",
+        "modal macro call",
+        "modal macro calls are not supported; write G65 on every line that calls the macro",
+    ),
     Code("G67", "call", "modal macro call off"),
     Code("G68", "rotation", "rotation"),
     Code("G68.2", "rotation", "tilted plane", "tilted planes are not supported; write X Y Z"),
@@ -157,21 +172,21 @@ _FANUC_G: Final = (
         "G76",
         "motion",
         "fine boring",
-        "it shifts the tool by a parameter of the control; use G85, or write it out",
+        "it shifts the tool by a parameter of the control; use G85 or single moves",
     ),
     Code("G87", "motion", "back boring", "it shifts the tool by a parameter of the control; not supported"),
-    Code("G92.1", "once", "no G92"),
-    Code("G103", "look ahead", "limits how far the control looks ahead"),
+    Code("G92.1", "once", "G92 off"),
+    Code("G103", "look ahead", "limits the look-ahead of the control"),
     Code("G107", "once", "cylindrical interpolation", "cylindrical interpolation is not supported; write X Y Z"),
     *(
         Code(code, "system", "one of the additional work coordinate systems of a Haas")
         for code in ("G154", *HAAS_SYSTEMS)
     ),
     Code("G187", "high speed", "smoothness"),
-    *(Code(f"G{n}", "motion", "pocket or bolt holes of a Haas", _NO_POCKET) for n in (12, 13, 70, 71, 72, 150)),
+    *(Code(f"G{n}", "motion", "pocket or bolt hole cycle of a Haas", _NO_POCKET) for n in (12, 13, 70, 71, 72, 150)),
 )
 
-_CALL = "subprograms are not followed; write the moves into the program"
+_CALL = "subprograms are not followed; write their moves in the program"
 
 _COMMON_M: Final = (
     Code("M0", "stop", "stop"),
@@ -195,7 +210,7 @@ _LINUXCNC_M: Final = (
     Code("M98", "stop", "subprogram call", f"{_CALL}; {_EXPAND}"),
     *(Code(f"M{n}", "override", "override switch") for n in range(50, 54)),
     Code("M60", "stop", "stop, change pallets"),
-    Code("M61", "tool", "tells the number of the tool"),
+    Code("M61", "tool", "sets the number of the current tool"),
     *(Code(f"M{n}", "io", "inputs and outputs") for n in range(62, 69)),
     *(
         Code(f"M{n}", "state", "stores or restores modal codes", f"stored modal states are not followed; {_EXPAND}")
@@ -204,7 +219,7 @@ _LINUXCNC_M: Final = (
 )
 
 _FANUC_M: Final = (
-    Code("M97", "stop", "call of a line", f"subprograms are not followed; {_WRITTEN}"),
+    Code("M97", "stop", "local subprogram call", f"subprograms are not followed; {_WRITTEN}"),
     Code("M98", "stop", "subprogram call", f"subprograms are not followed; {_WRITTEN}"),
     Code("M29", "tapping", "rigid tapping"),
     Code("M198", "stop", "subprogram call", f"{_CALL} in the CAM system"),
@@ -259,7 +274,7 @@ USED_BY: Final[dict[Controller, dict[str, frozenset[str]]]] = {
 
 #: letters that are refused whatever stands with them
 REFUSED_LETTERS: Final[dict[str, str]] = {
-    "U": "the axes U V W are not supported; a dwell is G4 P, or G4 X of a Fanuc",
+    "U": "the axes U V W are not supported; write a dwell as G4 P, or on a Fanuc as G4 X",
     "V": "the axes U V W are not supported",
     "W": "the axes U V W are not supported",
     "@": "polar coordinates (@ ^) are not supported; write X and Y",

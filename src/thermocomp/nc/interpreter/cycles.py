@@ -93,12 +93,12 @@ class CannedCycle:
             r += self.level
             bottom += r
         if r < bottom:
-            raise CycleError(f"R is at {r:g}, below the bottom at {bottom:g}; check R and {'XYZ'[across]}")
+            raise CycleError(f"R is at {r:g}, below the bottom of the hole at {bottom:g}; check R and {'XYZ'[across]}")
         pecks = (r - bottom) / self.sticky["Q"] if self.code in ("G73", "G83") else 1.0
         if pecks > MOST:
             raise CycleError(f"Q{self.sticky['Q']:g} makes more than {MOST} pecks; check Q")
         if self.repeats * max(pecks, 1.0) > MOST:
-            raise CycleError(f"{self.repeats} repeats make more than {MOST} strokes; write fewer in L or K")
+            raise CycleError(f"{self.repeats} repeats make more than {MOST} strokes; reduce L or K")
 
         a, b, now = self.start[first], self.start[second], self.start[across]
         level = self.level

@@ -62,9 +62,9 @@ _USUAL: Final = ("length", "feed", "g41", "g43", "exact", "radius", "state", "be
 #: kinds of open words that are named
 _NAMED: Final = 5
 
-_BEGINS = "how a Fanuc's or Haas's programs begin"
+_BEGINS = "the beginning of a Fanuc's or Haas's program"
 _EITHER = "or give --controller linuxcnc or --controller fanuc"
-_BEHIND = "is a comment for LinuxCNC, and the next block for a Fanuc: take it away, or give it a line of its own"
+_BEHIND = "is a comment for LinuxCNC, and the next block for a Fanuc: remove it, or put it on a separate line"
 
 
 class Place(NamedTuple):
@@ -77,7 +77,7 @@ class Place(NamedTuple):
 
 @dataclass
 class Judgement:
-    """Signs of the dialect in a program.
+    """Signs of the dialect of a program.
 
     Parameters
     ----------
@@ -124,13 +124,13 @@ def check_dialect(lines: Iterable[str], *, whole: bool = False, startup: str = "
     if mine and other:
         raise ProgramError(
             other.line,
-            f"{other.text!r} is {other.what}, and line {mine.line}: {mine.text!r} is {mine.what}: take away the one "
-            f"that is not meant, {_EITHER}",
+            f"{other.text!r} is {other.what}, and line {mine.line}: {mine.text!r} is {mine.what}: remove the wrong "
+            f"one, {_EITHER}",
         )
     if other:
         raise ProgramError(
             other.line,
-            f"{other.text!r} is {other.what}: give --controller fanuc (dwells, cycles and lengths are others there), "
+            f"{other.text!r} is {other.what}: give --controller fanuc (its dwells, cycles and lengths differ), "
             "or --controller linuxcnc",
         )
     if found.fault is not None and not mine:
@@ -147,8 +147,8 @@ def check_dialect(lines: Iterable[str], *, whole: bool = False, startup: str = "
     first = found.open[kinds[0]].line
     raise ProgramError(
         first,
-        f"{'; '.join(told).removeprefix(f'line {first}: ')}. Nothing in the program is LinuxCNC's or a Fanuc's alone: "
-        f"write it so that both read the same, {_EITHER}",
+        f"{'; '.join(told).removeprefix(f'line {first}: ')}. No word is specific to LinuxCNC or to a Fanuc: "
+        f"write it so that both read it alike, {_EITHER}",
     )
 
 
@@ -257,14 +257,14 @@ class _Scan:
         if len(head["delete"] or "") > 1 or head["again"]:
             self._sign("fanuc", "a block delete with a number, or behind N, which only a Fanuc or Haas has")
         if _FANUC_FLOW.match(body) or _FANUC_OUTPUT.match(body):
-            self._sign("fanuc", "of a Fanuc's or Haas's macros")
+            self._sign("fanuc", "a macro word of a Fanuc or Haas")
             return
         if "#<" in "".join(self._code.split()):
             self._sign("linuxcnc", "a named parameter, which only LinuxCNC has")
         if "@" in body or "^" in body:
-            self._sign("linuxcnc", "a place in polar coordinates of LinuxCNC's (@ ^)")
+            self._sign("linuxcnc", "a position in LinuxCNC's polar coordinates (@ ^)")
         if _FANUC_CORNER.search(body):
-            self._sign("fanuc", "a corner of a Fanuc's or Haas's (,R ,C ,A)")
+            self._sign("fanuc", "a corner word of a Fanuc or Haas (,R ,C ,A)")
         if assigned := _ASSIGNED.search(body):
             self._assigned(body[assigned.end() :].replace("ATAN{}/{}", "{}"))
             body = body[: assigned.start()]
@@ -272,9 +272,9 @@ class _Scan:
 
     def _assigned(self, value: str) -> None:
         if "=" in value:
-            self._sign("linuxcnc", "several assignments on a line, which only LinuxCNC takes")
+            self._sign("linuxcnc", "several assignments on a line, which only LinuxCNC accepts")
         elif _OPERATOR.search(value):
-            self._sign("fanuc", "an expression without brackets, which only a Fanuc or Haas takes")
+            self._sign("fanuc", "an expression without brackets, which only a Fanuc or Haas accepts")
 
     def _words(self, words: list[tuple[str, str]], *, runs: bool) -> None:
         values = {letter: value for letter, value in words if letter not in "GM"}
@@ -292,7 +292,7 @@ class _Scan:
             for kind, text, readings in list_open_words(line, self.force):
                 self._ask(kind, text.replace("{}", "[..]"), readings)
             if self.force.mixed > 1:
-                self._hint("an arc that closes only if lengths without a point are whole")
+                self._hint("an arc that closes only if lengths without a decimal point are in whole units")
         # an end behind "/" may be skipped
         self._ended = self._ended or (runs and not {2.0, 30.0}.isdisjoint(line.m))
 

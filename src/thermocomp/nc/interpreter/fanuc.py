@@ -1,4 +1,4 @@
-"""Special behaviour of a Fanuc: G80 with words, G0 next to G28, G68, and manufacturer-specific parts of cycles."""
+"""Codes specific to a Fanuc: G80 with words, G0 with G28, G68, and cycles that its models read differently."""
 
 from typing import Final
 
@@ -27,7 +27,9 @@ def motion_beside_g80(state: InterpreterState, words: BlockWords) -> str:
     modal = state.modal.motion
     before = state.under if modal in CYCLES else modal
     if before not in _STRAIGHT:
-        raise words.error("axis words beside G80, and neither G0 nor G1 was in force before the cycle; write G0 there")
+        raise words.error(
+            "axis words with G80, but neither G0 nor G1 was in force before the cycle; write G0 with them"
+        )
     return before
 
 
@@ -60,19 +62,21 @@ def check_codes(state: InterpreterState, words: BlockWords, code: str) -> None:
                 "meaning depends on the control; write G80 before"
             )
     if groups.get("once") == "G92.1" and not words.values.keys() >= {"X", "Y", "Z"}:
-        raise words.error("G92.1 without X, Y and Z: what is taken back of the others depends on the control; name all")
+        raise words.error(
+            "G92.1 without X, Y and Z: the control determines which other axes are restored; name X, Y and Z"
+        )
     rotation = groups.get("rotation")
     if modal.turned and rotation != "G69":
         wrong = sorted((_NOT_TURNED & groups.keys()) | ({groups.get("once", "")} & _ONCE_NOT_TURNED))
         if wrong:
             raise words.error(
-                f"{groups.get(wrong[0], wrong[0])} while G68 is in force, which controls do not allow or read in "
-                "several ways; write G69 before"
+                f"{groups.get(wrong[0], wrong[0])} while G68 is in force, which controls reject or read in "
+                "different ways; write G69 before"
             )
     if rotation is not None and modal.cutter:
-        raise words.error(f"{rotation} under cutter compensation; write G40 before")
+        raise words.error(f"{rotation} during cutter compensation; write G40 before")
     if rotation is not None and code in CYCLES:
-        raise words.error(f"{rotation} on a line that drills; put it on a line of its own")
+        raise words.error(f"{rotation} on a line that drills; put it on a separate line")
 
 
 def rotate(state: InterpreterState, words: BlockWords) -> None:
@@ -91,9 +95,11 @@ def rotate(state: InterpreterState, words: BlockWords) -> None:
             _turned(state, "G69")
         return
     if modal.plane != 17:
-        raise words.error(f"G68 in G{modal.plane} is not supported; write the coordinates out")
+        raise words.error(f"G68 in G{modal.plane} is not supported; write the rotated coordinates")
     if not modal.absolute:
-        raise words.error("G68 in G91: whether its words count from where the tool stands depends on the control; G90")
+        raise words.error(
+            "G68 in G91: whether its words count from the tool position depends on the control; write G90 before"
+        )
     if modal.motion in CYCLES:
         raise words.error(f"G68 while {modal.motion} is in force; write G80 before")
     values = words.values
@@ -104,7 +110,7 @@ def rotate(state: InterpreterState, words: BlockWords) -> None:
             "control; write X, Y and R"
         )
     if "Z" in values:
-        raise words.error("G68 with Z; X, Y and R are supported")
+        raise words.error("G68 with Z is not supported; write X, Y and R only")
     if modal.turned:
         raise words.error("G68 while G68 is in force: whether the angles add depends on the control; write G69 before")
     offsets.turn((values["X"] * state.scale, values["Y"] * state.scale), values["R"])
@@ -140,8 +146,8 @@ def check_place(state: InterpreterState, words: BlockWords, code: str) -> None:
         return
     if named != _PLANE_LETTERS or not state.modal.absolute or not (straight or code in CYCLES):
         raise words.error(
-            f"the first move behind {state.turned_anew} has to go to X and Y in G90, straight: where the control takes "
-            "the tool to stand is not certain before"
+            f"the first move after {state.turned_anew} must be a linear move to X and Y in G90: the position that the "
+            "control assumes for the tool is uncertain before"
         )
     state.turned_anew = ""
 
@@ -152,8 +158,8 @@ def check_dwell(words: BlockWords) -> None:
     if word is not None and word.number is not None and "." in word.value:
         seconds = f"G4 X{word.value.strip()} for seconds, or " if words.groups.get("once") == "G4" else ""
         raise words.error(
-            f"P{word.value.strip()} for a dwell: with a decimal point it counts seconds for a Haas, and a Fanuc does "
-            f"not take it; write {seconds}P without a point for milliseconds"
+            f"P{word.value.strip()} for a dwell: with a decimal point it is in seconds for a Haas, and a Fanuc does "
+            f"not accept it; write {seconds}P without a decimal point for milliseconds"
         )
 
 
@@ -170,8 +176,8 @@ def dwell_of_x(state: InterpreterState, words: BlockWords) -> float:
         return words.values["X"]
     if state.setup.integers == "refuse":
         raise words.error(
-            f"G4 X{word.value.strip()} has no decimal point: whether it counts seconds or milliseconds depends on the "
-            "control; state which with --integers, or write the point"
+            f"G4 X{word.value.strip()} has no decimal point: whether it is in seconds or milliseconds depends on the "
+            "control; state which with --integers, or write the decimal point"
         )
     return words.values["X"] / (1000.0 if state.setup.integers == "least" else 1.0)
 
@@ -191,8 +197,8 @@ def drills(state: InterpreterState, words: BlockWords) -> bool:
     for i, place in state.axis_values(words).items():
         if i != across and not (state.modal.absolute and state.known[i] and abs(place - state.place[i]) < _SAME):
             raise words.error(
-                f"{'XYZ'[i]} beside {'K0' if 'K' in words.values else 'L0'}, which stores the words of the cycle: "
-                f"some controls go there; write {'XYZ'[i]} on a line before"
+                f"{'XYZ'[i]} with {'K0' if 'K' in words.values else 'L0'}, which stores the words of the cycle: "
+                f"some controls move there; write {'XYZ'[i]} on a line before"
             )
     return False
 
@@ -204,6 +210,6 @@ def _check_level(state: InterpreterState, words: BlockWords) -> None:
     sure = state.level_known or not state.modal.absolute
     if sure and above > _SAME:
         raise words.error(
-            f"R is {above:g} mm above the level where the cycle begins: when the tool goes up depends on the control; "
-            "go to that level before"
+            f"R is {above:g} mm above the initial level of the cycle: when the tool retracts depends on the control; "
+            "move to that level before"
         )

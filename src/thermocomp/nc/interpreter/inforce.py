@@ -1,4 +1,4 @@
-"""Codes in force in a program, and the words of a line, as far as they determine its dialect."""
+"""Modal state of a program and the words of a line, as far as they decide the dialect of the program."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -47,7 +47,7 @@ class LineWords:
 
 @dataclass
 class InForce:
-    """Codes in force in a program, as far as they determine its dialect.
+    """Modal state of a program, as far as it matters for the dialect.
 
     Parameters
     ----------

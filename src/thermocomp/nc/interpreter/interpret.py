@@ -87,7 +87,11 @@ class Follower:
         if line.error:
             raise ProgramError(line.number, line.error)
         if line.flow:
-            remedy = "--expand writes them out" if self.state.fanuc else "--expand lets the interpreter unroll them"
+            remedy = (
+                "--expand writes them as plain lines"
+                if self.state.fanuc
+                else "--expand lets the interpreter unroll them"
+            )
             raise ProgramError(line.number, f"{line.flow}: loops, branches and subprograms are not followed; {remedy}")
         if not line.words and not line.assignments:
             return self._idle(line)
@@ -134,10 +138,10 @@ class Follower:
         if block.kind in ("cycle", "set"):
             changed.append(f"the state of {' '.join(block.codes) or 'the cycle'}")
         if block.moves and not block.modal.absolute and block.kind != "home":
-            changed.append("the place of all G91 moves behind it")
+            changed.append("the position of all later G91 moves")
         if changed:
             raise words.error(
-                f"an optional line (/) that changes {changed[0]}: what comes after depends on whether the operator "
+                f"an optional line (/) that changes {changed[0]}: the lines after it depend on whether the operator "
                 "skips it; decide with --block-delete"
             )
         if block.moves:
@@ -243,7 +247,9 @@ class Follower:
         turns = groups.get("rotation") == "G68"
         smoothed = "high speed" in groups and not _AXIS_LETTERS.isdisjoint(values)
         if smoothed and (told or any(values.get(letter) for letter in _AXIS_LETTERS)):  # zeros state which are smoothed
-            raise words.error("axis words beside a code that smooths the path; put it on a line of its own")
+            raise words.error(
+                "axis words and a code that smooths the path are on one line; put the code on a separate line"
+            )
         if once is None and not smoothed and not turns and "tool length" not in groups:
             if told == "G80":
                 return "" if _AXIS_LETTERS.isdisjoint(values) else self._beside_g80(words)
@@ -261,12 +267,12 @@ class Follower:
             return ""
         force = self.state.modal.motion
         if not force or told == "G80":
-            raise words.error("axis words, and no motion code is in force; write G0, G1 ... before them")
+            raise words.error("axis words, but no motion code is in force; write G0, G1 ... before them")
         return force
 
     def _beside_g80(self, words: BlockWords) -> str:
         if not self.state.fanuc:
-            raise words.error("axis words beside G80; write the motion code they are for")
+            raise words.error("axis words with G80; write the motion code they are for")
         return fanuc.motion_beside_g80(self.state, words)
 
     def _beside(self, words: BlockWords, told: str | None, other: str) -> None:
@@ -274,7 +280,7 @@ class Follower:
         if told in ("G0", "G1") and self.state.fanuc and other in ("G28", "G30", "G68"):
             fanuc.put_in_force(self.state, told)
         elif told not in (None, "G80"):
-            raise words.error(f"{told} beside {other}: both would use the axis words; put one on its own line")
+            raise words.error(f"{told} with {other}: both would use the axis words; put them on separate lines")
 
     def _turns(self, words: BlockWords) -> bool:
         """Whether the line is an arc without axis words: a full circle."""
@@ -292,9 +298,9 @@ class Follower:
             elif state.fanuc and "X" in values:
                 seconds = fanuc.dwell_of_x(state, words)
             else:
-                raise words.error("G4 needs P, the time")
+                raise words.error("G4 needs P, the dwell time")
             if seconds < 0.0:
-                raise words.error("G4 with a negative time")
+                raise words.error("G4 has a negative time; P must be 0 or more")
             block.pause += seconds
         elif once in ("G28", "G30"):
             motion.home(state, words, block)
@@ -312,7 +318,7 @@ class Follower:
             if state.level is not None:
                 state.level, state.sticky = None, {}
         elif _AXIS_LETTERS.isdisjoint(words.values):
-            raise words.error(f"{code} without axis words; say where")
+            raise words.error(f"{code} without axis words; write the end position")
         if words.groups.get("once") == "G53":
             motion.in_machine(state, words, block)
         elif code in ("G0", "G1"):
@@ -322,7 +328,7 @@ class Follower:
         elif code in CYCLES:
             motion.cycle(state, words, block, again)
         elif _AXIS_LETTERS.isdisjoint(words.values):
-            raise words.error(f"{code} without axis words; say where")
+            raise words.error(f"{code} without axis words; write the end position")
         elif code in _PROBES:
             motion.probe(state, words, block)
         elif code in _THREADS:

@@ -68,12 +68,12 @@ def speeds(state: InterpreterState, words: BlockWords, inch: bool) -> None:
     if "F" in values:
         word = values["F"]
         if word < 0.0:
-            raise words.error(f"F{word:g} is negative")
+            raise words.error(f"F{word:g} is negative; write a feed above 0")
         state.feed_word = word
         state.feed = word * MM if inch and state.modal.feed_mode != 93 else word
     if "S" in values:
         if values["S"] < 0.0:
-            raise words.error(f"S{values['S']:g} is negative; M4 turns the other way")
+            raise words.error(f"S{values['S']:g} is negative; write it positive, with M4 to reverse the spindle")
         state.spindle = values["S"]
     if "T" in values:
         state.selected = words.whole("T") or 0
@@ -137,14 +137,14 @@ def _unit_of_feed(state: InterpreterState, words: BlockWords) -> None:
 def _check_cutter(state: InterpreterState, words: BlockWords) -> None:
     groups = words.groups
     for group in _NOT_UNDER_CUTTER & groups.keys():
-        raise words.error(f"{groups[group]} cannot stand under cutter compensation; G40 has to come before")
+        raise words.error(f"{groups[group]} is not allowed during cutter compensation; write G40 before")
     if groups.get("once") in ("G52", "G92", "G92.1", "G92.2", "G92.3", "G10"):
-        raise words.error(f"{groups['once']} cannot stand under cutter compensation; G40 has to come before")
+        raise words.error(f"{groups['once']} is not allowed during cutter compensation; write G40 before")
     if groups.get("cutter", "G40") != "G40":
         raise words.error(f"{groups['cutter']} while cutter compensation is on; write G40 before")
     plane = groups.get("plane")
     if plane is not None and int(plane[1:]) != state.modal.plane:
-        raise words.error(f"{plane} under cutter compensation; write G40 before")
+        raise words.error(f"{plane} during cutter compensation; write G40 before")
 
 
 def _machine_codes(state: InterpreterState, words: BlockWords, block: Block) -> None:
@@ -160,13 +160,13 @@ def _machine_codes(state: InterpreterState, words: BlockWords, block: Block) -> 
     elif tool == "M61":
         number = words.whole("Q")
         if number is None:
-            raise words.error("M61 needs Q, the number of the tool")
+            raise words.error("M61 needs Q, the tool number")
         state.tool = number
     spindle = groups.get("spindle")
     if spindle in ("M3", "M4"):
         if state.spindle is None:
             raise words.error(
-                f"{spindle} and no spindle speed was stated: the drift would not be known; write S, or say the speed "
+                f"{spindle} without a spindle speed: the drift would be unknown; write S, or state the speed "
                 "the control starts with"
             )
         state.turning = 1 if spindle == "M3" else -1

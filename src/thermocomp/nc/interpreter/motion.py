@@ -10,7 +10,7 @@ from thermocomp.nc.interpreter.state import InterpreterState
 from thermocomp.nc.interpreter.words import BlockWords
 
 #: LinuxCNC refuses these under cutter compensation, which this follower does not compute
-_NOT_COMPENSATED = "cannot stand under cutter compensation; G40 has to come before"
+_NOT_COMPENSATED = "is not allowed during cutter compensation; write G40 before"
 
 #: levels nearer than that are the same [mm]
 _SAME_LEVEL = 1e-4
@@ -40,7 +40,7 @@ def straight(state: InterpreterState, words: BlockWords, block: Block) -> None:
 def in_machine(state: InterpreterState, words: BlockWords, block: Block) -> None:
     """G53: the words are machine coordinates."""
     if not state.modal.absolute:
-        raise words.error("G53 cannot stand in G91; write G90 before")
+        raise words.error("G53 is not allowed in G91; write G90 before")
     if state.modal.cutter:
         raise words.error(f"G53 {_NOT_COMPENSATED}")
     if state.modal.motion not in ("G0", "G1"):
@@ -63,7 +63,7 @@ def in_machine(state: InterpreterState, words: BlockWords, block: Block) -> None
 
 
 def _doubt(state: InterpreterState, axes: dict[int, float]) -> Known:
-    """Return which coordinates are still known after some axes moved to machine coordinates."""
+    """Return the axes that are still known after machine coordinates of some axes were reached."""
     known = mark_axes(state.known, axes, to=False)
     turned = state.offsets.rotation and (0 in axes or 1 in axes)
     return (False, False, known[2]) if turned else known
@@ -78,7 +78,7 @@ def home(state: InterpreterState, words: BlockWords, block: Block) -> None:
     rotary = state.turn(words)
     named = state.axis_values(words)
     if not named and not turns and state.fanuc:
-        raise words.error(f"{code} without axis words; name the axes that go home, such as {code} Z0")
+        raise words.error(f"{code} without axis words; name the axes to return, such as {code} Z0")
     place, _ = state.goal(words)
     start, between = state.machine, state.offsets.machine(place)
     far = state.setup.home or (0.0, 0.0, 0.0)
@@ -144,9 +144,9 @@ def in_step(state: InterpreterState, words: BlockWords, block: Block) -> None:
     """G33 and G33.1: in step with the spindle; G33.1 comes back to where it started."""
     code = state.modal.motion
     if "K" not in words.values:
-        raise words.error(f"{code} needs K, the way per turn")
+        raise words.error(f"{code} needs K, the distance per turn")
     if "F" in words.values:
-        raise words.error(f"F with {code}: its feed is K; remove F")
+        raise words.error(f"{code} takes its feed from K, found F; remove F")
     if state.modal.cutter:
         raise words.error(f"{code} {_NOT_COMPENSATED}")
     rotary = state.turn(words)
@@ -158,7 +158,7 @@ def in_step(state: InterpreterState, words: BlockWords, block: Block) -> None:
     if code == "G33.1":
         back = words.values.get("I", 1.0)
         if back <= 0.0:
-            raise words.error(f"G33.1 with I{back:g}: how much faster it comes back has to be above 0")
+            raise words.error(f"G33.1 with I{back:g}: the speed multiple of the return must be above 0")
         block.moves.append(state.per_turn(words, state.machine, start, abs(pitch) * back))
         state.reach(before, was_known)
 
@@ -185,7 +185,7 @@ def curve(state: InterpreterState, words: BlockWords, block: Block) -> None:
     """G5 and G5.1; the move is recorded as the straight line from start to end."""
     code, values = state.modal.motion, words.values
     if code not in ("G5", "G5.1"):  # whoever adds a code to the table has to say what it does
-        raise words.error(f"{code} is known, and nothing does it")
+        raise words.error(f"{code} is known but not implemented; please report this")
     if state.modal.plane != 17 or {"Z", "A", "B", "C"} & values.keys():
         raise words.error(f"{code} is for X and Y in G17 only")
     if state.modal.cutter:
@@ -196,7 +196,7 @@ def curve(state: InterpreterState, words: BlockWords, block: Block) -> None:
     if not all(letter in values for letter in needed):
         raise words.error(f"{code} needs {needed[0]} and {needed[1]}")
     if ("I" in values) != ("J" in values):
-        raise words.error("G5 needs I and J both, or none of them")
+        raise words.error("G5 needs both I and J, or neither")
     start = state.machine
     state.reach(*state.goal(words))
     block.kind = "curve"
@@ -230,7 +230,7 @@ def cycle(state: InterpreterState, words: BlockWords, block: Block, again: bool)
     if state.level is None:
         state.level, state.level_known, state.level_frame = start[across], state.known[across], frame
     elif state.level_frame != frame:
-        raise words.error(f"{code} after a change of plane or unit within cycles; write G80 before the change")
+        raise words.error(f"{code} continues a cycle after a change of plane or unit; write G80 before the change")
     elif modal.absolute and modal.retract == 98 and not state.fanuc:
         _refuse_near_r(start[across], state.level, state.sticky["R"] * scale, words)
     block.kind, block.sticky = "cycle", state.sticky
@@ -277,9 +277,9 @@ def _keep_words(state: InterpreterState, words: BlockWords, again: bool, axes: d
     state.sticky = (state.sticky if again else {}) | kept | depth
     missing = [c for c in KEPT[code] + letter if c not in state.sticky and not (state.fanuc and c == "P")]
     if missing:
-        raise words.error(f"{code} needs {' '.join(missing)} where it begins")
+        raise words.error(f"{code} needs {' '.join(missing)} on its first line")
     if code in ("G73", "G83") and state.sticky["Q"] <= 0.0:
-        raise words.error(f"Q of {code} has to be above 0")
+        raise words.error(f"Q of {code} must be above 0")
     if code in ("G74", "G84") and not state.fanuc:
         state.sticky.setdefault("P", state.last_dwell)  # that of the cycle before, in LinuxCNC
     state.last_dwell = state.sticky.get("P", state.last_dwell)
@@ -290,7 +290,7 @@ def _turn_for_a_tap(state: InterpreterState, words: BlockWords, block: Block) ->
     code = state.modal.motion
     if state.fanuc and code in ("G74", "G84") and not state.turning:
         if state.spindle is None:
-            raise words.error(f"{code}, and no spindle speed was stated; write S before")
+            raise words.error(f"{code} without a spindle speed; write S before")
         block.speed = state.spindle if code == "G84" else -state.spindle
 
 
@@ -306,7 +306,7 @@ def _ends_certainly(state: InterpreterState) -> bool:
 def _refuse_near_r(start: float, level: float, plane: float, words: BlockWords) -> None:
     if ROUNDING < abs(start - plane) < _SAME_LEVEL < abs(level - plane):
         raise words.error(
-            "G98 after a hole that ended at almost the same R: whether LinuxCNC goes up before the next hole depends "
+            "G98 after a hole that ended at almost the same R: whether LinuxCNC retracts before the next hole depends "
             "on rounding; write the same R, or G80 between them"
         )
 
@@ -314,9 +314,9 @@ def _refuse_near_r(start: float, level: float, plane: float, words: BlockWords) 
 def _may_drill(state: InterpreterState, words: BlockWords) -> None:
     code, modal = state.modal.motion, state.modal
     if {"A", "B", "C"} & words.values.keys():
-        raise words.error(f"{code} with a rotary axis; turn it on a line of its own before")
+        raise words.error(f"{code} with a rotary axis; turn it on a separate line before")
     if modal.feed_mode == 93:
-        raise words.error(f"{code} cannot stand in G93; write G94 and F before")
+        raise words.error(f"{code} is not allowed in G93; write G94 and F before")
     if modal.cutter:
         raise words.error(f"{code} {_NOT_COMPENSATED}")
     if state.fanuc:
@@ -327,7 +327,9 @@ def _may_drill(state: InterpreterState, words: BlockWords) -> None:
     if code in ("G74", "G84", "G86", "G87") and not turning:
         raise words.error(f"{code} while the spindle is stopped; start it before")
     if (code == "G84" and turning < 0) or (code == "G74" and turning > 0):
-        raise words.error(f"{code} while the spindle turns the other way; {'M3' if code == 'G84' else 'M4'} before it")
+        raise words.error(
+            f"{code} while the spindle turns in the wrong direction; write {'M3' if code == 'G84' else 'M4'} before it"
+        )
 
 
 def dwell_seconds(state: InterpreterState, p: float) -> float:

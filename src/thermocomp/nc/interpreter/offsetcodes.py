@@ -16,7 +16,7 @@ def select_system(state: InterpreterState, words: BlockWords) -> None:
     if code in ("G54.1", "G154"):
         number = words.whole("P", least=1)
         if number is None:
-            raise words.error(f"{code} needs P, the number of the coordinate system")
+            raise words.error(f"{code} needs P, the number of the work coordinate system")
         system = 100 + number
     else:
         system = _SYSTEMS[code] if code in _SYSTEMS else 100 + HAAS_SYSTEMS[code]
@@ -30,8 +30,8 @@ def tool_length(state: InterpreterState, words: BlockWords) -> None:
     offsets = state.offsets
     if state.length_inch not in (None, state.modal.inch) and not state.fanuc:
         raise words.error(
-            f"{code} after G20 or G21 under a tool length: LinuxCNC 2.9 mistakes its unit and moves Z by it; write G49 "
-            "before the unit changes"
+            f"{code} after G20 or G21 under a tool length: LinuxCNC 2.9 converts its unit wrongly and moves Z by it; "
+            "write G49 before the unit changes"
         )
     state.length_inch = None if code == "G49" else state.modal.inch
     if code == "G43.1":
@@ -70,7 +70,7 @@ def _length_number(state: InterpreterState, words: BlockWords, code: str) -> int
         state.length_number = number
         return -1 if number is None else number
     if code == "G43.2" and not number:
-        raise words.error("G43.2 needs H, the tool whose length is added")
+        raise words.error("G43.2 needs H, the number of the tool whose length is added")
     return number or state.tool  # H0 is the tool in the spindle
 
 
@@ -101,7 +101,7 @@ def local(state: InterpreterState, words: BlockWords, block: Block) -> None:
     elif code in ("G92.1", "G92.2"):
         still = offsets.drop_shift(keep=code == "G92.2")
     else:  # whoever adds a code to the table has to say what it does
-        raise words.error(f"{code} is known, and nothing does it")
+        raise words.error(f"{code} is known but not implemented; please report this")
     state.renamed(still)
 
 
@@ -112,7 +112,7 @@ def g10(state: InterpreterState, words: BlockWords, block: Block) -> None:
     if kind not in (2, 20) and (state.fanuc or kind not in (1, 10, 11)):
         raise words.error(f"G10 L{kind if kind is not None else ''} is not supported; L2 and L20 are")
     if number is None:
-        raise words.error(f"G10 L{kind} needs P, the number of what is set")
+        raise words.error(f"G10 L{kind} needs P, the number of the tool or work coordinate system")
     if kind in (2, 20):
         _origin(state, words, block, kind, number)
     else:
@@ -128,14 +128,14 @@ def _origin(state: InterpreterState, words: BlockWords, block: Block, kind: int,
     if state.fanuc:
         system, rotation = (100 + number if kind == 20 else number or EXTERNAL), None
         if "R" in words.values:
-            raise words.error("R with G10 L2 is not Fanuc's; remove it")
+            raise words.error("a Fanuc has no R with G10 L2; remove it")
         top = 6 if kind == 2 else 300
     else:
         system, rotation, top = number or offsets.system, words.values.get("R"), LAST
         if "I" in words.values or "J" in words.values or (rotation is not None and kind == 20):
             raise words.error(f"G10 L{kind} takes X Y Z{' and R' if kind == 2 else ''} only")
     if number > top:
-        raise words.error(f"G10 L{kind} P{number}: there are {top} coordinate systems")
+        raise words.error(f"G10 L{kind} P{number}: there are only {top} work coordinate systems")
     if kind == 20 and not state.fanuc:
         offsets.name_origin(system, state.machine, values, state.known)
         if system == offsets.system:
@@ -144,8 +144,8 @@ def _origin(state: InterpreterState, words: BlockWords, block: Block, kind: int,
         return
     if not (number or offsets.named or state.fanuc):
         raise words.error(
-            "G10 L2 P0 sets the work coordinate system in force, and the program has not said which that is; write G54 "
-            "(or another) before it, or its number for P"
+            "G10 L2 P0 sets the work coordinate system in force, which the program has not selected; write G54 "
+            "(or another) before it, or its number as P"
         )
     offsets.set_origin(system, values, rotation, add=state.fanuc and not state.modal.absolute)
     if system in (offsets.system, EXTERNAL) or not offsets.named:

@@ -176,10 +176,10 @@ class InterpreterState:
         mode, feed = self.modal.feed_mode, self.feed
         if mode == 93:
             if not words.values.get("F"):
-                raise words.error("G93 needs F on every line that cuts; add it, or write G94")
+                raise words.error("G93 needs F on every feed move; add it, or write G94")
             return Move(rapid=False, start=start, end=end, arc=arc, feed=0.0, seconds=60.0 / feed, rotary=rotary)
         if not feed:
-            raise words.error("a move in feed, and no F is in force (G93, G94 and G95 forget it in LinuxCNC); write F")
+            raise words.error("a feed move, but no F is in force (in LinuxCNC, G93, G94 and G95 clear it); write F")
         if rotary and start == end and arc is None:
             feed = self.feed_word
         if mode == 94:

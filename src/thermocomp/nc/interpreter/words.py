@@ -1,4 +1,4 @@
-"""Words of a line: its codes by modal group, and the values of its words, checked individually."""
+"""Words of a line: its codes by modal group, and the values of its words, each checked by itself."""
 
 from dataclasses import dataclass
 
@@ -45,7 +45,7 @@ class BlockWords:
             return None
         number = round(value)
         if abs(value - number) > 1e-4 or number < least:
-            raise self.error(f"{letter} is {value:g} and has to be a whole number, at least {least}")
+            raise self.error(f"{letter} must be a whole number, at least {least}; found {value:g}")
         return number
 
 
@@ -91,7 +91,7 @@ class Reader:
                     groups[code.group] = code.name
                 codes += (code.name,)
             elif letter in values:
-                raise ProgramError(line.number, f"{letter} appears twice on the line; one has to go")
+                raise ProgramError(line.number, f"{letter} appears twice on the line; remove one")
             else:
                 words[letter] = word
                 values[letter] = number
@@ -127,21 +127,21 @@ class Reader:
             if letter in "RPQ" and "M19" in words.codes:
                 word = f"{letter}{words.words[letter].value.strip()}"
                 return (
-                    f"M19 with {word} turns the spindle to an angle, in the way that the machine's maker has chosen, "
-                    "which is not followed; M19 alone is, and neither moves an axis: revise the program without "
-                    f"{word}, and write it back behind M19 in the revised one"
+                    f"M19 with {word} turns the spindle to an angle in a way that the machine builder has defined, "
+                    "which is not followed; M19 alone is. Neither moves an axis: revise the program without "
+                    f"{word}, and put it back after M19 in the revised program"
                 )
             other = USED_BY["linuxcnc"].get(letter, frozenset())
             theirs = owner if owner in other else next((c for c in words.codes if c in other and c[0] == "G"), "")
             if theirs:
                 return (
-                    f"{theirs} with {letter} is LinuxCNC's, and a Fanuc's {theirs} has none: remove {letter}, or give "
+                    f"LinuxCNC's {theirs} has {letter}, a Fanuc's has none: remove {letter}, or give "
                     "--controller linuxcnc if the program is for that"
                 )
-            return f"the line has {letter}, and no code that uses it; remove it, or add the code"
+            return f"the line has {letter} but no code that uses it; remove it, or add the code"
         return (
-            f"the line has {letter}, and no code that uses it in LinuxCNC, but it may act on a Fanuc or Haas: give "
-            "--controller fanuc if the program is for one; else remove it, or add the code"
+            f"the line has {letter} but no code that uses it in LinuxCNC; it may act on a Fanuc or Haas: give "
+            "--controller fanuc if the program is for one, otherwise remove it, or add the code"
         )
 
     def _evaluate(self, line: Line, word: Word) -> float:
@@ -157,11 +157,11 @@ class Reader:
             code = Code(name, name, "moves nothing")
         if code is None:
             user = letter == "M" and 100 <= number < 200 and self._controller == "linuxcnc"
-            remedy = f"if it leaves axes and spindle as they are: --harmless {name}; else " if letter == "M" else ""
+            remedy = f"if it does not affect axes and spindle: --harmless {name}; otherwise " if letter == "M" else ""
             raise ProgramError(
                 line.number,
-                f"{name} is unknown ({'a code of the user' if user else self._controller}): nobody knows what it does; "
-                f"{remedy}say it in codes that are followed (docs/precompensation.rst)",
+                f"{name} is unknown ({'a code of the user' if user else self._controller}): its effect is unknown; "
+                f"{remedy}replace it by supported codes (docs/precompensation.rst)",
             )
         if code.refused:
             raise ProgramError(line.number, f"{code.name} ({code.does}): {code.refused}")
@@ -175,18 +175,18 @@ class Reader:
             groups[code.group] = other if code.name == "G80" else code.name
             return
         raise ProgramError(
-            line.number, f"{other} and {code.name} on one line exclude each other; put them on two lines"
+            line.number, f"{other} and {code.name} on one line exclude each other; put them on separate lines"
         )
 
     def _count(self, words: BlockWords) -> None:
         if self._controller == "linuxcnc" and sum(name[0] == "M" for name in words.codes) > _MOST_M:
-            raise words.error(f"more than {_MOST_M} M codes on one line; put them on two lines")
+            raise words.error(f"more than {_MOST_M} M codes on one line; put them on separate lines")
 
     def _assign(self, line: Line) -> None:
         try:
             self.parameters.assign(line.assignments)
             if line.optional:
                 for assignment in line.assignments:
-                    self.parameters.forget(assignment.target, "an optional line sets it; decide with --block-delete")
+                    self.parameters.forget(assignment.target, "an optional line sets it; give --block-delete off or on")
         except InputError as error:
             raise ProgramError(line.number, f"a parameter: {error}") from None

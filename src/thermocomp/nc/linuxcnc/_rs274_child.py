@@ -281,7 +281,7 @@ class Canon:
             done: int = self.python_before(this, code, result, as_file)
             return done
         self.where()
-        raise RefusedError(self.line, "it holds Python code (py, ...), which is not run here")
+        raise RefusedError(self.line, "it contains Python code (py, ...), which is not run here; remove it")
 
     def commented(self, text: bytes) -> None:
         self.comment(text.decode("latin-1"))
@@ -414,7 +414,7 @@ class Canon:
             self.told, self.last = told, now
         elif now - self.last > MOST_IDLE and not self.hooks.failure:
             self.where()
-            reason = f"it has run for {MOST_IDLE:.0f} s and done nothing: has it an endless loop?"
+            reason = f"it has run for {MOST_IDLE:.0f} s without output: check the program for an endless loop"
             self.hooks.failure = RefusedError(self.line, reason)
         return self.hooks.failure is not None
 

@@ -69,7 +69,7 @@ class Hooks:
         found = slots(library, set(functions))
         missing = sorted(set(functions) - set(found))
         if missing:
-            raise RuntimeError(f"{library} is of a version that is not known: it does not call {', '.join(missing)}")
+            raise RuntimeError(f"{library} has an unsupported version: it does not call {', '.join(missing)}")
         before = {}
         for name, (function, types) in functions.items():
             callback = ctypes.CFUNCTYPE(*types)(self.guarded(function))

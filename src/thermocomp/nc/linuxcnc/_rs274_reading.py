@@ -1,4 +1,4 @@
-"""Limits on the input of LinuxCNC's interpreter: no file outside the folders of the job, and no endless loop.
+"""Reading by LinuxCNC's interpreter: no file outside the folders of the job, and nothing endless.
 
 Part of the script `_rs274_child.py`: standard library only.
 """

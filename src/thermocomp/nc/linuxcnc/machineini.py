@@ -1,4 +1,4 @@
-"""Axes in a LinuxCNC configuration, and the names already used in its HAL files."""
+"""Axes of a LinuxCNC configuration, and the names that its HAL files already use."""
 
 import math
 import re
@@ -43,7 +43,7 @@ class Ini:
         if found:
             return found[0]
         if default is None:
-            raise InputError(f"{self.path}: there is no {key} in [{section}]; is this the INI of the machine?")
+            raise InputError(f"{self.path}: there is no {key} in [{section}]; give the INI file of the machine")
         return default
 
     def number(self, section: str, key: str, default: float | None = None) -> float:
@@ -71,7 +71,7 @@ class Ini:
 
 @dataclass
 class HalFiles:
-    """Names used in HAL files, as far as they can be determined: no Tcl, no conditions.
+    """Names that HAL files use, as far as they can be read: no Tcl, no conditions.
 
     Parameters
     ----------

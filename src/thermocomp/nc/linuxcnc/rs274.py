@@ -34,7 +34,7 @@ ORIGIN: Place = (0.0,) * 9
 
 
 class ArcPath(NamedTuple):
-    """Geometry of an arc; the third coordinate of its centre is that of the arc's end."""
+    """Direction and centre of an arc; the third coordinate of its centre is that of the arc's end."""
 
     plane: int  #: 17, 18, 19
     centre: tuple[float, float, float]  #: program coordinates [mm]
@@ -66,7 +66,7 @@ class Canonical(NamedTuple):
 
 
 class ProgramFrame:
-    """Transformation between program and machine coordinates.
+    """Offsets between program and machine coordinates.
 
     Attributes
     ----------
@@ -142,7 +142,7 @@ def find_obstacle() -> str | None:
     advice = f"LinuxCNC's interpreter is needed: install the Debian package {PACKAGE} (apt-get install {PACKAGE})"
     python = rs274process.PYTHON
     if not python.exists():
-        return f"{python} is not here; {advice}"
+        return f"{python} does not exist; {advice}"
     with scratch() as folder:
         trying = [str(python), rs274process.ISOLATED, "-c", "import gcode"]
         if subprocess.run(trying, capture_output=True, cwd=folder, check=False).returncode:
@@ -155,7 +155,9 @@ def find_obstacle() -> str | None:
             return f"the interpreter of {PACKAGE} does not work as expected: {error}"
     expected = {"m3", "speed", "rapid", "m5", "end"}
     if missing := expected - set(kinds):
-        return f"the interpreter of {PACKAGE} does not tell of {', '.join(sorted(missing))}: its version is not known"
+        return (
+            f"the interpreter of {PACKAGE} does not report {', '.join(sorted(missing))}: its version is not supported"
+        )
     return None
 
 

@@ -38,8 +38,8 @@ _PIPE = 1 << 20
 #: the interpreter's words for a subprogram that it does not find
 _NOT_THERE = re.compile(r"(?:EOF in file|Unable to open file).*?(o<[^>]*>)(?: from line: \d+)?.*")
 _TOO_DEEP = "Too many subroutine levels"
-_RECURSION = "more than 10 calls inside each other: a subprogram that calls itself has no end; write a loop instead"
-_MISSING = r"\1 is not there: of a subprogram name the folder (--subroutines); a loop or a branch needs its end"
+_RECURSION = "more than 10 nested calls: a subprogram that calls itself does not end; write a loop instead"
+_MISSING = r"\1 was not found: for a subprogram, name its folder (--subroutines); for a loop or a branch, write its end"
 
 
 class CallBlock(NamedTuple):
@@ -97,7 +97,9 @@ class InterpreterRun:
         if not path.is_file():
             raise InputError(f"{path} is not a file")
         if len(subroutines) > MOST_FOLDERS:
-            raise InputError(f"{len(subroutines)} folders of subprograms; the interpreter takes {MOST_FOLDERS}")
+            raise InputError(
+                f"found {len(subroutines)} folders of subprograms; the interpreter reads up to {MOST_FOLDERS}"
+            )
         self.jobs, self.path, self._number = jobs, path, -1
         self._home = ExitStack()
         self.folder = self._home.enter_context(scratch())
@@ -179,11 +181,11 @@ class InterpreterRun:
         if code == -24:
             seconds = self.jobs[self._number].seconds
             raise ProgramError(
-                max(line, 1), f"the program takes more than {seconds} s to interpret: has it an endless loop?"
+                max(line, 1), f"the program takes more than {seconds} s to interpret: check it for an endless loop"
             )
-        said = words[-1] if words else "it said nothing"
+        said = words[-1] if words else "no message"
         if code < 0:
-            raise ProgramError(max(line, 1), f"the interpreter died of signal {-code}: {said}")
+            raise ProgramError(max(line, 1), f"the interpreter was ended by signal {-code}: {said}")
         raise InputError(f"LinuxCNC's interpreter ended with code {code}: {said}")
 
     def opened(self) -> set[Path]:
@@ -202,7 +204,7 @@ class InterpreterRun:
 def _all(pipe: IO[bytes], size: int) -> bytes:
     found = pipe.read(size)
     if len(found) < size:
-        raise InputError("LinuxCNC's interpreter ended in the middle of what it told")
+        raise InputError("LinuxCNC's interpreter ended before its output was complete")
     return found
 
 

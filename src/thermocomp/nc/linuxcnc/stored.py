@@ -1,4 +1,4 @@
-"""Values stored in a controller and not in the program; and controllers that have nothing in common."""
+"""State stored in a controller and not in the program; and controllers that have nothing in common."""
 
 import random
 from collections.abc import Mapping, Sequence
@@ -12,7 +12,7 @@ SYSTEMS = range(1, 10)
 
 @dataclass(frozen=True)
 class Stored:
-    """Values stored in the controller and not in the program.
+    """State stored in the controller and not in the program.
 
     Parameters
     ----------

@@ -54,13 +54,13 @@ def _round(a: float) -> float:
 
 def _angle(a: float) -> float:
     if abs(a) > 1e9:  # its digits behind the point are lost
-        raise ValueError(f"an angle of {a:g} degrees")
+        raise ValueError(f"an angle of {a:g} degrees is out of range")
     return math.radians(a)
 
 
 def _tangent(a: float) -> float:
     if abs(math.cos(_angle(a))) < 1e-9:
-        raise ValueError(f"TAN of {a:g} degrees")
+        raise ValueError(f"TAN of {a:g} degrees is undefined")
     return math.tan(_angle(a))
 
 
@@ -69,7 +69,7 @@ def _sure(what: Binary) -> Binary:
 
     def compared(a: float, b: float) -> float:
         if a != b and abs(a - b) <= _ROUNDED * max(abs(a), abs(b)):
-            raise ValueError(f"{a:.12g} and {b:.12g} are the same but for rounding; compare with half a step between")
+            raise ValueError(f"{a:.12g} and {b:.12g} differ by rounding only; compare with a value half a step away")
         return float(what(a, b))
 
     return compared
@@ -78,7 +78,7 @@ def _sure(what: Binary) -> Binary:
 def _sure_whole(what: Callable[[float], float]) -> Callable[[float], float]:
     def cut(a: float) -> float:
         if a != round(a) and abs(a - round(a)) <= _ROUNDED * max(abs(a), 1.0):
-            raise ValueError(f"FIX or FUP of {a:.12g}, which is whole but for rounding")
+            raise ValueError(f"FIX or FUP of {a:.12g}, which is within rounding of a whole number")
         return what(a)
 
     return cut
@@ -87,14 +87,14 @@ def _sure_whole(what: Callable[[float], float]) -> Callable[[float], float]:
 def _sure_half(a: float) -> float:
     rest = abs(a) % 1.0
     if rest != 0.5 and abs(rest - 0.5) <= _ROUNDED * max(abs(a), 1.0):
-        raise ValueError(f"ROUND of {a:.12g}, which is a half but for rounding")
+        raise ValueError(f"ROUND of {a:.12g}, which is within rounding of a half")
     return math.copysign(math.floor(abs(a) + 0.5), a)
 
 
 def _bits(what: Callable[[int, int], int]) -> Binary:
     def on_integers(a: float, b: float) -> float:
         if a != int(a) or b != int(b) or min(a, b) < 0:
-            raise ValueError(f"AND, OR and XOR of {a:g} and {b:g}: they are for whole numbers")
+            raise ValueError(f"AND, OR and XOR of {a:g} and {b:g}: they need whole numbers")
         return float(what(int(a), int(b)))
 
     return on_integers
@@ -152,8 +152,8 @@ _FANUC_FUNCTIONS: dict[str, Callable[[float], float]] = {
     "round": _sure_half,
 }
 _REFUSED_BY_FANUC = {
-    "round": "ROUND in a word rounds to the control's least increment, which the program does not tell",
-    "exists": "EXISTS is LinuxCNC's",
+    "round": "ROUND in a word rounds to the control's least increment, which the program does not define",
+    "exists": "only LinuxCNC has EXISTS",
 }
 
 
@@ -197,9 +197,7 @@ class Parameters:
         for target, value, _, _ in assignments:
             key = self.key(target)
             if meaning := machine_meaning(key, self.controller):
-                raise InputError(
-                    f"{target} is set, which changes the machine: {meaning}; set it at the control instead"
-                )
+                raise InputError(f"setting {target} changes the machine: {meaning}; set it at the control instead")
             known[key] = evaluate(value, self, word=False)
         self._values.update(known)
 
@@ -215,7 +213,7 @@ class Parameters:
             return int(simple[1])
         reader = _Reader(target, self)
         if not reader.takes("#"):
-            raise InputError(f"found '{target}' where a parameter, such as #5, should be")
+            raise InputError(f"expected a parameter, such as #5, found '{target}'")
         key = reader.parameter()
         reader.end()
         return key
@@ -259,7 +257,7 @@ def evaluate(text: str, parameters: Parameters, *, word: bool = True) -> float:
 def _read_simple(
     text: str, controller: Literal["linuxcnc", "fanuc"]
 ) -> tuple[float | int, Binary | None, float | int] | None:
-    """Return operands and operator of a simple expression: numbers, or parameter numbers (int); None for others."""
+    """Return operator and operands of a simple expression: numbers, or numbers (int) of parameters; else None."""
     found = _SIMPLE.fullmatch(_BLANKS.sub("", text).lower())
     if found is None or bool(found[1]) != bool(found[7]) or not (found[1] or controller == "fanuc" or not found[4]):
         return None
@@ -323,7 +321,7 @@ class _Reader:
             raise self.error("'['")
         self.depth += 1
         if self.depth > DEEPEST:
-            raise InputError(f"in '{self.written[:40]}...': more than {DEEPEST} brackets inside each other")
+            raise InputError(f"in '{self.written[:40]}...': more than {DEEPEST} nested brackets")
         value = self.expression()
         self.depth -= 1
         if not self.takes("]"):
@@ -401,7 +399,9 @@ class _Reader:
         if isinstance(key, int) or key in self.parameters or machine_meaning(key):
             return 1.0
         if key.startswith("_"):
-            raise InputError(f"whether #<{key}> exists is unknown: another program may have set it")
+            raise InputError(
+                f"whether #<{key}> exists is unknown: another program may have set it; set it in this program"
+            )
         return 0.0
 
 

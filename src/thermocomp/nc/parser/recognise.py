@@ -58,7 +58,7 @@ _KINDS = (
         "G-code of a 3-D printer",
         code=r"^\s*M(10[49]|140|190)\s+S[0-9.]+\s*$|^\s*G92\s+E-?[0-9.]+\s*$",
         raw=r"\s*;\s*(FLAVOR:|LAYER_COUNT:|Generated (with|by) (Cura|PrusaSlicer|Slic3r|SuperSlicer|OrcaSlicer))",
-        advice="a printer has no spindle that drifts",
+        advice="only programs of machine tools can be revised",
     ),
     _Kind(
         "APT or CLDATA (the tool path of a CAM system)",
@@ -70,7 +70,7 @@ _KINDS = (
 )
 _PATTERNS = [(kind, re.compile(kind.code, re.I), re.compile(kind.raw, re.I)) for kind in _KINDS]
 
-_UTF_16 = "UTF-16 text, which controls do not read; save it as plain text (ASCII)"
+_UTF_16 = "UTF-16 text, which controls cannot read; save it as plain text (ASCII)"
 #: share of NUL bytes at every second place, from which a text without a byte order mark is UTF-16
 _MOSTLY = 0.9
 

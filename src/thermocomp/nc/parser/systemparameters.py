@@ -10,7 +10,7 @@ _LINUXCNC = (
     (5210, 5219, "offset of G92 or G52"),
     (5220, 5220, "number of the work coordinate system"),
     (5221, 5390, "origin or rotation of a work coordinate system (G54 to G59.3)"),
-    (5399, 5399, "answer of M66"),
+    (5399, 5399, "result of M66"),
     (5400, 5413, "data of the tool in the spindle"),
     (5420, 5428, "present position"),
     (5600, 5601, "fault of the tool changer"),
@@ -20,7 +20,7 @@ _FANUC = (
     (2000, 2999, "tool or work offset of the machine"),
     (3000, 3999, "alarm, clock, stop, or setting of the machine"),
     (4000, 4999, "modal state"),
-    (5001, 5020, "end point of the block before"),
+    (5001, 5020, "end point of the previous block"),
     (5021, 5060, "present position"),
     (5061, 5080, "result of a skip move (G31)"),
     (5081, 5200, "tool offset in force"),
@@ -64,7 +64,7 @@ _NAMED = {
         "modal state",
     ),
     **dict.fromkeys(("_current_tool", "_current_pocket", "_selected_tool", "_selected_pocket"), "tool of the machine"),
-    **dict.fromkeys(("_value", "_value_returned"), "value that a subroutine gave back"),
+    **dict.fromkeys(("_value", "_value_returned"), "return value of a subroutine"),
     **dict.fromkeys(
         ("_vmajor", "_vminor", "_line", "_task", "_call_level", "_remap_level"), "state of the interpreter"
     ),

@@ -94,7 +94,7 @@ def program_lines(stream: TextIO) -> Iterator[str]:
         if len(text) == LONGEST:
             raise InputError(
                 f"a line has {LONGEST} characters or more: this is not an NC program; "
-                "give the program as text, with line ends"
+                "save the program as text, with line ends"
             )
         yield text
 
@@ -218,11 +218,11 @@ def _refuse_bytes(text: str, body: str) -> None:
     """Refuse what controls disagree about: where the line ends, and what the bytes are."""
     for mark in _BYTE_ORDER_MARKS:
         if text.startswith(mark):
-            raise _NotUnderstoodError(0, "a byte order mark, which controls do not read; save the program without it")
+            raise _NotUnderstoodError(0, "a byte order mark, which controls cannot read; save the program without it")
     if "\0" in text:
-        raise _NotUnderstoodError(text.index("\0"), "a NUL byte; LinuxCNC would not read on")
+        raise _NotUnderstoodError(text.index("\0"), "a NUL byte, at which LinuxCNC stops reading; remove it")
     if text.endswith("\r") or "\n" in body or "\r" in body:
-        what = "a lone carriage return: LinuxCNC reads on, others begin a new line; save with usual line ends"
+        what = "a lone carriage return, which LinuxCNC ignores and others read as a line end; save with usual line ends"
         raise _NotUnderstoodError(len(body), what)
 
 
@@ -237,11 +237,11 @@ def _squeeze(body: str, controller: Controller, line: Line) -> tuple[str, list[i
         if rest is not None:
             remark = rest
             if controller == "fanuc" and rest.strip(_BLANK):
-                raise _NotUnderstoodError(start, "text after ';', which ends the block; put it on a line of its own")
+                raise _NotUnderstoodError(start, "text after ';', which ends the block; put it on a separate line")
         elif remark is not None:
             if not closed:
                 nested = body.startswith("(", end)
-                what = "comments inside comments" if nested else "the comment is not closed on its line"
+                what = "nested comments are not supported" if nested else "the comment is not closed on its line"
                 raise _NotUnderstoodError(end if nested else start, what)
             pieces.append("(")
             columns.append(start)
@@ -251,7 +251,9 @@ def _squeeze(body: str, controller: Controller, line: Line) -> tuple[str, list[i
         if remark is not None:
             comments.append(remark)
             if controller == "linuxcnc" and _runs_python(remark):
-                raise _NotUnderstoodError(start, "this comment runs Python in LinuxCNC: nobody knows what it will do")
+                raise _NotUnderstoodError(
+                    start, "this comment runs Python in LinuxCNC: its effect is unknown; remove it"
+                )
     line.comment = " ".join(filter(None, comments))
     return "".join(pieces).translate(_UPPER), columns
 
@@ -282,7 +284,7 @@ def _read_squeezed(text: str, columns: Sequence[int], controller: Controller, li
             line.label, place = found.group(), found.end()
         if found := _FANUC_OUTPUT.match(text, place):
             raise _NotUnderstoodError(
-                place, f"{found.group()} is not supported: it gives values of the program to the outside"
+                place, f"{found.group()} is not supported: it passes values of the program to other programs; remove it"
             )
         flow = _FANUC_FLOW.match(text, place) is not None
     if flow:
@@ -307,7 +309,7 @@ def _check_control(text: str, place: int) -> None:
             place += 1
         else:
             raise _NotUnderstoodError(
-                place, f"found '{text[place]}' behind the O-word, where only brackets and comments may be"
+                place, f"expected only brackets and comments after the O-word, found '{text[place]}'"
             )
 
 
@@ -347,16 +349,16 @@ def _complaint(text: str, place: int) -> str:
     """Return the fault of a character that starts no token."""
     letter = text[place]
     if letter == "," and text[place + 1 : place + 2] in {"R", "C", "A"}:
-        return f"',{text[place + 1]}' (corner rounding, chamfer, angle) is not supported; write the moves out"
+        return f"',{text[place + 1]}' (corner rounding, chamfer, angle) is not supported; replace it by its moves"
     if letter == "N":
-        return "the line number N has to be a whole number, at the beginning of the line"
+        return "the line number N must be a whole number at the beginning of the line"
     if letter == "O":
-        return "an O-word has to be at the beginning of the line; in a number write the digit 0, not the letter O"
+        return "an O-word must be at the beginning of the line; in a number write the digit 0, not the letter O"
     if letter == "/":
-        return "block delete '/' has to be at the beginning of the line"
+        return "block delete '/' must be at the beginning of the line"
     if letter == "%":
-        return "'%' has to be alone on its line"
-    return f"found {letter!r}, which begins no word{'; numbers have a decimal point' * (letter == ',')}"
+        return "'%' must be alone on its line"
+    return f"found {letter!r}, which is not the start of a word{'; numbers have a decimal point' * (letter == ',')}"
 
 
 def _value(text: str, place: int, letter: str, controller: Controller) -> int:
@@ -376,8 +378,8 @@ def _value(text: str, place: int, letter: str, controller: Controller) -> int:
         return _closed(text, place + 1) if found.group() == "ATAN" and text.startswith("/[", place) else place
     what = f"found {head!r}" if head and head != "(" else "found nothing"
     if head == "O":
-        what = "found the letter O, not the digit 0,"
-    raise _NotUnderstoodError(place, f"{what} where the value of {letter} should be")
+        what = "found the letter O; write the digit 0"
+    raise _NotUnderstoodError(place, f"expected the value of {letter}, {what}")
 
 
 def _parameter(text: str, place: int) -> int:
@@ -398,7 +400,7 @@ def _assigned(text: str, equals: int, controller: Controller) -> int:
     end = text.find("(", equals)
     end = len(text) if end < 0 else end
     if end == equals + 1:
-        raise _NotUnderstoodError(end, "found nothing where the value of the parameter should be")
+        raise _NotUnderstoodError(end, "expected the value of the parameter, found nothing")
     return end
 
 
@@ -407,7 +409,7 @@ def _closed(text: str, place: int) -> int:
     depth = 0
     for found in re.compile(r"[][(]").finditer(text, place):
         if found.group() == "(":
-            raise _NotUnderstoodError(found.start(), "a comment stands inside brackets")
+            raise _NotUnderstoodError(found.start(), "a comment inside brackets; move it out")
         depth += 1 if found.group() == "[" else -1
         if depth == 0:
             return found.end()

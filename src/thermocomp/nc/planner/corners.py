@@ -1,4 +1,4 @@
-"""Cornering of a controller: its possible behaviour between one move and the next.
+"""Cornering of a controller: the transition from one move to the next.
 
 The controller is LinuxCNC 2.9. Moves that meet at a small angle run through; else an arc is put into the corner, as
 wide as the tolerance and half of each move allow; where no arc fits, the next move begins while the last one brakes.
@@ -19,7 +19,7 @@ REST = 4
 
 
 class Corners:
-    """Behaviour between two moves.
+    """Transition between two moves.
 
     Parameters
     ----------

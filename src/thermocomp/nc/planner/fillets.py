@@ -14,7 +14,7 @@ class Straight:
         self.turn = turn
 
     def cut(self, radius: float, _: float) -> tuple[float, float, float]:
-        """Return the length an arc removes from the first line, its own length, and that removed from the second."""
+        """Return the length that an arc of a radius takes from the first line, its own, and that from the second."""
         off = radius / math.tan(self.half)
         return off, radius * self.turn, off
 
@@ -53,7 +53,7 @@ class Bent:
         self.room = 0.0 if narrow else min(rooms)
 
     def cut(self, radius: float, tolerance: float) -> tuple[float, float, float] | None:
-        """Return the length an arc removes from the first move, its own length, and that removed from the second."""
+        """Return the length that an arc of a radius takes from the first move, its own, and that from the second."""
         cos, sin = math.cos(self.turn), math.sin(self.turn)
         r1, r2 = self.before.radius, self.after.radius
         # centres of the arcs, and the way from them to the centre of the new one

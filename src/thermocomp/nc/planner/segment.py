@@ -137,7 +137,7 @@ class Segments:
         self.speeds, self.accelerations, self.feed, self.rotary = speeds, accelerations, feed, rotary
 
     def of(self, serial: int, move: Move, block: Block) -> Segment | None:
-        """Return the planner segment of a move; None if it does not move."""
+        """Return the planner's segment of a move; None if it has no length."""
         if move.arc is not None:
             return self._arc(serial, move, block)
         (x, y, z), (ex, ey, ez) = move.start, move.end
@@ -167,11 +167,11 @@ class Segments:
         """Return the speed that the program asks for [mm/s]."""
         speed = length / move.seconds if move.seconds else move.feed / 60.0
         if not speed > 0.0:
-            raise ProgramError(block.line.number, "it moves in feed, and no feed is in force: write F before it")
+            raise ProgramError(block.line.number, "a feed move, but no feed is in force: write F before it")
         return min(speed, self.feed)
 
     def _arc(self, serial: int, move: Move, block: Block) -> Segment:
-        """Return the planner segment of an arc or a helix."""
+        """Return the planner's segment of an arc or a helix."""
         arc = move.arc
         assert arc is not None
         i, j, k = PLANES[arc.plane]
@@ -180,7 +180,7 @@ class Segments:
         qi, qj = move.end[i] - ci, move.end[j] - cj
         first, second = math.hypot(pi, pj), math.hypot(qi, qj)
         if not first or not second:
-            raise ProgramError(block.line.number, "an arc around its own start or end: check its centre")
+            raise ProgramError(block.line.number, "the centre of the arc is at its start or end: check the centre")
         sense = -1.0 if arc.clockwise else 1.0
         turned = sweep(arc, move.start, move.end)
         climb = move.end[k] - move.start[k]

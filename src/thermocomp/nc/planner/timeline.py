@@ -164,7 +164,7 @@ def time_blocks(blocks: Iterable[Block], kinematics: MotionLimits) -> Iterator[T
 
 
 class _Plan:
-    """Queue of the controller, and the completed moves."""
+    """Moves ahead of the controller, and those it has completed."""
 
     def __init__(self, kinematics: MotionLimits) -> None:
         self.kinematics = kinematics

@@ -95,7 +95,7 @@ def _drift(ax: Axes, bound: Bound, time: FloatArray, run: Run) -> None:
 
 
 def _said(bound: Bound, *, cut: bool) -> str:
-    """Return the drift, the residual, and the bound including the error of the model, for the table."""
+    """Return the text of the table: drift, its remainder, and the bound, which includes the model's error."""
     far = max(abs(bound.low), abs(bound.high))
     if not cut:
         return f"the tool drifts by up to {far:.1f} um; nothing is cut"

@@ -18,7 +18,7 @@ _TIME = ("time", "t", "elapsed")
 
 @dataclass(frozen=True)
 class Forecast:
-    """Content of a forecast file, in internal units.
+    """Content of a forecast file, in house units.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def read(path: str | Path) -> Forecast:
     try:
         check_file(source, FileLimits())
         if source.stat().st_size > _MOST_BYTES:
-            raise InputError(f"{source}: has more than {_MOST_BYTES >> 20} MiB, which no forecast has; leave rows out")
+            raise InputError(f"{source}: has more than {_MOST_BYTES >> 20} MiB, the limit of a forecast; remove rows")
         text = source.read_text(encoding="utf-8-sig")
     except FileNotFoundError as e:
         raise InputError(f"{source}: no such file") from e
@@ -70,7 +70,9 @@ def read(path: str | Path) -> Forecast:
         (n, line) for n, line in enumerate(text.splitlines(), start=1) if line.strip() and not line.startswith("#")
     ]
     if len(lines) < 2:
-        raise InputError(f"{source}: a forecast is a line of headings and rows of numbers below it; found {len(lines)}")
+        raise InputError(
+            f"{source}: a forecast needs a line of headings and rows of numbers below it; found {len(lines)}"
+        )
     delimiter = next((d for d in "\t;" if d in lines[0][1]), ",")
     cells = [_cells(line, delimiter, f"{source}: line {number}") for number, line in lines]
     headings = [h.strip() for h in cells[0]]
@@ -84,13 +86,13 @@ def read(path: str | Path) -> Forecast:
     for (number, _), row in zip(lines[1:], cells[1:], strict=True):
         where = f"{source}: line {number}"
         if len(row) != len(headings):
-            raise InputError(f"{where} has {len(row)} cells where the headings are {len(headings)}")
+            raise InputError(f"{where} has {len(row)} cells, but there are {len(headings)} headings")
         numbers = {
             k: _number(row[k], unit, delimiter, f"{where}, column {headings[k]!r}") for k, (_, unit) in kept.items()
         }
         now = numbers.pop(time)
         if now is None or not now > last:
-            raise InputError(f"{where}, column {headings[time]!r}: {row[time]!r}: the time must be there and rise")
+            raise InputError(f"{where}, column {headings[time]!r}: {row[time]!r}: times must be given and increase")
         last = now
         for k, value in numbers.items():
             if value is not None:
@@ -130,7 +132,7 @@ def _columns(headings: list[str], source: str) -> tuple[dict[int, tuple[str, Uni
         is_time = meaning.unit.quantity == "time"
         name = "" if is_time else meaning.name
         if name in (n for n, _ in kept.values()):
-            raise InputError(f"{source}: column {heading!r}: there is another one of {name or 'time'}; delete one")
+            raise InputError(f"{source}: column {heading!r}: another column also holds {name or 'time'}; delete one")
         kept[k] = name, meaning.unit
     return kept, left_out
 
@@ -145,5 +147,5 @@ def _number(cell: str, unit: Unit, delimiter: str, where: str) -> float | None:
     except ValueError as e:
         raise InputError(f"{where}: {text!r} is not a number") from e
     if not math.isfinite(number):
-        raise InputError(f"{where}: {text!r} is no finite number")
+        raise InputError(f"{where}: {text!r} must be finite; remove NaN and infinity")
     return unit.scale * number + unit.shift

@@ -1,4 +1,4 @@
-"""Header of a revised program, with the data of its run."""
+"""Facts about the run in the header of a revised program."""
 
 import math
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ _ALWAYS = 7
 
 
 def count_lines(models: Sequence[str], taken: Sequence[str], states: str, *, by_position: bool) -> int:
-    """Return the number of lines of a header, before its text is known.
+    """Return the number of lines of a header, before their content is known.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def told_taken(taken: Sequence[str]) -> list[str]:
 
 
 def describe_bound(bounds: Sequence[Bound]) -> str:
-    """Return the bound of the tool error in the cuts."""
+    """Return the error bounds of the tool in the cuts."""
     return "bound " + ", ".join(
         f"{b.axis} {b.most:.1f} um" if math.isfinite(b.most) else f"{b.axis} not known" for b in bounds
     )
@@ -80,6 +80,6 @@ def describe_origins(revision: Revision) -> str:
 
 
 def cost(elsewhere: Elsewhere, axes: Sequence[str]) -> str:
-    """Return the cost of another work offset or tool length."""
+    """Return the error that another work offset or tool length would cause."""
     costs = ", ".join(f"{axis} {elsewhere.most['XYZ'.index(axis)]:.1f} um" for axis in axes)
     return f"{AWAY:g} mm of another offset cost up to {costs}"

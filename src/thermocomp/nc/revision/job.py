@@ -68,7 +68,7 @@ class Paths(NamedTuple):
 
 @dataclass(frozen=True)
 class Job:
-    """Revision of a program.
+    """Job of revising a program.
 
     Parameters
     ----------
@@ -113,12 +113,12 @@ class Job:
 
     @property
     def begun(self) -> str:
-        """Return the start state of the run, in words."""
+        """Return the initial thermal state of the run, in words."""
         return f"{self.start}, {self.zero}"
 
 
 class Done(NamedTuple):
-    """Result of a revision."""
+    """Result of a job."""
 
     run: Run
     bounds: tuple[Bound, ...]
@@ -293,7 +293,7 @@ def _bounds(job: Job, run: Run) -> tuple[Bound, ...]:
 
 
 def _facts(job: Job, bounds: Sequence[Bound], proof: Proof | None) -> list[str]:
-    """Return the data of the header."""
+    """Return the texts of the header."""
     place = headers.describe_place(job.revision, job.drift.axes) if job.drift.by_position else []
     facts = [
         f"thermocomp {__version__}, {job.when.date()}, for {job.revision.setup.controller}",
@@ -311,7 +311,7 @@ def _facts(job: Job, bounds: Sequence[Bound], proof: Proof | None) -> list[str]:
 
 
 def _proved(job: Job, original: Path, revised: Path, ledger: Ledger, tell: Tell) -> Proof:
-    """Return the result of the interpreter."""
+    """Return the verdict of the interpreter."""
     lines, last = max(job.revision.lines, 1), 0
 
     def progress(line: int) -> None:

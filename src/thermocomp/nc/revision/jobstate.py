@@ -1,4 +1,4 @@
-"""State after a job for the next one, as JSON: versioned, bit-exact; damaged or unknown files are refused."""
+"""State that a job leaves for the next one, as JSON: versioned, bit-exact, damaged or unknown files refused."""
 
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime

@@ -17,7 +17,7 @@ def open_to_read(path: Path) -> TextIO:
         There is no such file.
     """
     if path.is_dir():
-        raise InputError(f"{path}: is a folder; name an NC program")
+        raise InputError(f"{path}: is a directory; give an NC program")
     try:
         return path.open(encoding="latin-1", newline="")
     except FileNotFoundError as e:

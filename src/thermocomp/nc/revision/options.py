@@ -1,4 +1,4 @@
-"""Options of a revision, as for ``thermocomp revise``, and the objects made from them."""
+"""Options of a revision, as given to ``thermocomp revise``, and the objects built from them."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -44,13 +44,13 @@ WARMED = 3.0
 _COUNTED: dict[Zero, str] = {
     "start": "from the start of the program",
     "cold": "from the cold machine",
-    "last": "from where the last job counted it",
+    "last": "from the zero of the last job",
 }
 
 
 @dataclass(frozen=True, kw_only=True)
 class Drifting:
-    """Models and inputs of the thermal drift.
+    """Inputs that make the tool drift.
 
     Parameters
     ----------
@@ -90,15 +90,15 @@ class Drifting:
         driven = any(i.quantity == SPEED and i.name in m.sensors for m in models for i in m.inputs)
         if not driven and self.forecast is None and any(m.sensors for m in models):
             raise InputError(
-                "no model is driven by the spindle speed, and no --forecast tells what changes: they cannot tell what "
-                "this program does to the machine; fit one with --inputs spindle_rpm"
+                "no model is driven by the spindle speed, and no --forecast gives changing inputs: the effect of this "
+                "program on the machine is unknown; fit a model with --inputs spindle_rpm"
             )
         if self.forecast is None:
             return signals, _taken(signals, "held at a constant")
         read = forecasts.read(self.forecast)
         twice = sorted(set(signals) & set(read.columns))
         if twice:
-            raise InputError(f"{self.forecast}: {twice[0]} is given by --constant too; take one of them away")
+            raise InputError(f"{self.forecast}: {twice[0]} is also given by --constant; remove one")
         wanted = {i.name for m in models for i in m.inputs}
         notes = [f"{self.forecast}: {name} is no input of the models" for name in read.columns if name not in wanted]
         notes += [f"{self.forecast}: {text}" for text in read.left_out]
@@ -120,19 +120,19 @@ def _refuse_heated(model: ErrorModel, constant: Iterable[str]) -> None:
     for i in model.inputs:
         if i.name in constant and i.quantity == "temperature" and i.name != surroundings and i.high - i.low > WARMED:
             raise InputError(
-                f"--constant {i.name}: it went over {i.high - i.low:.1f} degC in training, so it will not stand still "
-                "while this program runs; give it by --forecast, or fit a model that does without it, such as "
+                f"--constant {i.name}: it varied by {i.high - i.low:.1f} degC in training and will not stay constant "
+                "while this program runs; give it by --forecast, or fit a model without it, such as "
                 "--inputs spindle_rpm"
             )
 
 
 def _taken(names: Iterable[str], how: str) -> list[str]:
-    return [f"{name} is {how}: that it may be otherwise is in no bound" for name in sorted(names)]
+    return [f"{name} is {how}: a deviation from that is not part of the bounds" for name in sorted(names)]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Starting:
-    """Thermal state of the machine at the start of the program.
+    """Initial thermal state of the machine when the program starts.
 
     Parameters
     ----------
@@ -160,9 +160,9 @@ class Starting:
         """Raise `InputError` if the state is not given, or given more than once."""
         given = self.cold + (self.carried is not None) + (self.measured is not None)
         if given != 1:
-            found = "it is not stated" if not given else f"it is stated {given} times"
+            found = "not stated" if not given else f"stated {given} times"
             raise InputError(
-                f"how warm is the machine when the program starts? {found}: give one of --cold, --carried JOB.json and "
+                f"the initial thermal state of the machine is {found}: give one of --cold, --carried JOB.json and "
                 "--measured z=12um"
             )
         if self.pause is not None and self.carried is None:
@@ -193,13 +193,13 @@ class Starting:
         return f"measured {', '.join(self.measured)}" if self.measured else "cold"
 
     def counted(self) -> str:
-        """Return the zero of the drift in words."""
+        """Return the zero of the drift, in words."""
         return _COUNTED[self._zero]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Way:
-    """Method of correction.
+    """Method of writing the correction into the program.
 
     Parameters
     ----------
@@ -256,8 +256,8 @@ class Way:
             return Coordinates(digits, step, safe_z=safe, helix=setup.controller == "linuxcnc")
         if not setup.no_shift:
             raise InputError(
-                "--method offset writes G52, which wipes a G92 or G52 that is in force when the program starts: make "
-                "sure that none is, and give --no-g92; or take --method coordinates"
+                "--method offset writes G52, which cancels a G92 or G52 that is in force when the program starts: make "
+                "sure that none is, and give --no-g92; or use --method coordinates"
             )
         x, y, z = (name in axes for name in "XYZ")
         return Offset(digits, step, safe_z=safe, axes=(x, y, z))
@@ -269,7 +269,7 @@ class Way:
             raise InputError("--subroutines is for --expand: without it subprograms are refused")
         for folder in folders:
             if not folder.is_dir():
-                raise InputError(f"--subroutines {folder}: no such folder")
+                raise InputError(f"--subroutines {folder}: no such directory")
         return folders
 
     def words(self) -> str:
@@ -280,7 +280,7 @@ class Way:
 
 @dataclass(frozen=True, kw_only=True)
 class Controller:
-    """Settings of the controller that are not in the program.
+    """State of the controller that is not in the program.
 
     Parameters
     ----------
@@ -374,7 +374,7 @@ class Controller:
 
 @dataclass(frozen=True, kw_only=True)
 class Timing:
-    """Dynamics and waiting times of the machine.
+    """Speeds and accelerations of the machine.
 
     Parameters
     ----------
@@ -395,7 +395,7 @@ class Timing:
         return None if self.machine is None else read_machine(self.machine)
 
     def kinematics(self, machine: Machine | None) -> tuple[MotionLimits, list[str]]:
-        """Return the dynamics of the machine, and which values are assumed."""
+        """Return the dynamics of the machine, and notes on those that are assumed."""
         change = read_value(self.tool_change, "time", "--tool-change", "8 s")
         stop = read_value(self.stop, "time", "--stop", "60 s")
         if machine is None:

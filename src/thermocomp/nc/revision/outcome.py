@@ -1,4 +1,4 @@
-"""Result of a revision: its warnings, and all its numbers."""
+"""Results of a revision: its warnings, and all its numbers."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -18,7 +18,7 @@ def warnings(job: Job, done: Done) -> list[str]:
     found = list(drift.assumed)
     found += [
         f"{o.name} went to {o.farthest:g} {o.unit}, and a model was trained from {o.low:g} to {o.high:g} {o.unit}: "
-        f"outside its range for {duration(o.seconds)}, the bound is widened by all it says since"
+        f"outside its range for {duration(o.seconds)}, the bound is widened by its whole prediction since"
         for o in drift.outside
     ]
     found += [
@@ -26,7 +26,7 @@ def warnings(job: Job, done: Done) -> list[str]:
         for name, seconds in drift.held.items()
     ]
     found += [
-        f"{axis} was asked for {far:.1f} mm beyond its outermost station: the value there was held"
+        f"{axis} was needed {far:.1f} mm beyond its outermost station: the value there was held"
         for axis, far in drift.beyond.items()
     ]
     found += [
@@ -41,9 +41,11 @@ def warnings(job: Job, done: Done) -> list[str]:
     ]
     found += [] if job.travel is None else job.travel.warnings()
     if revision.standing:
-        found.append(f"the spindle is stopped at line {revision.standing}, and the tool moves in feed: is that right?")
+        found.append(
+            f"the spindle is stopped at line {revision.standing}, but the tool moves at feed rate: check the program"
+        )
     if revision.idle:
-        found.append(f"{revision.idle} lines behind the end of the program are as they were: nobody runs them")
+        found.append(f"{revision.idle} lines after the end of the program are unchanged: they do not run")
     if done.written and revision.method.leaves_mark:
         found.append("G52 may stay in force if the run is aborted: send G52 X0 Y0 Z0 then")
     found += [
@@ -57,7 +59,9 @@ def warnings(job: Job, done: Done) -> list[str]:
         if (honest := s.model.honest_error) is not None and honest.harm_margin is not None
     ]
     if all(i.quantity == SPEED for s in drift.stations for i in s.model.inputs):
-        found.append("the models know the spindle speed alone: a change of the room is in no bound")
+        found.append(
+            "the models know the spindle speed alone: a change of the room temperature is not part of the bounds"
+        )
     if done.written and done.proof is None:
         found.append(f"no interpreter has judged it (--unproved){_assumed(revision.setup)}")
     if done.written and job.paths.picture is None:
@@ -80,21 +84,21 @@ def explain_nothing(job: Job, done: Done) -> str:
     said = f"nothing was corrected: the drift in the cuts is {most:.1f} um at most"
     method, tolerance = revision.method, revision.demand.tolerance
     if most <= TELLING * tolerance:
-        return f"{said}, and it is taken off from {tolerance:g} um on; run the original, or give a smaller --tolerance"
+        return f"{said}, and corrections start at {tolerance:g} um; run the original, or give a smaller --tolerance"
     if not isinstance(method, Offset):
         why = ", ".join(revision.held) or "the time between renewals"
         return f"{said}, and it was held by {why}; change that in the program, or try --method offset with --safe-z"
     if method.leaves_mark:
         return (
             f"{said}, but it was less than {tolerance:g} um wherever the offset could be updated; give "
-            f"{'a' if method.safe_z is None else 'a lower'} --safe-z, so that there are more such places, or take "
+            f"{'a' if method.safe_z is None else 'a lower'} --safe-z, so that there are more such points, or use "
             "--method coordinates"
         )
     if method.safe_z is None:
-        return f"{said}, but there is no safe point: give --safe-z, or take --method coordinates"
+        return f"{said}, but there is no safe point: give --safe-z, or use --method coordinates"
     return (
         f"{said}, but no rapid in G90 begins at or above Z {method.safe_z:g} mm of the work coordinates after one: "
-        "give a lower --safe-z, or take --method coordinates"
+        "give a lower --safe-z, or use --method coordinates"
     )
 
 

@@ -1,4 +1,4 @@
-"""Conversion of the options of a revision to a job; invalid ones are refused before any work."""
+"""Preparation of a job from the options of a revision; wrong options are refused before any work."""
 
 from collections.abc import Mapping, Sequence
 from datetime import date, datetime
@@ -33,7 +33,7 @@ def prepare_job(
     *,
     overwrite: bool,
 ) -> tuple[Job, list[str]]:
-    """Return the job for a program, and notes.
+    """Return the job of revising a program, and notes.
 
     Parameters
     ----------
@@ -138,8 +138,8 @@ def _refuse_optional(program: Path) -> None:
         for line in read_lines(lines):
             if line.optional:
                 raise InputError(
-                    f"{program}: line {line.number}: an optional line: --expand writes it out as a plain one, or "
-                    "leaves it out; give --block-delete off or on"
+                    f"{program}: line {line.number}: an optional line: --expand writes it as a plain line, or "
+                    "skips it; give --block-delete off or on"
                 )
 
 
@@ -149,7 +149,7 @@ def _check_interpreter(way: Way, setup: Setup, *, diameters: bool) -> None:
         raise InputError(f"--expand: {reason}")
     if way.expand and setup.controller == "fanuc" and (way.subroutines or diameters):
         raise InputError(
-            "--subroutines and --diameter are for LinuxCNC: a Fanuc's subprograms stand in its file, and its G41 stays"
+            "--subroutines and --diameter are for LinuxCNC: a Fanuc's subprograms are in its file, and its G41 stays"
         )
     if not way.unproved and (reason := rs274.find_obstacle()):
         raise InputError(f"it cannot be proved: {reason}; {ALL_THE_SAME}")

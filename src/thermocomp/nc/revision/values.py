@@ -1,4 +1,4 @@
-"""Conversion of the texts of the options of ``thermocomp revise``."""
+"""Values of the options of ``thermocomp revise``, parsed from their texts."""
 
 import re
 from collections.abc import Sequence
@@ -131,12 +131,12 @@ def _system(name: str, said: str, example: str) -> int:
     """Return the number of a work coordinate system."""
     found = _SYSTEM.fullmatch(name.strip())
     if found is None or (found[2] and found[3] and found[2] != "1"):
-        raise InputError(f'{said}: want a work coordinate system, such as "{example}"')
+        raise InputError(f'{said}: expected a work coordinate system, such as "{example}"')
     base, decimal, extra = int(found[1]), found[2], found[3]
     if extra:  # G54.1 P3
         return 100 + int(extra)
     if decimal and base != 9:
-        raise InputError(f"{said}: there are G54 to G59, G59.1 to G59.3, and G54.1 P1 and on")
+        raise InputError(f"{said}: expected G54 to G59, G59.1 to G59.3, or G54.1 P1 and up")
     return 6 + int(decimal) if decimal else base - 3
 
 
@@ -215,7 +215,9 @@ def m_code_of(text: str, controller: Controller) -> int:
     if not number.isdecimal():
         raise InputError(f"--harmless {text!r}: expected an M code, such as M{101 if controller == 'linuxcnc' else 88}")
     if (code := find_code("M", float(number), controller)) is not None:
-        raise InputError(f"--harmless {text!r}: {code.name} is known ({code.does}), and is followed as that")
+        raise InputError(
+            f"--harmless {text!r}: {code.name} is a known code ({code.does}) and is followed as such; remove the option"
+        )
     if controller == "linuxcnc" and not 100 <= int(number) < 200:
         raise InputError(f"--harmless {text!r}: LinuxCNC has no such code; a user's own are M100 to M199")
     return int(number)
@@ -245,5 +247,5 @@ def tool_of(text: str, option: str, example: str) -> tuple[int, float]:
     name, _, length = (part.strip() for part in text.partition("="))
     number = name.upper().removeprefix("T")
     if not number.isdecimal():
-        raise InputError(f'{option} {text!r}: want the number of a tool and a length, such as "1={example}"')
+        raise InputError(f'{option} {text!r}: expected the number of a tool and a length, such as "1={example}"')
     return int(number), read_value(length, "position", f"{option} {text!r}", example)

@@ -146,7 +146,7 @@ class Coordinates(CorrectionMethod):
     def _drill(self, block: Block, frame: Frame, old: Vector, demand: Vector) -> str:
         if block.modal.motion == "G87":
             raise ProgramError(
-                block.line.number, "G87 has levels that are not shifted; --method offset, or --expand writes it out"
+                block.line.number, "G87 has levels that cannot be shifted; use --method offset, or --expand"
             )
         axis = PLANES[block.modal.plane][2]
         self._refuse_mixed_levels(block, axis)
@@ -166,7 +166,7 @@ class Coordinates(CorrectionMethod):
                 new[i] = goal[i]
                 shifts[AXES[i]] = round(new[i] - old[i], frame.digits)
         if block.line.optional and tuple(new) != old:
-            raise ProgramError(block.line.number, "an optional line that drills: decide with --block-delete")
+            raise ProgramError(block.line.number, "an optional line that drills: give --block-delete off or on")
         if not block.moves:  # K0: it stores its words, and drills where later lines say
             return self._store(block, axis, frame, old, goal[axis])
         self._take(block, frame, old, new)
@@ -182,8 +182,8 @@ class Coordinates(CorrectionMethod):
             if self._cycle:
                 raise ProgramError(
                     block.line.number,
-                    f"G91 while {block.modal.motion} is in force, whose R and {AXES[axis]} are shifted places: write "
-                    "G80 before, and the cycle with all its words; or --expand",
+                    f"G91 while {block.modal.motion} is in force, whose R and {AXES[axis]} are shifted levels: write "
+                    "G80 before, and the cycle with all its words; or use --expand",
                 )
         else:
             self._cycle = 0.0
@@ -225,7 +225,7 @@ class Coordinates(CorrectionMethod):
                 raise ProgramError(
                     block.line.number,
                     f"Q divides the way from R to {words[0]}, so rounding decides whether there is one peck more, and "
-                    "the tool stands at R, which must not move: write G80 and a rapid above R before, or --expand",
+                    "the tool is at R, which must not move: write G80 and a rapid above R before, or use --expand",
                 )
         if goal != self._cycle or all(word in block.words for word in words):
             added |= {word: block.sticky[word] + goal for word in words if word not in block.words}
@@ -253,8 +253,8 @@ class Coordinates(CorrectionMethod):
             if self.doubtful[i]:
                 raise ProgramError(
                     block.line.number,
-                    f"names the place of {AXES[i]}, and nobody knows where it is: a tool change or an optional line "
-                    "may have moved it; position it before, or decide with --block-delete",
+                    f"names the position of {AXES[i]}, which is unknown: a tool change or an optional line "
+                    "may have moved it; position it before, or give --block-delete off or on",
                 )
         frame = self.frame(block)
         old = frame.words(self.carried)

@@ -1,4 +1,4 @@
-"""Course of a revised program, in as many points as a figure needs, however long it is."""
+"""Course of a revised program over time, in as many points as a picture needs, however long it is."""
 
 import math
 from dataclasses import dataclass, field
@@ -27,7 +27,7 @@ class Run(NamedTuple):
 
 
 class Bound(NamedTuple):
-    """Bound of the tool error in a cut, of one axis [um]."""
+    """Error bound of the tool in a cut, of one axis [um]."""
 
     axis: str
     low: float  #: of the drift, in the whole run

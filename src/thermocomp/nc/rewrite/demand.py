@@ -16,7 +16,7 @@ Field = Callable[[Point], Vector]
 
 
 class DriftSource(Protocol):
-    """Interface to the drift of a machine."""
+    """Interface of a machine's drift."""
 
     @property
     def by_position(self) -> bool:
@@ -29,12 +29,12 @@ class DriftSource(Protocol):
         """Return by how much the tool point deviates now [um], at a place in machine coordinates [mm]."""
 
     def field(self) -> Field:
-        """Return the present `deviation` as a function of position, unaffected by later time steps."""
+        """Return the present `deviation` as a function of position that time no longer changes."""
 
 
 @dataclass
 class Demand:
-    """Demanded corrections of the axes.
+    """Corrections required of the axes.
 
     A correction is renewed when it is due: every `every` seconds (P-06), or as soon as the drift has moved by
     `tolerance` since. Renewed every so often, it still follows the place by `tolerance`, where it depends on it.
@@ -108,7 +108,7 @@ def oppose_deviation(deviation: Vector) -> Vector:
 
 
 class CutErrors(NamedTuple):
-    """Errors in a block in which the tool cuts, at its ends and inside: lowest and highest of each axis [um]."""
+    """Deviations in a block in which the tool cuts, at its ends and inside: lowest and highest of each axis [um]."""
 
     drift: tuple[Vector, Vector]
     left: tuple[Vector, Vector]  #: what the correction leaves of it
@@ -116,7 +116,7 @@ class CutErrors(NamedTuple):
 
 @dataclass
 class Left:
-    """Residual of the drift from which a correction was computed, in the cuts.
+    """Remainder of the drift in the cuts, after the correction that was computed from it.
 
     Parameters
     ----------

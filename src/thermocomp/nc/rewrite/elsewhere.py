@@ -1,4 +1,4 @@
-"""Error of a program revised for some work offsets if run with others, where the drift depends on the position."""
+"""Error of a program, revised for some work offsets, with others, where the drift depends on the position."""
 
 import math
 from dataclasses import dataclass, field

@@ -13,7 +13,7 @@ _MM = 1e-3  # mm per um
 
 @dataclass(frozen=True)
 class Frame:
-    """Conversion of a shift of the tool [um, machine axes] to the words X, Y and Z, under one modal state.
+    """Conversion of a tool shift [um, machine axes] into words of X, Y and Z, under one modal state.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Frame:
         return self.sine != 0 or self.cosine != 1
 
     def words(self, shift: Vector) -> Vector:
-        """Return the values that a shift [um, machine axes] adds to absolute words, rounded to the decimals."""
+        """Return the amount that a shift [um, machine axes] adds to absolute words, rounded to the decimals."""
         x, y, z = shift
         if self.turned:
             x, y = self.cosine * x + self.sine * y, self.cosine * y - self.sine * x

@@ -1,4 +1,4 @@
-"""Conditions that must be known before a block can be corrected, and the messages if they are not."""
+"""Facts that must be known before a block can be corrected, and the errors where they are not."""
 
 import math
 from dataclasses import dataclass
@@ -30,8 +30,8 @@ class SpindleState:
             if not self._told and any(not m.rapid for m in block.moves):
                 raise ProgramError(
                     block.line.number,
-                    "the program cuts, but has not said how fast the spindle turns (S, M3): its drift is unknown; "
-                    "state the speed it finds with --speed",
+                    "the program cuts, but has not set the spindle speed (S, M3): its drift is unknown; "
+                    "state the speed at its start with --speed",
                 )
         return block.speed
 
@@ -64,12 +64,12 @@ def _refuse_unknown_place(block: Block) -> None:
         return
     name, tool = system_name(modal.system), modal.untold_tool
     if not modal.origin_told:
-        what = f"where {name} begins is unknown: --origin '{name}=0 mm, 0 mm, 0 mm'"
+        what = f"the origin of {name} is unknown: --origin '{name}=0 mm, 0 mm, 0 mm'"
     elif tool == -1:
         what = "the length of the tool in the spindle is unknown: write its number (T, M6, or H)"
     else:
         what = f"the length of tool {tool} is unknown: --tool '{tool}=120 mm'"
-    raise ProgramError(block.line.number, f"the drift depends on the place, and {what}")
+    raise ProgramError(block.line.number, f"the drift depends on the position, but {what}")
 
 
 def _refuse_turned(block: Block, setup: Setup) -> None:
@@ -78,14 +78,14 @@ def _refuse_turned(block: Block, setup: Setup) -> None:
         side = setup.rotary.get(letter)
         if side == "table":
             continue
-        where = "gets another zero" if math.isnan(angle) else f"is at {angle:g} deg"
+        where = "gets a new zero" if math.isnan(angle) else f"is at {angle:g} deg"
         what = (
-            "it is in the head, so the spindle grows along the tool and not along Z: not supported"
+            "it is in the head, where the spindle grows along the tool and not along Z: not supported"
             if side
-            else "does it turn the spindle or the workpiece? state it with --machine, whose structure names it: "
+            else "state whether it turns the spindle or the workpiece, with --machine, whose structure names it: "
             f'"w {letter}\' X\' b Y Z (C1) t" in the table, "w X\' b Y Z {letter} (C1) t" in the head'
         )
-        raise ProgramError(block.line.number, f"{letter} {where}, and {what}")
+        raise ProgramError(block.line.number, f"{letter} {where}: {what}")
 
 
 def refuse_untold_rotation(block: Block, carried: Vector) -> None:

@@ -1,4 +1,4 @@
-"""Common part of the two methods of revising: the correction of each axis, and its change by a block."""
+"""Common base of the two methods: the correction that each axis carries, and its change by a block."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
@@ -17,7 +17,7 @@ STILL = 1e-7
 
 
 class Change(NamedTuple):
-    """Result of the revision of a block."""
+    """Result of revising a block."""
 
     texts: tuple[str, ...]  #: lines to write instead of its line; the last one is the line itself
     before: Vector  #: correction that the axes carried when it began [um, machine axes]
@@ -150,13 +150,13 @@ class CorrectionMethod(ABC):
         if unknown and not ROTARY.isdisjoint(block.words) and not block.moves[-1].rapid:
             raise ProgramError(
                 block.line.number,
-                f"turns a rotary axis in feed, and nobody knows whether {unknown[0]} moves, which decides whether F "
+                f"turns a rotary axis at feed rate; whether {unknown[0]} moves is unknown, which decides whether F "
                 f"counts degrees: position {' '.join(unknown)} by a rapid before",
             )
         return not moves and not (unknown and ROTARY.isdisjoint(block.words) and block.moves[-1].rapid)
 
     def frame(self, block: Block) -> Frame:
-        """Return the conversion of corrections to the words of a block."""
+        """Return the conversion of corrections into the words of a block."""
         if block.modal is not self._modal:  # one snapshot serves many blocks
             self._modal, self._frame = block.modal, Frame.of(block.modal, self.digits)
         return self._frame
@@ -205,8 +205,8 @@ class CorrectionMethod(ABC):
         if fed and not ROTARY.isdisjoint(block.words) and any(self.carried[i] or self.doubtful[i] for i in axes):
             raise ProgramError(
                 block.line.number,
-                "turns a rotary axis by the feed on the way to machine coordinates, where X, Y and Z give back the "
-                "correction: if they stand, F would no longer count degrees; write G53 G0, or a line for each",
+                "turns a rotary axis at feed rate on the way to machine coordinates, where X, Y and Z remove the "
+                "correction: if they stop, F would no longer count degrees; write G53 G0, or a line for each",
             )
         after = list(self.carried)
         for i in axes:
@@ -219,6 +219,6 @@ def refuse_probing(block: Block) -> None:
     if block.kind == "probe":
         raise ProgramError(
             block.line.number,
-            f"{block.modal.motion} probes: the program continues with what it finds, which holds the drift already; "
+            f"{block.modal.motion} probes: the program continues with the result, which already contains the drift; "
             "revise the part of the program that cuts",
         )

@@ -65,7 +65,7 @@ class Offset(CorrectionMethod):
         elif block.ends and self._begun:
             if block.modal.cutter:
                 raise ProgramError(
-                    block.line.number, "the program ends under cutter radius compensation; write G40 before"
+                    block.line.number, "the program ends during cutter radius compensation; write G40 before"
                 )
             before = self._update(block, frame, (0.0, 0.0, 0.0))
         self._carry(block, frame)
@@ -124,7 +124,7 @@ class Offset(CorrectionMethod):
     def _update(self, block: Block, frame: Frame, demand: Vector) -> tuple[str, ...]:
         if frame.turned and any(demand[:2]):
             raise ProgramError(
-                block.line.number, "the coordinates are rotated: X and Y are shifted by --method coordinates only"
+                block.line.number, "the coordinates are rotated: to shift X and Y, use --method coordinates"
             )
         words = frame.words(demand)
         if not any(self.axes) or (self._begun and frame.shift(words) == self._shift):
@@ -160,7 +160,7 @@ class Offset(CorrectionMethod):
         for i in self.named(block):
             if block.line.optional and self.carried[i] != self._shift[i]:
                 raise ProgramError(
-                    block.line.number, "an optional line behind an update of the offset: decide with --block-delete"
+                    block.line.number, "an optional line after an update of the offset: give --block-delete off or on"
                 )
             after[i], self.fixed[i], self.doubtful[i] = self._shift[i], False, False
         if kind in ("arc", "curve", "cycle"):
@@ -191,7 +191,7 @@ class Offset(CorrectionMethod):
         for code in block.codes:
             if code in SAME_STORE:
                 raise ProgramError(
-                    block.line.number, f"{code} uses the offset that the correction is put in: --method coordinates"
+                    block.line.number, f"{code} uses the offset that holds the correction: use --method coordinates"
                 )
 
     def _refuse_mixed(self, block: Block, axes: list[int], what: str) -> None:
@@ -201,10 +201,10 @@ class Offset(CorrectionMethod):
                 raise ProgramError(
                     block.line.number,
                     f"{what}, but {AXES[i]} has not been positioned since the offset was updated: "
-                    "--method coordinates, or position all axes after the tool change",
+                    "use --method coordinates, or position all axes after the tool change",
                 )
 
 
 def ending(text: str) -> str:
-    """Return the line ending of a line."""
+    """Return the ending of a line."""
     return text[len(text.rstrip("\r\n")) :] or "\n"

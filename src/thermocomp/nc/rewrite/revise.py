@@ -243,7 +243,7 @@ class Revision:
         self._refuse_open(ended, carried)
 
     def _cut(self, block: Block, samples: list[Sample], knots: list[tuple[float, Vector]], demand: Vector) -> CutErrors:
-        """Return the errors of the tool in a cut, and note what has limited the correction."""
+        """Return the error of the tool in a cut, and note the reason that held the correction."""
         cut = self.left.take(block.line.number, _beside(samples, knots))
         self._note_held(block, demand, samples[0].deviation, (knots[0][1], knots[-1][1]), cut)
         return cut
@@ -274,7 +274,7 @@ class Revision:
         return revised
 
     def _changed(self, block: Block, samples: list[Sample], check: Check) -> tuple[Change, list[tuple[float, Vector]]]:
-        """Return the revision of a block, and the corrections of the axes along its path."""
+        """Return the change of a block, and the corrections that the axes carry along its path."""
         method = self.method
         before, begun = method.before, method.carried
         parts = [1.0]
@@ -389,7 +389,8 @@ class Revision:
         """Raise `ProgramError` if an offset would stay in force behind the last line."""
         if not ended and any(carried) and self.method.leaves_offset:
             raise ProgramError(
-                self.lines, "the program has no end (M2, M30 or %) at which the offset could be taken back"
+                self.lines,
+                "the program has no end (M2, M30 or %) at which the offset could be cancelled; add M2 or M30",
             )
 
 

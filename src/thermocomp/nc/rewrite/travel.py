@@ -1,4 +1,4 @@
-"""Travel check: a program beyond the travels is wrong, or its given origins are."""
+"""Check that a program stays within the travel of the machine: if not, the program or its stated origins are wrong."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -39,7 +39,7 @@ class Outside(NamedTuple):
 
 
 class Drift:
-    """Drift of the tool point, at any time of a program and at any position.
+    """Drift of the tool point at any moment and position of a program.
 
     Parameters
     ----------
@@ -83,7 +83,9 @@ class Drift:
         if not 0 < step < math.inf:
             raise InputError(f"drift: step {step} s must be positive and finite")
         if zero == "last" and start.zeros is None:
-            raise InputError("drift: it cannot count from the zero of the last job: no state of one is carried over")
+            raise InputError(
+                "drift: counting from the zero of the last job needs a state that is carried over; found none"
+            )
         if check_stations(stations) != list(stations) or len(start.states) != len(stations):
             raise InputError("drift: stations must be ordered by axis and position, as 'stations' gives them")
         self.stations = tuple(stations)
@@ -219,7 +221,7 @@ class Drift:
         return (found[0], found[1], found[2])
 
     def field(self) -> Callable[[Point], Point]:
-        """Return the present `deviation` as a function of position, unaffected by later time steps."""
+        """Return the present `deviation` as a function of position that time no longer changes."""
         everywhere = self._everywhere
         if not self._ladders:
             return lambda _: everywhere
@@ -282,7 +284,7 @@ class Drift:
         return {n: h for n, s in self._others.items() if n in used and (h := s.held(self.time)) > 0}
 
     def uncertainty(self) -> tuple[float, float, float]:
-        """Return the uncertainty of the models.
+        """Return the error bounds of the models.
 
         Per axis, of its stations the greatest of: the greatest error on cycles the method had not seen, twice if the
         zero itself is a prediction; and, since an input has left the trained range, all that the model says on top.

@@ -1,4 +1,4 @@
-"""Inputs of the models along a program: the spindle speed of the program, all others constant or forecast."""
+"""Inputs of the models along a program: the spindle speed of the program, all else constant or forecast."""
 
 import math
 from bisect import bisect_right
@@ -55,7 +55,7 @@ class InputSignal:
         if not all(map(math.isfinite, (*self.time, *self.values))):
             raise InputError("forecast: times and values must be finite numbers")
         if any(not a < b for a, b in pairwise(self.time)):
-            raise InputError("forecast: the times must rise")
+            raise InputError("forecast: the times must increase")
 
     @classmethod
     def constant(cls, value: float) -> "InputSignal":
@@ -159,7 +159,7 @@ def constants(texts: Sequence[str], models: Sequence[ErrorModel]) -> dict[str, I
         if channel.quantity == SPEED:
             raise InputError(f"constant {text!r}: the spindle speed comes from the program")
         if channel.name in found:
-            raise InputError(f"constant {text!r}: {channel.name} was given before")
+            raise InputError(f"constant {text!r}: {channel.name} was given before; remove one")
         number = read_with_unit(value, channel.quantity)
         if number is None:
             raise InputError(f"constant {text!r}: write a value with its unit, such as {_written(channel, said)}")

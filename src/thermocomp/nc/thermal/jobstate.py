@@ -8,7 +8,7 @@ from thermocomp.core.exceptions import SettingError
 
 @dataclass(frozen=True)
 class StationState:
-    """State of the model of one station.
+    """Model state of one station.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class StationState:
 
 @dataclass(frozen=True)
 class JobState:
-    """State after one job for the next one (E-P5).
+    """State that one job leaves for the next one (E-P5).
 
     Parameters
     ----------

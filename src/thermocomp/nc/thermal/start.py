@@ -133,7 +133,7 @@ def begin_measured(stations: Sequence[Station], deviations: Mapping[str, float],
         named = [s for s in mine if told[str(s)]]
         if axis in deviations:
             if named:
-                raise InputError(f"measured start: {axis} and {told[str(named[0])]} are given; take one of them away")
+                raise InputError(f"measured start: {axis} and {told[str(named[0])]} are both given; remove one")
             parts = [(mine, mine, deviations[axis])]
         elif len(named) == 1:
             parts = [(mine, named, deviations[told[str(named[0])]])]
@@ -142,7 +142,7 @@ def begin_measured(stations: Sequence[Station], deviations: Mapping[str, float],
         if len(named) not in (1, len(mine)) and axis not in deviations:
             missing = next(s for s in mine if not told[str(s)])
             what, name = (missing, _names(missing)[0]) if named else (axis, axis)
-            raise InputError(f"measured start: that of {what} is missing; give {name}=VALUEum too")
+            raise InputError(f"measured start: that of {what} is missing; also give {name}=VALUEum")
         for group, seen, deviation in parts:
             found, speed = _explaining(group, seen, others, deviation)
             states |= {str(s): state for s, state in zip(group, found, strict=True)}
@@ -183,7 +183,7 @@ def deviations(texts: Sequence[str]) -> dict[str, float]:
                 f"measured {text!r}: expected an axis or target, and a value with its unit, such as Z=12um"
             )
         if name in found:
-            raise InputError(f"measured {text!r}: {name} was given before")
+            raise InputError(f"measured {text!r}: {name} was given before; remove one")
         found[name] = number
     return found
 
@@ -237,7 +237,7 @@ def identity(model: ErrorModel) -> str:
 
 
 def _names(station: Station) -> list[str]:
-    """Return the valid names for a measured deviation of a station, the best first; its axis is another name."""
+    """Return the names for a measured deviation of a station, the best first; its axis is another name."""
     target = station.model.target
     return [n for n in (target.removesuffix("_um"), target) if n != station.axis]
 
@@ -273,11 +273,11 @@ def _explaining(
     """
     what = seen[0].model.target if len(seen) == 1 else f"{seen[0].axis} (the mean of {len(seen)} models)"
     if not math.isfinite(deviation):
-        raise InputError(f"measured deviation of {what}: {deviation} um is not a finite number")
+        raise InputError(f"measured deviation of {what}: {deviation} um must be finite; remove NaN and infinity")
     for model in (s.model for s in stations):
         if not model.remembers:
             raise InputError(
-                f"model of {model.target} has no memory: what it says follows from the inputs of the moment alone, it "
+                f"model of {model.target} has no memory: its prediction depends on the present inputs alone, so it "
                 "cannot start from a measured deviation; start cold"
             )
     wirings = {str(s): Wiring(s.model, others) for s in stations}
@@ -308,8 +308,8 @@ def _explaining(
             return [stopped(s, speed) for s in stations], speed
     reach = [e + deviation for e in excess]
     raise InputError(
-        f"measured deviation of {what}: {deviation:g} um; no speed from {low:g} to {high:g} 1/min leaves it: "
-        f"the model goes from {min(reach):.3g} to {max(reach):.3g} um; check sign and zero of the measurement"
+        f"measured deviation of {what}: {deviation:g} um; no speed from {low:g} to {high:g} 1/min causes it: "
+        f"the model predicts from {min(reach):.3g} to {max(reach):.3g} um; check sign and zero of the measurement"
     )
 
 

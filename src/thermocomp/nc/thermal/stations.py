@@ -98,7 +98,7 @@ def stations(models: Sequence[ErrorModel], texts: Sequence[str] = ()) -> list[St
         if model is None:
             raise explain_unknown("model of", target, targets)
         if model.target in named:
-            raise InputError(f"{text!r}: {model.target} was given before; a model stands for one axis at one place")
+            raise InputError(f"{text!r}: {model.target} was given before; a model belongs to one axis at one position")
         named.add(model.target)
         found.append(_stated(text, place, model) if says else _by_name(model, targets))
     return check_stations(found)
@@ -114,7 +114,7 @@ def check_stations(found: Sequence[Station]) -> list[Station]:
         another place.
     """
     if not found:
-        raise InputError("there is no model to correct a program with")
+        raise InputError("no model was given to correct a program with; give at least one")
     ordered = sorted(found, key=lambda s: (s.axis, s.at))
     for axis, group in groupby(ordered, key=lambda s: s.axis):
         mine = list(group)
@@ -122,8 +122,8 @@ def check_stations(found: Sequence[Station]) -> list[Station]:
         along = {s.along for s in mine}
         if len(mine) == 1 and along != {None}:
             raise InputError(
-                f"{axis} has one model at a position ({names}): with one it cannot be told how the drift varies along "
-                f"{mine[0].along}; give another one, or give --axis {mine[0].model.target}={axis}"
+                f"{axis} has one model at a position ({names}): one position does not show how the drift varies along "
+                f"{mine[0].along}; give another model, or --axis {mine[0].model.target}={axis}"
             )
         if len(mine) > 1 and (len(along) > 1 or None in along):
             raise InputError(

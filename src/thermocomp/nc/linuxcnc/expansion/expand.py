@@ -37,7 +37,7 @@ MOST = 2_000_000
 
 @dataclass(frozen=True)
 class Expansion:
-    """Result of `expand`.
+    """Output of `expand`.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class Expansion:
 
 @dataclass(frozen=True)
 class _Around:
-    """Context in which a program is run; see `expand`."""
+    """Environment in which a program is run; see `expand`."""
 
     inch: bool | None
     startup: str | None
@@ -189,7 +189,9 @@ def expand(
                 if not len(sources) % _OFTEN:
                     progress(len(sources))
                 if len(sources) > MOST:
-                    raise ProgramError(line, f"more than {MOST:,} plain lines come out: does a loop never end?")
+                    raise ProgramError(
+                        line, f"more than {MOST:,} plain lines would be written: check the program for an endless loop"
+                    )
         for seed in _PROVED:
             left: tuple[dict[int, float], dict[int, float]] = ({}, {})
             stored = around.controller(seed)
@@ -212,7 +214,7 @@ def _lines(path: Path, around: _Around) -> Iterator[tuple[str, int]]:
         yield "%", 0
     yield f"(expanded from {clean_comment(path.name)[:_NAME]} by thermocomp)", 0
     if around.diameters:
-        yield "(cutter radius compensation is worked out for given tool diameters)", 0
+        yield "(cutter radius compensation is computed for given tool diameters)", 0
     yield "G17 G40 G80 G90 G94", 0
     if around.startup is not None:
         yield f"G21 {around.startup}", 0
@@ -227,9 +229,9 @@ def _lines(path: Path, around: _Around) -> Iterator[tuple[str, int]]:
     with closing(around.run(path, one, opened=opened)) as run1, closing(around.run(path, two, task=True)) as run2:
         for first, second in zip_longest(_told(run1, writer.sides[0]), _told(run2, writer.sides[1])):
             if first is None or second is None:
-                raise writer.refuse(f"where it ends {DEPENDS}")
+                raise writer.refuse(f"its end position {DEPENDS}")
             if first.kind == "end" and not first.file and _REPEATS.search(_code(writer.source(first.line))):
-                raise ProgramError(first.line, "M99 in a main program repeats it without end: end it with M2 or M30")
+                raise ProgramError(first.line, "M99 in a main program repeats it endlessly: end it with M2 or M30")
             yield from writer.write(first, second)
     for file in sorted(opened):
         _refuse_lost(file, path, around.block_delete, radii=radii)
@@ -261,7 +263,7 @@ def _refuse_lost(file: Path, program: Path, block_delete: bool, *, radii: bool) 
     own = file == program.resolve()
     reasons = {_ORIENTS: "it orients the spindle (M19), which plain lines would lose"}
     if not radii:
-        reasons[_DIAMETERS] = "a subprogram says G7 or G8 and the program does not; write G8 at its top"
+        reasons[_DIAMETERS] = "a subprogram has G7 or G8 and the program has not; write G8 at the start of the program"
     for code, reason in reasons.items():
         for number in _lines_with(code, file, block_delete):
             where = "" if own else f" (line {number} of {file.name})"

@@ -87,8 +87,8 @@ def plain_g10(sides: Sides, words: Words, refuse: Refuse, source: str) -> str:
     text = _bare(source)
     if not PLAIN_G10.fullmatch(text):
         raise refuse(
-            "an origin of a work coordinate system that is not in force is set by more than plain numbers; choose that "
-            "system before (G54 ...), or write the numbers"
+            "the origin of a work coordinate system that is not in force is set by more than plain numbers; select "
+            "that system before (G54 ...), or write the numbers"
         )
     index = int(text[text.index("P") + 1])
     for letter, value in re.findall(r"([XYZABC])([-+]?[\d.]+)", text):

@@ -28,7 +28,7 @@ RESETS = {
     "plane", "feedmode", "speedmode", "path", "length",
 }  # fmt: skip
 REFUSED = {
-    "probe": "it probes (G38): where it ends is not known before",
+    "probe": "it probes (G38): its end position is unknown before the run",
     "wait": "it waits for an input (M66)",
     "tooltable": "it writes the tool table (G10 L1, L10, L11)",
     "orient": "it orients the spindle (M19)",
@@ -85,8 +85,8 @@ class Writer:
         if first.kind != second.kind or first.line != second.line:
             self.line = line if first.file or second.file else min(line, second.line)
             raise self.refuse(
-                f"what is run {DEPENDS}: a branch or a loop asks for a parameter, an origin or a place that the "
-                "program has not set; set it before",
+                f"the path of execution {DEPENDS}: a branch or a loop uses a parameter, an origin or a position that "
+                "the program has not set; set it before",
                 first.file,
             )
         merged = False
@@ -144,7 +144,7 @@ class Writer:
             merged = a.kind == "naive" and close
             if held.values != other.values or (merged and a.values != b.values):
                 raise self.refuse(
-                    "a canned cycle puts the path mode back, which the program has not said (G61, G61.1, G64); tell it"
+                    "a canned cycle restores the path mode, which the program has not set; write G61, G61.1 or G64"
                 )
             return [(kind, self.path(held.values, a.values[0] if merged else 0.0))], merged
         if kind == "speedmode":
@@ -168,11 +168,11 @@ class Writer:
         """Yield (kind, text) of a pair of calls."""
         kind = a.kind
         if kind in REFUSED or (kind == "user" and not self.user_codes):
-            what = REFUSED.get(kind) or f"M{a.values[0]:.0f} is a code of the user's own"
+            what = REFUSED.get(kind) or f"M{a.values[0]:.0f} is a user-defined code"
             raise self.refuse(what, a.file)
         if kind in {"rapid", "feed", "arc", "tap", "curve"}:
             if not self.stated:
-                raise self.refuse("no unit (G20 or G21) is said before this move; tell which it is", a.file)
+                raise self.refuse("no unit is set before this move; write G20 or G21", a.file)
             yield from ((kind, text) for text in self.move(a, b))
         elif kind in {"g92", "length"}:
             old = self.sides[0].frame.shift, self.sides[1].frame.shift
@@ -217,7 +217,7 @@ class Writer:
         elif kind in PLAIN:
             yield kind, PLAIN[kind].format(*map(format_number, values))
         elif kind not in {"rotation", "naive"}:
-            raise self.refuse(f"{kind} is not known", call.file)
+            raise self.refuse(f"{kind} is unknown", call.file)
 
     # --- moves ---
     def move(self, a: Canonical, b: Canonical) -> Iterator[str]:
@@ -240,7 +240,7 @@ class Writer:
                 yield f"{self.code(a)} {' '.join(words)}{self.feed_word(a)}"
             self.pieces += self.pitch != 0.0
         elif a.arc:
-            raise self.refuse(f"where this arc starts or ends {DEPENDS}")
+            raise self.refuse(f"the start or end of this arc {DEPENDS}")
         else:
             yield from self.machine_move(a, b)
         first.move(pa)
@@ -253,7 +253,7 @@ class Writer:
             if agree(first, second):
                 words += " " + self.words.axis(i, first)
             elif not self.still(i, first, second):
-                raise self.refuse(f"where it taps {DEPENDS}")
+                raise self.refuse(f"the position of the tapped hole {DEPENDS}")
         scale = "" if a.values[3] == 1 else f" I{format_number(a.values[3])}"
         self.pieces += 1
         return f"G33.1{words} K{self.words.length(self.pitch)}{scale}"
@@ -269,7 +269,9 @@ class Writer:
             return "G0"
         if self.pitch:
             if self.pieces:
-                raise self.refuse("a thread of several pieces (G76 with a taper at its end) has no plain words")
+                raise self.refuse(
+                    "a thread of several sections (G76 with a taper at its end) has no equivalent in plain codes"
+                )
             return f"G33 K{self.words.length(self.pitch)}"
         return "G1"
 
@@ -297,8 +299,8 @@ class Writer:
                     yield "G90"
                 return
         raise self.refuse(
-            f"where {', '.join(AXES[i] for i in moved)} goes {DEPENDS} (origins, tools, parameters, G98 or "
-            "G99, where it stands): let the program set it before"
+            f"the end position in {', '.join(AXES[i] for i in moved)} {DEPENDS} (origins, tools, parameters, G98 or "
+            "G99, its position at the start): let the program set it before"
         )
 
     def arc(self, a: Canonical, b: Canonical, known: list[bool]) -> Iterator[str]:
@@ -307,12 +309,12 @@ class Writer:
         assert b.arc is not None
         i, j, _ = PLANE_AXES[a.arc.plane]
         if self.pitch or a.arc.turns == 0 or a.arc[0] != b.arc[0] or a.arc.turns != b.arc.turns:
-            raise self.refuse(f"how this arc turns {DEPENDS}")
+            raise self.refuse(f"the direction of this arc {DEPENDS}")
         centre = ""
         for axis, letter in zip((i, j), CENTRES[a.arc.plane], strict=True):
             starts = [side.program[axis] for side in self.sides]
             if not (known[axis] and agree(*starts) and agree(a.arc.centre[axis], b.arc.centre[axis])):
-                raise self.refuse(f"where this arc starts or ends {DEPENDS}")
+                raise self.refuse(f"the start or end of this arc {DEPENDS}")
             # from the start as it is written, so that the roundings do not add up
             centre += f" {letter}{self.words.length(a.arc.centre[axis] - self.words.rounded(starts[0]))}"
         words = " ".join(self.words.axis(axis, a.program[axis]) for axis in range(9) if known[axis])
@@ -328,9 +330,9 @@ class Writer:
         start = self.sides[0].program[:2], self.sides[1].program[:2]
         agreed = all(agree(x, y) for x, y in zip((*a.values, *start[0]), (*b.values, *start[1]), strict=True))
         if not agreed:
-            raise self.refuse(f"where this curve goes {DEPENDS}")
+            raise self.refuse(f"the path of this curve {DEPENDS}")
         if order not in {3, 4} or len(points) != order or any(p[2] != 1 for p in points):
-            raise self.refuse("splines of G5.2 have no plain words")
+            raise self.refuse("splines of G5.2 have no equivalent in plain codes")
         (x0, y0), end = map(self.words.rounded, start[0]), [self.words.rounded(v) for v in points[-1][:2]]
         words = [self.words.axis(0, end[0]), self.words.axis(1, end[1])]
         words += ["I" + self.words.length(points[1][0] - x0), "J" + self.words.length(points[1][1] - y0)]
@@ -361,7 +363,7 @@ class Writer:
         """Return G96 or G97."""
         limit = call.values[1]
         if limit and speed is None:
-            raise self.refuse("G96 without S")
+            raise self.refuse("G96 without S; write S")
         return (f"G96 D{format_number(limit)}" if limit else "G97") + (
             "" if speed is None else f" S{format_number(speed)}"
         )

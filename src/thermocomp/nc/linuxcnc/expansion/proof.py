@@ -77,7 +77,9 @@ def compare_parameters(asked: dict[int, float], done: dict[int, float]) -> None:
         if number == G92_IN_FORCE and not shifted:
             continue  # in force or not, nothing is shifted
         if abs(asked.get(number, 0.0) - done.get(number, 0.0)) > TOLERANCE:
-            raise ProgramError(1, f"the plain lines would leave another parameter #{number} in the controller")
+            raise ProgramError(
+                1, f"the plain lines would leave a different value in parameter #{number} of the controller"
+            )
 
 
 def trace_acts(calls: Iterator[Canonical]) -> Iterator[Act]:

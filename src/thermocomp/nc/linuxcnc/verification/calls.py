@@ -217,7 +217,7 @@ class Side:
     # -- when --------------------------------------------------------------------------------------------------------
 
     def _seconds(self, calls: Calls, moving: "np.ndarray[Any, Any]") -> Floats:
-        """Return the duration of feed moves; while F is per turn and the spindle is stopped, in minutes per 1/min."""
+        """Return the durations of feed moves; while F is per turn and the spindle is stopped, in minutes per 1/min."""
         feed = self._state("feed", calls, "feedrate")
         if self.is_kind(calls.kind, *_SPINDLE).any() or self._states["sync"][0] or self._states["feedmode"][1]:
             mode = self._state("feedmode", calls, "feedmode")[:, 1]

@@ -26,7 +26,7 @@ class RefusedError(Exception):
 
 
 class Found(NamedTuple):
-    """Result of a comparison."""
+    """Findings of a comparison."""
 
     moves: int
     largest: float  #: largest difference between a move and what was asked for [um]
@@ -103,7 +103,7 @@ def compare(
         b = b.part(count, len(b.calls)) if len(b.calls) > count else None
     if (rest := a or (b and b.calls)) is not None:
         side, whose = (sides[0], "original") if a is not None else (sides[1], "revised program")
-        raise ProgramError(int(rest.line[0]), f"it makes a '{side.name(rest.kind[0])}' in the {whose} only")
+        raise ProgramError(int(rest.line[0]), f"a '{side.name(rest.kind[0])}' is in the {whose} only")
     return Found(comparison.moves, comparison.largest, comparison.slower * 100.0)
 
 
@@ -184,7 +184,7 @@ class _Comparison:
     def _order(self, was: Calls, now: Calls) -> Iterator[_Check]:
         name, other = self.sides[0].name, self.sides[1].name
         yield _Check(
-            was.kind != now.kind, lambda i: f"makes a '{other(now.kind[i])}' in place of a '{name(was.kind[i])}'"
+            was.kind != now.kind, lambda i: f"makes a '{other(now.kind[i])}' instead of a '{name(was.kind[i])}'"
         )
         yield _Check(
             was.line != now.line, lambda i: f"makes a '{name(was.kind[i])}' that belongs to line {now.line[i]}"
@@ -225,7 +225,7 @@ class _Comparison:
 
         yield _Check(straight & ~(off <= ROUNDING).all(axis=1), say)
         others = np.abs(now.end[:, 3:] - was.end[:, 3:]).max(axis=1) > STILL
-        yield _Check(moving & others, lambda _: "moves another axis than X, Y and Z")
+        yield _Check(moving & others, lambda _: "moves an axis other than X, Y and Z")
         stands, moves = (np.abs(c.end[:, :3] - c.start[:, :3]).max(axis=1) for c in (was, now))
         turning = np.abs(was.end[:, 3:6] - was.start[:, 3:6]).max(axis=1) > STILL
         still = (stands < STILL) & (was.plane == 0) & straight
@@ -299,7 +299,7 @@ class _Comparison:
 
             yield _Check(mine & ~(off <= ROUNDING).all(axis=1), say)
         # a circle that has become no way at all, or the other way round
-        yield _Check(arcs & (np.abs(was.sweep - now.sweep) > np.pi), lambda _: "turns another angle")
+        yield _Check(arcs & (np.abs(was.sweep - now.sweep) > np.pi), lambda _: "turns by a different angle")
 
     # -- when --------------------------------------------------------------------------------------------------------
 
@@ -368,9 +368,9 @@ class _Comparison:
         def say(i: int) -> str:
             k = int(np.argmax(beside & (of == i)))
             if np.isnan(asked[k]).any():
-                return "divides a move into other pieces than were asked for"
+                return "divides a move into pieces other than those specified"
             axis = int(np.argmax(np.abs(found[k])))
-            return f"puts a piece of a divided move beside its way: {'XYZ'[axis]} by {found[k, axis]:.2f} um"
+            return f"puts a piece of a divided move off its path: {'XYZ'[axis]} by {found[k, axis]:.2f} um"
 
         yield _Check(bad, say)
 

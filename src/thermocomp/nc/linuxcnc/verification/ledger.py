@@ -1,4 +1,4 @@
-"""Expected shift of every line of a revised program, and the origin of its lines."""
+"""Required shift of every line of a revised program, and the origin of its lines."""
 
 from array import array
 from typing import Any, NamedTuple
@@ -64,7 +64,7 @@ class _Track:
 
 
 class Ledger:
-    """Expected shift of every line of a program; a constant shift needs no additional memory."""
+    """Required shift of every line of a program; stored only where it changes."""
 
     def __init__(self) -> None:
         self._carried, self._inner, self._other = _Track(3), _Track(3), _Track(3)
@@ -99,7 +99,7 @@ class Ledger:
         self._other.take(line, (x, y, z))
 
     def of(self, lines: Integers) -> Shifts:
-        """Return the expected shifts of lines of the original."""
+        """Return the required shifts of lines of the original."""
         after = self._carried.at(lines)
         inverse = self._inverse.at(lines)[:, 0] > 0
         before, loose = self._carried.at(lines - 1), self._loose.at(lines)[:, 0]
@@ -116,7 +116,7 @@ class Ledger:
         )
 
     def at(self, line: int) -> LineShift:
-        """Return the expected shift of a line of the original."""
+        """Return the required shift of a line of the original."""
         found = self.of(np.array([line]))
         before, after, inner, inverse = (row[0].tolist() for row in found[:4])
         other = tuple(found.others[1][0].tolist()) if found.others else tuple(after)

@@ -26,9 +26,9 @@ REMEDIES: Final[Mapping[str, str]] = MappingProxyType(
         "origins": "state them, such as --origin 'G54=0 mm, 0 mm, 0 mm'",
         "tool lengths": "state them, such as --tool '1=120 mm'",
         "homes": "state it: --home '0 mm, 0 mm, 0 mm'; G30 cannot be stated",
-        "start": "position all axes before",
-        "unit": "write G20 or G21 at the top, or state it: --units",
-        "optional lines": "state whether they are run: --block-delete",
+        "start": "position all axes before this line",
+        "unit": "write G20 or G21 at the start of the program, or state it: --units",
+        "optional lines": "state whether they run: --block-delete",
         "tool diameters": "expand the program for its tools: --expand",
         "parameters": "give them a value in the program",
     }
@@ -48,7 +48,7 @@ class ControllerState(NamedTuple):
 
 
 def build_stored(setup: Setup) -> Stored:
-    """Return the values stored in the controller, as far as they are given; all others are 0."""
+    """Return the state of the controller as far as it is stated; all else is 0."""
     return Stored(
         origins={system: origin for system, origin in setup.offsets.items() if system in SYSTEMS},
         lengths=setup.tools,
@@ -59,7 +59,7 @@ def build_stored(setup: Setup) -> Stored:
 
 
 def list_unstated(setup: Setup) -> tuple[str, ...]:
-    """Return the settings that are not given and therefore drawn at random."""
+    """Return the parts of the state that are not stated and are therefore drawn."""
     held = {
         "rotation": all(system in setup.rotations for system in SYSTEMS),
         "G92": setup.no_shift,
@@ -123,7 +123,7 @@ def state(setup: Setup, number: int, what: frozenset[str] | set[str]) -> Control
 
 
 def describe_setup(setup: Setup) -> tuple[str, ...]:
-    """Return the given settings, in words."""
+    """Return the stated parts, in words."""
     said = [] if setup.inch is None else ["inch" if setup.inch else "mm"]
     said += [f"{system_name(system)} at {_point(origin)}" for system, origin in sorted(setup.offsets.items())]
     said += [f"tool {tool} = {length:g} mm" for tool, length in sorted(setup.tools.items())]
@@ -135,7 +135,7 @@ def describe_setup(setup: Setup) -> tuple[str, ...]:
         said += [f"{system_name(system)} turned by {angle:g} deg" for system, angle in angles]
     said += ["no G92"] * setup.no_shift + [setup.startup] * bool(setup.startup)
     said += [f"M{number} moves nothing" for number in sorted(setup.harmless)]
-    return (*said, *["optional lines left out"] * setup.skip_optional)
+    return (*said, *["optional lines skipped"] * setup.skip_optional)
 
 
 def _point(place: tuple[float, ...]) -> str:

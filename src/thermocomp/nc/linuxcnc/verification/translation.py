@@ -136,7 +136,7 @@ class Translator:
                 return
 
     def setup(self) -> Setup:
-        """Return the settings of a LinuxCNC that does what the Fanuc does, after the whole program has been translated.
+        """Return the state of a LinuxCNC that acts as the Fanuc does, after the whole program has been translated.
 
         A Fanuc stores no rotation, and begins with G98 and without a tolerance of its path, where nothing else is
         stated. Where the program uses G52 or G68, no G92 may be in force at its start: LinuxCNC has one store for all.
@@ -184,10 +184,10 @@ class Translator:
         if strange := sorted(codes - known):
             raise _cannot(block, f"{strange[0]} has no counterpart in LinuxCNC")
         if block.kind == "probe":
-            raise _cannot(block, "G31 probes: where it ends is not known")
+            raise _cannot(block, "G31 probes: its end position is unknown")
         self._stores |= codes & {"G52", "G68", "G92", "G92.1"}
         if self._stores & {"G92", "G92.1"} and self._stores & {"G52", "G68"}:
-            raise _cannot(block, "G92 beside G52 or G68: LinuxCNC has one store for them")
+            raise _cannot(block, "G92 with G52 or G68: LinuxCNC has one store for them")
 
     def _cutter(self, block: Block, codes: set[str]) -> list[str]:
         side = next((code for code in ("G41", "G42") if code in codes), None)
@@ -202,7 +202,7 @@ class Translator:
             return []
         self._length = int(block.values["H"]) if "H" in block.values else self._length
         if self._length is None:
-            raise _cannot(block, "G43 without H: the control takes the H of before, which is not in the program")
+            raise _cannot(block, "G43 without H: the control uses the last H, which is not in the program")
         return [f"G43 H{self._length}"] if self._length else ["G49"]
 
     def _system(self, block: Block, codes: set[str]) -> list[str]:
@@ -211,7 +211,7 @@ class Translator:
         system = block.modal.system
         if system not in self.systems:
             if len(self.systems) == len(_SPARE):
-                raise _cannot(block, f"LinuxCNC has no room for more than {len(_SPARE)} systems of G54.1")
+                raise _cannot(block, f"LinuxCNC can hold up to {len(_SPARE)} work coordinate systems of G54.1")
             self.systems[system] = _SPARE[len(self.systems)]
         return [system_name(self.systems[system])]
 
@@ -254,11 +254,11 @@ class Translator:
         values = block.values
         kind, target = int(values["L"]), int(values["P"])
         if not block.modal.absolute:
-            raise _cannot(block, "G10 in G91: the origin is moved by its words, which LinuxCNC does not do")
+            raise _cannot(block, "G10 in G91 moves the origin by its words, which LinuxCNC does not do")
         if kind == 20:
             if 100 + target not in self.systems:
                 if len(self.systems) == len(_SPARE):
-                    raise _cannot(block, f"LinuxCNC has no room for more than {len(_SPARE)} systems of G54.1")
+                    raise _cannot(block, f"LinuxCNC can hold up to {len(_SPARE)} work coordinate systems of G54.1")
                 self.systems[100 + target] = _SPARE[len(self.systems)]
             target = self.systems[100 + target]
         elif not target:
@@ -312,7 +312,7 @@ class Translator:
         return before, f"{back}{code} {_words(words, 'XYZRQPL')}", after
 
     def _spindle(self, block: Block) -> tuple[list[str], list[str]]:
-        """Return the codes that turn the spindle for a tap, and those after it: a Fanuc does it automatically."""
+        """Return the lines that start the spindle for a tap, and those after it: a Fanuc starts it by itself."""
         code, turning = block.modal.motion, self._turning
         if code not in ("G74", "G84", "G86"):
             return [], []

@@ -28,7 +28,7 @@ _SPARED = ("rotation", "tool diameters")
 
 
 class Proof(NamedTuple):
-    """Result of the verification by the interpreter."""
+    """Findings of the interpreter."""
 
     moves: int  #: that were compared in each state
     largest: float  #: largest difference between a move and what was asked for [um]
@@ -77,7 +77,7 @@ class _Proving(NamedTuple):
         return False
 
     def causes(self, number: int, drawn: set[str]) -> list[str]:
-        """Return the drawn settings that make them fail: each by itself, or those without which they do not fail.
+        """Return the drawn parts that make them fail: each by itself, or those without which they do not fail.
 
         Nothing if they fail with nothing drawn as well.
         """
@@ -143,7 +143,7 @@ def prove(
             first = _Translated.of(original, folder / "original.ngc", setup)
             second = _Translated.of(revised, folder / "revised.ngc", setup)
         except UntranslatableError as e:
-            raise Unprovable(f"line {e.line} cannot be said in LinuxCNC's words: {e.reason}") from e
+            raise Unprovable(f"line {e.line} cannot be translated for LinuxCNC: {e.reason}") from e
         origin = LineOrigins(first.lines, lambda lines: ledger.originals(second.lines(lines)), divided=False)
         proof = _prove(
             _Proving(original=first.path, revised=second.path, ledger=ledger, setup=first.setup, origin=origin),
@@ -153,7 +153,7 @@ def prove(
 
 
 def _assumed(setup: Setup, held: Sequence[str]) -> tuple[str, ...]:
-    """Return the settings that are the same in all states, and those of them that are not given."""
+    """Return the parts that are the same in all states, marking those that are not stated."""
     if setup.controller == "linuxcnc":
         # all moves of X and all arcs would be others
         return (*held, "G8 and G91.1 at the start (assumed)")
@@ -165,7 +165,7 @@ def _assumed(setup: Setup, held: Sequence[str]) -> tuple[str, ...]:
 
 
 def foresee_sentence(setup: Setup) -> str:
-    """Return the expected sentence of a proof about its states, except for what does not run in all of them."""
+    """Return a proof's description of its states, without the lines that do not run in all of them."""
     drawn = setup if setup.controller == "linuxcnc" else Translator(setup).setup()
     return _say_states(states.STATES, _assumed(setup, states.describe_setup(drawn)), states.list_unstated(drawn))
 
@@ -257,7 +257,7 @@ def _fault(proving: _Proving, number: int, drawn: set[str], error: ProgramError)
 
 
 def _spared(proving: _Proving, number: int, drawn: set[str], error: RefusedError) -> str:
-    """Return the setting that a state must not have so that the original runs in it."""
+    """Return the part that a state must not have for the original to run in it."""
     line, reason = error.args
     neutral = InterpreterJob(
         proving.original, states.build_stored(proving.setup), bool(proving.setup.inch), proving.setup.skip_optional
@@ -273,7 +273,7 @@ def _spared(proving: _Proving, number: int, drawn: set[str], error: RefusedError
         return causes[0]
     causes = causes or ["start"]  # the only thing that is drawn always
     raise Unprovable(
-        f"line {line}: where the tool stands depends on what is stored in the controller "
+        f"line {line}: the tool position depends on what is stored in the controller "
         f"({_listed(causes)}), and the original does not run in all states of it: {reason}; "
         + "; ".join(states.REMEDIES[cause] for cause in causes)
     ) from error
