@@ -319,7 +319,7 @@ def test_a_correction_that_is_no_whole_number_of_32_bits(
 ) -> None:
     command = ["export", str(written(tmp_path, watched_model("z_um"))), "--to", to, "-o", str(tmp_path / "out")]
     assert run([*command, "--magnitude", "9e8"]) == 2
-    assert f"--magnitude 9e+08: {to} takes 1e-06 to {most}: give" in " ".join(capsys.readouterr().err.split())
+    assert f"--magnitude 9e+08: {to} accepts 1e-06 to {most}: give" in " ".join(capsys.readouterr().err.split())
     assert run([*command, "--magnitude", most]) == 0
 
 

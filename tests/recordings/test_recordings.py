@@ -153,8 +153,8 @@ def test_another_unit_of_the_same_quantity_in_the_mapping_is_obeyed_and_told(tmp
     recording = read(path, Mapping(TimeColumn("time_s", "min"), columns))
 
     assert recording.notes == (
-        "t: the heading 't [degF]' says degF, the mapping says degC; the mapping is obeyed",
-        "time: the heading 'time_s' specifies s, the mapping says min; the mapping is obeyed",
+        "t: the heading 't [degF]' specifies degF, the mapping degC; the mapping applies",
+        "time: the heading 'time_s' specifies s, the mapping min; the mapping applies",
     )
     assert recording.time.tolist() == [0.0, 60.0]
     assert recording.table["t"].tolist() == [20.0, 21.0]
@@ -371,5 +371,5 @@ def test_a_role_without_a_unit_takes_the_unit_of_the_heading(tmp_path: Path) -> 
     assert table["t2"].tolist() == pytest.approx([20.0, 25.0])
     assert table["z"].tolist() == pytest.approx([500.0, 600.0])
     assert table["frame"].tolist() == [20.0, 21.0]
-    with pytest.raises(UnitError, match=r"a displacement in um, but the heading 'T2 \[degF\]' says degF"):
+    with pytest.raises(UnitError, match=r"a displacement in um, but the heading 'T2 \[degF\]' specifies degF"):
         read(path, Mapping(columns={"t2": ColumnMap("T2 [degF]", role="displacement")}))

@@ -238,7 +238,7 @@ def _meant(rule: ColumnMap, meaning: Meaning | None, where: str, heading: str) -
         ) from e
     if not rule.unit or said == meant:
         return said, ""
-    return meant, f"the heading {heading!r} says {said.symbol}, the mapping says {meant.symbol}; the mapping is obeyed"
+    return meant, f"the heading {heading!r} specifies {said.symbol}, the mapping {meant.symbol}; the mapping applies"
 
 
 def _understand_all(headings: Sequence[str], mapping: Mapping, source: str) -> list[Meaning | None]:
@@ -271,7 +271,7 @@ def _time_unit(heading: str, meaning: Meaning | None, mapping: Mapping, source: 
         )
     if given in ("", "timestamp") or find_unit(given, "time") == said:
         return given or said.symbol, ""
-    return given, f"time: the heading {heading!r} says {said.symbol}, the mapping says {given}; the mapping is obeyed"
+    return given, f"time: the heading {heading!r} specifies {said.symbol}, the mapping {given}; the mapping applies"
 
 
 def _find_cycle(headings: Sequence[str], mapping: Mapping, source: str) -> int | None:
