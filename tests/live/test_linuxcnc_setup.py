@@ -89,9 +89,9 @@ def test_more_joints_than_a_table_takes(tmp_path: Path) -> None:
     [
         ("OFFSET_AV_RATIO = 0.1\n", "", HalSettings(), "add OFFSET_AV_RATIO = 0.1 to"),
         ("OFFSET_AV_RATIO = 0.1\n", "OFFSET_AV_RATIO = 1.5\n", HalSettings(), "add OFFSET_AV_RATIO = 0.1 to"),
-        ("OFFSET_AV_RATIO = 0.1\n", "OFFSET_AV_RATIO = nan\n", HalSettings(), "want a number"),
+        ("OFFSET_AV_RATIO = 0.1\n", "OFFSET_AV_RATIO = nan\n", HalSettings(), "expected a number"),
         ("MAX_LIMIT = 100", "MAX_LIMIT = -300", HalSettings(), "must be below"),
-        ("MAX_LIMIT = 100", "MAX_LIMIT = much", HalSettings(), "want a number"),
+        ("MAX_LIMIT = 100", "MAX_LIMIT = much", HalSettings(), "expected a number"),
         ("MAX_LIMIT = 100\n", "", HalSettings(), "there is no MAX_LIMIT"),
         ("[AXIS_", "[", HalSettings(), "there is no [AXIS_Z]; there are no axes"),
         ("MAX_LIMIT = 100", "MAX_LIMIT = \\\n -300", HalSettings(), "MAX_LIMIT = -300"),

@@ -335,7 +335,7 @@ def test_a_file_holds_one_watch_for_all_its_models(watch: Watch, samples: Sample
     text = modelfile.dumps(models)
     assert text.count('"sensors"') == 1
     assert modelfile.loads(text) == tuple(models)
-    with pytest.raises(ModelFileError, match="in different ways"):
+    with pytest.raises(ModelFileError, match="different watches"):
         modelfile.dumps([models[0], replace(models[1], watch=None)])
     with pytest.raises(ModelFileError, match="checksum"):
         modelfile.loads(text.replace('"off": 1.0', '"off": 9.0', 1))
