@@ -330,6 +330,6 @@ def test_revise() -> None:
         tc.revise("part.ngc", "model.json", "out.ngc", controller="linuxcnc", cold=True, unproved=True)
     with pytest.raises(InputError, match="no option 'colde'; the nearest are cold"):
         tc.revise("part.ngc", "model.json", "out2.ngc", controller="linuxcnc", colde=True)
-    with pytest.raises(InputError, match="how warm is the machine"):
+    with pytest.raises(InputError, match="the initial thermal state of the machine is"):
         tc.revise("part.ngc", "model.json", "out2.ngc", controller="linuxcnc", unproved=True)
     assert not Path("out2.ngc").exists()

@@ -95,7 +95,7 @@ def test_who_takes_an_unproven_model_stands_in_the_program(
     assert "is unproven and runs in shadow only: judged on 2 units" in said(capsys)
     assert not Path("out.ngc").exists()
     assert revise(*given, "--accept-unproven", "") == 2
-    assert "want a name and a reason" in said(capsys)
+    assert "expected a name and a reason" in said(capsys)
     assert revise(*given, "--accept-unproven", "M. Weber, trial on machine 7", "--json") == 0
     assert f"({MARK} unproven, taken by M. Weber, trial on machine 7)" in Path("out.ngc").read_text(encoding="ascii")
     warnings = json.loads(capsys.readouterr().out)["warnings"]
