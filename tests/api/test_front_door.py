@@ -194,7 +194,7 @@ def test_report_of_a_handed_in_estimator(recording: Recording, tmp_path: Path) -
 def test_fitted_models(results: dict[str, Result], tmp_path: Path) -> None:
     found, test = results["fit"], small_machine()
     assert isinstance(found, FittedModels)
-    with pytest.raises(InputError, match=r"models of z_um, x_um: take one of \.models"):
+    with pytest.raises(InputError, match=r"models of z_um, x_um: use one of \.models"):
         found.model  # noqa: B018
     predicted = found.predict(test.to_frame())
     assert list(predicted) == ["z_um", "x_um"]
