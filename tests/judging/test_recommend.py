@@ -69,7 +69,7 @@ def test_one_that_is_named_beforehand_is_not_corrected() -> None:
     only = compare(samples, ["dynamic"], judging, robustness=False).overall()[0]
     assert dynamic.verdict.p_value >= 2 * only.verdict.p_value or dynamic.verdict.p_value >= ols.verdict.p_value
     assert dynamic.verdict.p_value > only.verdict.p_value
-    with pytest.raises(InputError, match="primary method 'mra' is not compared"):
+    with pytest.raises(InputError, match="primary method 'mra' is not among the compared methods"):
         compare(samples, ["ols"], judging, rules=Rules(primary="mra"))
 
 

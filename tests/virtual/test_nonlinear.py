@@ -254,7 +254,7 @@ def test_in_blocks_it_is_the_same_and_nothing_hides_in_it(machine: Any, drives: 
 
 def test_heat_without_a_place_is_refused(tool: NonlinearTool, centre: NonlinearCentre) -> None:
     for place in ("on_chuck", "taper_a", "surface"):
-        with pytest.raises(InputError, match=f"'{place}' but at heater, tip$"):
+        with pytest.raises(InputError, match=f"'{place}', only at heater, tip$"):
             tool.run(tool.init(AIR), [FeedDrive(loads={place: 5.0})], steps(1), 1.0)
     with pytest.raises(InputError, match="beyond the machine's 3500"):
         centre.run(centre.init(AIR), [FeedDrive(4000.0)], steps(1), 1.0)

@@ -205,7 +205,7 @@ def test_unusable_steps_are_refused(tool: RestingTool) -> None:
     for drives, air in (([], row[:0]), ([REST], np.tile(row, (2, 1))), ([REST] * 2, row)):
         with pytest.raises(InputError, match="one row of three numbers per drive"):
             tool.run(state, drives, air, 1.0)
-    with pytest.raises(InputError, match="not finite"):
+    with pytest.raises(InputError, match="must be finite"):
         tool.run(state, [REST], np.array([[20.0, float("nan"), 0.0]]), 1.0)
     for load in (float("nan"), float("inf")):
         with pytest.raises(InputError, match="finite"):
