@@ -3,6 +3,7 @@
 import re
 from collections import Counter
 from collections.abc import Sequence
+from functools import cache
 from typing import NamedTuple
 
 from thermocomp.core.units import is_unit
@@ -68,12 +69,14 @@ def find_layout(rows: Sequence[Sequence[str]]) -> FileLayout | None:
     later = rows[len(rows) // 2 :]
     width, columns = find_columns(later)
     numbers = [k for k in columns if _holds_numbers(later, k)]
-    is_row = [_is_row(row, columns) for row in rows]
-    # a row of the numbers of channels, say, is no row of the table: units follow it
-    is_units = [_is_units(row, numbers) for row in rows]
-    labels = [*is_units[1:], False]
+    units_at = cache(lambda k: _is_units(rows[k], numbers))  # of a wide file only the rows that are needed
+
+    def labels(k: int) -> bool:
+        """Return whether a row holds the numbers of channels, say, and none of the table: units follow it."""
+        return k + 1 < len(rows) and units_at(k + 1)
+
     for begin in range(1, len(rows)):
-        if not is_row[begin] or labels[begin]:
+        if not _is_row(rows[begin], columns) or labels(begin):
             continue
         first = begin
         while first and begin - first < _MOST_BETWEEN:
@@ -83,11 +86,11 @@ def find_layout(rows: Sequence[Sequence[str]]) -> FileLayout | None:
                 continue
             if not _is_text(above, width):
                 break
-            if any(k < len(above) and _is_value(above[k]) for k in columns) and not labels[first - 1]:
+            if any(k < len(above) and _is_value(above[k]) for k in columns) and not labels(first - 1):
                 break  # perhaps a row of the table with words in it, which is not passed over
             first -= 1
         block = range(first, begin)
-        units = [k for k in block if is_units[k]]
+        units = [k for k in block if units_at(k)]
         names = [k for k in block if k not in units and _is_heading(rows[k])]
         if not names and units and _names_time(rows[units[0]]):  # headings that are units: Time, rpm, um
             names = [units.pop(0)]

@@ -8,7 +8,7 @@ from thermocomp.core.exceptions import RecordingError
 from thermocomp.recordings.readers.limits import FileLimits
 
 #: what an element of XML counts, in bytes: it costs time, however short it is
-_ELEMENT = 64
+_ELEMENT = 72
 _BLOCK = 1 << 16
 #: elements whose content is done with at their end, by the root of the part
 _DONE_WITH = {"worksheet": "row", "sst": "si", "document-content": "table-row"}
