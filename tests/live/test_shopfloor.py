@@ -102,7 +102,11 @@ def test_killed_at_random_moments(kills: int, factor: float, tmp_path: Path) -> 
         f"{kills} kills: RMS {rms(left):.2f} um of {rms(deviation):.1f}, {rms(without):.2f} without kills; "
         f"largest {np.abs(left).max():.2f} of {np.abs(deviation).max():.1f} um, {np.abs(without).max():.2f} without"
     )
-    # an outage of two seconds is one of two minutes where the heat is 60 times as fast, of seven where it is 200 times
-    assert rms(left) <= (1.1 if factor < 100.0 else 1.2) * rms(without)
+    # while nothing drives the correction the drift since then is left, however long this computer takes for a restart
+    held = np.diff(rows[:, 2], prepend=np.nan) == 0.0
+    since = np.maximum.accumulate(np.where(held, 0, np.arange(len(rows))))
+    allowed = np.abs(without) + np.abs(deviation - deviation[since])
+    assert rms(left) <= 1.1 * rms(allowed)
+    assert rms(left) <= 0.3 * rms(deviation)
     rows_kept = sum(1 for _ in JournalReader(tmp_path / "live.db").rows())
     assert rows_kept > 50
