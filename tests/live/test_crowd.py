@@ -1,6 +1,7 @@
 """Many connections at the page, idle or deaf: the operator is served at once, and what nobody needs is closed."""
 
 import contextlib
+import gc
 import json
 import socket
 import threading
@@ -117,6 +118,17 @@ def test_half_a_request_is_closed(said: bytes, monkeypatch: pytest.MonkeyPatch) 
                     said_more += 1
                     time.sleep(0.2)
             assert said_more < 150
+
+
+def test_who_comes_while_the_page_ends_is_closed() -> None:
+    for _ in range(6):
+        with contextlib.ExitStack() as crowd, served(serving(), "127.0.0.1") as port:
+            for _ in range(120):
+                one = crowd.enter_context(socket.socket())
+                one.setblocking(False)
+                with contextlib.suppress(BlockingIOError):
+                    one.connect(("127.0.0.1", port))
+    gc.collect()  # a connection that is left open warns now
 
 
 def test_who_does_not_read_is_dropped_and_blocks_nobody(monkeypatch: pytest.MonkeyPatch) -> None:

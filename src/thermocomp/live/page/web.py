@@ -41,6 +41,15 @@ class _Server(uvicorn.Server):
                     connection.look(time.monotonic())
         return await super().on_tick(counter)
 
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        # what asyncio has accepted, and not yet made a connection of, would be left open when its server closes
+        for one in sockets or ():
+            with contextlib.suppress(NotImplementedError):  # Windows accepts in another way
+                asyncio.get_running_loop().remove_reader(one)
+        await asyncio.sleep(0)
+        await asyncio.sleep(0)
+        await super().shutdown(sockets)
+
 
 def read_token(path: Path) -> str:
     """Return the token in a file.
