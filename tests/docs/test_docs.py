@@ -6,6 +6,8 @@ import importlib
 import inspect
 import re
 import shutil
+import subprocess
+import sys
 from collections.abc import Iterator
 from dataclasses import fields
 from functools import cached_property
@@ -141,6 +143,16 @@ def test_the_mapping_of_the_page_reads_the_real_logs(shared_data: Path) -> None:
         recording = read(log, read_mapping(DOCS / "files" / "voron.toml"))
         assert {c.name: c.unit for c in recording.channels} == {"z": "um", "frame_t": "degC", "bed_t": "degC"}
         assert recording.table["z"].iloc[0] == 0
+
+
+@pytest.mark.parametrize("example", sorted(DOCS.glob("tutorial/plot_*.py")), ids=lambda path: path.stem)
+@pytest.mark.long
+def test_the_tutorials_run(example: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    monkeypatch.setenv("PYTHONPATH", str(DOCS / "_ext"))
+
+    subprocess.run([sys.executable, example], check=True)
 
 
 @pytest.mark.parametrize(
