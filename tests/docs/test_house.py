@@ -5,9 +5,10 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from itertools import groupby
 from pathlib import Path
-from types import FrameType
+from types import CodeType, FrameType
 from typing import Any, NamedTuple
 
 import pytest
@@ -56,20 +57,20 @@ def told(title: str) -> list[Call]:
 def traced(wanted: Sequence[Call]) -> Iterator[list[Call]]:
     """Note the calls of the page as they happen for the first time, and inside which other."""
     known = {call[:2] for call in wanted}
-    stack: list[tuple[FrameType, tuple[str, str]]] = []
     found: dict[tuple[str, str], Call] = {}
 
+    @cache  # the profiler asks for every call of every library
+    def listed(code: CodeType) -> tuple[str, str] | None:
+        path = Path(code.co_filename)
+        name = (str(path.relative_to(PACKAGE)), code.co_qualname) if path.is_relative_to(PACKAGE) else None
+        return name if name in known else None
+
     def note(frame: FrameType, event: str, _: Any) -> None:
-        code = frame.f_code
-        if not code.co_filename.startswith(str(PACKAGE)):
-            return
-        if event == "call":
-            name = (str(Path(code.co_filename).relative_to(PACKAGE)), code.co_qualname)
-            if name in known:
-                found.setdefault(name, Call(*name, stack[-1][1] if stack else None))
-                stack.append((frame, name))
-        elif event == "return" and stack and stack[-1][0] is frame:
-            stack.pop()
+        if event == "call" and (name := listed(frame.f_code)) and name not in found:
+            above = frame.f_back
+            while above and not listed(above.f_code):
+                above = above.f_back
+            found[name] = Call(*name, listed(above.f_code) if above else None)
 
     before = sys.getprofile()
     called: list[Call] = []
