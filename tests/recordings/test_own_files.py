@@ -114,19 +114,30 @@ def test_a_model_fitted_before_assesses_after(tmp_path: Path, way: str, fitted: 
     assert found["rms"].to_list() == pytest.approx(tc.assess(fitted, new).to_frame()["rms"].to_list(), rel=1e-9)
 
 
-@pytest.mark.parametrize("way", WAYS)
-def test_a_channel_without_a_unit_in_its_name_is_found_by_that_name(tmp_path: Path, way: str) -> None:
+@pytest.fixture(scope="module")
+def renamed() -> Recording:
     plain = small_machine()
     names = {"t1_C": "spindle front", "z_um": "Z", "t2_C": "t2_degC"}
     channels = tuple(replace(c, name=names.get(c.name, c.name)) for c in plain.channels)
-    recording = replace(plain, channels=channels, table=plain.table.rename(columns=names))
-    model = tc.fit(recording, "Z", "ols", inputs=["spindle front", "t3_C", "t2_degC"])
+    return replace(plain, channels=channels, table=plain.table.rename(columns=names))
 
-    again = _round_trip(recording, way, tmp_path)
 
-    assert [again.channel(c.name).unit for c in recording.channels] == [c.unit for c in recording.channels]
-    there = tc.assess(model, again).to_frame()["rms"].to_list()
-    assert there == pytest.approx(tc.assess(model, recording).to_frame()["rms"].to_list(), rel=1e-9)
+@pytest.fixture(scope="module")
+def model_and_rms(renamed: Recording) -> tuple[FittedModels, list[float]]:
+    model = tc.fit(renamed, "Z", "ols", inputs=["spindle front", "t3_C", "t2_degC"])
+    return model, tc.assess(model, renamed).to_frame()["rms"].to_list()
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_channel_without_a_unit_in_its_name_is_found_by_that_name(
+    tmp_path: Path, way: str, renamed: Recording, model_and_rms: tuple[FittedModels, list[float]]
+) -> None:
+    model, rms = model_and_rms
+
+    again = _round_trip(renamed, way, tmp_path)
+
+    assert [again.channel(c.name).unit for c in renamed.channels] == [c.unit for c in renamed.channels]
+    assert tc.assess(model, again).to_frame()["rms"].to_list() == pytest.approx(rms, rel=1e-9)
 
 
 def test_own_files_name_what_has_its_unit_as_it_is(tmp_path: Path) -> None:
