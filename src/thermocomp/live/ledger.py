@@ -40,6 +40,7 @@ class ProbingLedger:
 
         A measurement that includes the correction (``left`` is false: LinuxCNC's ``#5063`` is a motor position) is the
         uncompensated deviation.
+
         Parameters
         ----------
         found : Measurement
