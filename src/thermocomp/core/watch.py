@@ -1,4 +1,4 @@
-"""`Watch`: what each temperature reads by the others and the spindle speed, and how far off it may be."""
+"""`Watch`: prediction of each temperature from the others and the spindle speed, with limits of the difference."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -26,34 +26,35 @@ from thermocomp.core.zero import FIRST_READING, Zeroing
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
 
-#: how long a jump or a difference has to last before it is a failure [s]
+#: minimum duration of a jump or a difference that counts as a failure [s]
 LASTING = 300.0
-#: how far a speed may be beyond those of the training until nothing is said of differences
+#: largest speed, relative to the highest trained one, at which differences are evaluated
 FASTER = 1.02
-#: error that is reckoned with at least where differences are weighed [degC]
+#: lower bound of the error used to weight differences [degC]
 LEAST_UNSEEN = 0.05
 
 
 @dataclass(frozen=True)
 class Watched:
-    """A temperature, as the others predict it, and what of its readings is not to be believed.
+    """A temperature with its prediction from the others, and the limits for rejecting its readings.
 
     Parameters
     ----------
     input : int
         Index into the inputs of the watch.
     weights : tuple of float
-        Read-out of the temperatures, of their lags, lag by lag, and of the speed states [degC/degC; degC]; of itself 0.
+        Readout coefficients of the temperatures, of their lags, lag by lag, and of the speed states [degC/degC; degC];
+        0 for the temperature itself.
     off : float
-        It is off when it is further from its prediction [degC].
+        Difference from the prediction above which the sensor is off [degC].
     jump : float
-        It has jumped when it changes by more within `Watch.pace` [degC].
+        Change within `Watch.pace` above which the reading has jumped [degC].
     moved : float
-        It is stuck when its prediction moves by more while it reads the same [degC].
+        Change of the prediction, with a constant reading, above which the sensor is stuck [degC].
     still : float
-        Longest constant reading while another one changes; beyond it is stuck; `GAP` where time is no criterion [s].
+        Longest constant reading while another one changes, above which the sensor is stuck; `GAP`: no time limit [s].
     unseen : float
-        Root mean square error of its prediction in cycles that were left out [degC].
+        RMS error of the prediction in cycles that were left out [degC].
     """
 
     input: int
@@ -67,7 +68,7 @@ class Watched:
 
 @dataclass(frozen=True)
 class Watch:
-    """Predictions of temperatures by each other and by states of the spindle speed, with limits: see `PacedDynamic`.
+    """Predictions of temperatures from each other and from states of the spindle speed, with limits.
 
     Parameters
     ----------
