@@ -78,6 +78,6 @@ def read(path: str | Path) -> tuple[PositionModel, ...]:
     Raises
     ------
     ModelFileError
-        There is no such file, or it cannot be used; see `loads`.
+        The file does not exist or cannot be used; see `loads`.
     """
     return loads(*jsonfile.read(jsonfile.POSITION_MODELS, path))

@@ -9,21 +9,21 @@ import pandas as pd
 from thermocomp.recordings.readers.layout import is_stamp
 from thermocomp.recordings.readers.numbers import is_number_like
 
-#: a time of day, or one that has passed: hh:mm:ss beyond 24 h, with days before it
+#: a time of day, or an elapsed time: hh:mm:ss beyond 24 h, optionally with days
 CLOCK = re.compile(
     r"(?:(?P<days>\d+)(?: days?,? |\.))?(?P<hours>\d+):(?P<minutes>\d\d)(?::(?P<seconds>\d\d(?:[.,:]\d+)?))?"
 )
 #: a time of day with AM or PM
 HALF = re.compile(r"\d{1,2}:\d\d(?::\d\d(?:\.\d+)?)? ?[AaPp]\.?[Mm]\.?")
-#: midnight, that a spreadsheet gives a date; the day from which it counts, that it gives a time of day
+#: midnight that a spreadsheet adds to a date; the epoch day that it adds to a time of day
 _MIDNIGHT = re.compile(r"[ T]00:00(?::00(?:\.0+)?)?$")
 _FIRST_DAY = re.compile(r"^1(?:899-12-3[01]|904-01-01)[ T]")
 #: a day of the week before a date
 _WEEKDAY = re.compile(r"^[^\W\d_]{2,10}\.?,? +(?=\d{1,4}[-./]|\d{1,2}\.? +[^\W\d_]{3,})")
-#: a date of digits alone
+#: a date that consists of digits only
 _COMPACT = re.compile(r"(?:19|20)\d\d(?:0[1-9]|1[0-2])(?:0[1-9]|[12]\d|3[01])")
 
-#: ``compact``: dates of digits alone, which may be numbers
+#: ``compact``: dates of digits only, which may be numbers
 #: ``passed``: hours beyond a day, or days before them; ``other``: words; empty: nothing
 Kind = Literal["number", "compact", "date", "clock", "passed", "stamp", "other", ""]
 #: what the column of a number holds
