@@ -101,7 +101,7 @@ def _bits(what: Callable[[int, int], int]) -> Binary:
     return on_integers
 
 
-# name: (precedence, function)
+# by name: precedence and function
 _LINUXCNC: dict[str, tuple[int, Binary]] = {
     "and": (1, lambda a, b: float(a != 0 and b != 0)),
     "or": (1, lambda a, b: float(a != 0 or b != 0)),

@@ -14,7 +14,7 @@ class Straight:
         self.turn = turn
 
     def cut(self, radius: float, _: float) -> tuple[float, float, float]:
-        """Return the length of the first line that an arc replaces, the arc length, and the same for the second line."""
+        """Return the length of the first line replaced by an arc, the arc length, and the same for the second line."""
         off = radius / math.tan(self.half)
         return off, radius * self.turn, off
 
@@ -53,7 +53,7 @@ class Bent:
         self.room = 0.0 if narrow else min(rooms)
 
     def cut(self, radius: float, tolerance: float) -> tuple[float, float, float] | None:
-        """Return the length of the first move that an arc replaces, the arc length, and the same for the second move."""
+        """Return the length of the first move replaced by an arc, the arc length, and the same for the second move."""
         cos, sin = math.cos(self.turn), math.sin(self.turn)
         r1, r2 = self.before.radius, self.after.radius
         # centres of the arcs, and distances from them to the centre of the new arc
