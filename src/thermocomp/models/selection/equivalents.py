@@ -92,8 +92,8 @@ def equivalents(
 
     For each displacement the best set has the greatest psi summed over the data sets; if several are equal, the first.
     Another set is equivalent if the two-sided Wilcoxon signed-rank test does not distinguish its psi from that of the
-    best. A non-significant difference does not prove equality: with few data sets no difference is ever significant, which
-    a note then states.
+    best. A non-significant difference does not prove equality: with few data sets no difference is ever significant,
+    which a note then states.
 
     Parameters
     ----------
@@ -157,10 +157,10 @@ def signed_rank_p(differences: FloatArray) -> FloatArray:
     """Return the two-sided p values of Wilcoxon's signed-rank test, one per row.
 
     The p values are exact even with ties: under the null hypothesis every sign is equally likely for any ranks, and the
-    distribution of the sum of positive ranks is built by adding one pair at a time. `scipy.stats.wilcoxon` does the same
-    without ties; with ties it draws signs at random or uses the normal approximation, which for five pairs gives 0.04
-    although no p below 0.0625 exists. Zero differences are removed before ranking (Wilcoxon's original rule); if none
-    remain, p = 1.
+    distribution of the sum of positive ranks is built by adding one pair at a time. `scipy.stats.wilcoxon` does the
+    same without ties; with ties it draws signs at random or uses the normal approximation, which for five pairs gives
+    0.04 although no p below 0.0625 exists. Zero differences are removed before ranking (Wilcoxon's original rule); if
+    none remain, p = 1.
 
     Parameters
     ----------

@@ -61,8 +61,8 @@ class Search:
 def search_subsets(tri: Triangle, columns: Sequence[int], *, limit: int = LIMIT) -> Search:
     """Find the subset with the smallest MSE_p among all non-empty subsets (Hwang, Eq. 5; H-05, H-07).
 
-    Of equally good subsets the smaller one is chosen, then the one with the earlier columns. The search is exact and not
-    slower for collinear sensors: a sensor that adds only rounding leaves the sum of squares unchanged.
+    Of equally good subsets the smaller one is chosen, then the one with the earlier columns. The search is exact and
+    not slower for collinear sensors: a sensor that adds only rounding leaves the sum of squares unchanged.
 
     Parameters
     ----------
@@ -173,8 +173,8 @@ def _squares(tri: Triangle, levels: Sequence[Sequence[int]], *, skip: bool) -> F
 def _deflated(left: FloatArray, sizes: Sequence[int], least: FloatArray, skip: bool) -> FloatArray:
     """Project each column of the first level out of the later levels and of y (modified Gram-Schmidt).
 
-    `left`, of shape (n_choices_so_far, n_rows, n_columns + 1), contains the remainders of the columns and of y after the
-    earlier choices.
+    `left`, of shape (n_choices_so_far, n_rows, n_columns + 1), contains the remainders of the columns and of y after
+    the earlier choices.
     """
     if not sizes:
         return np.asarray(np.einsum("sm,sm->s", left[:, :, -1], left[:, :, -1]))

@@ -85,8 +85,8 @@ def maximal_correlations(
 ) -> MaximalCorrelations:
     """Compute the maximal correlation of every subset, for every test and displacement (W-10, W-12).
 
-    The transformations are those of `thermocomp.models.ace.ACE` with its option `converged`. After a keyboard interrupt,
-    the results computed so far are returned.
+    The transformations are those of `thermocomp.models.ace.ACE` with its option `converged`. After a keyboard
+    interrupt, the results computed so far are returned.
 
     Parameters
     ----------

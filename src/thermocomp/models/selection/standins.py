@@ -86,7 +86,7 @@ class StandInAnswer:
         return self.gram[: self.copies.shape[1], : self.copies.shape[1]]
 
     def lose(self, made: FloatArray) -> FloatArray:
-        """Return the RMS change of the output if temperatures are estimated by the matrix of `make_up`, (n_targets,)."""
+        """Return the RMS change of the output with temperatures estimated by a matrix of `make_up`, (n_targets,)."""
         missed = np.eye(len(made)) - made
         lost = np.concatenate([missed @ copy for copy in self.copies])
         return _root((lost * (self.gram @ lost)).sum(axis=0))
@@ -120,8 +120,8 @@ def reduce_sensors(
 
     The errors on left-out parts alone are too few for a selection: the set with the smallest error would be best by
     chance. Therefore the model with all temperatures is used as well: each removed temperature is estimated from the
-    remaining ones (linear, with noise in use), and the resulting change of the model's output is added to the error. With
-    many temperatures, the first ones are removed by this change alone.
+    remaining ones (linear, with noise in use), and the resulting change of the model's output is added to the error.
+    With many temperatures, the first ones are removed by this change alone.
 
     Parameters
     ----------
