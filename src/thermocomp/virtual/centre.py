@@ -154,8 +154,8 @@ class MachiningCentre:
                 end = after[n:].tolist()
                 share = heat.until_switch(chilling, seen[4] - seen[5], end[4] - end[5])
                 if share < 1.0:
-                    # The chiller runs for part of the step: without this correction the result would depend on switching
-                    # times and step length.
+                    # The chiller runs for part of the step: without this correction the result would depend on the
+                    # switching times and the step length.
                     change = heat.chiller * (1.0 - share)
                     after += variable[:, 2] * (change if chilling else -change)
                     chilling = not chilling
