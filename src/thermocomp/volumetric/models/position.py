@@ -80,7 +80,7 @@ class PositionFit:
 
     @property
     def enough(self) -> int:
-        """Smallest m to which higher powers add little: below a tenth of the rest or a twentieth of the thermal part."""
+        """Smallest m above which powers add little: below a tenth of the rest or a twentieth of the thermal part."""
         return choose_power(self.remainders, self.thermal_rms) or 1
 
     @property
