@@ -31,7 +31,7 @@ class Facts:
     left_out: Mapping[str, str] = field(default_factory=dict)
 
     def origin(self) -> list[str]:
-        """Return the lines on the origin of the export."""
+        """Return lines of text on the origin of the export."""
         return [
             f"Model: {self.source}, SHA-256 {self.sha256}",
             f"Written by thermocomp {self.version} on {self.date}; change nothing here, export again",

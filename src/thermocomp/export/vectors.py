@@ -197,7 +197,7 @@ def make_readings(tables: Tables) -> Readings:
     return Readings(values, ages, steps)
 
 
-#: up and down at the highest permitted rate of a correction
+#: (fraction of top speed, time step [s]) that moves corrections up and down at their rate limit
 _THERE_AND_BACK = [(1.0, 7.0)] * 8 + [(1.0, 600.0)] * 8 + [(0.0, 4 * 3600.0)] + [(0.0, 7.0)] * 8
 
 

@@ -168,7 +168,7 @@ class Cluster:
         done: SimpleQueue[int] = SimpleQueue()
         name = f"thermocomp-{uuid4().hex}"
         futures = {
-            # submit in order, or the progress, which is reported in order, lags behind
+            # submitted in order; otherwise the progress, reported in order, would lag behind
             k: self._client.submit(_do, shared, k, self._versions, key=f"{name}-{k}", priority=-k)
             for k in numbers
         }

@@ -50,7 +50,7 @@ def compare(
 ) -> Comparison:
     """Train every method for every target and judge it on unseen data.
 
-    Interrupted from the keyboard, it returns the methods already judged on all blocks, and the number of the others.
+    After a keyboard interrupt, the methods already judged on all blocks are returned, with the number of the others.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def _concluded(
     best: Recommendation | None,
     caps: tuple[str, ...],
 ) -> list[Assessment]:
-    """Return the results for one target: each method in each block, and over all of them with its verdict."""
+    """Return the results for one target: each method in each block, and over all blocks with its verdict."""
     whole = {name: do_no_harm.join_verdicts(v, caps=caps) for name, v in verdicts.items()}
     after = correct_verdicts(whole, rules.primary, best)
     found = []

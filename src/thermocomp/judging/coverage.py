@@ -31,7 +31,7 @@ _SAME_SPEED = 0.02
 
 
 def find_validity(samples: Samples, judging: Judging, recordings: Sequence[Recording] = ()) -> Validity:
-    """Return the conditions covered by the units of a judging.
+    """Return the conditions covered by the units of a judging scheme.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def _ambient(
 
 
 def table(named: dict[str, Validity]) -> Table:
-    """Return the covered conditions as a short table: one column per judging.
+    """Return the covered conditions as a short table: one column per judging scheme.
 
     Parameters
     ----------

@@ -95,7 +95,7 @@ class JudgedUnit:
 
     @property
     def log_ratios(self) -> tuple[float, ...]:
-        """Logarithm of the ratio of the error to that of each baseline, errors below the noise set to it."""
+        """Logarithm of the ratio of the error to that of each baseline; errors are at least the noise."""
         least = max(self.noise, NO_NOISE)
         pairs = [(self.rms, b) for b in self.baselines] + ([self.rezeroed] if self.rezeroed else [])
         return tuple(float(np.log(max(model, least) / max(other, least))) for model, other in pairs)

@@ -54,7 +54,7 @@ def find_guard(samples: Samples, learn: BoolArray, rows: BoolArray) -> Guard | N
     Returns
     -------
     Guard or None
-        None if nothing can be watched; see `thermocomp.models.watching.find_watch`.
+        None if no sensor can be monitored; see `thermocomp.models.watching.find_watch`.
     """
     watch = find_watch(samples, learn)
     return None if watch is None else let_fail(watch, samples, rows)

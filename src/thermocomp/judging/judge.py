@@ -25,7 +25,7 @@ BoolArray = NDArray[np.bool_]
 
 
 def drop_unreadable(samples: Samples, target: int, judging: Judging) -> Judging:
-    """Return a judging without the blocks in which a target has too few values for a result.
+    """Return a judging scheme without the blocks in which a target has too few values for a result.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Rows used for both training and judging: detect them, and leave them out or reject the judging."""
+"""Rows used for both training and judging: detect them, and leave them out or reject the judging scheme."""
 
 import numpy as np
 from numpy.typing import NDArray

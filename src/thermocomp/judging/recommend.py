@@ -28,7 +28,7 @@ LEAST = 3
 
 @dataclass(frozen=True)
 class Inner:
-    """An inner training part, with the units left out of it and those that it scores.
+    """An inner split, with the pairs of units that it scores.
 
     Parameters
     ----------

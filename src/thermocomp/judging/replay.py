@@ -346,7 +346,7 @@ def _begun(
 
 
 def _window(model: ErrorModel, samples: Samples, readings: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the first of the readings given, from which a zero is averaged."""
+    """Return the first readings, from which a zero is averaged."""
     return readings[: first_rows(model.zeroing, samples.time[readings], samples.stands[readings])[0]]
 
 

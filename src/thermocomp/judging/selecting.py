@@ -194,7 +194,7 @@ def _other_thresholds(candidates: Candidates, found: CorrelationGrouping, settin
     kept = list(found.candidates_)
     tri = triangle(join_columns(values[:, kept], candidates.y), intercept=True)
     swept = grouping.sweep(X[:, kept], tri, absolute=settings.unsigned)
-    # thresholds that change the groups but not the sensors chosen are merged to one row
+    # thresholds that change the groups but not the sensors chosen are merged into one row
     alike = [
         list(part)
         for _, part in groupby(swept, lambda s: (len(s.interval.groups), s.choice.selected if s.choice else s.failure))

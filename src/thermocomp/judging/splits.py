@@ -41,7 +41,7 @@ class Split:
 
     @property
     def name(self) -> str:
-        """Name of the left-out unit, without the word for its kind."""
+        """Name of the left-out unit, without its kind."""
         return self.block.partition(" ")[2]
 
 
@@ -170,7 +170,7 @@ def leave_one_cycle_out(samples: Samples) -> Judging:
 
 
 def leave_one_file_out(samples: Samples) -> Judging:
-    """Judge on each file in turn, train on all others; `whole` blocks are judged as one unit.
+    """Judge on each file in turn, train on all others; each file is judged as one unit.
 
     Raises
     ------

@@ -105,7 +105,7 @@ def begin(s: Names, w: Names, t: Names) -> None:
 
 
 def calm_down(s: Names, w: Names, t: Names) -> None:
-    """Limit speeds to the range of the heat states."""
+    """Limit speeds to a multiple of the top speed."""
     for k in range(t.SPEEDS):
         most = HEATS * t.top_speed
         w.change[t.speed_input[k]] = larger(-most, smaller(most, w.change[t.speed_input[k]]))

@@ -179,7 +179,7 @@ def _cap(limits: Limits, option: str, times: float) -> float:
 
 
 def _plausible(r: Reduced) -> list[tuple[float, float]]:
-    """Return the range of each plausible temperature, including offsets of the zero from day to day."""
+    """Return the plausible range of each temperature, including changes of the zero from day to day."""
     least, most = PLAUSIBLE["temperature"]
     found = []
     for (i, _), zero in zip(r.terms, r.zeros, strict=True):

@@ -23,7 +23,7 @@ UNCONFIRMED = (
     "UNCONFIRMED: which of the words W576 to W582 of a TNC 360 is of which axis",
     "UNCONFIRMED: whether your software takes as many digits and brackets as the formula has",
 )
-#: largest word of a TNC 360 [um]
+#: largest value of a TNC 360 word [um]
 _WORD = 32_767
 
 _ABOUT = """\

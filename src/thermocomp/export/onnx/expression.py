@@ -8,7 +8,7 @@ from thermocomp.core import expression as e
 from thermocomp.export.onnx.nodes import Graph
 from thermocomp.export.recurrences import Clock
 
-#: largest number of ticks in one call (0.6 s of work): a model with roots below 0.9997 has settled by then
+#: largest number of ticks in one call (0.6 s of computing time): a model with roots below 0.9997 has settled by then
 MOST_TICKS = 100_000
 #: fraction of an interval by which an early reading still triggers the tick
 EARLY = 1e-6
@@ -22,8 +22,8 @@ class Memory:
     graph : Graph
     state : str
         Incoming state.
-    First free element.
-        First place that is free.
+    begin : int
+        First free element.
     """
 
     def __init__(self, graph: Graph, state: str, begin: int = 0) -> None:
@@ -31,7 +31,7 @@ class Memory:
         self.after: list[str] = []  #: names of the new values, in order
 
     def before(self, size: int = 1) -> str:
-        """Return the stored values of the next elements; append their new values to `after` in the same order."""
+        """Return the stored values of the next elements; the caller appends their new values to `after` in order."""
         self.end += size
         return self._graph.part(self._state, self.end - size, self.end)
 

@@ -45,10 +45,10 @@ class _Moment:
 
     Parameters
     ----------
-    Whether the values are used; whether earlier values were used.
-        Whether they are; whether any were before.
-    Time available for moving the corrections, and time since the last values used [s].
-        Time that counts for the corrections, and since the values that were used last [s].
+    passes, seen : str
+        Whether the values are used; whether earlier values were used.
+    travel, step : str
+        Time available for moving the corrections, and time since the last values used [s].
     clocks : str
         Elements of the next state.
     """
@@ -109,7 +109,7 @@ def _checked(g: Graph, drive: Drive, state: str, places: list[int]) -> str:
 def _changes(g: Graph, tables: Tables, value: str, zero: str) -> tuple[str, str]:
     """Return all inputs minus their zero, and whether all are present, finite and plausible.
 
-    An invalid value is replaced by its zero, an invalid zero by that of the training: neither is used.
+    An invalid value is replaced by its zero, an invalid zero by the training zero; such a call is rejected.
     """
     t = tables.values
     rezero, applies, reference = np.array(t["rezero"]), np.array(t["applies"]), np.array(t["reference"])

@@ -27,7 +27,7 @@ class LinearReduction(TermRegressor):
 
     Every set is fitted without each thermal cycle in turn and tested on that cycle, complete and with each input lost:
     a simple controller does not detect a lost input. Sets that are then worse than no model are passed over, unless
-    the RMS of the others exceeds the best one `DEAR` times. The smallest set that no larger one beats by `GAIN` is
+    the RMS of the others exceeds `DEAR` times the best one. The smallest set that no larger one beats by `GAIN` is
     fitted to all cycles, and its coefficients are rounded as in the controller's file: the judged model is the printed
     one.
 

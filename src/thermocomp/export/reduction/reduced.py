@@ -175,7 +175,7 @@ def fits(model: ErrorModel, shape: Shape) -> bool:
 
 
 def as_it_is(model: ErrorModel, axis: str) -> Reduced:
-    """Return a model of the form of the controller with rounded coefficients, without a loss."""
+    """Return a model that already has the form of the controller, with rounded coefficients and no loss."""
     found = model.honest_error
     assert isinstance(model, Polynomial)
     model = replace(

@@ -25,7 +25,7 @@ RESERVED = frozenset(
     replace resource result retain return right rol ror round sel shl shr sin single sint sqrt step stop string
     struct sub super swap tan task then this time to tod transition true trunc type udint uint ulint until usint var
     void while with word write xor
-    """.split()  # noqa: SIM905 - a list of a line per word is long
+    """.split()  # noqa: SIM905 - a list with one word per line would be long
 )
 
 #: attributes after the name of a block: data blocks without optimized access are limited to 64 kB

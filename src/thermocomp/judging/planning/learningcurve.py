@@ -33,7 +33,7 @@ class Point(NamedTuple):
     """One model, trained on some cycles and judged on an unseen one."""
 
     learned: int  #: number of training cycles
-    speeds: int  #: number of different speeds in them, 0 if none was recorded
+    speeds: int  #: number of different speeds in the training cycles, 0 if none was recorded
     unseen: int  #: index of the judged block
     rms: float  #: mean over the targets [um]; nan: the model could not be fitted
 

@@ -72,7 +72,7 @@ class ExponentialFit:
 def fit(t: FloatArray, y: FloatArray) -> tuple[ExponentialFit | None, ExponentialFit | None]:
     """Fit one and two exponentials by least squares.
 
-    Time constants are searched between the shortest interval and ten times the duration; the amplitudes are linear and
+    Time constants are sought between the shortest interval and ten times the duration; the amplitudes are linear and
     follow from them, so that the search has one or two unknowns only and is robust. Standard errors are based on the
     effective sample size of the residual, given its autocorrelation: neighbouring rows of a drift are almost equal.
 

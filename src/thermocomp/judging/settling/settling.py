@@ -74,8 +74,8 @@ class Settling:
     returns : bool
         It ends closer to its start than to its extreme: no single time describes it.
     overshoots : bool
-        It exceeds its last value by more than a tenth of its change, and then settles back: the time to first reach 90
-        % is then not a settling time, so no times are reported.
+        It exceeds its last value by more than a tenth of its change, and then settles back: the time at which 90 %
+        are first reached is then not a settling time, so no times are reported.
     settled : bool
         Over the last quarter of the phase it stays within `SETTLED` of its change about its last value, and a straight
         line through it rises by no more; noise is allowed for. By this rule an exponential is settled after 3.3 time
