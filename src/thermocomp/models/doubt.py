@@ -72,8 +72,7 @@ class Doubt:
         return np.vstack(list(self.features.tables(rows, step)))
 
     def spread(self, table: FloatArray) -> FloatArray:
-        """Return the expected RMS error over the given rows, (n_targets,) [unit of the target].
-        """
+        """Return the expected RMS error over the given rows, (n_targets,) [unit of the target]."""
         squares = (self.covariance * (table.T @ table / len(table))).sum(axis=(1, 2))
         return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
 

@@ -30,7 +30,7 @@ SAFETY = 1.5
 FASTEST = 2.0
 #: lower bounds of the limits: deviation, change within a minute, movement while stuck, in addition to resolution [degC]
 OFF, JUMP, MOVED = 1.0, 0.8, 0.5
-#: a reading constant for this time is stuck, if no reading of the recording was constant for a part of it [s; -]
+#: a reading constant for this time is stuck, if none in the recording was constant for this part of it [s; -]
 STILL, STILL_PART = 1200.0, 1 / 3
 #: minimum time over which a jump is measured [s]
 PACE = 60.0
@@ -100,7 +100,7 @@ def find_watch(samples: Samples, learn: BoolArray) -> Watch | None:
 def _weights(
     of: PacedFeatures, change: FloatArray, step: FloatArray, heat: Sequence[int], parts: IntArray, folds: IntArray
 ) -> FloatArray:
-    """Return the predictor of each temperature, with all cycles and without each, (1 + n_cycles, n_features, n_heat)."""
+    """Return each temperature's predictor, with all cycles and without each, (1 + n_cycles, n_features, n_heat)."""
     moments = of.moments(change, change[:, list(heat)], step, parts, NOISE)
     every = np.unique(parts[parts >= 0])
     learned = (every, *(np.setdiff1d(every, parts[folds == k]) for k in range(int(folds.max()) + 1)))
