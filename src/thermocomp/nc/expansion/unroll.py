@@ -17,7 +17,7 @@ from thermocomp.nc.parser.expressions import Key
 from thermocomp.nc.parser.line import Assignment, Line, Word
 from thermocomp.nc.parser.tokens import read_line
 
-#: limits, in lines beyond those of the file: lines written, lines run, and lines run without a motion of an axis;
+#: limits, in lines beyond those of the file: lines written, lines run, and lines run without axis motion;
 #: running a line takes about 10 us, so each limit is reached within seconds
 MOST: Final = 220_000
 MOST_STEPS: Final = 1_000_000

@@ -25,9 +25,9 @@ class Modal:
     plane : {17, 18, 19}
         Plane of arcs and cycles.
     inch : bool
-        G20.
+        G20 (inches) is in force.
     absolute : bool
-        G90; False in G91.
+        G90 is in force; False in G91.
     arc_absolute : bool
         G90.1: centres of arcs are absolute.
     feed_mode : {93, 94, 95}

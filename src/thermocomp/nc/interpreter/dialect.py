@@ -83,7 +83,7 @@ class Judgement:
     Parameters
     ----------
     linuxcnc, fanuc : Place or None
-        The first sign of each.
+        First sign of each control.
     hint : Place or None
         First hint of LinuxCNC.
     open : dict of str to Place

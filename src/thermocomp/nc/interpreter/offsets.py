@@ -13,9 +13,9 @@ _ZERO: Point = (0.0, 0.0, 0.0)
 _NEVER: Known = (False, False, False)
 _ALL: Known = (True, True, True)
 
-#: LinuxCNC: the last work coordinate system, G59.3
+#: LinuxCNC: number of the last work coordinate system, G59.3
 LAST = 9
-#: Fanuc: the external offset, added to all work coordinate systems
+#: Fanuc: number of the external offset, which is added to all work coordinate systems
 EXTERNAL = 0
 
 

@@ -151,7 +151,7 @@ class InterpreterState:
         self.machine = self.offsets.machine(place)
 
     def renamed(self, still: Known) -> None:
-        """Keep the tool position under new offsets; coordinates stay known as given by `still`."""
+        """Keep the tool position under new offsets; known coordinates remain so where `still` is True."""
         self.place = self.offsets.program(self.machine)
         a, b, c = self.known
         self.known = (a and still[0], b and still[1], c and still[2])

@@ -365,7 +365,7 @@ def _value(text: str, place: int, letter: str, controller: Controller) -> int:
     """Return the end of a value."""
     begin = place
     while text[place : place + 1] in {"+", "-"} and (controller == "linuxcnc" or place == begin):
-        place += 1  # LinuxCNC takes X--5 for X5
+        place += 1  # LinuxCNC reads X--5 as X5
     if found := _PLAIN.match(text, place):
         return found.end()
     head = text[place : place + 1]

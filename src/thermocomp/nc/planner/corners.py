@@ -12,7 +12,7 @@ from thermocomp.nc.planner.segment import ACROSS, ALONG, Segment, Vector
 
 #: fraction of the acceleration of an axis available for a kink between two moves
 KINK = 0.1
-#: moves that reverse at a smaller angle stop in between [rad]
+#: two moves that enclose a smaller angle (reversal) stop in between [rad]
 SHARP = math.radians(2.0)
 #: the rest of a move becomes part of the corner if it would take fewer cycles
 REST = 4
@@ -38,7 +38,7 @@ class Corners:
         Parameters
         ----------
         before, after : Segment
-            Changed in place.
+            Segments, changed in place.
         tolerance : float or None
             Maximum deviation of the path from the corner [mm]; 0: limited by the moves only; None: no deviation.
 

@@ -261,7 +261,7 @@ class Coordinates(CorrectionMethod):
         old = frame.words(self.carried)
         return shift_words(block, {AXES[i]: old[i] for i in self.named(block)}, {}, frame.digits)
 
-    # -- what may change ---------------------------------------------------------------------------------------------
+    # -- allowed changes ---------------------------------------------------------------------------------------------
 
     def _placed(self, block: Block, axis: int, carried: float, *, moved: bool) -> None:
         """Record that an axis moves to a position in absolute coordinates, if the line is run."""

@@ -34,7 +34,7 @@ class DriftSource(Protocol):
 
 @dataclass
 class Demand:
-    """Corrections required of the axes.
+    """Required corrections of the axes, and their updates.
 
     A correction is updated when it is due: every `every` seconds (P-06), or as soon as the drift has changed by
     `tolerance` since the last update. With `every`, it still follows a dependence on position by `tolerance`.

@@ -73,7 +73,7 @@ def _refuse_unknown_place(block: Block) -> None:
 
 
 def _refuse_turned(block: Block, setup: Setup) -> None:
-    """Raise `ProgramError` if a rotary axis is not at 0 and may tilt the spindle: it grows along the tool."""
+    """Raise `ProgramError` if a rotary axis is not at 0 and may tilt the spindle, which grows along the tool."""
     for letter, angle in block.turned.items():
         side = setup.rotary.get(letter)
         if side == "table":

@@ -44,7 +44,7 @@ _PLAIN = frozenset(("G0", "G1"))
 class Revised(NamedTuple):
     """Original line with its revision."""
 
-    number: int  #: of the original line; 0 for the header
+    number: int  #: number of the original line; 0 for the header
     text: str  #: the original line; empty for the header
     texts: tuple[str, ...]  #: lines that replace it
     block: Block | None  #: effect of the line; None for the header and after the end of the program
@@ -61,7 +61,7 @@ class Revised(NamedTuple):
 
 @dataclass
 class Revision:
-    """One run of the revision.
+    """Revision of one program.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The drift along a program: frozen models in free run, driven by its spindle speed (P-05, P-06).
+"""Drift along a program: frozen models in free run, driven by its spindle speed (P-05, P-06).
 
 Program time advances in steps as short as a move; the models are stepped on a coarser clock: at least every
 `Drift.step` seconds, when the spindle speed changes, and again soon after, because part of a deviation may follow the

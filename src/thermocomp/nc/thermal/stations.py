@@ -11,11 +11,11 @@ from thermocomp.core.units import read_with_unit
 
 AXES = "XYZ"
 _NUMBER = r"-?\d+(?:\.\d+)?"
-#: x_um, z, z_at_200, x_at_z-50_um
+#: target names such as x_um, z, z_at_200, x_at_z-50_um
 _NAME = re.compile(rf"([xyz])(?:_at_([xyz]?)({_NUMBER})(?:mm)?)?(?:_um)?", re.IGNORECASE)
-#: y1_um, but not yaw
+#: axis letter at the beginning of a name: y1_um, but not yaw
 _BEGINS = re.compile(r"[xyz](?![a-z])", re.IGNORECASE)
-#: Z, X at Z 200 mm
+#: axes given by the user: Z, X at Z 200 mm
 _PLACE = re.compile(rf"([xyz])(?:\s+at\s+([xyz])\s*=?\s*({_NUMBER}\s*[a-z]*))?", re.IGNORECASE)
 
 

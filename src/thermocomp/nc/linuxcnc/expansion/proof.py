@@ -8,7 +8,7 @@ from typing import NamedTuple
 from thermocomp.core.exceptions import ProgramError
 from thermocomp.nc.linuxcnc.rs274 import ORIGIN, PLANE_AXES, Canonical, Place, ProgramFrame
 
-TOLERANCE = 1e-6  #: [mm]
+TOLERANCE = 1e-6  #: of positions [mm]
 #: calls that set a state, with the name of the state
 STATES = {
     "feedmode": "feed mode", "speed": "speed", "speedmode": "speed mode", "select": "tool", "path": "path",

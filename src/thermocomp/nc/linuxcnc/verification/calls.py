@@ -192,7 +192,7 @@ class Side:
         there = self._frame.program(tuple(here.tolist()))
         if kind[i] == self.run.codes["tap"]:
             points = [(*values[i, :3].tolist(), *there[3:])]
-            values[i, 1], values[i, 2], values[i, 3] = values[i, 3], 0.0, 0.0  # scale of the speed
+            values[i, 1], values[i, 2], values[i, 3] = values[i, 3], 0.0, 0.0  # speed scale
         else:
             numbers = block.more[int(values[i, 0])]
             points = [(x, y, *there[2:]) for x, y in zip(numbers[1::3], numbers[2::3], strict=True)]
