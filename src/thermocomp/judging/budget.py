@@ -59,7 +59,7 @@ class Budget:
     answer : StandInAnswer
         Output of `averaged` with all temperatures and rows, for the virtual sensors; targets in `unit`.
     failures : mapping of str to str
-        Reason why a model could not be judged somewhere, by model.
+        Reason why a model could not be judged on some block, by model.
     """
 
     targets: tuple[str, ...]

@@ -102,7 +102,7 @@ def _read_address(address: str) -> tuple[str, int, bool]:
 
 
 class Cluster:
-    """A scheduler and its workers, all with this machine's versions.
+    """A scheduler and its workers, with the same package versions as this machine.
 
     Parameters
     ----------

@@ -18,7 +18,7 @@ class Collinearity:
     ----------
     names : tuple of str
     condition_number : float
-        Largest over smallest eigenvalue of the correlation matrix; that of X'X itself is in `Diagnosis.spectrum`.
+        Largest over smallest eigenvalue of the correlation matrix; for X'X itself see `Diagnosis.spectrum`.
     vif : tuple of float
         Variance inflation factor of each input; inf if determined by the other inputs.
     """

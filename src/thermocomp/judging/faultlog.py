@@ -75,7 +75,7 @@ class Cost(NamedTuple):
     failed: tuple[str, ...]  #: failed sensors of the model; empty: all were good
     hours: float  #: total duration of the judged rows in this state [h]
     rms: float  #: RMS with the compensator as it would run [unit of the model]
-    none_rms: float  #: without compensation, in these rows [unit of the model]
+    none_rms: float  #: RMS without compensation in these rows [unit of the model]
     honest: float | None  #: RMS on unseen cycles without these sensors [unit of the model]; None: never judged
     runs_on: bool  #: True: runs on with replacement values; False: the correction is held, then fades
 

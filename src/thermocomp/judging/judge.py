@@ -221,7 +221,7 @@ def refuse_method(samples: Samples, name: str, target: int, split: Split, why: s
         Index into ``samples.targets``.
     split : Split
     why : str
-        Reason.
+        Reason for the missing prediction.
 
     Returns
     -------

@@ -247,7 +247,7 @@ def look_through(watch: Watch, samples: Samples, test: int) -> Iterator[tuple[in
 
 
 def replay(model: ErrorModel, samples: Samples, rows: BoolArray) -> tuple[FloatArray, BoolArray]:
-    """Replay a model over the tests that hold `rows`, from the start of each test.
+    """Replay a model over the tests that contain `rows`, from the start of each test.
 
     Parameters
     ----------

@@ -78,7 +78,7 @@ class Assessment:
     overall : bool
         True for the final result of this model and target, over all judged data instead of one cycle.
     n_sensors : tuple of (int, int)
-        Fewest and most inputs with an influence in one model.
+        Smallest and largest number of inputs with an influence in one model.
     learned : int
         Number of rows used for training the model: left out, unless there are no others (see `caveat`).
     alone : ndarray of shape (n_judged,), optional
@@ -224,7 +224,7 @@ class Comparison:
     ----------
     judging : Judging
     assessments : tuple of Assessment
-        Per target, method and block; with several blocks also one for all of them together.
+        Per target, method and block; with several blocks, also one over all blocks.
     collinearity : Collinearity
         Collinearity of the temperatures.
     left : int

@@ -46,7 +46,7 @@ class LinearReduction(TermRegressor):
     unseen_ : float
         RMS over the left-out cycles [unit of y].
     chosen_by_ : str
-        Units left out for the choice.
+        Units left out for the selection.
     terms_, coef_, intercept_, r_squared_, adjusted_r_squared_, standard_error_, n_effective_, condition_
         See `thermocomp.models.linear.TermRegressor`; they refer to the coefficients before rounding.
 

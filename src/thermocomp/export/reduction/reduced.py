@@ -25,7 +25,7 @@ class Shape:
     sensors : int
         Maximum number of sensors.
     constant : bool
-        A constant may be added. False: it is relative to the temperature at homing.
+        A constant may be added. False: the formula is relative to the temperature at homing.
     axes : str
         Letters of the axes with a formula.
     """
