@@ -13,7 +13,7 @@ _RANKS = ({ast.Add, ast.Sub}, {ast.Mult, ast.Div})
 
 
 class Printer(ABC):
-    """Translates one function.
+    """Translator of one function.
 
     Parameters
     ----------

@@ -48,7 +48,7 @@ def blame(s: Names, w: Names, t: Names, elapsed: float) -> None:
             w.able[i] = w.able[i] and not s.has_jumped[i]
             w.weighed[i] = w.x[i] - s.predicted[i] if w.able[i] else 0.0
         weigh_one(s, w, t)
-        # otherwise no single failure explains the difference: the machine behaves unlike in its training
+        # otherwise no single failure explains the difference: the machine behaves differently from its training
         if w.lasting and not swapped and not alone and w.one >= 0 and w.one_worst <= 1.0:
             for i in range(t.SENSORS):
                 w.failing[i] = i == w.one

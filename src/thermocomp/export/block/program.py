@@ -89,7 +89,7 @@ def _made(name: str, text: str) -> Function:
 
 
 class _Decided(ast.NodeTransformer):
-    """Removes branches and loops that a compensator does not use."""
+    """Transformer that removes branches and loops not used by a compensator."""
 
     def __init__(self, sizes: Mapping[str, int]) -> None:
         self._sizes = sizes

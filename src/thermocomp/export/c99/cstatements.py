@@ -31,7 +31,7 @@ def write_functions(tables: Tables, state: str) -> str:
 
 
 class _Writer(Printer):
-    """Writes one function."""
+    """Writer of one function."""
 
     operators: ClassVar = {
         ast.Add: "+",

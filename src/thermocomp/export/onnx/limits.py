@@ -8,7 +8,7 @@ from thermocomp.export.onnx.nodes import Graph
 
 
 class Drive:
-    """Moves corrections like ``drive`` and ``idle`` of `thermocomp.export.block.steps`.
+    """Movement of corrections, equivalent to ``drive`` and ``idle`` of `thermocomp.export.block.steps`.
 
     Parameters
     ----------

@@ -67,7 +67,7 @@ def write_functions(tables: Tables, name: str, dialect: Dialect) -> dict[str, tu
 
 
 class _Writer(Printer):
-    """Writes one function."""
+    """Writer of one function."""
 
     operators: ClassVar = {
         ast.Add: "+",
