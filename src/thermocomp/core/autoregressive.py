@@ -14,7 +14,6 @@ The model's clock ticks every `interval`; readings may come at any time:
 The past deviations are those of the model, never measured ones (P-05, E-P3). `ErrorModel.init` starts cold: zero
 deviation and zero inputs before the first reading. The effect of an earlier job (E-P5) is carried over either by
 continuing with its `State`, or by `begin_at`.
-going on with its `State`, or by `begin_at`.
 """
 
 import math

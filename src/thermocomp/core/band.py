@@ -73,7 +73,7 @@ class Band:
         return f"{100 * self.level:g} % band {by}, {self.cycles} cycles"
 
     def tell(self, unit: str) -> str:
-        """Return the band as text, with its half-widths where the structures agree, in a unit."""
+        """Return the band as text in a given unit, with its half-widths where the structures agree."""
         rest, run = (f"{self.floor * factor:.2f} {unit}" for factor in (self.stopped, self.running))
         if not self.speeds:
             rest = run = f"{self.floor * max(self.stopped, self.running):.2f} {unit}"

@@ -18,37 +18,37 @@ from thermocomp.core.exceptions import SettingError
 
 FloatArray = NDArray[np.float64]
 
-#: coefficients, weights, gains, thresholds, values of curves, intercepts: a micrometre per 1e-15 of an input [-]
+#: largest coefficient, weight, gain, threshold, curve value or intercept: a micrometre per 1e-15 of an input [-]
 COEFFICIENT = 1e15
-#: references and ends of trained ranges in house units: 1,000 km, 1e9 1/min, a time stamp
+#: largest reference or end of a trained range in house units: 1,000 km, 1e9 1/min, a time stamp
 RANGE = 1e9
 #: larger readings are clipped to this value, far outside every trained range
 READING = 1e12
-#: positions [mm]: 10 km
+#: largest position [mm]: 10 km
 POSITION = 1e7
-#: memory of a state: products of readings
+#: largest value in the memory of a state: products of readings
 MEMORY = 1e30
 #: largest factor by which trained ranges may be widened or over which a deviation may fade, in range widths
 MARGIN = 1e6
 #: smallest scale, tolerance, time constant [s] or fraction used as a divisor
 LEAST = 1e-6
-#: time constants, and time between two readings [s]: 300 years
+#: longest time constant or time between two readings [s]: 300 years
 GAP = 1e10
 #: smallest interval of a model with ticks [s]
 TICK = 1e-3
-#: inputs of a model
+#: maximum number of inputs of a model
 INPUTS = 1000
-#: variables, hidden nodes
+#: maximum number of variables or hidden nodes
 NODES = 10_000
-#: terms, lags, weights of a net
+#: maximum number of terms, lags, or weights of a net
 ENTRIES = 100_000
-#: factors of a term
+#: maximum number of factors of a term
 DEGREE = 8
 #: maximum exponent of a profile, and maximum power of ten of a term without its coefficient
 EXPONENT, POWER_OF_TEN = 30, 200
-#: past values used in one tick of an autoregressive model
+#: maximum number of past values used in one tick of an autoregressive model
 ORDER = 100
-#: characters of a name
+#: maximum number of characters of a name
 NAME = 200
 
 #: smallest and largest numbers in single precision

@@ -19,7 +19,7 @@ class Columns(Protocol):
         """Return a column."""
 
     def __contains__(self, name: object, /) -> bool:
-        """Return whether there is a column of that name."""
+        """Return whether a column of this name exists."""
 
     def __iter__(self) -> Iterator[Any]:
         """Return an iterator over the column names."""

@@ -15,7 +15,7 @@ from thermocomp.core.watch import LASTING, Watched
 FAR = 3.0
 #: the same for the error with the substitute value, as a multiple of the error with all sensors
 DEAR = 2.0
-#: any time constant or time step; settled values do not depend on it [s]
+#: arbitrary time constant or time step; settled values do not depend on it [s]
 _ANY = 60.0
 
 
@@ -42,7 +42,7 @@ class SensorExplanation:
     pace : float or None
         [s]
     still : float or None
-        Longest constant reading while another input changes [s]; None: time alone is no criterion.
+        Longest constant reading while another input changes [s]; None: time alone is not a criterion.
     unseen : float or None
         RMS error of the prediction in cycles that were left out [degC].
     undetected : float or None
@@ -101,7 +101,7 @@ class Explanation:
     covered : str
         Conditions covered by the judged cycles; empty if unknown.
     pairs : tuple of int
-        Number of sensor pairs judged as lost together, and of those with which the correction continues.
+        Number of sensor pairs whose joint failure was judged, and of those with which the correction continues.
     """
 
     target: str

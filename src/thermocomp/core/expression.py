@@ -142,14 +142,14 @@ class PacedLag:
 
 @dataclass(frozen=True)
 class Past:
-    """In a `Recurrence`: its value some ticks ago; 1 is the last tick."""
+    """Value of a `Recurrence` a number of ticks ago; 1 is the last tick."""
 
     ticks: int
 
 
 @dataclass(frozen=True)
 class Mean:
-    """In a `Recurrence`: the mean of a value over the interval that ended some ticks ago; 0: the one that ends now.
+    """Mean of a value over the interval that ended a number of ticks ago, in a `Recurrence`; 0: the one that ends now.
 
     A reading represents the time since the previous one. The value before the first reading is 0, except at the start.
     """

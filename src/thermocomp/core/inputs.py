@@ -10,7 +10,7 @@ from thermocomp.core.units import HOUSE_UNITS
 
 @dataclass(frozen=True)
 class Input:
-    """One input of a model, with the range it was trained in.
+    """One input of a model, with its training range.
 
     Parameters
     ----------

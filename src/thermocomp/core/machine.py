@@ -128,7 +128,7 @@ class Machine:
     tool : tuple of float
         Vector from the gauge point to the tool tip [mm]; (0, 0, -L) for a tool of length L.
     channels : tuple of Channel
-        Its sensors.
+        Sensors of the machine.
     reference_temperature : float
         Temperature at which the geometry is defined [degC]; 20 according to ISO 1.
 

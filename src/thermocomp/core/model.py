@@ -131,7 +131,7 @@ class ErrorModel(ABC):
 
     @abstractmethod
     def _advance(self, memory: FloatArray, change: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
-        """Return (memory, deviation) `dt` seconds later, the inputs having changed to `change`."""
+        """Return (memory, deviation) `dt` seconds later, after the inputs changed to `change`."""
 
     def _directions(self, memory: FloatArray, change: FloatArray) -> FloatArray:  # noqa: ARG002
         """Return the principal directions in which the structures averaged by the model differ [unit].
@@ -165,7 +165,7 @@ class ErrorModel(ABC):
         return found is not None and max(left) <= found.none_rms
 
     def widening(self, names: Collection[str]) -> float:
-        """Return the factor by which its error on unseen cycles increases without some of its inputs; at least 1."""
+        """Return the factor by which the error on unseen cycles increases without some of the inputs; at least 1."""
         found, key = self.honest_error, ", ".join(i.name for i in self.inputs if i.name in names)
         return 1.0 if found is None or not found.rms else max(1.0, found.lost.get(key, 0.0) / found.rms)
 

@@ -77,7 +77,7 @@ class PositionModel:
 
     @property
     def models(self) -> tuple[ErrorModel, ...]:
-        """The models of time: the offset, if any, then the slopes."""
+        """Models that depend on time only: the offset, if any, then the slopes."""
         return tuple(m for _, m in self._by_power)
 
     def taken(self, by: str | None) -> "PositionModel":

@@ -130,7 +130,7 @@ class HonestError:
 
     @property
     def typical(self) -> float:
-        """RMS of the residual in most unseen cycles: the median over them."""
+        """Median RMS of the residual over the unseen cycles."""
         return median(self.cycles.values()) if self.cycles else self.rms
 
     @property

@@ -82,7 +82,7 @@ class Variable:
 
 @dataclass(frozen=True)
 class TermTable:
-    """Table that evaluates terms for one or many readings.
+    """Evaluator of terms for one or many readings.
 
     Parameters
     ----------

@@ -200,7 +200,7 @@ def find_unit(symbol: str, quantity: str | None = None) -> Unit:
 
 @lru_cache(maxsize=4096)
 def is_unit(symbol: str) -> bool:
-    """Return whether `find_unit` knows a symbol."""
+    """Return whether a symbol is a known unit."""
     name = _name(symbol)
     counted = _COUNT.fullmatch(name)
     return name in _SYMBOLS or (counted is not None and _name(counted[3]) in _SYMBOLS)

@@ -229,7 +229,7 @@ def _status(path: Path) -> os.stat_result | None:
 
 @contextmanager
 def _telling(places: dict[Path, Path]) -> Iterator[None]:
-    """Convert disk errors about drafts to an error that names the file; errors of other files pass."""
+    """Convert disk errors about drafts to an error that names the file; other errors pass unchanged."""
     try:
         yield
     except OSError as e:

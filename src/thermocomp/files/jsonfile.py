@@ -28,7 +28,7 @@ _REPEATED = 60
 
 @dataclass(frozen=True)
 class Format:
-    """A kind of file.
+    """A file format.
 
     Parameters
     ----------

@@ -19,13 +19,13 @@ Marks = NDArray[np.uint32]
 
 #: number of differences in a run
 LENGTH = 20
-#: candidate strides of the long runs [rows]; used is the first at which a run is at most a third of the recording
+#: strides of the long runs [rows]; the first at which a run spans at most a third of the recording is used
 LONG = (60, 12, 6, 4, 2)
 #: number of inputs whose runs are stored
 INPUTS = 4
 #: maximum size of the fingerprints in a model file [byte]; base64 text is a third larger
 BYTES = 14_000
-#: a run whose half has more distinct continuations carries too little information
+#: a run with a half that has more distinct continuations than this carries too little information
 WAYS = 4
 #: a run that recurs within this number of its lengths is periodic
 PERIOD = 5
@@ -122,8 +122,8 @@ def find_rows(samples: Samples, target: int) -> TargetRows:
 def _scale(x: FloatArray) -> _Scale:
     """Return the rounding step for the differences of a channel.
 
-    The step is twice their noise, so that a run has about 24 bits and withstands another rounding of the file; if the
-    resolution of the file is not much finer, it is an odd multiple of it, so that no difference is near a boundary.
+    The step is twice their noise, so that a run has about 24 bits and withstands another rounding of the file. If the
+    resolution of the file is not much finer, the step is an odd multiple of it: no difference is near a boundary then.
     """
     steps = np.abs(np.concatenate([np.diff(x), np.diff(x, 2)]))
     steps = steps[steps > 1e-9 * np.nanmax(np.abs(x), initial=0.0)]

@@ -71,7 +71,7 @@ class Profiles:
     Raises
     ------
     RecordingError
-        Shapes differ, a number is infinite, there are fewer than 3 positions, or positions do not increase or repeat.
+        Shapes differ, a number is infinite, there are fewer than 3 positions, or they are not increasing or not unique.
     InputError
         The unit or axis is invalid, or differs from that of the component.
     """
@@ -248,7 +248,7 @@ class Profiles:
         Raises
         ------
         InputError
-            There is nothing to fit, or there are no more positions than factors.
+            There is nothing to fit, or the number of positions does not exceed the number of factors.
         """
         powers = tuple(range(0 if offset else 1, order + 1))
         n_positions = len(np.unique(self.position[self.position != reference_position])) + offset

@@ -1,4 +1,4 @@
-"""Stacking of recordings to samples, with the zero of each recording."""
+"""Stacking of recordings into samples, with the zero of each recording."""
 
 from collections.abc import Sequence
 from typing import NamedTuple

@@ -119,7 +119,7 @@ def bridge_files(start: Start, recording: Recording) -> tuple[Start, FloatArray]
     start : Start
         Start with known gaps.
     begins : ndarray of shape (n_earlier + 1,)
-        Start of each earlier file and of the recording itself, since the first of them [s].
+        Start time of each earlier file and of the recording itself, relative to the first file [s].
 
     Raises
     ------

@@ -29,7 +29,7 @@ class _Fits:
     shifts : ndarray of shape (n_shifts,)
         [s]; positive: the channel lags the spindle.
     gain : ndarray of shape (n_shifts, n_channels)
-        Gain in log-likelihood over no shift.
+        Gain in log-likelihood relative to no shift.
     """
 
     shifts: FloatArray

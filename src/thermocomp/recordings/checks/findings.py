@@ -57,7 +57,7 @@ class Signal:
     values : ndarray of shape (n_rows,)
         Values in the unit of the channel.
     good : ndarray of bool of shape (n_rows,)
-        Rows with a finite, plausible number that is no error code; later also without spikes and stuck values.
+        Rows with a finite, plausible number that is not an error code; later also without spikes and stuck values.
     probed : bool
         The channel is measured in probing cycles only, together with others.
     """

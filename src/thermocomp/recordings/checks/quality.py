@@ -62,7 +62,7 @@ def check(recording: Recording) -> tuple[Finding, ...]:
         found.append(Finding("trouble", "", "compensation", UNKNOWN))
     found += [*_sampling(time), *_no_cycle(recording), *_duplicates(recording)]
     speed = None
-    if recording.speed is not None:  # larger values are no speeds, and their squares would overflow
+    if recording.speed is not None:  # larger values are not speeds, and their squares would overflow
         speed = np.clip(np.nan_to_num(recording.table[recording.speed.name].to_numpy(dtype=np.float64)), -1e9, 1e9)
     moved = speed_changes(speed, len(time))
     probed = _probed(recording)

@@ -164,9 +164,9 @@ def _half_span_time(signal: Signal, time: FloatArray) -> float | None:
 def zeros(signals: Sequence[Signal], time: FloatArray) -> Iterator[Finding]:
     """Yield findings on displacements and tilts with an offset at the start: continued recording, or probe not zeroed.
 
-    The start is the value nearest to 0 of the first value and the median of the first three. It is far if over 2 um or
-    2 urad, over 5 % of the span and over 6 times the noise. This is a warning: the numbers are valid, but models are
-    relative to zero.
+    The start is the value nearest to 0 of the first value and the median of the first three. It is reported if it
+    exceeds 2 um or 2 urad, 5 % of the span and 6 times the noise. This is a warning: the numbers are valid, but models
+    are relative to zero.
 
     Parameters
     ----------

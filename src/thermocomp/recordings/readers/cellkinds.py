@@ -1,4 +1,4 @@
-"""Contents of the cells of a column, regardless of its heading: numbers, dates, times of day, or both in one."""
+"""Contents of the cells of a column, regardless of its heading: numbers, dates, times of day, or timestamps."""
 
 import re
 from collections.abc import Callable, Sequence
@@ -24,7 +24,7 @@ _WEEKDAY = re.compile(r"^[^\W\d_]{2,10}\.?,? +(?=\d{1,4}[-./]|\d{1,2}\.? +[^\W\d
 _COMPACT = re.compile(r"(?:19|20)\d\d(?:0[1-9]|1[0-2])(?:0[1-9]|[12]\d|3[01])")
 
 #: ``compact``: dates of digits only, which may be numbers
-#: ``passed``: hours beyond a day, or days before them; ``other``: words; empty: nothing
+#: ``passed``: elapsed times of over 24 h or with days; ``other``: words; empty: no contents
 Kind = Literal["number", "compact", "date", "clock", "passed", "stamp", "other", ""]
 #: kind of contents of the column with a given number
 Kinds = Callable[[int], Kind]

@@ -289,7 +289,7 @@ def _mapped(mapping: Mapping) -> set[Place]:
 
 
 def _refuse_twins(headings: Sequence[str], mapping: Mapping, source: str, time: str = "") -> None:
-    """Reject columns with equal headings, unless it is the time column or the mapping names them by number."""
+    """Reject columns with equal headings, except the time column and columns that the mapping names by number."""
     numbered = {*_mapped(mapping), mapping.time.column, mapping.time.date}
     places: dict[str, list[int]] = {}
     for k, heading in enumerate(headings, start=1):

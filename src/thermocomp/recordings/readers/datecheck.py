@@ -1,4 +1,4 @@
-"""Dates in a file that were not used for the times of the rows."""
+"""Check of the times of the rows against dates in the file that were not used."""
 
 import re
 from collections.abc import Sequence
@@ -55,7 +55,7 @@ def holds_own_date(table: FileTable, number: int) -> bool:
 
 
 def check_dates(time: FloatArray, file: FileCells, others: Sequence[int] = ()) -> tuple[str, ...]:
-    """Refuse times without a date that are inconsistent with the dates of another column.
+    """Reject times without a date that are inconsistent with the dates of another column.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def _quoted(place: str | int) -> str:
 
 
 def _find_contradiction(time: FloatArray, cells: "pd.Series[Any]", clock: float | None) -> int | None:
-    """Return the first row whose date no time of day of the first row explains; None if there is none."""
+    """Return the first row whose date contradicts every possible time of day of the first row; None if none does."""
     there = np.flatnonzero(cells.notna())
     texts = plain_dates(cells.iloc[there])
     if texts.nunique() < 2:
@@ -163,7 +163,7 @@ def _usual(t: FloatArray) -> float:
 
 
 def _runs_on(days: IntArray, t: FloatArray) -> bool:
-    """Return whether there is no pause where the date changes: times that start at zero may be elapsed times."""
+    """Return whether no pause coincides with a change of date: times that start at zero may then be elapsed times."""
     return bool((np.diff(t)[np.diff(days) != 0] <= 2 * _usual(t)).all())
 
 

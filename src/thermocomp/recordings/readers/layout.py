@@ -40,7 +40,7 @@ _STATISTICS = split_words(
 
 
 class FileLayout(NamedTuple):
-    """Rows of a file, counted from 0 in the rows given."""
+    """Row indices (0-based) in the rows examined."""
 
     heading: int  #: row of the headings
     units: int  #: row of the units; same as `heading` if there is none

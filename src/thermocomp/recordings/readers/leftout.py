@@ -1,4 +1,4 @@
-"""Columns that are left out, and those that must not be: missing information in their headings."""
+"""Columns that are left out, and the information missing in their headings."""
 
 from collections.abc import Sequence
 from difflib import get_close_matches

@@ -285,7 +285,7 @@ class _Dialogue:
         self.decided: list[tuple[Question, Remedy | None]] = []
 
     def ask(self, question: Question) -> bool:
-        """Have a question decided, once; return whether the mapping has new entries."""
+        """Have a question decided, each question only once; return whether the mapping has new entries."""
         if any(q.text == question.text and q.options == question.options for q, _ in self.decided):
             return False
         answer = self.decide(question)

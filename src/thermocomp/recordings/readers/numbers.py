@@ -48,7 +48,7 @@ class Notation(NamedTuple):
 class Signs:
     """Evidence from the cells of a file for its decimal sign.
 
-    A sign after a zero or after more than three digits, or followed by other than three digits, is a decimal sign; a
+    A sign after a zero or more than three digits, or before a number of digits other than three, is a decimal sign; a
     sign that occurs twice is a thousands separator. ``1,234`` alone is ambiguous.
     """
 

@@ -269,7 +269,7 @@ def _as_written(name: str, *, as_text: bool) -> str:
 
 
 def _zeroed(rows: Rows, columns: ColumnPlan) -> Rows:
-    """Set the zero of columns relative to their first value again if the first rows were removed."""
+    """Re-zero columns that are relative to their first value if the first rows were removed."""
     table = rows.table
     for name in (c.channel.name for c in columns.columns if c.rule.zero == "first"):
         x = table[name].to_numpy(dtype=np.float64)
