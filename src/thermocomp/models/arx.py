@@ -81,7 +81,7 @@ class ARX(ClockedRegressor):
     orders_ : tuple of Order
         Table of FPE, AIC and BIC at `interval_`; empty with ``"free-run"``.
     trials_ : tuple of TriedSetting
-        Settings assessed in free run on left-out cycles; may be empty.
+        Settings assessed in free run on left-out cycles; empty if there was no choice.
     cv_rms_ : float
         RMS of the chosen setting; nan if none was assessed.
     chosen_by_ : str

@@ -37,7 +37,7 @@ class _Net:
     def ticked(self, run: TickedRun) -> FloatArray:
         """Run freely from a cold start; return the deviation at each tick."""
         k, n = self.k, len(run.drive)
-        own = np.zeros(n + k)  # k ticks of rest in front
+        own = np.zeros(n + k)  # preceded by k ticks at rest
         driven = ticks.regressors(np.empty(0), run.drive, np.arange(n), 0, self.m, run.drive)
         row = np.empty(k + driven.shape[1])
         for t in range(1, n):
@@ -211,7 +211,7 @@ class NetARX(ClockedRegressor):
         self._orders(self.m, 0, "m")
         if self.k is not None and self.m is not None:
             return self.k, self.m
-        with config_context(enable_metadata_routing=False):  # the steps were checked
+        with config_context(enable_metadata_routing=False):  # the steps were already checked
             linear = ARX(interval=self.interval, k=self.k, m=self.m, time="routed").fit(inputs, y, dt=step, cycle=cycle)
         return linear.k_, linear.m_
 

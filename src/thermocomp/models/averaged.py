@@ -78,8 +78,8 @@ class AveragedDynamic(TimedRegressor):
     chosen_by_ : str
         Kind of units that were left out.
     left_out_ : ndarray of shape (n_rows, 2)
-        For each training row: prediction by structures that were fitted without its cycle, and their spread [unit of
-        y]; nan elsewhere.
+        Prediction for each training row by structures fitted without its cycle, and their spread [unit of y]; nan
+        elsewhere.
     gain_ : ndarray of shape (n_inputs,)
         Sensitivity of y to each temperature within one step between rows, in absolute value [unit of y per degC]; 0
         for a speed.
@@ -162,7 +162,7 @@ class AveragedDynamic(TimedRegressor):
     def lay_out(
         self, rows: FloatArray, step: FloatArray, folds: IntArray, speeds: Sequence[int]
     ) -> tuple[PacedFeatures, IntArray, str]:
-        """Return the features that the rows can determine, and the parts of the rows to leave out together.
+        """Return the features identifiable from the rows, and the parts of the rows to leave out together.
 
         Parameters
         ----------

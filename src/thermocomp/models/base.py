@@ -51,7 +51,7 @@ class ThermalRegressor(RegressorMixin, BaseEstimator, ABC):
             One per feature. Default: created from the training data, with the names of the features, no unit, reference
             0 and the trained range.
         support : Support
-            Behaviour of the model outside its training range.
+            Behaviour of the model outside its trained range.
         provenance : Provenance, optional
             Origin of the model.
 

@@ -21,7 +21,7 @@ IntArray = NDArray[np.intp]
 SHARE = 0.95
 #: a speed this close to a trained one counts as known, relative to the span of the trained speeds and standstill
 NEAR = 0.1
-#: maximum of numbers in all points together: adds less than 8 KB to the model file
+#: maximum count of numbers in all points together: adds less than 8 KB to the model file
 NUMBERS = 360
 #: maximum number of inputs compared, those with the largest changes first
 COLUMNS = 40
@@ -92,7 +92,7 @@ def _calibrated(states: FloatArray, cycle: IntArray, n_points: int) -> float:
 
 
 def _points(states: FloatArray, n_points: int) -> FloatArray:
-    """Return states that cover all: the one nearest to the mean, then repeatedly the one farthest from the others."""
+    """Return states that cover all: the one nearest to the mean, then always the one farthest from those chosen."""
     pool = _thinned(states)
     taken = [int(np.argmin(((pool - pool.mean(axis=0)) ** 2).sum(axis=1)))]
     far = _nearest(pool, pool[taken])

@@ -105,7 +105,7 @@ class NetRegressor(MemorylessRegressor):
         return change, deviation.reshape(len(deviation), -1)
 
     def _keep(self, net: Perceptron, into: Affine, out_of: Affine, X: FloatArray, y: FloatArray, n_rows: int) -> None:
-        """Store the net and its relation to the `n_rows` training patterns from X and y."""
+        """Store the net, with a comparison of its size and the `n_rows` training patterns from X and y."""
         self.net_, self.input_scaling_, self.output_scaling_ = net, into, out_of
         self.n_parameters_, self.n_patterns_ = net.n_parameters, n_rows
         residual = y - out_of(net.evaluate(into(X)))

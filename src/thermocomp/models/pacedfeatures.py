@@ -60,7 +60,7 @@ class PacedFeatures:
         stopped: Sequence[float],
         running: Sequence[float],
     ) -> "PacedFeatures":
-        """Return the features that the rows can determine.
+        """Return the features identifiable from the rows.
 
         Parameters
         ----------

@@ -12,8 +12,8 @@ class PartialF(StepwiseRegressor):
     The temperature with the greatest partial F enters if its F is at least `f_enter`; then the temperatures in the
     model are tested again, and the worst is deleted while its F is below `f_delete`; this is repeated until none enters
     or leaves. If no temperature enters, the model is the mean (zero without intercept) and `selected_` is empty. A
-    temperature of which the model leaves less than 1e-8 of its norm does not enter. Raises `InputError` unless
-    ``f_enter >= f_delete >= 0``.
+    temperature whose remainder outside the span of the model is below 1e-8 of its norm does not enter. Raises
+    `InputError` unless ``f_enter >= f_delete >= 0``.
 
     Parameters
     ----------

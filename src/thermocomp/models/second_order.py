@@ -18,9 +18,9 @@ class SecondOrderRegression(StepwiseRegressor):
     The form is ``A1' dT + dT' A2 dT`` without constant (Chen 1996, Eq. 4; C-09), with variables that are inputs or
     differences of inputs (C-12). SYSTAT's stepwise rule selects among its n + n(n+1)/2 terms (C-10): one action per
     step, removal before entry, by default with alpha-to-enter .001 and alpha-to-remove .015 (C-15). The significances
-    treat the rows as independent, which the rows of a time series are not: see `n_effective_` (E-C12). A term of which
-    the model leaves less than 1e-8 of its norm does not enter. Invalid significance levels and unknown variables raise
-    `InputError`.
+    treat the rows as independent, which the rows of a time series are not: see `n_effective_` (E-C12). A term whose
+    remainder outside the span of the model is below 1e-8 of its norm does not enter. Invalid significance levels and
+    unknown variables raise `InputError`.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ def scaling(X: FloatArray, *, centred: bool = True) -> tuple[FloatArray, FloatAr
     -------
     centre : ndarray of shape (n_features,)
     scale : ndarray of shape (n_features,)
-        inf for a constant column, which division by it makes ineffective.
+        inf for a constant column, so that it has no effect after the division.
     """
     centre = X.mean(axis=0) if centred else np.zeros(X.shape[1])
     scale = np.sqrt(np.mean((X - centre) ** 2, axis=0))

@@ -23,7 +23,7 @@ from thermocomp.models.numerics.ticks import check_steps as checked_steps
 
 Time = Literal["column", "routed", "none"]
 
-#: a step this many times the usual step is not a logger delay: rows are missing
+#: a step longer than this many usual steps means missing rows, not a pause of the logger
 GAP = 10.0
 #: a time column that ends before this cannot be the time [s] of a thermal test: it was scaled, or is in hours
 LEAST = 60.0

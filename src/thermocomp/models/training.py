@@ -1,4 +1,4 @@
-"""Training of a method on the training rows."""
+"""Training of a method on selected rows."""
 
 import time
 from collections.abc import Sequence

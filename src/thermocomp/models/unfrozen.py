@@ -37,7 +37,8 @@ class UnfrozenRegressor(StaticRegressor):
         inputs : sequence of Input, optional
             One per feature; see `thermocomp.models.base.ThermalRegressor.freeze`.
         rows : ndarray of shape (n_rows, n_features), optional
-            Inputs minus their reference that will be predicted later; predicting them in advance is much faster.
+            Inputs minus their reference for which predictions will be required; computing these in advance is much
+            faster.
         **header
             As in `thermocomp.models.base.ThermalRegressor.freeze`.
 

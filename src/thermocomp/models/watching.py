@@ -30,7 +30,7 @@ SAFETY = 1.5
 FASTEST = 2.0
 #: lower bounds of the limits: deviation, change within a minute, movement while stuck, in addition to resolution [degC]
 OFF, JUMP, MOVED = 1.0, 0.8, 0.5
-#: a reading constant for this time is stuck, if none in the recording was constant for this part of it [s; -]
+#: a reading constant for this time is stuck, unless one in the recording was constant for this fraction of it [s; -]
 STILL, STILL_PART = 1200.0, 1 / 3
 #: minimum time over which a jump is measured [s]
 PACE = 60.0
@@ -130,14 +130,14 @@ def _limits(
         "off": max(OFF, wider * float(np.nanmax(np.abs(off), initial=0.0))),
         "jump": max(JUMP, FASTEST * _jump(change, samples.time, folds, pace)),
         "moved": max(MOVED + _resolution(values), SAFETY * moved),
-        # a sensor with coarse resolution may be constant for days on a machine at rest: time indicates nothing
+        # a sensor with coarse resolution may be constant for days on a machine at rest: the duration is no criterion
         "still": STILL if still <= STILL_PART * STILL else GAP,
         "unseen": float(np.sqrt(np.nanmean(off**2))) if np.isfinite(off).any() else 0.0,
     }
 
 
 def _covered(speed: FloatArray, folds: IntArray, test: IntArray) -> BoolArray:
-    """Return a mask of rows with speeds covered by the other cycles: until a test exceeds the maximum of these."""
+    """Return a mask of the rows up to which a test does not exceed the speeds of the other cycles."""
     found = np.ones(len(speed), dtype=np.bool_)
     for k in range(int(folds.max()) + 1):
         others = (folds >= 0) & (folds != k)

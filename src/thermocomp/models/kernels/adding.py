@@ -47,7 +47,7 @@ def left_by(
 ) -> None:
     """Recompute the products of all columns after projecting out the first `n` of `chosen`, scaled to norm 1.
 
-    A column without a remainder receives products that make it useless.
+    A column without a remainder gets products that prevent its selection.
     """
     p = columns.shape[0] - 1
     some = np.empty((n + p + 1, columns.shape[1]))

@@ -167,7 +167,7 @@ def train(  # noqa: PLR0912, PLR0915 - a single function is a sixth faster
                     net += second[k, j] * hidden[j]
                 out[k] = net
             sigmoid(out)
-            # backward: delta and slope are minus the rate times the derivatives by each NET
+            # backward: delta and slope are minus the rate times the derivatives with respect to NET
             for k in range(n_outputs):
                 error = targets[pattern, k] - out[k]
                 loss += error * error

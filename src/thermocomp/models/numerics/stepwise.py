@@ -27,7 +27,7 @@ _SAME = 1e-10  # gains closer than this count as equal, and the first candidate 
 
 
 class Rule(Protocol):
-    """Rule for entering and deleting terms, as partial F."""
+    """Rule for entry and deletion of terms by partial F."""
 
     def enter_f(self, df: int) -> float:
         """Return the smallest F for a term to enter; `df`: residual degrees of freedom with the term included."""
@@ -215,9 +215,9 @@ def stepwise(
     candidate with the greatest F enters if it reaches the threshold; otherwise the selection ends (T-04 to T-06). After
     each entry, the terms in the model are thus tested again until all stay.
 
-    Candidates that are constant, or of which the model leaves less than `tolerance` of their norm, do not enter. No
-    candidate enters once the residual is reduced to rounding or no degree of freedom would remain, so there may be more
-    candidates than rows.
+    Candidates that are constant, or whose remainder outside the span of the model is below `tolerance` times their
+    norm, do not enter. No candidate enters once the residual is reduced to rounding or no degree of freedom would
+    remain, so there may be more candidates than rows.
 
     Parameters
     ----------
@@ -299,7 +299,7 @@ class _Tableau:
         return self._free - len(self.active)
 
     def best(self, barred: Sequence[int] | None) -> tuple[int, float] | None:
-        """Return the candidate with the greatest F, and that F; `None` if no candidate may enter."""
+        """Return the candidate with the greatest F, and its F value; `None` if no candidate may enter."""
         if not self.sse > self._least[-1]:
             return None
         rest = self._rows[len(self.active) :]
@@ -317,7 +317,7 @@ class _Tableau:
         return index, _ratio(float(gain[index]), max(self.sse - float(gain[index]), 0.0), self.df - 1)
 
     def worst(self, held: set[int] | None) -> tuple[int, float] | None:
-        """Return the term of the model with the smallest F, and that F; `None` if no term may leave."""
+        """Return the term of the model with the smallest F, and its F value; `None` if no term may leave."""
         k = len(self.active)
         if k == 0:
             return None

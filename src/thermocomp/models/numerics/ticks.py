@@ -15,7 +15,7 @@ IntArray = NDArray[np.intp]
 
 #: a displacement between two rows is interpolated if their distance is at most this many usual steps
 NEAR = 1.5
-#: a recording with more ticks than this is rejected: the interval must be a typing error
+#: a recording with more ticks than this is rejected: the interval is probably a typing error
 MOST_TICKS = 50_000_000
 
 

@@ -16,7 +16,7 @@ from thermocomp.core.exceptions import InputError
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-_DECIMALS = 12  # decimals of psi differences that are compared; further digits are rounding
+_DECIMALS = 12  # decimals of psi differences that are compared; further digits are rounding errors
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +173,7 @@ def signed_rank_p(differences: FloatArray) -> FloatArray:
     """
     rounded = np.round(differences, _DECIMALS)
     size, zero = np.abs(rounded), rounded == 0
-    # zeros have the lowest ranks and are subtracted from the other ranks; ranks are doubled because of half ranks
+    # zeros have the lowest ranks, so their number is subtracted from the other ranks; doubled because of half ranks
     ranks = 2 * np.asarray(rankdata(size, axis=1)) - 2 * zero.sum(axis=1, keepdims=True)
     doubled = np.where(zero, 0, np.rint(ranks)).astype(np.intp)
     positive = (doubled * (rounded > 0)).sum(axis=1)

@@ -31,7 +31,7 @@ def group(correlation: FloatArray, threshold: float, *, absolute: bool = False) 
 
     - above the threshold for both seeds: the larger correlation decides (E-H3); if equal, the first seed;
     - seeds whose own correlation is above the threshold: then all remaining pairs are, and all remaining variables form
-      one group. (Two groups as close as that would contradict the threshold, and no threshold would give one group.)
+      one group. (Two groups as close as these would contradict the threshold, and no threshold would yield one group.)
     - one remaining variable: a separate group;
     - several pairs with the smallest correlation: the first by the lower index, then by the higher.
 

@@ -105,7 +105,7 @@ def maximal_correlations(
     jobs : int
         Number of threads; -1 for all cores.
     share : callable, optional
-        Distributes the work instead of threads.
+        Function that distributes the work, instead of threads.
     progress : callable
         Called with a line of text after each displacement of each test.
 

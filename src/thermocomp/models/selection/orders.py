@@ -37,7 +37,7 @@ class Order:
         Largest modulus of the roots of the polynomial in dz; with 1 or more, the free run diverges. inf if the
         coefficients are undetermined because the columns are dependent.
     admissible : bool
-        Whether the free run decays, and fast enough.
+        Whether the free run decays fast enough.
     """
 
     k: int

@@ -17,7 +17,7 @@ _STRUCTURES = 30
 
 @dataclass(frozen=True, eq=False)
 class SensorSets:
-    """One set of temperatures for each number of them, for several targets at once.
+    """One set of temperatures for each set size, for several targets at once.
 
     Parameters
     ----------
@@ -39,12 +39,12 @@ class SensorSets:
 
 @dataclass(frozen=True, eq=False)
 class StandIns:
-    """Substitutes of temperatures; a kept one is predicted from the other kept ones, as if its sensor had failed.
+    """Substitutes for temperatures; a kept one is predicted from the other kept ones, as if its sensor had failed.
 
     Parameters
     ----------
     single : tuple of int
-        Best single substitute of each temperature; the temperature itself if there is no other.
+        Best single substitute for each temperature; the temperature itself if there is no other.
     single_residual : ndarray of shape (n_temperatures,)
         Root mean square residual of each temperature with this substitute [degC]; inf if there is no other.
     weights : ndarray of shape (n_temperatures, n_temperatures)
@@ -92,9 +92,9 @@ class StandInAnswer:
         return _root((lost * (self.gram @ lost)).sum(axis=0))
 
     def stand_ins(self, kept: Sequence[int]) -> StandIns:
-        """Return the substitutes of each temperature: by a single other sensor, and by the kept sensors."""
+        """Return the substitutes for each temperature: by a single other sensor, and by the kept sensors."""
         gram, everything = self.temperatures, range(self.copies.shape[1])
-        pairs = np.full(gram.shape, np.inf)  # residual of one with another
+        pairs = np.full(gram.shape, np.inf)  # residual of one predicted by another
         for k in everything:
             others = [j for j in everything if j != k]
             pairs[others, k] = _left(gram, make_up(gram, [k], self.noise))[others]

@@ -243,10 +243,10 @@ class Adding(Search):
 
 
 def _promising(problem: Problem, sizes: int) -> list[int]:
-    """Return the columns in the order of forward selection, for good sets early, but nearly coinciding columns first.
+    """Return the columns in the order of forward selection, to find good sets early, but nearly equal columns first.
 
-    Of two nearly coinciding columns, the second has almost no remainder once the first is in the set; this must not
-    occur among the last two columns, which enter in closed form.
+    Of two nearly equal columns, the second has almost no remainder once the first is in the set; this must not occur
+    among the last two columns, which enter in closed form.
     """
     rest = problem.triangle[:, :-1].copy()
     y = problem.triangle[:, -1].copy()
