@@ -33,8 +33,8 @@ MEMORY = 5.0
 #: two probings confirm each other if they agree within this many standard deviations and are at least this far apart in
 #: time [s]
 AGREED, APART = 5.0, 600.0
-#: two probings that confirm each other show that the machine differs from the validation of the model: from then on,
-#: their error counts as this many standard deviations of the offset
+#: two probings that confirm each other show that the machine behaves differently than in the validation of the model:
+#: from then on, their error counts as this many standard deviations of the offset
 UNLIKE = 3.0
 #: upper bounds of a model's error, as multiples of its error on left-out cycles and of the drift without compensation
 #: (both root mean squares)
@@ -103,7 +103,7 @@ class Adaptation(NamedTuple):
     def narrowing(self, time: FloatArray | float, directions: FloatArray, floor: float) -> FloatArray:
         """Return the factor on the half-width of an uncertainty band; `floor` is the floor of the band [um].
 
-        It exceeds 1 if probings have shown that the machine differs from the validation data of the band.
+        It exceeds 1 if probings have shown that the machine behaves differently than in the validation of the band.
         """
         _, covariance = self.at(time)
         weights = _beside(directions, floor / self.size)
@@ -198,7 +198,7 @@ def take(
     typical, noise, doubt = (known * before.usual + own) ** 0.5, own, (np.nan, -np.inf)
     alike = abs(error - before.refused) <= AGREED * (2 * own) ** 0.5
     since = before.refused_since if alike else time
-    if alike and time - since < APART:  # possibly with the same chip
+    if alike and time - since < APART:  # possibly the same chip as before
         return before, f"as suspect as the one before: measure again {APART / 60:.0f} min or more after that"
     plausible = abs(surprise) <= IMPLAUSIBLE * typical
     if alike and not plausible:  # confirmed
@@ -208,7 +208,7 @@ def take(
         limit = f"{IMPLAUSIBLE * typical:.1f} um are plausible"
         why = f"{surprise:+.1f} um from what is expected, where {limit}: measure again after {APART / 60:.0f} min"
         return before._replace(refused=error, refused_since=since), why
-    elif not alike and abs(surprise) > SUSPECT * typical:  # as from a bad probe
+    elif not alike and abs(surprise) > SUSPECT * typical:  # possibly a bad probing
         noise, doubt = own + (known + own) * ((surprise / SUSPECT / typical) ** 2 - 1.0), (error, since)
     usual = before.usual + (min(surprise**2 / (known + own), SUSPECT**2) - before.usual) / MEMORY
     usual = max(usual, LEAST_USUAL**2)

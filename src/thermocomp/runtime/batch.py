@@ -1,7 +1,7 @@
 """The compensator for all readings of a test at once, as used to judge a replay.
 
 Same gate, models and limits as `Compensator.step`, without the cost of a call per reading; a test checks that they
-agree. Readings arrive at the time of measurement: none is stale, and the clock is their time.
+agree. Each reading arrives at its time of measurement, which is also the time of the clock, so none is stale.
 """
 
 import math
@@ -29,7 +29,7 @@ class ModelRun(NamedTuple):
     compensated: FloatArray  #: (n_rows,), minus the correction in force: the part removed from the deviation
     outside: BoolArray  #: (n_rows,), whether an input of the model alone was outside the trained range
     rejected: BoolArray  #: (n_rows,), complete readings that the gate rejected
-    why: str  #: reason of the first rejection; empty if there is none
+    why: str  #: reason for the first rejection; empty if there is none
     half_width: FloatArray  #: (n_rows,), of the band about `deviation`; nan without a band, and after a re-zero
     shift: FloatArray  #: (n_rows,), change due to probings, contained in `compensated`
     without: FloatArray  #: (n_rows,), `compensated` without probings
@@ -64,12 +64,12 @@ def run(
     reference : array-like of shape (n_inputs,), optional
         Zero of the inputs; see `ErrorModel.init`.
     resting : ndarray of bool of shape (n_rows,), optional
-        Whether the spindle is known to be stopped; default: nowhere.
+        Whether the spindle is known to be stopped; default: never.
     anew : int, optional
         Row of a re-zero: from there, the deviation is the model output minus its mean over the rows of the new zero,
         and the correction restarts at zero.
     undriven : ndarray of bool of shape (n_rows,), optional
-        Rows without a drive of the correction because essential sensors failed: it is held, then fades out.
+        Rows in which the correction is not driven because essential sensors failed: it is held, then fades.
     probed : ndarray of shape (n_rows,), optional
         Deviation measured by a probing, nan elsewhere; it takes effect from the next row onwards [um].
     repeatability : float
@@ -164,7 +164,7 @@ class _Gate(NamedTuple):
     passed: BoolArray  #: (n_rows,)
     zero: FloatArray  #: (n_inputs,)
     known: int  #: row from which the zero is known and the correction starts to move
-    why: str  #: reason for the first complete reading that did not pass
+    why: str  #: reason why the first rejected complete reading did not pass
     window: list[int]  #: rows of the zero
 
 

@@ -1,4 +1,4 @@
-"""The failure that explains the residuals of readings: failure of one sensor, or two swapped sensors."""
+"""Isolation of sensor faults: the failure of one sensor, or the swap of two, that best explains the residuals."""
 
 from typing import NamedTuple
 
@@ -11,9 +11,9 @@ from thermocomp.core.watch import Watch
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-#: time constant of the usual difference [s]
+#: time constant of the low-passed difference of reading and prediction [s]
 USUAL = 1800.0
-#: swapping is excluded once it has left this much more than no swap, per sensor, in units of the unseen errors
+#: a swap is excluded once it has increased the mean square residual by this much, in units of the unseen errors
 AGAINST = 0.1
 
 

@@ -60,7 +60,7 @@ class Compensator:
         Lines by target or axis.
     limits : Limits
     watching : bool
-        True: allowed even if none of its targets may run, to observe their predictions.
+        True: permit creation even if none of its targets may run, to observe their predictions.
 
     Raises
     ------
@@ -125,7 +125,7 @@ class Compensator:
             the controller; if the thermal part is not a straight line, it is replaced by the best line over the travel.
         limits : Limits
         watching : bool
-            True: allowed even if none of the targets may run.
+            True: permit creation even if none of the targets may run.
 
         Raises
         ------
@@ -206,7 +206,7 @@ class Compensator:
         )
 
     def share(self, models: Sequence[State], state: CompensatorState) -> CompensatorState:
-        """Return a state with the given model states, with equal parts of several model states as shared objects."""
+        """Return a state with the given model states, sharing objects that are equal in several of them."""
         found = list(models)
         for group in self.groups:
             for k, own in zip(group.members, group.share([found[k] for k in group.members]), strict=True):
@@ -218,10 +218,10 @@ class Compensator:
 
         A temperature is plausible within its trained range widened on either side by the span of that range. For the
         first readings, which determine the zero, the median of the temperatures must lie within `DAY` of the zero of
-        the training, and the offset of each temperature from the others may differ from that in the training by its
-        trained span, but at least by `MIN_SPAN`. Quantities without physical bounds (a displacement, a dimensionless
-        number) may take values in their trained range widened by `WIDE` times its width. The constants are defined in
-        `thermocomp.runtime.gate`.
+        the training, and the offset of each temperature from the others may differ from that in the training by at most
+        its trained span or `MIN_SPAN`, whichever is greater. Quantities without physical bounds (a displacement, a
+        dimensionless number) may take values in their trained range widened by `WIDE` times its width. The constants
+        are defined in `thermocomp.runtime.gate`.
 
         Parameters
         ----------

@@ -1,7 +1,7 @@
 """One step for many machines: machines of one kind, each with its own zero, memory and correction.
 
 For machines that share a linear model with lags (`LinearDynamic`): the same gate for each value, model and limits as in
-`Compensator.step`, as array operations over all machines at once. Tasks for individual machines (zeros, orders,
+`Compensator.step`, as array operations over all machines at once. Tasks for individual machines (zeros, commands,
 restarts, sensor faults, probings) are not included; use a `Compensator` for these.
 """
 

@@ -175,5 +175,5 @@ def is_number(value: object) -> bool:
         return False
     try:
         return math.isfinite(float(value))
-    except OverflowError:  # an integer of 400 digits
+    except OverflowError:  # such as an integer with 400 digits
         return False

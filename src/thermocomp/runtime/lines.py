@@ -116,6 +116,6 @@ def evaluate(
 
 
 def _mean_square(line: DeviationLine, models: Sequence[ErrorModel], name: str) -> float:
-    """Return a root mean square of the line over cycles unseen by its models [um]."""
+    """Return the RMS value `name` of the line over cycles unseen by its models [um]."""
     errors = np.diag([0.0 if m.honest_error is None else getattr(m.honest_error, name) for m in models])
     return math.hypot(*(line.deviation(one).offset for one in errors.tolist()))

@@ -82,7 +82,7 @@ def rezero(
     time : float
         Time on the scale of the readings' stamps [s].
     why : str
-        Reason for the log, such as ``homing`` or ``work offset, by M. Weber``.
+        Reason for the ledger, such as ``homing`` or ``work offset, by M. Weber``.
     in_force : Correction, optional
         Present correction as reported by the controller. Default: the last one.
 

@@ -13,7 +13,7 @@ from thermocomp.runtime.watch import WatchState
 
 Word = Literal["active", "holding", "fading", "suspended", "shadow", "restarting"]
 
-#: a state older than this is discarded except for the corrections in force [s]
+#: maximum age of a state to be resumed; of an older one, only the corrections in force are kept [s]
 FORGOTTEN = 24 * 3600.0
 
 
@@ -47,7 +47,7 @@ class CompensatorState(NamedTuple):
     origin: float  #: amount by which the clock of the readings was set; nan: unknown, after a restart [s]
     gathered: tuple[Gathered, ...]  #: readings averaged for the zero, one per model; empty once it is known
     watches: tuple[WatchState, ...]  #: of the temperatures
-    idle: dict[str, float]  #: time without a drive by a model, per target or axis; absent: driven [s]
+    idle: dict[str, float]  #: time for which no model has driven a target or axis; absent: driven [s]
     learned: dict[str, Adaptation]  #: adaptations by probings, by target or axis
     references: dict[str, Reference]  #: zero of each target or axis; absent: still being averaged
     raw: dict[str, Deviation]  #: last output of the models, by target or axis

@@ -161,7 +161,7 @@ def _made_up(watch: Watch, values: FloatArray) -> FloatArray:
     Possible readings are those that the gate of the compensator accepts at a start.
     """
     zero, (low, _, width) = np.array([watch.inputs[s.input].reference for s in watch.sensors]), watch.ranges
-    zero = zero + np.where([watch.inputs[s.input].rezero for s in watch.sensors], 0.0, low)  # absolute: no zero
+    zero = zero + np.where([watch.inputs[s.input].rezero for s in watch.sensors], 0.0, low)  # absolute inputs: no zero
     span = np.maximum(width, MIN_SPAN)
     least, most = PLAUSIBLE["temperature"]
     with np.errstate(all="ignore"):

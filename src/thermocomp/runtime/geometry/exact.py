@@ -60,7 +60,7 @@ def error(machine: Machine, values: FloatArray, points: FloatArray, tool: ArrayL
 
 
 def _moved(machine: Machine, name: str, values: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the travel along an axis, and the additional effect of its non-square guide and its translations [mm]."""
+    """Return the travel along an axis, and the additional effect of its squareness and translational errors [mm]."""
     position = points[..., "XYZ".index(name)]
     way = position - machine.axis(name).reference_position
     square = np.zeros((*position.shape, 3))

@@ -27,8 +27,8 @@ class ErrorField:
     kinematics : Kinematics
         Machine with its levers.
     uniform : ndarray of shape (32,)
-        Components that are constant over the volume, in the order of `thermocomp.core.components.COMPONENTS` [um,
-        urad]; zero for those in `varying`.
+        Components that are constant over the volume [um, urad], in the order of
+        `thermocomp.core.components.COMPONENTS`; zero for those in `varying`.
     varying : tuple of (int, PositionModel, sequence of float)
         Index of each other component, its model, and the outputs of that model's models of time.
     """
@@ -143,9 +143,8 @@ class ErrorField:
         Notes
         -----
         At the position moved by c, the error is e(P + c), not e(P): c = -e(P + c) with exact transforms, solved by
-        fixed- point iteration. Along a non-existent axis c is zero in each step, and e(P + c) remains. Outside the
-        travel the correction at its end is held: nothing was measured there, and levers and slopes must not be
-        extrapolated.
+        iteration. Along a non-existent axis c is zero in each step, and e(P + c) remains. Outside the travel the
+        correction at its end is held: nothing was measured there, and levers and slopes must not be extrapolated.
         """
         machine = self.kinematics.machine
         places = np.clip(check_finite("positions", points), *self.kinematics.travel)

@@ -182,7 +182,7 @@ def _turning(lever: FloatArray) -> FloatArray:
     return np.asarray(_LEVER * np.cross(np.eye(3), lever))
 
 
-#: effect of each component on the tilt of the tool about X, Y and Z; a squareness shifts a guide without any tilt
+#: effect of each component on the tilt of the tool about X, Y and Z; a squareness turns a guide, not the tool
 _TILT = np.array(
     [
         [float(c.unit == "urad" and c.group != "squareness" and letter in c.code[:2]) for letter in "ABC"]

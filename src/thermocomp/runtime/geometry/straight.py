@@ -171,7 +171,7 @@ def best_lines(
 
 
 def best_line(positions: FloatArray, errors: FloatArray, reference: float) -> Deviation:
-    """Return the least-squares straight line through errors.
+    """Return the least-squares straight line of errors against positions.
 
     Parameters
     ----------
