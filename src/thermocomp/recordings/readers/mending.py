@@ -70,9 +70,9 @@ Decide = Callable[[Question], Remedy | None]
 
 
 def take_best(question: Question) -> Remedy | None:
-    """Select the most likely option only for trouble, and never offset values: that requires the user's knowledge.
+    """Return the most likely option; None for warnings and infos, and where only the user can decide.
 
-    A time unit is not selected either if another one is equally likely.
+    The user decides on steps that shift, offset or exchange values, and on times with several likely interpretations.
     """
     if not question.may_guess:
         return None
