@@ -187,8 +187,8 @@ def as_measured(truth: VolumetricTruth, now: FloatArray, start: FloatArray, poin
     Parameters
     ----------
     truth : VolumetricTruth
-    Observables of the machine at the time of the row, and when the nest was zeroed.
-        The machine at the instant, and when the nest was set to zero.
+    now, start : ndarray of shape (n, n_observables)
+        Observables of the machine at the time of the row, and when the nest was zeroed.
     points : ndarray of shape (n, 3)
         Points [mm].
 

@@ -89,7 +89,7 @@ def polynomial(samples: Samples, names: Sequence[str], degree: int) -> PaperFit:
     samples : Samples
     names : sequence of str
         Names of the temperatures.
-    Highest power; there are no products.
+    degree : int
         Highest power; there are no products.
 
     Returns
