@@ -133,10 +133,10 @@ def run(
     Parameters
     ----------
     machine : VirtualMachine
-    Equipment mounted on the machine.
-        Equipment mounted on it.
-    Programme of the test, with the recorded channels.
-        Programme of the test, and recorded channels.
+    kit : Kit
+        Equipment mounted on the machine.
+    programme : Programme
+        Programme of the test, with the recorded channels.
     weather, noise : numpy.random.Generator
         Generators of the ambient air, and of sensors and probes.
     sensor_noise : float, optional

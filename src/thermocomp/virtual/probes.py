@@ -216,8 +216,8 @@ def swing(along: str, way: FloatArray) -> list[tuple[str, float]]:
     Parameters
     ----------
     along : {'X', 'Y', 'Z'}
-    Lever [mm].
-        [mm]
+    way : ndarray of shape (3,)
+        Lever [mm].
 
     Returns
     -------
