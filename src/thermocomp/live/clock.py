@@ -1,4 +1,4 @@
-"""The clocks of the service."""
+"""Clocks of the service."""
 
 import time
 

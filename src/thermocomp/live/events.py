@@ -1,4 +1,4 @@
-"""Recent events for display; the number of frequent kinds is limited so that they cannot displace the others."""
+"""Recent events for display; kinds that may be frequent are limited in number so that they cannot displace the others."""
 
 import time
 from collections import deque

@@ -61,7 +61,7 @@ class JournalReader:
     Parameters
     ----------
     path : str or Path
-        Path given to the service: all files of the journal are read. Or one of these files, to be read alone.
+        Path given to the service, to read all files of the journal; or one of these files.
 
     Raises
     ------

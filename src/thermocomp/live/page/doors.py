@@ -73,7 +73,7 @@ class Doorkeeper:
         self._wrong = deque[float](maxlen=MOST_WRONG)
 
     def check(self, given: str) -> None:
-        """Return if an order is authorised, or raise.
+        """Raise unless an order is authorised.
 
         Every token is compared: if wrong tokens could lock the page, anyone who can reach it could prevent the operator
         from holding the machine's correction. A token of 16 characters or more cannot be guessed.
@@ -96,7 +96,7 @@ class Doorkeeper:
 
 
 class Door:
-    """ASGI middleware that refuses requests under other host names, from other origins, or too large.
+    """ASGI middleware that refuses requests for other host names, from other origins, or of excessive size.
 
     Parameters
     ----------

@@ -100,7 +100,7 @@ def listen(host: str, port: int) -> socket.socket:
         why = getattr(e, "strerror", None) or e
         do = "choose another host in [page]" if isinstance(e, socket.gaierror | ValueError) else _OTHERWISE
         raise InputError(f"page on {host}, port {port}: {why}; {do}") from e
-    # detects a client that does not read sooner, and limits its memory
+    # a client that does not read is detected sooner and uses less memory
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, AHEAD)
     return listening
 

@@ -134,11 +134,11 @@ class Server:
         offset, slope = (low + high) / 2.0, (high - low) / (2.0 * axis.half)
         rate = micron * (min(self.rate, self.options.fade) if fading else self.rate)
         begin = self.get(axis, "offset-now"), self.get(axis, "slope-now")
-        if begin == (offset, slope):  # target reached: use the rate needed to return from zero after off and on
+        if begin == (offset, slope):  # target reached: use the rate for returning from zero after off and on
             begin = 0.0, 0.0
         steps = abs(offset - begin[0]), abs(slope - begin[1])
         seconds = (steps[0] + steps[1] * axis.half) / rate or 1.0  # for the end of the travel that moves further
-        letter = axis.letter  # the servo thread may run in between: rates are zeroed so that no state is wrong
+        letter = axis.letter  # the servo thread may interrupt: zero rates prevent a wrong movement
         self.pins[f"{letter}.offset-rate"] = self.pins[f"{letter}.slope-rate"] = 0.0
         self.pins[f"{letter}.offset"], self.pins[f"{letter}.slope"] = offset, slope
         self.pins[f"{letter}.offset-rate"], self.pins[f"{letter}.slope-rate"] = (v / seconds for v in steps)
