@@ -45,7 +45,7 @@ class CentreState:
 
 @dataclass(frozen=True, eq=False)
 class MachiningCentre:
-    """The virtual machine tool (X-01); fills `thermocomp.virtual.machine.VirtualMachine`.
+    """The virtual machine tool (X-01); implements `thermocomp.virtual.machine.VirtualMachine`.
 
     Structure ``w X' b Z Y (C1) t``: the table moves along X on the bed's front, the column along Z on its rear, the
     headstock along Y on the column's front, the spindle points towards -Z. Right is +X, front is -Z. Time constants

@@ -35,7 +35,7 @@ class Climate:
         Standard deviation of the fluctuations of the lateral gradient by doors, with a third of the time constant
         [K/m].
     begin : float
-        Time of day at the start, after midnight [s].
+        Time of day at the start, from midnight [s].
     """
 
     mean: float = 22.0

@@ -6,7 +6,7 @@ M. G. Cooper, B. B. Mikic and M. M. Yovanovich, Thermal contact conductance, Int
 with the constants of M. M. Yovanovich, Four decades of research on thermal contact, gap, and joint resistance in
 microelectronics, IEEE Trans. Compon. Packag. Technol. 28 (2005) 182. S. P. Timoshenko, Strength of Materials, part II
 (Lame's rings). B. Bossmanns and J. F. Tu, A thermal model for high speed motorized spindles, Int. J. Mach. Tools Manuf.
-39 (1999) 1345: a ring's gap in its housing closes as the ring is warmer.
+39 (1999) 1345: the gap of a ring in its housing closes as the ring warms up.
 """
 
 import math

@@ -52,7 +52,7 @@ class HeatSources:
     drive_nut, drive_bearing : float
         Friction of the nut of a feed drive, and of its bearing and motor, at 1000 mm/min [W].
     hold : float
-        Motor of the vertical axis Y, which holds the headstock [W].
+        Heat of the motor of the vertical axis Y, which holds the headstock [W].
     cabinet, cabinet_share : float
         Heat conducted into the rear right of the column by the electric cabinet: constant [W], and per watt of motor
         loss.
