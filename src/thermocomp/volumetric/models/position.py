@@ -85,7 +85,7 @@ class PositionFit:
 
     @property
     def shifts(self) -> bool:
-        """True if an offset would remove more than that: the profiles tilt about another position, or shift."""
+        """True if adding an offset is worthwhile: the profiles tilt about another position, or shift."""
         rest = self.remainders.get(len(self.model.slopes), np.nan)
         return self.model.offset is None and is_worthwhile(rest, self.offset_remainder, self.thermal_rms)
 

@@ -8,7 +8,7 @@ from thermocomp.volumetric.models.positionoptions import Setting
 
 
 def position(found: PositionStudy, left_open: Sequence[Setting]) -> dict[str, Any]:
-    """Return all results of one component as plain numbers; its choices are those of the open settings."""
+    """Return all results of one component as plain numbers, including the values chosen for open settings."""
     fit, judged = found.fit, found.assessment
     model = fit.model
     factors = []

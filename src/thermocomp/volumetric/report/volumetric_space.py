@@ -35,7 +35,7 @@ _Section = tuple[int, int, FloatArray, FloatArray, FloatArray, FloatArray]
 
 
 def boxes(study: Volumetric) -> str:
-    """Draw the deformation of the work volume in each state, and its rest after the straight lines of the axes."""
+    """Draw the deformation of the work volume in each state, and its residual after the straight lines of the axes."""
     moments = choose_moments(study)
     travels = lay_grid(study.machine, 2).reshape(-1, 3)
     largest = max(SMALL, *(m.straight.before.largest for m in moments))

@@ -31,7 +31,7 @@ def headline(study: Volumetric) -> str:
 
 
 def components(study: Volumetric, *, page: bool = False) -> Layout:
-    """Return the components with their values in each state: those with a source; on a page all."""
+    """Return the components with their values in each state: on a page all, else those with a source."""
     rows = [r for r in listed(study) if page or r["source"] != "nothing"]
     nothing = dict.fromkeys((k for k, r in enumerate(rows) if r["source"] == "nothing"), "soft")
 
@@ -90,7 +90,7 @@ def contributions(study: Volumetric, *, point: bool) -> Layout:
 
 
 def lines(study: Volumetric, *, page: bool = False) -> Layout:
-    """Return the best straight lines and the residual error after them; on a page over the volume too."""
+    """Return the best straight lines and the residual error after them, on a page also over the volume."""
     rows = [
         {"name": "" if k else m.name, **line}
         for m, state in zip(study.moments, states(study), strict=True)
