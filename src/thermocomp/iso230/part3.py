@@ -166,7 +166,7 @@ class _Stretch(NamedTuple):
 
     recording: Recording
     kind: Kind
-    rows: tuple[int, int, int]  #: rows of its start, of the stop of the drives, and of its end
+    rows: tuple[int, int, int]  #: first row, row of the stop of the drives, last row
     lead: int  #: number of preceding rows that define the initial state
     rests: bool  #: whether no drive ran before
     warm: Phase
