@@ -17,7 +17,7 @@ _STAR: dict[str, Any] = {"marker": "*", "ms": 12, "ls": "", "color": RESIDUAL, "
 
 
 def draw(plan: Plan, curve: LearningCurve | None) -> Drawn:
-    """Draw the recorded data with the next test in its gap; below all tests, and the learning curve if there is one.
+    """Draw the recorded data with the next test in its gap; below it all tests, and the learning curve if any.
 
     Parameters
     ----------

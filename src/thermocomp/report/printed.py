@@ -190,7 +190,7 @@ def _band_words(assessments: Sequence[Assessment]) -> str:
 
 
 def _cycle_table(assessments: Sequence[Assessment]) -> Layout:
-    """Return the RMS in each unseen cycle, a section per target; the larger of models and cycles are the rows."""
+    """Return the RMS in each unseen cycle, a section per target; rows are models or cycles, whichever are more."""
     models = ["none", *dict.fromkeys(a.model for a in assessments)]
     cycles = list(dict.fromkeys(c.name for a in assessments for c in a.verdict.units))
     down, across = (models, cycles) if len(models) > len(cycles) + 1 else (cycles, models)
