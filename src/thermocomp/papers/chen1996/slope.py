@@ -63,7 +63,7 @@ class LearnedPositioning:
 
     @property
     def regression(self) -> Any:
-        """The SecondOrderRegression of its fit."""
+        """The fitted `SecondOrderRegression`."""
         return self.fits[MRA].trained[0].estimator
 
     @cached_property

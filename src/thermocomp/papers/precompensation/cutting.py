@@ -136,7 +136,7 @@ class Milled:
     Parameters
     ----------
     surfaces : dict of (str, str, str) to Surfaces
-        By case, model and revision method; unrevised: `NONE` and an empty method.
+        Surfaces by case, model and revision method; unrevised: `NONE` and an empty method.
     turning : float
         Share of the time during which the spindle speed of the programs equals that of the recorded tests.
     lines : int
