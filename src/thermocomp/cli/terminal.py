@@ -96,7 +96,7 @@ def print_table(t: Layout, console: Console, **how: Any) -> None:
     """
     table = Table(title=words(t.title) or None, caption=words(t.caption) or None, **how)
     for c in t.columns:
-        # wrappable cells are folded, not cut; a number that does not fit shows that it is cut
+        # wrappable cells are folded, not cut; a number that does not fit is visibly cut
         table.add_column(
             words(f"{c.heading}, {c.unit}" if c.unit else c.heading),
             justify="right" if c.form else "left",
