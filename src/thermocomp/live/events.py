@@ -1,4 +1,4 @@
-"""Recent events for display; kinds that may be frequent are limited in number so that they cannot displace the others."""
+"""Recent events for display; events of frequent kinds are limited in number so as not to displace others."""
 
 import time
 from collections import deque
