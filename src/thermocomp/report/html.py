@@ -70,7 +70,7 @@ def draw_runs(comparison: Comparison, recordings: Sequence[Recording]) -> dict[s
     Returns
     -------
     dict of str to (str, Drawn, str)
-        By target: model, its course over the judged blocks, and coverage of its band; targets without a course are omitted.
+        By target: model, its course over the judged blocks, and coverage of its band; only targets with a course.
     """
     times = [r.time for r in recordings]
     overall = comparison.overall()
