@@ -268,7 +268,7 @@ def _nodes(found: LearnedDrift) -> Ours:
 
 
 def _rejected(found: LearnedDrift, kind: str) -> Ours:
-    """Return our result for a rejected alternative: its mean error after training must exceed that of the chosen net."""
+    """Return our result for a rejected alternative: its mean error after training must exceed the chosen one's."""
     chosen, other = (float(np.mean([n.mean for n in nets])) for nets in (found.nets, found.others[kind]))
     return Ours(
         f"{chosen:.2f} um; {kind} {other:.2f} um",

@@ -50,7 +50,7 @@ class Design:
         Number of laser runs, whose mean is a profile; the temperatures are means over the same runs.
     centred : bool
         Temperatures and slopes are relative to the mean of all states of their test; else to the first state, as
-        Chen's.
+        in Chen's work.
     laser, sensor : float
         See `LASER` and `SENSOR`.
     hierarchy : bool
