@@ -2,9 +2,9 @@
 The methods on all experiments
 ==============================
 
-Each paper tries its own method on its own machine. Here every method is trained on every paper's experiment and judged
-on tests it has not seen: other speeds, other days. ``thermocomp papers cross`` prints the same; ``--with drift.csv``
-adds recordings of your own, ``--models all`` the slower methods.
+Each paper tests its own method on its own machine. Here every method is trained on every paper's experiment and judged
+on unseen tests: other speeds, other days. ``thermocomp papers cross`` prints the same; ``--with drift.csv`` adds your
+own recordings, ``--models all`` the slower methods.
 """
 
 # %%
@@ -21,16 +21,16 @@ print(page.format_table(overview))
 assert numbers["chen1996, z_um, dynamic: rms_um"] < 0.2 * numbers["chen1996, z_um, none: rms_um"]
 
 # %%
-# Nothing wins everywhere. Where the fit is closest the unseen test is not: compare the first two columns. And look at
-# the last ones before trusting any of them: what noise does, and what the worst sensor does if it reads no rise at all
-# and nobody notices.
+# No method is best everywhere. The method with the closest fit is not the best on the unseen test: compare the first
+# two columns. Also consider the last columns before relying on any method: the effect of noise, and that of the worst
+# sensor if it reads no rise at all without being detected.
 
 print(page.format_table(details[0]))
 print()
 print(page.format_table(details[-1]))
 
 # %%
-# The same as a picture: what is left of the drift.
+# The same as a figure: the residual of the drift.
 
 (figure,) = study.figures
 page.paint(figure, plt.figure(figsize=page.size(figure), layout="constrained"))
@@ -38,7 +38,7 @@ plt.show()
 print(figure.caption)
 
 # %%
-# Is a method better than no compensation at all? On these machines nearly always. On a measured one it is not so sure:
-# the front page of the project shows the same methods on one.
+# Is a method better than no compensation at all? On these machines nearly always. On a measured machine this is less
+# certain: the front page of the project shows the same methods on one.
 
 print(page.text(study))

@@ -2,18 +2,19 @@
 Hwang, Lee, Yang: grouping and choice of variables
 ==================================================
 
-*Optimal Variable Selection in a Thermal Error Model for Real Time Error Compensation*. A machining centre stands still,
-runs slowly or fast, in an order drawn by lot, for six hours; 14 temperatures and the drift of Z are read. Temperatures
-that go together form a group, each group sends one to the model, and the model is linear: that shall be as accurate as
-what an engineer would choose, quicker to find, better conditioned, and less sensitive to errors of the sensors.
+*Optimal Variable Selection in a Thermal Error Model for Real Time Error Compensation*. A machining centre is stopped,
+or runs slowly or fast, in random order, for six hours; 14 temperatures and the drift of Z are recorded. Correlated
+temperatures form a group, one temperature of each group enters the model, and the model is linear: according to the
+paper it is as accurate as an engineer's choice, quicker to find, better conditioned, and less sensitive to sensor
+errors.
 
-Here the same is done on the virtual machining centre; ``thermocomp papers hwang`` prints the same. The paper's figures
-come from about 32 rows of one machine. Ours is another machine, so numbers differ; what is compared is what the paper
-says of the method.
+This page does the same on the virtual machining centre; ``thermocomp papers hwang`` prints the same. The paper's
+figures are based on about 32 rows of one machine. Ours is a different machine, so numbers differ; the question is
+whether the paper's statements about the method hold.
 """
 
 # %%
-# One call does it all. A claim that does not hold here says why.
+# One call runs the whole study. For a claim that does not hold here the reason is given.
 
 import matplotlib.pyplot as plt
 
@@ -37,9 +38,9 @@ print(page.headline(study))
 # Groups
 # ------
 #
-# Correlation is all the grouping goes by: the two temperatures that go together least begin two groups, and whatever is
-# closer to one of them than a threshold joins it. The paper does not give its threshold. Taken here is the one that
-# gives as many groups as its Table 1 has, or next to as many.
+# Grouping is based on correlation alone: the two least correlated temperatures start two groups, and every temperature
+# whose correlation with one of them is above a threshold joins it. The paper does not give its threshold. The threshold
+# used here gives the same number of groups as its Table 1, or the nearest possible number.
 
 print(page.text(study, "H-03", "E-H2", "H-04", "H-07", "H-09"))
 assert numbers["models_tried_without_grouping"] == 8191
@@ -49,8 +50,8 @@ assert numbers["models_tried"] < 1000
 # How many variables
 # ------------------
 #
-# One temperature stands for each group. Of all subsets of these the one with the smallest residual mean square says
-# which groups take part; then every combination of their members is tried.
+# One temperature represents each group. Of all subsets of these, the one with the smallest residual mean square
+# determines which groups are used; then every combination of their members is tried.
 
 draw("hwang-fig4")
 print(page.text(study, "H-05", "H-06", "H-15"))
@@ -59,8 +60,9 @@ print(page.text(study, "H-05", "H-06", "H-15"))
 # How accurate
 # ------------
 #
-# Beside it stands the model of an engineer: the Z nut, the front of the spindle and the bed, and their squares. Five
-# more tests, with other orders of the three states and another weather, were not used for anything.
+# For comparison there is a model as an engineer would choose it: the Z nut, the front of the spindle and the bed, and
+# their squares. Five further tests, with other orders of the three states and different weather, were not used for
+# fitting or selection.
 
 draw("hwang-fig5")
 print(page.text(study, "H-13", "E-C12"))
@@ -72,15 +74,15 @@ assert numbers["rms_new_um"] < 0.2 * numbers["rms_new_none_um"]
 # Collinearity
 # ------------
 #
-# Temperatures of one machine repeat each other, and then the coefficients of a regression can be anything: their
-# variance goes with the sum of 1/eigenvalue of X'X. Grouping is meant to help against that.
+# Temperatures of one machine are collinear, and then the coefficients of a regression are poorly determined: their
+# variance is proportional to the sum of 1/eigenvalue of X'X. Grouping is intended to reduce this.
 
 print(page.text(study, "H-16", "H-17"))
 print(page.format_table(study.tables[1]))
 assert numbers["smallest_eigenvalue_degC2"] > numbers["smallest_eigenvalue_without_grouping_degC2"] > 0
 
 # %%
-# What the threshold decides. The more groups, the closer the fit, and the worse the condition; a better fit is not
+# The effect of the threshold. The more groups, the closer the fit, and the worse the condition; a better fit is not
 # always better on new tests.
 
 draw("hwang-thresholds")
@@ -89,8 +91,8 @@ draw("hwang-thresholds")
 # Errors of the sensors
 # ---------------------
 #
-# A hundred times, an error drawn by lot is added to every temperature, and R2 computed again: a model with squares
-# scatters more than a linear one.
+# A hundred times, a random error is added to every temperature, and R2 is computed again: the R2 of a model with
+# squares varies more than that of a linear one.
 
 draw("hwang-fig6")
 print(page.text(study, "H-18"))

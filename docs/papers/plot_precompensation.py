@@ -2,18 +2,18 @@
 Pre-compensation: the drift from the spindle speed alone
 ========================================================
 
-The paper, of which only a part has come down to us, does without temperatures. The next drift follows from the last one
-and from the spindle speed, which stands in the NC program; so the drift of a whole program can be computed beforehand,
-every ten minutes, and added to its Z. A net learns the coefficients; depth differences between surfaces milled cold and
-after an hour fell from 7 to 2 um.
+The paper, of which only a part is available, uses no temperatures. The next drift follows from the last one and from
+the spindle speed, which is specified in the NC program; so the drift of a whole program can be computed beforehand,
+every ten minutes, and its negative added to Z. A neural network learns the coefficients; depth differences between
+surfaces milled cold and after an hour decreased from 7 to 2 um.
 
-Here it is done on the virtual machining centre, in a measuring room; ``thermocomp papers precompensation`` prints the
-same. The cutting tests are done twice: with the schedule of corrections, applied to the depths; and with NC programs,
-which ``thermocomp revise`` would revise in the same way, read back and milled.
+This page does the same on the virtual machining centre, in a measuring room; ``thermocomp papers precompensation``
+prints the same. The cutting tests are done twice: with the schedule of corrections, applied to the depths; and with NC
+programs, revised in the same way as by ``thermocomp revise``, read back and milled.
 """
 
 # %%
-# One call does it all. A claim that does not hold here says why.
+# One call runs the whole study. For a claim that does not hold here the reason is given.
 
 import matplotlib.pyplot as plt
 
@@ -37,8 +37,8 @@ print(page.headline(study))
 # How long a memory
 # -----------------
 #
-# Of k past drifts and the speed at m past times the final prediction error chooses how many are used: it is the error
-# one step ahead, made worse for every coefficient.
+# The numbers of past drifts k and of past speeds m are selected by the final prediction error, which is the error one
+# step ahead with a penalty for every coefficient.
 
 print(page.text(study, "P-02"))
 print(page.format_table(study.tables[0]))
@@ -50,16 +50,16 @@ assert numbers["k"] >= 1
 # Free run
 # --------
 #
-# One step ahead a model is given the measured drift of ten minutes ago, which no machine in production has. So all are
-# judged in free run: from the start of the test on, a model knows nothing but the speed. The test has speeds that were
-# not learned from.
+# For a prediction one step ahead, the model is given the measured drift of ten minutes ago, which no machine in
+# production has. So all models are judged in free run: from the start of the test on, the speed is the only input of a
+# model. The speeds of the test do not occur in the training data.
 
 print(page.text(study, "P-03", "P-05", "E-P3"))
 draw("precompensation-fig4")
 assert numbers["rms_one_step_um"] < numbers["rms_least_squares_um"] < 0.3 * numbers["rms_none_um"]
 
 # %%
-# Four models stand for the whole travel of Z; between their positions one interpolates.
+# Four models cover the whole travel of Z; between their positions the drift is interpolated.
 
 print(page.text(study, "P-04"))
 
@@ -67,24 +67,24 @@ print(page.text(study, "P-04"))
 # The program
 # -----------
 #
-# Every ten minutes of the program a new correction is added to Z. Deviations are actual minus commanded, so what is
-# added is minus the deviation.
+# Every ten minutes of the program a new correction is added to Z. Deviations are actual minus commanded, so the
+# correction is minus the deviation.
 
 print(page.text(study, "P-06"))
 draw("precompensation-schedule")
 
 # %%
-# A surface is milled with the cold machine, then the spindle runs at varying speeds for an hour, then another one is
-# milled: how much deeper is it? Eight such tests, each with other speeds.
+# A surface is milled with the cold machine, then the spindle runs at varying speeds for an hour, then another surface
+# is milled: how much deeper is the second? Eight such tests, each with different speeds.
 
 print(page.text(study, "P-07"))
 draw("precompensation-cut")
 assert numbers["depth_difference_corrected_um"] < 0.5 * numbers["depth_difference_um"]
 
 # %%
-# For the second of these answers each test has its NC program: four faces at four positions of Z, an hour of moves at
-# other spindle speeds, four more faces. It is revised as a file, read back as a controller reads it, and what it
-# commands is added to the true drift of that moment and place.
+# For the second method each test has its NC program: four faces at four positions of Z, an hour of moves at other
+# spindle speeds, four more faces. The program is revised as a file and read back as a controller reads it, and the
+# commanded positions are added to the true drift at that instant and position.
 
 print(page.format_table(study.tables[4]))
 print()
@@ -96,15 +96,15 @@ assert numbers["program_depth_difference_cold_revised_um"] < 0.5 * numbers["prog
 # What it cannot know
 # -------------------
 #
-# A program that begins when the machine is still warm from the last one, and a room that changes.
+# A program that begins when the machine is still warm from the previous one, and a room temperature that changes.
 
 print(page.text(study, "E-P5", "E-P6"))
 draw("precompensation-warm")
 assert numbers["room_peak_to_peak_um"] > 1
 
 # %%
-# The same with NC programs: a start state that is wrong by half an hour does more harm than no revision; the state that
-# the last job has left does none.
+# The same with NC programs: an initial state that is wrong by half an hour does more harm than no revision; the state
+# at the end of the last job does none.
 
 print(page.format_table(study.tables[6]))
 draw("precompensation-programs")

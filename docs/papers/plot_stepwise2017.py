@@ -3,16 +3,16 @@ Stepwise regression 2017: from 24 temperatures to a few
 =======================================================
 
 *The Open Mechanical Engineering Journal* 11, 2017. 24 temperatures of a machine are more than a model needs. Stepwise
-regression takes in the one with the largest partial F, tests those inside again, and continues until nothing enters and
-nothing leaves; five remain. On-line, the five predict the drift of X better than least squares on all 24 and than
-projection pursuit, with less than 5 um left.
+regression adds the temperature with the largest partial F, tests the included ones again, and continues until none
+enters and none leaves; five remain. On-line, the five predict the drift of X better than least squares on all 24 and
+than projection pursuit, with a residual below 5 um.
 
-Here it is done on the virtual machining centre; ``thermocomp papers stepwise2017`` prints the same. The paper compares
-its models on-line, without saying under which conditions; we take another day with other speeds.
+This page does the same on the virtual machining centre; ``thermocomp papers stepwise2017`` prints the same. The paper
+compares its models on-line without specifying the conditions; we use another day with other speeds.
 """
 
 # %%
-# One call does it all. A claim that does not hold here says why.
+# One call runs the whole study. For a claim that does not hold here the reason is given.
 
 import matplotlib.pyplot as plt
 
@@ -36,7 +36,7 @@ print(page.headline(study))
 # The test
 # --------
 #
-# Four speeds, each followed by a stop; three of the 24 temperatures, and the drift of X.
+# Four speeds, each followed by a standstill; three of the 24 temperatures, and the drift of X.
 
 draw("stepwise2017-fig2")
 assert numbers["temperatures"] == 24
@@ -55,7 +55,8 @@ assert 1 <= numbers["chosen"] < 24
 # On-line
 # -------
 #
-# Another day: the models run reading by reading, as they would at the machine, and are compared with what a probe says.
+# Another day: the models run reading by reading, as they would at the machine, and are compared with the probe
+# measurement.
 
 draw("stepwise2017-fig6")
 print(page.text(study, "T-08", "T-10"))
@@ -66,7 +67,7 @@ assert numbers["rms_online_um"] < 0.5 * numbers["rms_online_none_um"]
 # Robust?
 # -------
 #
-# The paper says so and does not show it. Noise on every temperature, and one sensor lost at a time:
+# The paper claims robustness without evidence. Noise on every temperature, and one sensor lost at a time:
 
 print(page.text(study, "E-T5"))
 
@@ -74,8 +75,9 @@ print(page.text(study, "E-T5"))
 # What the thresholds mean
 # ------------------------
 #
-# F grows with the number of rows, so 100 asks for little of a test that was sampled often, and for a lot of one that
-# was not. The rows of a drift are not independent either: how many they are worth does not grow with the sampling.
+# F increases with the number of rows, so a threshold of 100 is low for a test with fast sampling, and high for one with
+# slow sampling. In addition, the rows of a drift are not independent: their effective sample size does not grow with
+# the sampling rate.
 
 draw("stepwise2017-rows")
 print(page.text(study, "E-T3", "E-C12"))

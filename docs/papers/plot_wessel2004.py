@@ -3,17 +3,18 @@ Wessel et al. 2004: optimal transformations
 ===========================================
 
 *Predicting thermal displacements in modular tool systems*, Chaos 14. The displacement and every temperature are
-transformed by curves that make their correlation as great as can be (alternating conditional expectations, ACE), and
-the displacement is read back through the inverse of its curve. The paper tries this on a spindle of finite elements, on
-a resting tool that is heated, and on a working milling machine, beside multiple linear regression (MLR).
+transformed by curves that maximise their correlation (alternating conditional expectations, ACE), and the displacement
+is predicted by the inverse of its curve. The paper applies this to a spindle modelled by finite elements, to a heated
+tool at rest, and to a working milling machine, compared with multiple linear regression (MLR).
 
-Here the same is done on the virtual machines: their own spindle, heated tool and milling days. The paper's numbers
-stand beside ours; what is compared is whether what it says of the methods also holds here.
+This page does the same on the virtual machines: their spindle, heated tool and milling days. The paper's numbers are
+compared with ours; the question is whether its statements about the methods also hold here.
 """
 
 # %%
-# One call does it all; ``thermocomp papers wessel2004`` prints the same, and repeats it with other weather and noise. A
-# claim that does not hold here says why. :doc:`/virtual_machine` has the errors on the nonlinear machines beside these.
+# One call runs the whole study; ``thermocomp papers wessel2004`` prints the same, and repeats it with different weather
+# and noise. For a claim that does not hold here the reason is given. :doc:`/virtual_machine` compares these errors with
+# those on the nonlinear machines.
 
 import matplotlib.pyplot as plt
 
@@ -42,22 +43,22 @@ print(page.headline(study))
 # A spindle of finite elements
 # ----------------------------
 #
-# Three temperatures and two displacements of a spindle without sensor errors, 199 rows of 100 s. Curves are learned in
-# one regime of rotations. Fig. 2a: the reference series.
+# Three temperatures and two displacements of a spindle without sensor errors, 199 rows of 100 s. The curves are fitted
+# to one regime of rotations. Fig. 2a: the reference series.
 
 draw("fig2a")
 
 # %%
-# Fig. 2b: the curves for the displacement at the tip (i) and for each temperature (ii to iv), the sum of the latter
-# against the former (v), and what is left (vi).
+# Fig. 2b: the curves for the displacement at the tip (i) and for each temperature (ii to iv), the sum of the
+# temperature curves over the displacement curve (v), and the residual (vi).
 
 draw("fig2b")
 print(page.text(study, "W-06"))
 assert numbers["fem_psi"] > 0.99
 
 # %%
-# Fig. 3: another regime, which nothing was learned from. Where a temperature leaves the range that was learned, the
-# guard of the frozen model says so.
+# Fig. 3: another regime, not used for training. Where a temperature leaves the trained range, the range check of the
+# frozen model reports it.
 
 draw("fig3")
 print(page.text(study, "W-01", "W-05", "W-07"))
@@ -65,9 +66,9 @@ show(0, 1)
 assert numbers["fem_ace_rms_um"] < 0.5 * numbers["fem_none_rms_um"]
 
 # %%
-# Why it needs more than curves: the same displacement against each temperature. A loop means that one temperature goes
-# with two displacements, one while warming up and one while cooling down. No curve of a temperature can tell them
-# apart, however bent; several temperatures together can, and so can a memory (``dynamic``).
+# Why curves are not sufficient: the same displacement over each temperature. A loop means that one temperature
+# corresponds to two displacements, one while warming up and one while cooling down. No curve of a single temperature
+# can distinguish them, however nonlinear; several temperatures together can, and so can a memory (``dynamic``).
 
 draw("loops")
 assert numbers["fem_loop_width"] > 0.05
@@ -77,9 +78,9 @@ assert numbers["fem_dynamic_rms_um"] < numbers["fem_ace_rms_um"]
 # Which temperatures?
 # -------------------
 #
-# Nine thermometers on the heated tool, 23 data sets, three displacements: 35 259 models, which were too many in 2004.
-# Each set of temperatures gets a maximal correlation on each data set; sets that the Wilcoxon test for paired samples
-# cannot tell from the best are equivalent.
+# Nine temperature sensors on the heated tool, 23 data sets, three displacements: 35 259 models, which were too many in
+# 2004. Each set of temperatures gets a maximal correlation on each data set; sets that the Wilcoxon test for paired
+# samples cannot distinguish from the best are equivalent.
 
 print(page.text(study, "W-10", "W-11", "W-12"))
 show(2, 3)
@@ -91,7 +92,7 @@ assert numbers["sets_best_psi"] > 0.99
 # The resting tool
 # ----------------
 #
-# The tool is heated from behind and at its tip; the training has a break that lets it pass the fast warming twice.
+# The tool is heated from behind and at its tip; because of a break, the training data includes the fast warm-up twice.
 # Figs. 5 and 6:
 
 draw("fig5")
@@ -115,8 +116,8 @@ draw("tool-loops")
 # The working milling machine
 # ---------------------------
 #
-# Four days of milling at cutting speeds of 120, 200 and 370 m/min are learned; on the fifth the speed changes again and
-# again. Fig. 8: what was learned. The displacement is zero at each morning, whatever the temperature is.
+# Four days of milling at cutting speeds of 120, 200 and 370 m/min are used for training; on the fifth the speed changes
+# repeatedly. Fig. 8: the training data. The displacement is zero each morning, whatever the temperature is.
 
 draw("fig8")
 

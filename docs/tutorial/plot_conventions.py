@@ -2,17 +2,17 @@
 The conventions, drawn
 ======================
 
-Which way is plus? Every figure here is drawn from what `thermocomp.volumetric` computes: exact transforms with errors
-thousands of times too large, so that they can be seen. The numbers beside them are asserted when the page is built.
-In words: :doc:`../volumetric`.
+Which direction is positive? All figures on this page are drawn from the results of `thermocomp.volumetric`: exact
+transforms with errors enlarged several thousand times to make them visible. The numbers next to them are asserted when
+the page is built. The conventions in words: :doc:`../volumetric`.
 
-In all drawings grey and dashed is what was **commanded**, black is what is **actual**, and the orange arrow is the
-error: actual minus commanded, tool against workpiece.
+In all drawings the **commanded** state is grey and dashed, the **actual** state is black, and the orange arrow is the
+error: actual minus commanded, tool relative to workpiece.
 """
 
 # %%
-# What the sections below need: a machine of a given structure whose axes were measured at zero, and the error of its
-# tool's tip for some components, all others being zero.
+# The sections below need a machine of a given structure whose axes were measured at zero, and the error of its tool tip
+# for some components, all others being zero.
 
 from dataclasses import replace
 
@@ -62,8 +62,9 @@ def moved(of, components, places, at=(0, 0, 0)):
 # --------------
 #
 # X, Y and Z are those of ISO 841: Z along the spindle, positive where tool and workpiece move apart. A, B and C are the
-# turns about X, Y and Z. They are positive by the right-hand rule: thumb along the axis, fingers in the positive sense.
-# So A takes Y to Z, B takes Z to X and C takes X to Y: a turn of 1 urad moves a place 1000 mm away by 1 um.
+# rotations about X, Y and Z. They are positive by the right-hand rule: thumb along the axis, fingers in the positive
+# direction. So A rotates Y towards Z, B rotates Z towards X and C rotates X towards Y: a rotation of 1 urad moves a
+# point 1000 mm away by 1 um.
 
 single = machine("w b X (C1) t")
 
@@ -90,8 +91,8 @@ plt.show()
 # The six errors of an axis
 # -------------------------
 #
-# Here those of X; Y and Z have the same six. The second letter says what is wrong, the third which axis moves. The
-# reference point is in the middle of the carriage: there the angles move nothing.
+# This example shows those of X; Y and Z have the same six. The second letter denotes the error, the third the moving
+# axis. The reference point is in the middle of the carriage: there angular errors cause no displacement.
 
 six = ("EXX", "EYX", "EZX", "EAX", "EBX", "ECX")
 for way, name in enumerate(six[:3]):
@@ -127,10 +128,10 @@ plt.show()
 # Squareness
 # ----------
 #
-# A squareness error turns the guide of one axis; what moves along it stays straight and only goes astray, the more the
-# further it is from the axis' reference position. The second axis is turned in the positive sense of C, B or A: C0Y is
-# positive where the angle from +X to +Y is above 90 degrees, B0Z where the one from +X to +Z is below, A0Z where the
-# one from +Y to +Z is above.
+# A squareness error rotates the guide of one axis; the motion along it remains straight, but its deviation increases
+# with the distance from the axis' reference position. The second axis is rotated in the positive sense of C, B or A:
+# C0Y is positive if the angle from +X to +Y is above 90 degrees, B0Z if the angle from +X to +Z is below, A0Z if the
+# angle from +Y to +Z is above 90 degrees.
 
 three = machine("w b X Y Z (C1) t")
 
@@ -178,9 +179,9 @@ plt.show()
 # Tilt of the spindle
 # -------------------
 #
-# The drift of the spindle was measured at the tip of a test bar of 150 mm. That place is its reference point: what the
-# tilt does there is in the drift already. A tool of 250 mm reaches 100 mm further, and a tilt of 30 urad moves its tip
-# by 3 um: to +Y for A0C, to -X for B0C.
+# The drift of the spindle was measured at the tip of a test bar of 150 mm. This is its reference point: the effect of
+# the tilt at this point is already contained in the drift. A tool of 250 mm reaches 100 mm further, and a tilt of 30
+# urad moves its tip by 3 um: to +Y for A0C, to -X for B0C.
 
 mill = machine("w X' b Z Y (C1) t", spindle_tool=(0, 0, -150))
 
@@ -228,20 +229,20 @@ plt.show()
 # Levers, and who moves
 # ---------------------
 #
-# A component says what the tool's side does against the workpiece's side, whichever of them moves. In the upper row the
-# yaw of X is 20 urad. On the left a column carries the tool along X and turns to the left. On the right a table carries
-# the workpiece along X and turns to the **right**: the tool, seen from the workpiece, has turned to the left. It is the
-# same component, and it has the same lever, because Y lies between X and the tool on both machines. The ring is the
-# tool seen from above, the cross is where it ought to be on the workpiece.
+# A component is the motion of the tool side relative to the workpiece side, whichever of them moves. In the upper row
+# the yaw of X is 20 urad. On the left a column carries the tool along X and rotates to the left. On the right a table
+# carries the workpiece along X and rotates to the **right**: seen from the workpiece, the tool has rotated to the left.
+# It is the same component, and it has the same lever, because Y is between X and the tool on both machines. The ring is
+# the tool seen from above, the cross is its nominal position on the workpiece.
 
 yaw_x, yaw_y = {"ECX": 20}, {"ECY": 20}
 assert error(machine("w b X Y Z (C1) t"), yaw_x, at=(0, 400, 0)) == [-8, 0, 0]
 assert error(machine("w X' b Y Z (C1) t"), yaw_x, at=(0, 400, 0)) == [-8, 0, 0]
 
 # %%
-# In the lower row it is the yaw of Y, and X stands 400 mm from where that yaw was measured. On the left the gantry
-# carries X, so X is a lever. On the right the saddle turns together with the table upon it, about the tool; X lies on
-# the workpiece's side of Y and makes nothing longer. This is all that a structure code changes.
+# The lower row shows the yaw of Y, with X 400 mm from the position at which this yaw was measured. On the left the
+# gantry carries X, so X is a lever. On the right the saddle rotates together with the table on it, about the tool; X is
+# on the workpiece side of Y and does not contribute to the lever. This is the only effect of the structure code.
 
 assert error(machine("w b Y X Z (C1) t"), yaw_y, at=(400, 0, 0)) == [0, 8, 0]
 assert error(machine("w X' Y' b Z (C1) t"), yaw_y, at=(400, 0, 0)) == [0, 0, 0]
@@ -319,8 +320,8 @@ pencil.label(axes[1, 0], (-130, 85), "measured here", pencil.BLUE, size=9)
 plt.show()
 # sphinx_gallery_end_ignore
 # %%
-# In all four drawings the place where it was measured goes with the tool, as a reflector in the spindle does. If it
-# stays on the table, the axis' own way is a lever too (``measured_on``): the tool goes away from it.
+# In all four drawings the measuring point moves with the tool, like a reflector in the spindle. If it is fixed to the
+# table, the axis' own travel is also a lever (``measured_on``), because the tool moves away from the measuring point.
 
 table = machine("w X' b Y Z (C1) t")
 reflector_on_it = replace(table, axes=tuple(replace(a, measured_on="workpiece") for a in table.axes))

@@ -2,14 +2,14 @@
 From a drift test to a compensation
 ===================================
 
-A machining centre warms up and its tool point wanders. In this tutorial we record a drift test, ask which method
-predicts the drift best on thermal cycles it has not seen, fit that method, and let the model correct the machine
-reading by reading, with a sensor that fails on the way. The machine is a virtual one, so everybody gets the same
-numbers; files of a real machine go the same way from step 2 on.
+A machining centre warms up and its tool point drifts. In this tutorial we record a drift test, find out which method
+predicts the drift best on unseen thermal cycles, fit that method, and let the model correct the machine reading by
+reading; one sensor fails meanwhile. The machine is a virtual one, so the numbers are reproducible; files from a real
+machine are processed in the same way from step 2 on.
 """
 
 # %%
-# What we need from thermocomp, and something to draw with:
+# Imports from thermocomp, and for plotting:
 
 import tempfile
 from pathlib import Path
@@ -33,8 +33,8 @@ from thermocomp.virtual.datasets import record
 # 1. The test
 # -----------
 #
-# The spindle runs at six speeds, one after the other, with a stop after each: six *thermal cycles*. Every 20 seconds
-# 16 temperatures, the displacement of the tool point and the spindle speed are recorded.
+# The spindle runs at six speeds, one after the other, with a standstill after each: six *thermal cycles*. Every 20
+# seconds 16 temperatures, the displacement of the tool point and the spindle speed are recorded.
 
 recording = record("demo")[0]
 print(len(recording), "rows,", len(recording.temperatures), "temperatures")
@@ -43,7 +43,7 @@ for cycle in recording.cycles:
     print("cycle", cycle.name)
 
 # %%
-# With files of your own this step is ``recording = thermocomp.recordings.readers.recordings.read("drift.csv")``.
+# With your own files this step is ``recording = thermocomp.recordings.readers.recordings.read("drift.csv")``.
 #
 # 2. Is the recording sound?
 # --------------------------
@@ -57,8 +57,8 @@ for f in findings:
 print(len(findings), "findings")
 
 # %%
-# Then look at it. We want to predict ``z_um``, the displacement along the spindle: negative means that the tool has
-# come nearer to the workpiece, and a part would be cut too deep by that much.
+# Then plot it. We want to predict ``z_um``, the displacement along the spindle: negative means that the tool has moved
+# towards the workpiece, and a cut would be too deep by that amount.
 
 hours = recording.time / 3600
 shape = {"sharex": True, "layout": "constrained"}
@@ -80,15 +80,16 @@ axes[2].set_xlabel("time [h]")
 plt.show()
 
 # %%
-# Top: what the spindle did; every second thermal cycle is shaded. Middle: five of the 16 temperatures. The bearing
-# seat answers in minutes, the bed in hours, and the room has a day of its own. Bottom: the drift. It follows the
-# bearing at first and the slow parts later, which is why one thermometer is not enough.
+# Top: the spindle speed; every second thermal cycle is shaded. Middle: five of the 16 temperatures. The bearing seat
+# responds within minutes, the bed within hours, and the room temperature has a daily cycle. Bottom: the drift. It
+# follows the bearing at first and the slow parts later, which is why a single temperature sensor is not sufficient.
 #
 # 3. Which method, on cycles it has not seen?
 # -------------------------------------------
 #
-# Each thermal cycle is left out in turn; every method learns from the other five and is then replayed on the one left
-# out, with temperatures and spindle speed only. Temperatures are counted from the first row, as the displacement is.
+# Each thermal cycle is left out in turn; every method is trained on the other five and then replayed on the one left
+# out, with temperatures and spindle speed only. Temperatures are relative to the start of the test, like the
+# displacement.
 
 samples = stack([recording], targets=["z_um"])
 judging = leave_one_cycle_out(samples)
@@ -104,9 +105,9 @@ mae, rms, largest = (a.none_metric(m) for m in ("mae", "rms", "max_abs"))
 print(f"{'none':10} {mae:6.2f} {rms:6.2f} {largest:6.2f}")
 
 # %%
-# What is left of the drift, in um: mean of its absolute value (MAE), root of its mean square (RMS), and its largest
-# value. *None* is the machine without compensation. A method is accepted if it is shown to be better than that and than
-# constants over the cycles, and does harm in none of them.
+# The residual in um: mean of its absolute value (MAE), root of its mean square (RMS), and its largest absolute value.
+# *None* is the machine without compensation. A method is accepted if it is shown to be better than no compensation and
+# than constants over the cycles, and does harm in none of them.
 
 best = comparison.best("z_um")
 print(f"{best.model}: RMS {best.metric('reduction'):.0f} % less than without compensation")
@@ -114,7 +115,7 @@ print(best.reason.replace("; ", ";\n"))
 assert best.metric("reduction") > 85
 
 # %%
-# How it gets through each unseen cycle:
+# Its prediction in each unseen cycle:
 
 blocks = [a for a in comparison.assessments if a.model == best.model and not a.overall]
 fig, axes = plt.subplots(2, 3, figsize=(9, 5.5), sharey=True, **shape)
@@ -134,16 +135,16 @@ fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", 
 plt.show()
 
 # %%
-# Grey is what the probe measured, which is also the error without compensation. The dashed line is the prediction of
-# a model that has never seen this cycle; the third line is the difference of the two, the error with compensation.
-# Look for slow swings in it, and for bumps where the spindle starts or stops: they are what the model does not know.
-# The fuzz on the prediction is noise of the temperature sensors that the model passes on.
+# Grey is the probe measurement, which is also the error without compensation. The dashed line is the prediction of a
+# model for which this cycle was unseen; the third line is the difference of the two, the error with compensation. Look
+# for slow swings in it, and for bumps where the spindle starts or stops: these are effects that the model does not
+# describe. The fine noise on the prediction is sensor noise that the model passes on.
 #
 # 4. Fit and freeze
 # -----------------
 #
-# The winner is fitted to all six cycles and frozen into plain numbers. The model keeps its error on unseen cycles,
-# not the flattering one of the fit. Before it is written, noise and lost sensors are tried on it.
+# The best method is fitted to all six cycles and frozen into plain numbers. The model stores its error on unseen
+# cycles, not the optimistic error of the fit. Before it is written, it is tested with noise and lost sensors.
 
 model = study.fit(samples, best.model, judging).models[0]
 honest = model.honest_error
@@ -152,9 +153,9 @@ print(f"honest error: {honest.rms:.2f} um RMS, {honest.verdict}")
 print(honest.reason.replace("; ", ";\n"))
 
 # %%
-# Fitted to everything it leans on single sensors: one that is lost without a notice would cost more than the drift. So
-# it is unproven, and may run in shadow only. A stronger ridge leans less on each of them. It leaves a little more of
-# the unseen cycles, and it may run.
+# The model fitted to all cycles depends too much on single sensors: an undetected loss of one would cost more than the
+# drift. So it is unproven, and may run in shadow only. With a stronger ridge penalty the model depends less on each
+# sensor. Its error on unseen cycles is slightly larger, and it may run.
 
 steady = DynamicRidge(strengths=(1e-3, 1e-2, 0.1, 1.0))
 model = study.fit(samples, steady, judging).models[0]
@@ -166,7 +167,7 @@ assert honest.verdict == "accepted"
 # 5. The model file
 # -----------------
 #
-# JSON with a checksum. Reading it gives the same numbers to the last bit.
+# JSON with a checksum. Reading it restores the same numbers to the last bit.
 
 with tempfile.TemporaryDirectory() as folder:
     path = Path(folder) / "model.json"
@@ -179,10 +180,10 @@ assert loaded == model
 # 6. One reading after the other
 # ------------------------------
 #
-# Another day, another job: a new speed every 45 minutes, drawn by lot. The model from the file corrects the machine.
-# One `~thermocomp.core.reading.Reading` goes in, one `~thermocomp.core.correction.Correction` comes out; all that is
-# remembered is in ``state``. The correction has the opposite sign of the deviation; it may be at most 150 um and has a
-# rate of 0.05 um/s, which is 3 um per minute: faster than the drift.
+# Another day, another job: a new random speed every 45 minutes. The model from the file corrects the machine. One
+# `~thermocomp.core.reading.Reading` goes in, one `~thermocomp.core.correction.Correction` comes out; the complete
+# memory is in ``state``. The correction has the opposite sign of the deviation; it is limited to 150 um and to a rate
+# of 0.05 um/s, which is 3 um per minute: faster than the drift.
 
 workday = record("random")[0]
 names = [channel.name for channel in loaded.inputs]
@@ -196,9 +197,9 @@ state, result = compensator.step(state, reading, now=reading.time)
 print(reading.values["t_front_seat_C"], "degC:", result.corrections["z_um"])
 
 # %%
-# The first reading decides what counts as zero, so the first correction is zero. Let it run on. After seven hours the
-# sensor at the front bearing seat breaks and reads "not a number" for half an hour, at a bad moment: the spindle has
-# just begun to run faster.
+# The first readings determine the zero, so the first correction is zero. Now continue. After seven hours the sensor at
+# the front bearing seat fails and reads NaN for half an hour, at a bad moment: the spindle has just started to run
+# faster.
 
 corrections = [result.corrections["z_um"].offset]
 broken = []
@@ -218,7 +219,7 @@ print(held["z_um"])
 assert 7.1 < broken[0] < 7.2
 
 # %%
-# How good was it? This machine has a probe, so we know:
+# How accurate was it? This machine has a probe, so the error is known:
 
 hours = workday.time / 3600
 drift = workday.table["z_um"].to_numpy()
@@ -249,12 +250,13 @@ axes[1].legend(fontsize="small", loc="upper center", bbox_to_anchor=(0.5, -0.15)
 plt.show()
 
 # %%
-# Top: the spindle. Bottom: the drift, the correction, and their sum, which is what the part sees. The watch found the
-# y bearing's sensor unlike the others long before, and a substitute stands in for it. Without the front bearing seat
-# as well, in the red stretch, the correction stands still, and the result says why. The machine drifts on meanwhile
-# and the error grows. When the sensor is back, the correction returns to its place at its rate. A model that remembers
-# how the machine was heated does not know what happened in between, and needs a while to be right again.
+# Top: the spindle speed. Bottom: the drift, the correction, and their sum, which is the error of the part. The watch
+# found long before that the sensor of the y bearing deviates from its prediction, and replaced it by a substitute.
+# Without the front bearing seat as well, in the red interval, the correction is held, and the result gives the reason.
+# Meanwhile the machine continues to drift and the error grows. When the sensor is back, the correction returns at its
+# rate. A model with memory lacks the heating history of this interval, and needs some time until its prediction is
+# correct again.
 #
-# Compare what is left with the honest error of step 4. That one is a promise for days like those that were recorded;
-# a job with a new speed every 45 minutes is unlike six long cycles. If the two differ much, record what the machine
-# really does.
+# Compare this residual with the honest error of step 4. The honest error is valid for days like those that were
+# recorded; a job with a new speed every 45 minutes differs from six long cycles. If the two errors differ much, record
+# the actual operation of the machine.

@@ -2,14 +2,14 @@
 The virtual machine tool
 ========================
 
-Where the recordings of the examples come from: a machining centre of finite elements, reduced to a hundred numbers that
-step in microseconds. This page runs it through the warm-up and cool-down of Chen, Yuan and Ni (six hours at one speed,
-ten hours of stop) and looks at what a metrologist would look at.
+The source of the recordings in the examples: a machining centre modelled by finite elements, reduced to about a hundred
+states that are computed in microseconds per step. This page runs it through the warm-up and cool-down of Chen, Yuan and
+Ni (six hours at one speed, ten hours at standstill) and evaluates the results as a metrologist would.
 """
 
 # %%
-# The machine stands still for a night, runs at 2600 1/min while its axes move, and stops. We ask it directly, without
-# sensors, in steps of ten seconds.
+# The machine is at rest overnight, runs at 2600 1/min while its axes move, and stops. We read its outputs directly,
+# without sensors, in steps of ten seconds.
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -33,8 +33,8 @@ drift = {name: row - row[4319] for name, row in zip(machine.observables, truth.o
 # Temperatures and drift
 # ----------------------
 #
-# The bearing and the shaft are warm within minutes, the headstock within hours, and the column hardly at all; but the
-# column's front gets warmer than its rear, and that bends it.
+# The bearing and the shaft are warm within minutes, the headstock within hours, and the column hardly warms up at all;
+# but the front of the column gets warmer than its rear, which bends it.
 
 fig, axes = plt.subplots(2, 1, figsize=(9, 7), sharex=True, layout="constrained")
 for place in ("front_bearing", "front_seat", "housing", "headstock_front", "column_front_right", "column_rear_right"):
@@ -66,9 +66,9 @@ assert until(0.63, drift["tip"]) < 0.4 * until(0.63, temperature["column_front_r
 # Hysteresis
 # ----------
 #
-# The same temperature of the housing belongs to different drifts on the way up and on the way down. No function of that
-# one temperature can predict the drift, however bent: this is why the papers take several sensors, and why `dynamic`
-# takes their past as well.
+# The same temperature of the housing corresponds to different drifts during warm-up and cool-down. No function of this
+# single temperature can predict the drift, however nonlinear: this is why the papers use several sensors, and why
+# `dynamic` also uses their past values.
 
 fig, axes = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
 for ax, name in zip(axes, ("z", "y"), strict=True):
@@ -83,9 +83,9 @@ plt.show()
 # Position
 # --------
 #
-# A warm ball screw pushes its nut the further, the further away its fixed bearing is, and a bent column pitches the
-# headstock: the error of Y depends on Y. One slope describes most of it; that is Chen's observation, and his reason to
-# model a slope instead of a profile.
+# The displacement of the nut of a warm ball screw increases with the distance from the fixed bearing, and a bent column
+# pitches the headstock: the error of Y depends on Y. One slope describes most of it; this is Chen's observation, and
+# his reason to model a slope instead of a profile.
 
 fig, ax = plt.subplots(figsize=(7, 4), layout="constrained")
 positions = np.arange(0, 551, 50)

@@ -2,15 +2,16 @@
 A compensated work volume
 =========================
 
-A drift test tells the error at one place. A part is cut all over the table. Here a laser with six degrees of freedom
-has measured all three axes of the virtual machining centre again and again while it worked, probes have watched the
-tool at one place, and an artefact has told the squareness. From that we learn all 18 components of the axes, add them
-up anywhere in the work volume, and correct. The virtual machine knows its true error at every point, so we can judge
-what a shop never sees. The same with files and commands: :doc:`../position`.
+A drift test gives the error at one position. A part is machined anywhere on the table. In this example a laser with six
+degrees of freedom has measured all three axes of the virtual machining centre repeatedly while it worked, probes have
+measured the tool point at one position, and the squareness was measured by an artefact. From this data we fit all 18
+components of the axes, combine them anywhere in the work volume, and correct. The virtual machine knows its true error
+at every point, so we can judge quantities that are not accessible in a workshop. The same with files and commands:
+:doc:`../position`.
 """
 
 # %%
-# What we need from thermocomp, and something to draw with:
+# Imports from thermocomp, and for plotting:
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -35,9 +36,9 @@ from thermocomp.volumetric.models.positionoptions import fill_options
 # 1. The recordings
 # -----------------
 #
-# Eight days: the spindle alone, the axes alone, both, a hot room, and four days of jobs. Every five minutes a row with
-# 24 temperatures, the spindle speed, the nest of probes, and the profiles. ``EXX_200_um`` is the positioning of X with
-# X at 200 mm.
+# Eight days: the spindle alone, the axes alone, both, a hot room, and four days of jobs. Every five minutes there is a
+# row with 24 temperatures, the spindle speed, the nest of probes, and the profiles. ``EXX_200_um`` is the positioning
+# error of X with X at 200 mm.
 
 tests = virtual.record("volumetric")
 codes = codecolumns.codes(tests[0])
@@ -50,11 +51,11 @@ assert len(codes) == 18
 # 2. From profiles to components
 # ------------------------------
 #
-# `~thermocomp.volumetric.models.positionoptions.fill_options` looks at the profiles, never at a temperature, and says
-# what each of them asks for: how many powers of the position move with the temperatures (none, if heat does nothing but
-# noise), whether the profile shifts as a whole, and about which position it turns. Then the cold profile is fitted, and
-# the slopes are learned from the temperatures. These are absolute: a laser reads the machine as it is that morning, and
-# mornings differ.
+# `~thermocomp.volumetric.models.positionoptions.fill_options` uses the profiles, never a temperature, to determine for
+# each component: how many powers of the position change with the temperatures (none, if the thermal part is only
+# noise), whether the profile shifts as a whole, and about which position it rotates. Then the cold profile is fitted,
+# and the slopes are fitted to the temperatures. These are absolute temperatures: a laser reads the actual state of the
+# machine on that morning, which differs from day to day.
 
 fits = {}
 for code in codes:
@@ -72,13 +73,15 @@ for code, fit in fits.items():
 assert fits["EXX"].model.reference_position == 300.0
 
 # %%
-# The last column is what the powers leave of the thermal part: the laser's noise, and for a long screw a bend.
+# The last column is the remainder of the thermal part after these powers: the laser's noise, and for a long screw a
+# curvature.
 #
 # 3. The machine
 # --------------
 #
-# Where the tool was while the lasers and the nest looked, the angles have no lever and the profiles are zero. So the
-# nest tells all drifts at that place, of spindle and axes together, and nothing is counted twice.
+# At the position of the tool during the measurements by lasers and nest, the angular errors have no lever and the
+# profiles are zero. So the nest measures all drifts at that position, of spindle and axes together, and nothing is
+# counted twice.
 
 PLACE, BAR = (300.0, 250.0, 300.0), (0.0, 0.0, -150.0)
 TRAVEL = {"X": 600.0, "Y": 550.0, "Z": 600.0}
@@ -101,8 +104,8 @@ print(len(components), "of 32 components,", len(model.inputs), "inputs")
 # 4. A day that nobody has learned from
 # -------------------------------------
 #
-# Other weather, speeds and feed rates. The model is replayed over it, reading by reading, from temperatures and speed
-# alone.
+# A day with different weather, speeds and feed rates. The model is replayed over it, reading by reading, from
+# temperatures and speed alone.
 
 day = next(simulate(virtual.find_experiment("volumetric-new"), seed=5, whole=True))
 unseen = virtual.make_recording(day)
@@ -111,7 +114,7 @@ hours = unseen.time / 3600
 print(f"{len(unseen)} rows, {hours[-1]:.1f} h")
 
 # %%
-# Four components in three states of that day. Dots: what the laser reads. Lines: what the model says.
+# Four components in three states of that day. Dots: laser readings. Lines: model.
 
 fig, panels = plt.subplots(2, 2, figsize=(9, 6.5), layout="constrained")
 rows = [0, int(np.searchsorted(hours, 5.3)), int(np.searchsorted(hours, 13.0))]
@@ -134,9 +137,9 @@ plt.show()
 # 5. Judged by the truth
 # ----------------------
 #
-# 1,000 random points, each in a random instant of that day. The true error is composed by
-# `~thermocomp.virtual.volume`, which knows how the machine is built and nothing of our model. It is counted from the
-# zero that was set at the test position when the day began; the correction is what the axes are told to move besides.
+# 1,000 random points, each at a random instant of that day. The true error is computed by `~thermocomp.virtual.volume`
+# from the structure of the machine, independently of our model. It is relative to the zero that was set at the test
+# position at the beginning of the day; the correction is added to the commanded positions of the axes.
 
 truth = VolumetricTruth(MachiningCentre().observables)
 zero = truth.error(day.observables[:1], [PLACE])
@@ -165,9 +168,9 @@ for k, axis in enumerate("XYZ"):
 assert rms(before) > 8 * rms(after)
 
 # %%
-# What is left comes mostly from one place. At the test position, where all profiles are zero, the drift that was
-# predicted from the temperatures is off by almost as much as the error anywhere; take that off, and the axes' share
-# remains.
+# Most of the residual has a single cause. At the test position, where all profiles are zero, the error of the drift
+# predicted from the temperatures is almost as large as the error anywhere; when this is subtracted, the contribution of
+# the axes remains.
 
 there = left(instants, np.tile(PLACE, (len(points), 1)))
 print(f"left at the test position {rms(there):.1f} um (Z alone {rms(there[:, [2]]):.1f} um)")
@@ -175,7 +178,7 @@ print(f"left besides {rms(after - there):.1f} um")
 assert rms(after - there) < rms(there)
 
 # %%
-# So a better laser would gain little here. A probe that touches a sphere now and then would gain much.
+# So a better laser would improve little here. Probing a sphere occasionally would improve much.
 
 fig, ax = plt.subplots(figsize=(7, 4), layout="constrained")
 for name, error, color in (("without compensation", before, "0.3"), ("compensated", after, "tab:green")):
@@ -190,7 +193,7 @@ ax.legend(loc="lower right")
 plt.show()
 
 # %%
-# The work volume at the worst instant of the day, true errors drawn a thousand times as large.
+# The work volume at the worst instant of the day, with true errors enlarged a thousand times.
 
 corners = np.array([[x, y, z] for x in (0.0, 600.0) for y in (0.0, 550.0) for z in (0.0, 600.0)])
 size = [rms(left(np.full(8, row), corners, corrected=False)) for row in range(len(unseen))]
@@ -218,6 +221,6 @@ print(f"worst after {hours[worst]:.1f} h")
 plt.show()
 
 # %%
-# This is a virtual machine: its sensors sit where the heat is, and its laser reads every five minutes for eight days.
-# On a real one judge as ``thermocomp position`` and ``thermocomp fit`` do, on days that were left out, and then on a
-# test piece.
+# This is a virtual machine: its sensors are close to the heat sources, and its laser reads every five minutes for eight
+# days. On a real machine, judge as ``thermocomp position`` and ``thermocomp fit`` do, on days that were left out, and
+# then on a test piece.

@@ -33,7 +33,7 @@ def explain(model: "ErrorModel | FittedModels | str | Path | Sequence[ErrorModel
     Returns
     -------
     Explanation or Explanations
-        Explanation of one model, or of several; print it to read it.
+        Explanation of one or several models, to be printed.
 
     Examples
     --------

@@ -27,7 +27,7 @@ from thermocomp.recordings.tilts import with_tilts
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
 
-#: one test, or several
+#: one or several tests
 Given = Recording | str | Path | pd.DataFrame | Sequence["Recording | str | Path | pd.DataFrame"]
 LeaveOne = Literal["cycle", "day", "file"]
 #: initial thermal state of all recordings or of each one; None: determined from the recordings
@@ -51,7 +51,7 @@ def read(path: str | Path, mapping: str | Path | mappings.Mapping | None = None)
     Raises
     ------
     RecordingError, UnitError
-        See `thermocomp.recordings.readers.recordings.read`; a note of the error suggests a mapping where it would help.
+        See `thermocomp.recordings.readers.recordings.read`; a note of the error suggests a mapping if one would help.
 
     Examples
     --------
@@ -119,8 +119,8 @@ def starts_of(starts: Starts, recordings: Sequence[Recording]) -> tuple[Start, .
     Raises
     ------
     InputError
-        The number of starts differs from the number of recordings, a recording continues from itself, or a start that
-        continues is given for several recordings.
+        The number of starts differs from the number of recordings, a recording continues from itself, or a single
+        ``continued`` start is given for several recordings.
     """
     if starts is None:
         return None
@@ -145,7 +145,7 @@ class Prepared:
     ----------
     tests : tuple of Recording
     samples : Samples
-        Rows of the tests, without those in which a channel is in trouble.
+        Rows of the tests, without rows in which a channel is in trouble.
     judging : Judging
         Training and validation rows.
     trouble : list of str

@@ -23,7 +23,7 @@ def settings_of(kind: type[_Settings], given: Mapping[str, Any], verb: str) -> _
     Raises
     ------
     InputError
-        There is no such setting.
+        Setting unknown.
     """
     try:
         return kind(**given)

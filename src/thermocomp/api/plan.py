@@ -25,7 +25,7 @@ from thermocomp.recordings.readers.mapping import Mapping
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: what `may_stop` returns
+#: result of `may_stop`
 RunningTest = Running
 #: time between two measurements with a touch probe [min]
 EVERY = 30.0

@@ -1,4 +1,4 @@
-"""Results for notebooks: tables, figures, and one sentence."""
+"""Results for notebooks: tables, figures, and short text."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -29,7 +29,7 @@ FloatArray = NDArray[np.float64]
 
 
 class Result(ABC):
-    """Protocol of all results."""
+    """Base class of all results."""
 
     @abstractmethod
     def to_frame(self) -> pd.DataFrame:
@@ -61,7 +61,7 @@ class Paged(ABC):
 
     @abstractmethod
     def page(self) -> str:
-        """Return the page as a single HTML text that needs no network."""
+        """Return the page as a self-contained HTML text."""
 
     def report(self, path: str | Path, *, overwrite: bool = False) -> Path:
         """Write the page; return its path."""

@@ -74,7 +74,7 @@ class Selected(Result, Paged):
         Raises
         ------
         InputError
-            There is no such target, or there was nothing to choose from.
+            Target unknown, or nothing to choose from.
         """
         from thermocomp.report import selections
 

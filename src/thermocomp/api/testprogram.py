@@ -16,27 +16,27 @@ Dialect = Literal["linuxcnc", "fanuc"]
 
 #: longest dwell, so that the controller shows the progress of the test [s]
 LONGEST = 1800.0
-#: of a program; no control has a slower or faster dwell in question
+#: shortest interval between two measurements [s]
 _SHORTEST = 60.0
 
 
 class ProgramStretch(NamedTuple):
     """A period of a test without changes."""
 
-    start: float  #: since the start of the test [s]
+    start: float  #: time since the start of the test [s]
     duration: float  #: [s]
-    speed: float  #: of the spindle [1/min]
-    first: bool  #: the speed is another one than before
+    speed: float  #: spindle speed [1/min]
+    first: bool  #: whether the speed has changed
 
 
 def stretches(trial: Trial, every: float = 0.0) -> Iterator[ProgramStretch]:
-    """Divide a test into stretches without a change and without a measurement.
+    """Divide a test into periods without a change of speed and without a measurement.
 
     Parameters
     ----------
     trial : Trial
     every : float
-        Time between two measurements [s]; 0: none, and long stretches are divided into half hours.
+        Time between two measurements [s]; 0: no measurements, and long periods are divided into half hours.
 
     Yields
     ------
@@ -122,7 +122,7 @@ def write_sheet(trial: Trial, channels: Sequence[Channel], every: float = 0.0) -
             do += f", then {f'run at {part.speed:.0f} 1/min' if part.speed else 'stop the spindle'}"
         if trial.kind == "room" and part.first and part.start:
             do = "write down all, then let the room change: heating, gates, night"
-        # a row tells what led to it
+        # the speed of a row is that of the preceding period
         sheet.writerow([f"{part.start / 60:g}", f"{before:g}", *[""] * len(names), do])
         before = part.speed
     sheet.writerow([f"{trial.duration / 60:g}", f"{before:g}", *[""] * len(names), "write down all: the end"])
@@ -139,7 +139,7 @@ def write_test(
     picture: bytes = b"",
     overwrite: bool = False,
 ) -> Path:
-    """Write a test: its NC program, and next to it the sheet and a figure that shows why the test is run.
+    """Write a test: its NC program, and next to it the sheet and a figure that shows the purpose of the test.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def clock(seconds: float) -> str:
 
 
 def _length(trial: Trial, part: ProgramStretch) -> str:
-    """Return the time until the speed changes."""
+    """Return the duration until the next change of speed, as text."""
     end, own = 0.0, 0.0
     for _, duration in trial.steps:
         if end <= part.start + 1e-6:

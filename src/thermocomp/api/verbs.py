@@ -1,4 +1,4 @@
-"""The main job in Python: select, compare, fit, assess. The keywords are the options of the commands."""
+"""The main workflow in Python: select, compare, fit, assess. The keywords are the options of the commands."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace

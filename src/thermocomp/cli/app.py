@@ -20,10 +20,10 @@ app = App(
     help="Thermal error compensation of machine tools: from temperature recordings to a validated model.",
     version=__version__,
     version_flags=["--version", "-V"],
-    # every command returns its exit code; nothing but `main` leaves the process
+    # every command returns its exit code; only `main` exits the process
     result_action="return_value",
     suppress_keyboard_interrupt=False,
-    # a flag is set or not, and an option takes all words up to the next one
+    # flags have no negative form, and an option takes all words up to the next option
     default_parameter=Parameter(negative=(), consume_multiple=True),
 )
 
@@ -39,7 +39,7 @@ for command, entry in COMMANDS.items():
         _skip(f"{describe_plugin(entry)} is skipped: there is no {entry.value}")
     else:
         app.command(entry.value, name=command, help=summary)
-for flag, summary in loudness.FLAGS.items():  # for the help: `run` takes them off before anything is looked up
+for flag, summary in loudness.FLAGS.items():  # for the help only: `run` removes them before the command is parsed
     app.command(lambda: None, name=flag, help=summary)
 app.register_install_completion_command()
 
@@ -50,7 +50,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
     Parameters
     ----------
     arguments : sequence of str, optional
-        ``sys.argv[1:]`` if not given.
+        Command-line words. Default: ``sys.argv[1:]``.
 
     Returns
     -------
@@ -67,16 +67,16 @@ def run(arguments: Sequence[str] | None = None) -> int:
         loudness.tell(f"took {time.perf_counter() - begin:.1f} s")
     except ThermocompError as e:
         return _unusable(str(e), getattr(e, "__notes__", ()))
-    except OSError as e:  # a folder that may not be written to, a full disk
+    except OSError as e:  # directory not writable, disk full
         return _unusable(f"{e.filename or ''}: {e.strerror or e}".removeprefix(": "))
     except SystemExit as e:
-        if e.code and e.__context__ is not None:  # words that no command takes: it was told on stderr
+        if e.code and e.__context__ is not None:  # words that no command accepts: already reported on stderr
             _tell_programs(str(e.__context__))
         raise
     except KeyboardInterrupt:
         make_console(stderr=True).print("[bold red]stopped:[/] nothing was finished, nothing was written")
         return STOPPED
-    except Exception as e:  # noqa: BLE001 - a user is told what happened, and how to see where
+    except Exception as e:  # noqa: BLE001 - the user gets a message, and a hint for the traceback
         return _fault(e)
     return code if isinstance(code, int) else 0
 

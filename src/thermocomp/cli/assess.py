@@ -9,7 +9,7 @@ from thermocomp.report import printed
 
 @command("thermocomp.api.verbs:assess", writes=".html", forms={"model": Path})
 def assess(found: Assessed, face: CommandFace) -> int:
-    """Show it.
+    """Write and show the results.
 
     Parameters
     ----------

@@ -10,7 +10,7 @@ from thermocomp.cli.terminal import console
 
 @command("thermocomp.api.check:check", writes=".html", tell_changes=False)
 def check(found: CheckedRecordings, face: CommandFace) -> int:
-    """Show it.
+    """Write and show the results.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ from thermocomp.report.layout import Column, Layout, Toned
 _TONES = {"trouble": "grave", "warning": "doubtful", "info": "soft"}
 #: number of files above which each file gets one line
 MANY = 3
-#: number of findings of one kind that are printed in full; of the others only the channels are listed
+#: number of findings of one kind printed in full; for the rest only the channels are listed
 _FULL = 4
 
 
@@ -67,7 +67,7 @@ def _show(r: Recording, found: Sequence[Finding], content: dict[str, Any], conso
     console.print(f"{len(r.cycles)} thermal cycle(s): {words(cycles)}")
     told = {f.text for f in found}
     for note in r.notes:
-        if note not in told:  # a column that was left out is a finding too
+        if note not in told:  # an excluded column is also a finding
             console.print(f"[dim]note[/] {words(note)}")
     for kind in dict.fromkeys((f.severity, f.kind) for f in found):
         mine = [f for f in found if (f.severity, f.kind) == kind]

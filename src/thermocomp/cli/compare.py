@@ -8,7 +8,7 @@ from thermocomp.report import printed
 
 @command("thermocomp.api.verbs:compare", writes=".html")
 def compare(found: Compared, face: CommandFace) -> int:
-    """Show it.
+    """Write and show the results.
 
     Parameters
     ----------

@@ -9,7 +9,7 @@ from thermocomp.core.explained import Explanations
 
 @command("thermocomp.api.explain:explain", forms={"model": Path})
 def explain(found: Explanations, face: CommandFace) -> int:
-    """Show it.
+    """Show the explanation.
 
     Returns
     -------

@@ -17,11 +17,11 @@ EXTRAS: dict[str, tuple[str, ...]] = {
 
 @contextmanager
 def needs(extra: str) -> Iterator[None]:
-    """Turn a failing import of one of the extra's modules into a `MissingExtraError`."""
+    """Convert a failed import of a module of the extra into a `MissingExtraError`."""
     try:
         yield
     except ImportError as e:
-        # a command that cannot be imported says why beneath
+        # a command that cannot be imported gives the reason as the cause
         missing = (e.name or getattr(e.__cause__, "name", None) or "").split(".")[0]
         if missing in EXTRAS[extra]:
             raise MissingExtraError(extra, missing) from e

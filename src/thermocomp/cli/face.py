@@ -23,8 +23,8 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.core.outputs import refuse_existing
 from thermocomp.report.layout import Item
 
-#: type of a parameter on the command line, where Python accepts more types than a line can express; a group of options
-#: has `value`, which converts them to the argument of the verb
+#: types of parameters on the command line, where Python accepts more types than a command line can express; a group of
+#: options has a method `value`, which returns the argument of the verb
 ON_A_LINE: dict[str, Any] = {
     "recordings": list[Path],
     "models": list[str],
@@ -38,9 +38,9 @@ ON_A_LINE: dict[str, Any] = {
     "starts": Beginning,
     "limits": CompensatorOptions,
 }
-#: parameters without an option: the command itself shows their content
+#: parameters without an option, because the command itself displays their content
 SHOWN = ("progress",)
-#: files written for an output, depending on the options given
+#: function that returns the files written for an output and given options
 Writes = Callable[[Path, Mapping[str, Any]], list[Path]]
 
 

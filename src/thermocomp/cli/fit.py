@@ -7,7 +7,7 @@ from thermocomp.report import printed
 
 @command("thermocomp.api.verbs:fit", writes=".json", needs_output=True)
 def fit(found: FittedModels, face: CommandFace) -> int:
-    """Show it.
+    """Write and show the results.
 
     Parameters
     ----------

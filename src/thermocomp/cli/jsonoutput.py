@@ -8,16 +8,16 @@ from typing import Any
 
 from thermocomp import __version__
 
-#: command line that is being run
+#: current command line
 called_with: list[str] = []
 
 
 def print_json(content: dict[str, Any]) -> None:
     """Print results as JSON, with the version and the settings."""
     content = {"thermocomp": __version__, "arguments": called_with, **content}
-    # JSON has no nan and no infinity: what is not known is null
+    # JSON has no nan and no infinity: unknown values are null
     text = json.dumps(_nulled(content), indent=2, ensure_ascii=False)
-    # what no terminal should get, and bytes of a name that is not text, stand there as JSON escapes them
+    # characters unfit for terminals, and undecodable bytes of names, are written as JSON escapes
     sys.stdout.write("".join(c if c.isprintable() or c == "\n" else json.dumps(c)[1:-1] for c in text) + "\n")
 
 

@@ -16,17 +16,17 @@ FLAGS = {
     "unexpected error.",
 }
 
-#: verbosity of the command line that is being run
+#: verbosity of the current command line
 quiet = verbose = False
 
 
 def taken_off(words: Sequence[str]) -> list[str]:
-    """Return a command line without the flags, at any position; they are in effect until the next one is run.
+    """Return a command line without the flags, at any position; they apply until the next call.
 
     Raises
     ------
     InputError
-        Both are given.
+        Both flags are given.
     """
     global quiet, verbose  # noqa: PLW0603 - one process runs one command line
     quiet, verbose = (flag in words for flag in FLAGS)
@@ -43,6 +43,6 @@ def tell(text: str) -> None:
 
 
 def tell_read(recordings: "Sequence[Recording]") -> None:
-    """Write a summary of what was read on stderr, if verbose."""
+    """Write a summary of the recordings read on stderr, if verbose."""
     for r in recordings:
         tell(f"read {r.source or r.name}: {len(r)} rows, {len(r.table.columns)} columns")

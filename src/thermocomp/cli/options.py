@@ -42,7 +42,7 @@ class LeaveOneOut:
         Raises
         ------
         InputError
-            More than one of them is given.
+            More than one option is given.
         """
         units: dict[LeaveOne, bool] = {
             "cycle": self.leave_one_cycle_out,

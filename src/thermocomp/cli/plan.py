@@ -31,9 +31,9 @@ def plan(
     *,
     dialect: Dialect = "linuxcnc",
     probe_every: float = EVERY,
-    running: bool = False,  # noqa: ARG001 - asks for the other verb
+    running: bool = False,  # noqa: ARG001 - selects the other verb
 ) -> int:
-    """Show it.
+    """Write and show the results.
 
     Parameters
     ----------

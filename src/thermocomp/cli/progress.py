@@ -21,7 +21,7 @@ from thermocomp.cli import loudness
 from thermocomp.cli.terminal import make_console
 from thermocomp.core.shown import replace_unprintable
 
-#: interval of the lines without a terminal; shorter work prints none [s]
+#: interval of the lines without a terminal; shorter tasks print none [s]
 OFTEN = 10.0
 
 _console = make_console(stderr=True)

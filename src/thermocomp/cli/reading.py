@@ -25,7 +25,7 @@ class RecordingReader(Protocol):
 def read_recordings(paths: list[Path], mapping: Path | None, *, tell: bool = True) -> "list[Recording]":
     """Read the recordings named on the command line; ``-`` is a CSV file on standard input.
 
-    Changes of the values by a mapping are reported on stderr, unless `tell` is False: they are then shown elsewhere.
+    Changes of the values by a mapping are reported on stderr, unless `tell` is False because they are shown elsewhere.
     """
     if not paths:
         raise InputError("no recording given: name at least one CSV, XLSX or Parquet file")

@@ -12,7 +12,7 @@ from thermocomp.report import printed
 
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
-class Selector(SelectionSettings):  # noqa: D101 - that of SelectionSettings, which the help is made from
+class Selector(SelectionSettings):  # noqa: D101 - docstring of SelectionSettings, from which the help is generated
     __doc__ = SelectionSettings.__doc__
 
     unsigned: bool = False
@@ -22,7 +22,7 @@ class Selector(SelectionSettings):  # noqa: D101 - that of SelectionSettings, wh
 
 @command("thermocomp.api.verbs:select", writes=".html", forms={"settings": Selector})
 def select(found: Selected, face: CommandFace) -> int:
-    """Show it.
+    """Write and show the results.
 
     Parameters
     ----------

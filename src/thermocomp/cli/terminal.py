@@ -13,7 +13,7 @@ from thermocomp.report.layout import Item, Layout, Toned, verdict
 
 
 def make_console(**how: Any) -> Console:
-    """Return a console that does not alter text, such as emoji for ``:names:``, and executes no control codes in it.
+    """Return a console that does not alter text, such as emoji for ``:names:``, and executes no control codes.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def make_console(**how: Any) -> Console:
 
 
 class _Printable(RenderHook):
-    """Filter that removes characters that move the cursor, from all printed text."""
+    """Filter that removes cursor-moving characters from all printed text."""
 
     def process_renderables(self, renderables: list[ConsoleRenderable]) -> list[ConsoleRenderable]:
         return [_Cleaned(r) for r in renderables]
@@ -66,7 +66,7 @@ def words(text: object) -> str:
 
 
 def marked(text: str) -> str:
-    """Return text for rich, in its tone if one is given."""
+    """Return text for rich, in its tone if it has one."""
     return f"[{_TONES[text.tone]}]{words(text)}[/]" if isinstance(text, Toned) else words(text)
 
 
@@ -96,7 +96,7 @@ def print_table(t: Layout, console: Console, **how: Any) -> None:
     """
     table = Table(title=words(t.title) or None, caption=words(t.caption) or None, **how)
     for c in t.columns:
-        # what may be broken is folded, not cut; a number that finds no room shows that it is cut
+        # wrappable cells are folded, not cut; a number that does not fit is visibly cut
         table.add_column(
             words(f"{c.heading}, {c.unit}" if c.unit else c.heading),
             justify="right" if c.form else "left",

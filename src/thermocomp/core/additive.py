@@ -1,4 +1,4 @@
-"""Additive family: one curve per variable, their sum through one more curve; no memory."""
+"""Additive family: one curve per variable and one response curve applied to their sum; no memory."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,21 +20,21 @@ class Curve:
     """A function of one variable, constant beyond its ends.
 
     ``linear`` joins the points (x, y) by straight lines. ``step`` is constant between the breaks x: ``y[0]``
-    below ``x[0]``, ``y[i]`` from ``x[i-1]`` on. That is the exact form of a k-nearest-neighbour estimate from a table
-    of one variable: the neighbours change only half way between two entries that are k apart.
+    below ``x[0]``, ``y[i]`` from ``x[i-1]`` on. The step form represents a k-nearest-neighbour estimate from a table of
+    one variable exactly: the set of neighbours changes only midway between two entries that are k apart.
 
     Parameters
     ----------
     x : tuple of float
-        Strictly rising.
+        Strictly increasing.
     y : tuple of float
-        As many as `x`; one more if it is a ``step``.
+        Same length as `x`; one more value for ``step``.
     kind : {'linear', 'step'}
 
     Raises
     ------
     InputError
-        Numbers are not finite, not rising, or too few.
+        Values are not finite, not increasing, or too few.
     """
 
     x: tuple[float, ...]
@@ -55,7 +55,7 @@ class Curve:
 
     @cached_property
     def _pieces(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Break points; then the value at the left end, the slope and the left end of each piece."""
+        """Return the break points, and per piece the value at its left end, its slope and its left end."""
         x, y = np.array(self.x, dtype=np.float64), np.array(self.y, dtype=np.float64)
         if self.kind == "step":
             return x, y, np.zeros(len(y)), np.zeros(len(y))
@@ -70,15 +70,15 @@ class Curve:
 
     @property
     def span(self) -> float:
-        """Greatest minus least value."""
+        """Maximum minus minimum value."""
         return max(self.y) - min(self.y)
 
     def expression(self, of: Node, name: str) -> Lookup:
-        """Return it as a part of an expression."""
+        """Return the curve as a node of an expression."""
         return Lookup(of=of, x=self.x, y=self.y, kind=self.kind, name=name)
 
     def __call__(self, variable: FloatArray) -> FloatArray:
-        """Return the values at `variable`, element by element: the same alone as in a batch, to the last bit."""
+        """Return the values at `variable` element by element; scalar and batch results are bit-identical."""
         breaks, value, slope, left = self._pieces
         piece = breaks.searchsorted(variable, side="right")
         if self.kind == "step":
@@ -91,18 +91,18 @@ class Additive(ErrorModel):
     """Deviation = intercept + response(curve_1(variable_1) + curve_2(variable_2) + ...) (Wessel 2004, Eq. 5; W-05).
 
     Curves are constant beyond their ends: peaks outside the trained range are cropped (W-07), and ``State.outside``
-    tells which input was.
+    marks the inputs concerned.
 
     Parameters
     ----------
     family : str
-        Its word in a file.
+        Name of the family in a file.
     variables : tuple of Variable
         Linear combinations of the inputs: single sensors, or projections.
     curves : tuple of Curve
         One per variable.
     response : Curve or None
-        Curve applied to the sum, such as the inverse of theta; None: none.
+        Curve applied to the sum, such as the inverse of theta; None: the sum itself.
     """
 
     family: Literal["additive"] = "additive"
@@ -125,7 +125,7 @@ class Additive(ErrorModel):
         return np.empty((*change.shape[:-1], 0))
 
     def _advance(self, memory: FloatArray, change: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002
-        # Term by term, not as a matrix product: that one rounds a single reading otherwise than a batch of them.
+        # Sum term by term: a matrix product rounds a single reading differently from a batch.
         total = np.zeros(change.shape[:-1])
         for v, curve in zip(self.variables, self.curves, strict=True):
             (first, weight), *others = v.weights
@@ -155,7 +155,7 @@ class Additive(ErrorModel):
         return tuple(self.inputs[i].name for i in sorted(used))
 
     def coefficients_by_name(self) -> dict[str, float]:
-        """Return the span (greatest minus least value) of each curve, before the response."""
+        """Return the span (maximum minus minimum) of each curve, before the response."""
         return {name: c.span for name, c in zip(self._names(), self.curves, strict=True)}
 
     def _names(self) -> list[str]:

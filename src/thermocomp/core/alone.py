@@ -1,4 +1,4 @@
-"""A file that one process at a time may use."""
+"""Exclusive use of a file by one process at a time."""
 
 import os
 from collections.abc import Iterator
@@ -10,17 +10,17 @@ from thermocomp.core.exceptions import InputError
 
 @contextmanager
 def alone(path: Path) -> Iterator[None]:
-    """Hold a lock on an empty file next to a file: the system releases it when the process ends, however it does.
+    """Hold a lock on an empty file next to `path`; the system releases it when the process ends, even after a crash.
 
     Parameters
     ----------
     path : Path
-        Its folder has to exist.
+        Its folder must exist.
 
     Raises
     ------
     InputError
-        Another process holds it, or there is no writing there.
+        Another process holds the lock, or the folder is not writable.
     """
     beside = path.with_name(f"{path.name}.lock")
     try:
@@ -36,7 +36,7 @@ def alone(path: Path) -> Iterator[None]:
             raise InputError(
                 f"{path}: another thermocomp process is using it; stop that process, or name another file"
             ) from e
-        except (ImportError, OSError):  # the system, or the disk, knows no locks
+        except (ImportError, OSError):  # the operating system or the file system does not support locks
             pass
         yield
     finally:

@@ -1,9 +1,9 @@
-"""Arrays by their contents."""
+"""Array types by content."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
-#: positions and numbers of rows
+#: positions and row numbers
 IntArray = NDArray[np.intp]

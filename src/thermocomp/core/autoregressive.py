@@ -2,18 +2,18 @@
 
 The model's clock ticks every `interval`; readings may come at any time:
 
-- A reading stands for the time since the reading before it, as for the lags of `thermocomp.core.lagbank`. What drives
-  a tick is the mean of the inputs over the interval that ends there. Where readings come once per interval, this is the
+- A reading represents the time since the previous reading, as for the lags of `thermocomp.core.lagbank`. The input of
+  a tick is the mean of the inputs over the interval that ends at the tick. With one reading per interval, this is the
   reading itself.
-- Ticks are made when they are due, several at once after a gap. The work is bounded: once the inputs in the memory are
-  all the same, the rest of a gap is one matrix power (or, for a net, ends where the net has come to rest).
-- Between two ticks the deviation goes in a straight line from the last one towards the one that would come if the
-  inputs continued as they were since. It is continuous in time, so a reading at 14.9 s or 15.1 s makes no difference
-  worth mentioning, and at the tick it is exact.
+- Ticks are made when they are due, several at once after a gap. The work is bounded: once the stored inputs are all
+  equal, the rest of a gap is one matrix power (for a net, the loop ends once its output has settled).
+- Between two ticks the deviation is interpolated linearly from the last tick towards the next one, which is computed
+  with the mean of the inputs since the last tick. The deviation is continuous in time, so that a reading at 14.9 s
+  instead of 15.1 s makes no significant difference; at the tick it is exact.
 
-The past of the deviation is the model's own, never a measured one (P-05, E-P3). `ErrorModel.init` starts cold: no
-deviation and inputs at zero before the first reading. What an earlier job has left (E-P5) is carried over either by
-going on with its `State`, or by `begin_at`.
+The past deviations are those of the model, never measured ones (P-05, E-P3). `ErrorModel.init` starts cold: zero
+deviation and zero inputs before the first reading. The effect of an earlier job (E-P5) is carried over either by
+continuing with its `State`, or by `begin_at`.
 """
 
 import math
@@ -32,22 +32,22 @@ from thermocomp.core.expression import Constant, Mean, Named, Node, Past, Recurr
 from thermocomp.core.model import ErrorModel, FloatArray, State
 from thermocomp.core.network import Affine, Perceptron
 
-#: share of the interval by which a reading may come early and still make the tick: rounding of clocks, nothing else
+#: fraction of the interval by which a reading may come early and still trigger the tick; covers rounding of clocks
 EARLY = 1e-6
-#: what is left of 1 less the sum of the own coefficients, at least: a settled state is the drive by that
+#: smallest admissible 1 - sum(a); the settled deviation is the drive divided by it
 SETTLES = 1e-9
-#: ticks of a net made at once, at most: a day of 15 s; after that the machine is taken to have settled
+#: maximum number of ticks of a net made at once: one day at 15 s; after that the net is assumed to have settled
 MOST_TICKS = 5760
 
 
 def find_largest_root(a: ArrayLike) -> float:
-    """Return the largest modulus of the roots of z^k - a_1 z^(k-1) - ... - a_k; below 1, the free run decays."""
+    """Return the largest modulus of the roots of z^k - a_1 z^(k-1) - ... - a_k; below 1, the free run is stable."""
     roots = np.linalg.eigvals(companion(np.asarray(a, dtype=np.float64)))
     return float(np.abs(roots).max(initial=0.0))
 
 
 def companion(a: FloatArray) -> FloatArray:
-    """Return the matrix that takes the last k deviations one tick further, without inputs."""
+    """Return the matrix that advances the last k deviations by one tick, without inputs."""
     matrix = np.eye(len(a), k=-1)
     matrix[:1] = a
     return matrix
@@ -57,12 +57,12 @@ def companion(a: FloatArray) -> FloatArray:
 class Ticking(ErrorModel):
     """Common part of the autoregressive families: the clock and the memory.
 
-    The runs of a batch share their clock.
+    The runs of a batch share one clock.
 
     Parameters
     ----------
     interval : float
-        h, time from tick to tick [s].
+        h, time between two ticks [s].
     """
 
     remembers: ClassVar[bool] = True
@@ -80,31 +80,31 @@ class Ticking(ErrorModel):
 
     @abstractmethod
     def _coast(self, own: FloatArray, driven: FloatArray, ticks: int) -> FloatArray:
-        """Return the last deviations `ticks` later, all inputs `driven` staying the same."""
+        """Return the last deviations after `ticks` more ticks at constant inputs `driven`."""
 
     def begin_at(
         self, deviation: ArrayLike, inputs: ArrayLike | None = None, reference: ArrayLike | None = None
     ) -> State:
-        """Return the state of a machine whose deviation is known: what the last job has left (E-P5).
+        """Return the state of a machine whose deviation is known, such as after an earlier job (E-P5).
 
         Parameters
         ----------
         deviation : array-like of shape (...)
-            Known deviation, taken to have been the same for as long as the model remembers [unit].
+            Known deviation, assumed constant over the whole memory of the model [unit].
         inputs : array-like of shape (..., n_inputs), optional
-            Values the inputs had all that time; at their reference without it.
+            Input values over the same time. Default: their reference values.
         reference : array-like of shape (n_inputs,), optional
-            Values that count as zero; those in the model without it.
+            Values that count as zero. Default: those stored in the model.
 
         Returns
         -------
         State
-            The next `step` counts its `dt` from here.
+            The `dt` of the next `step` counts from this state.
 
         Raises
         ------
         InputError
-            A number is not finite, or there are not as many as inputs.
+            A value is not finite, or the number of values differs from the number of inputs.
         """
         zero = np.array([i.reference for i in self.inputs]) if reference is None else np.asarray(reference, np.float64)
         given = zero if inputs is None else np.asarray(inputs, dtype=np.float64)
@@ -127,7 +127,7 @@ class Ticking(ErrorModel):
         check_between(f"model of {self.target}", TICK, GAP, interval=self.interval)
 
     def _begin(self, change: FloatArray) -> FloatArray:
-        # [time since the last tick, inputs summed over it, own past, inputs of the last m ticks]
+        # [time since the last tick, integral of the inputs since then, past deviations, inputs of the last m ticks]
         k, m = self.orders
         n = len(self.inputs)
         memory = np.zeros((*change.shape[:-1], 1 + n + max(k, 1) + m * n))
@@ -136,7 +136,7 @@ class Ticking(ErrorModel):
         return memory
 
     def _advance(self, memory: FloatArray, change: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
-        if change.shape[:-1] != memory.shape[:-1]:  # one start for many runs, or many starts with the same inputs
+        if change.shape[:-1] != memory.shape[:-1]:  # one initial state for many runs, or many for the same inputs
             shape = np.broadcast_shapes(change.shape[:-1], memory.shape[:-1])
             memory = np.broadcast_to(memory, (*shape, memory.shape[-1]))
             change = np.broadcast_to(change, (*shape, change.shape[-1]))
@@ -158,7 +158,7 @@ class Ticking(ErrorModel):
                 mean = change
             if ticks > m + 1:
                 own = self._coast(own, np.concatenate([change, past], axis=-1), ticks - m - 1)
-            phase = min(max(phase + dt - ticks * h, -EARLY * h), h)  # bounds: rounding of a very long gap
+            phase = min(max(phase + dt - ticks * h, -EARLY * h), h)  # clipped: rounding over a very long gap
             total = phase * change
         deviation = own[..., 0]
         if phase > EARLY * h:
@@ -168,7 +168,7 @@ class Ticking(ErrorModel):
         return np.concatenate([clock, total, own, past], axis=-1), deviation
 
     def _one(self, own: FloatArray, mean: FloatArray, past: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Make one tick; return the own past and the inputs of the last m ticks, newest first."""
+        """Make one tick; return the past deviations and the inputs of the last m ticks, newest first."""
         k, m = self.orders
         value = self._tick(np.concatenate([own[..., :k], mean, past], axis=-1))
         own = np.concatenate([value[..., None], own[..., :-1]], axis=-1)
@@ -185,14 +185,14 @@ class Ticking(ErrorModel):
         return first
 
     def _regressor_names(self) -> list[str]:
-        """Return the arguments of `_tick`, such as ``dz(t-1)`` and ``n(t-2)``, with the time in ticks."""
+        """Return the names of the arguments of `_tick`, such as ``dz(t-1)`` and ``n(t-2)``, with time in ticks."""
         k, m = self.orders
         return [f"dz(t-{i})" for i in range(1, k + 1)] + [
             f"{x.name}(t-{i})" if i else f"{x.name}(t)" for i in range(m + 1) for x in self.inputs
         ]
 
     def _regressors(self, change: Sequence[Node]) -> list[Node]:
-        """Return the arguments of `_tick` as parts of an expression."""
+        """Return the arguments of `_tick` as nodes of an expression."""
         k, m = self.orders
         own: list[Node] = [Past(i) for i in range(1, k + 1)]
         return own + [Mean(x, i) for i in range(m + 1) for x in change]
@@ -202,16 +202,16 @@ class Ticking(ErrorModel):
 class Autoregressive(Ticking):
     """dz(t) = intercept + sum_i a_i dz(t - ih) + sum over inputs j, sum_i b_ji n_j(t - ih) (P-01).
 
-    A polynomial that does not decay is refused: in free run it would run away.
+    An unstable polynomial is rejected: its free run would diverge.
 
     Parameters
     ----------
     family : str
-        Its word in a file.
+        Name of the family in a file.
     a : tuple of float
-        a_1 .. a_k, of the past deviations.
+        a_1 .. a_k, coefficients of the past deviations.
     b : tuple of tuple of float
-        Per input, b_0 .. b_m [unit per unit of the input].
+        b_0 .. b_m of each input [unit per unit of the input].
     """
 
     family: Literal["autoregressive"] = "autoregressive"
@@ -255,7 +255,7 @@ class Autoregressive(Ticking):
         return value
 
     def _coast(self, own: FloatArray, driven: FloatArray, ticks: int) -> FloatArray:
-        # the rest from where it settles shrinks by the companion matrix
+        # the difference from the settled value decays with the companion matrix
         settled = (driven @ self._weights[len(self.a) :] + self.intercept) / (1.0 - sum(self.a))
         rest = own - settled[..., None]
         left: FloatArray = rest @ np.linalg.matrix_power(self._companion, ticks).T
@@ -267,7 +267,7 @@ class Autoregressive(Ticking):
         return tuple(x.name for x, b in zip(self.inputs, self.b, strict=True) if any(b))
 
     def coefficients_by_name(self) -> dict[str, float]:
-        """Return a_i as ``dz(t-i)`` and b_i as ``input(t-i)``; the time is counted in intervals."""
+        """Return a_i as ``dz(t-i)`` and b_i as ``input(t-i)``; time is counted in intervals."""
         return {n: c for n, c in zip(self._regressor_names(), self._weights.tolist(), strict=True) if c != 0}
 
     def _expression(self, change: Sequence[Node]) -> Node:
@@ -278,20 +278,20 @@ class Autoregressive(Ticking):
 class AutoregressiveNet(Ticking):
     """dz(t) = intercept + the output of a net for dz(t-h) .. dz(t-kh) and each input at t .. t-mh (P-03, E-P2).
 
-    The output must be a sigmoid or tanh: it cannot leave the ends of its scaling, so the free run cannot run away.
+    The output must be a sigmoid or tanh: it is bounded by its scaling, so the free run cannot diverge.
 
     Parameters
     ----------
     family : str
-        Its word in a file.
+        Name of the family in a file.
     k, m : int
         Number of past deviations, and of past values of each input.
     net : Perceptron
-        With one output; its inputs are dz(t-h) .. dz(t-kh), all inputs at t, all inputs at t-h, ...
+        Net with one output; its inputs are dz(t-h) .. dz(t-kh), all inputs at t, all inputs at t-h, ...
     input_scaling : Affine
-        Scaling of the same to the inputs of the net.
+        Scaling of these values to the inputs of the net.
     output_scaling : Affine
-        From what the net gives to the deviation [unit].
+        Scaling of the output of the net to the deviation [unit].
     """
 
     family: Literal["autoregressive-network"] = "autoregressive-network"
@@ -339,14 +339,14 @@ class AutoregressiveNet(Ticking):
 
     @property
     def sensors(self) -> tuple[str, ...]:
-        """Names of the inputs that have an influence on the deviation: a weight that is not zero on the way out."""
+        """Names of the inputs that influence the deviation through non-zero weights."""
         out = np.array(self.net.output_weights[0]) != 0
         reached = (np.array(self.net.hidden_weights)[out] != 0).any(axis=0) & (np.array(self.input_scaling.gain) != 0)
         alive = reached[self.k :].reshape(self.m + 1, -1).any(axis=0) & (self.output_scaling.gain[0] != 0)
         return tuple(x.name for x, used in zip(self.inputs, alive.tolist(), strict=True) if used)
 
     def coefficients_by_name(self) -> dict[str, float]:
-        """Return all weights and thresholds; ``w(dz(t-1), h2)`` leads from the last deviation to hidden node 2."""
+        """Return all weights and thresholds; ``w(dz(t-1), h2)`` connects the last deviation to hidden node 2."""
         names, net = self._regressor_names(), self.net
         found: dict[str, float] = {}
         for j, (weights, threshold) in enumerate(zip(net.hidden_weights, net.hidden_thresholds, strict=True), start=1):

@@ -1,4 +1,4 @@
-"""Band: how far a model's answer may be off, by the phase of the machine and by how far it is from what was covered."""
+"""Band: uncertainty of a model output, by machine phase and by distance from the training conditions."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -12,39 +12,40 @@ from thermocomp.core.zero import STANDS
 
 FloatArray = NDArray[np.float64]
 
-#: cycles from which on a band is distribution-free: with fewer, the quantile of so many cycles is beyond all of them
+#: minimum number of cycles for a distribution-free band; with fewer, the required quantile exceeds the largest error
 CONFORMAL = 9
-#: half-width where the structures agree [unit]
+#: largest half-width where the structures agree [unit]
 WIDEST = 1e6
 
 
 @dataclass(frozen=True)
 class Band:
-    """Half-width of the band about a model's answer, fixed when the model was fitted.
+    """Half-width of the band about a model output, fixed when the model was fitted.
 
-    It is ``factor * sqrt(floor^2 + spread^2)``. The spread is that of the structures a model is the average of: what
-    the training has not settled they answer differently. Inputs are clipped, so it does not grow beyond their range.
+    The half-width is ``factor * sqrt(floor^2 + spread^2)``. The spread is the disagreement of the structures averaged
+    by the model where the training data do not determine the output. Inputs are clipped, so the spread does not grow
+    beyond their range.
 
     Parameters
     ----------
     level : float
-        Share of the rows of unseen thermal cycles that the band is to hold.
+        Fraction of the rows of unseen thermal cycles that the band is designed to contain.
     basis : {'assumption', 'conformal'}
-        ``assumption``: errors are normal, a cycle errs as a whole, and their size is known from as many cycles as there
-        are; ``conformal``: distribution-free, over cycles that could as well have come in another order.
+        ``assumption``: errors are normal, fully correlated within a cycle, and their size is estimated from this number
+        of cycles; ``conformal``: distribution-free, assuming that the cycles are exchangeable.
     cycles : int
-        Thermal cycles it was made from, each left out in turn.
+        Number of thermal cycles the band is based on, each left out in turn.
     floor : float
         Smallest half-width, used where the structures agree [unit].
     running, stopped : float
         Factor while the spindle turns, and while it is stopped [-].
     speeds : tuple of int
-        Inputs that state whether the spindle turns; none: the larger factor holds always.
+        Indices of the inputs that show whether the spindle turns; empty: the larger factor always applies.
 
     Raises
     ------
     SettingError
-        A number is not in its range.
+        A value is out of range.
     """
 
     level: float
@@ -67,19 +68,19 @@ class Band:
 
     @property
     def words(self) -> str:
-        """Name of the band wherever it is shown."""
+        """Name of the band in all outputs."""
         by = "by assumption" if self.basis == "assumption" else "conformal"
         return f"{100 * self.level:g} % band {by}, {self.cycles} cycles"
 
     def tell(self, unit: str) -> str:
-        """Return it in words, with its half-widths where the structures agree, in a unit."""
+        """Return the band as text in a given unit, with its half-widths where the structures agree."""
         rest, run = (f"{self.floor * factor:.2f} {unit}" for factor in (self.stopped, self.running))
         if not self.speeds:
             rest = run = f"{self.floor * max(self.stopped, self.running):.2f} {unit}"
         return f"{self.words}: half-width at least {rest} at rest and {run} running, more where its structures differ"
 
     def turning(self, change: FloatArray) -> NDArray[np.bool_]:
-        """Return whether the spindle turns in states of the inputs, (..., n_inputs)."""
+        """Return whether the spindle turns, for input states of shape (..., n_inputs)."""
         return np.asarray(np.logical_or.reduce([np.abs(change[..., k]) > STANDS for k in self.speeds]))
 
     def half_width(self, change: FloatArray, spread: FloatArray) -> FloatArray:

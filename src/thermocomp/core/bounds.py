@@ -1,10 +1,10 @@
-"""Bounds of numbers and names in a model: defined once, and so wide that no machine comes near.
+"""Bounds of numbers and names in a model: defined in one place, and far wider than any machine needs.
 
-A model is read from files that somebody may have altered. Within these bounds nothing that it computes overflows: a
+A model is read from files that may have been altered. Within these bounds no computation of the model overflows: a
 reading is clipped to the trained range, widened at most `MARGIN` times (2e15); a variable is a sum of at most `INPUTS`
-of them, each by at most `COEFFICIENT` (2e33); a term is a product of at most `DEGREE` variables (3e266); by a
-coefficient, and summed over as many as `ENTRIES`, that is 3e286, and a float ends at 1.8e308. What an autoregressive
-model makes of its own past grows by less: its free run has to decay, over at most `ORDER` ticks.
+readings, each multiplied by at most `COEFFICIENT` (2e33); a term is a product of at most `DEGREE` variables (3e266);
+multiplied by a coefficient and summed over at most `ENTRIES` terms, the result is 3e286; the largest float is 1.8e308.
+The past deviations of an autoregressive model grow by less: its free run must be stable, over at most `ORDER` ticks.
 """
 
 import unicodedata
@@ -18,42 +18,42 @@ from thermocomp.core.exceptions import SettingError
 
 FloatArray = NDArray[np.float64]
 
-#: coefficients, weights, gains, thresholds, values of curves, intercepts: a micrometre per 1e-15 of an input [-]
+#: largest coefficient, weight, gain, threshold, curve value or intercept: a micrometre per 1e-15 of an input [-]
 COEFFICIENT = 1e15
-#: references and ends of trained ranges in house units: 1,000 km, 1e9 1/min, a time stamp
+#: largest reference or end of a trained range in house units: 1,000 km, 1e9 1/min, a time stamp
 RANGE = 1e9
-#: readings beyond count as this: far outside every trained range
+#: larger readings are clipped to this value, far outside every trained range
 READING = 1e12
-#: positions [mm]: 10 km
+#: largest position [mm]: 10 km
 POSITION = 1e7
-#: what a state remembers: products of readings
+#: largest value in the memory of a state: products of readings
 MEMORY = 1e30
-#: trained ranges are widened by no more than so many of their widths, nor faded over more
+#: largest factor by which trained ranges may be widened or over which a deviation may fade, in range widths
 MARGIN = 1e6
-#: scales, tolerances, time constants [s] and shares that something is divided by
+#: smallest scale, tolerance, time constant [s] or fraction used as a divisor
 LEAST = 1e-6
-#: time constants, and time between two readings [s]: 300 years
+#: longest time constant or time between two readings [s]: 300 years
 GAP = 1e10
-#: interval of a model that ticks [s]: a millisecond
+#: smallest interval of a model with ticks [s]
 TICK = 1e-3
-#: inputs of a model
+#: maximum number of inputs of a model
 INPUTS = 1000
-#: variables, hidden nodes
+#: maximum number of variables or hidden nodes
 NODES = 10_000
-#: terms, lags, weights of a net
+#: maximum number of terms, lags, or weights of a net
 ENTRIES = 100_000
-#: factors of a term
+#: maximum number of factors of a term
 DEGREE = 8
-#: exponents of a profile, and the largest value of a term without its coefficient, as a power of ten
+#: maximum exponent of a profile, and maximum power of ten of a term without its coefficient
 EXPONENT, POWER_OF_TEN = 30, 200
-#: past values that one tick of an autoregressive model is made of
+#: maximum number of past values used in one tick of an autoregressive model
 ORDER = 100
-#: characters of a name
+#: maximum number of characters of a name
 NAME = 200
 
-#: single precision: its least and its largest number
+#: smallest and largest numbers in single precision
 _TINY, _LARGEST = float(np.finfo(np.float32).smallest_subnormal), float(np.finfo(np.float32).max)
-#: magnitudes that a check lets nothing go below, and beyond; those that single precision does not hold exactly
+#: lower bounds of magnitudes in checks; single precision does not represent them exactly
 _FLOORS = np.array([0.0, LEAST**2, LEAST, TICK])
 _CEILINGS = np.array([1.0 - LEAST, READING, COEFFICIENT, MEMORY, _LARGEST])
 
@@ -61,41 +61,41 @@ _CEILINGS = np.array([1.0 - LEAST, READING, COEFFICIENT, MEMORY, _LARGEST])
 def round_within(
     values: ArrayLike, least: float | FloatArray = -_LARGEST, most: float | FloatArray = _LARGEST
 ) -> FloatArray:
-    """Return numbers as single precision holds them, as near as can be within bounds.
+    """Return the nearest single-precision numbers within bounds.
 
     Parameters
     ----------
     values : array-like of float
     least, most : float or ndarray
-        Bounds, the same for all or one per number; a number of single precision lies within them.
+        Bounds, common or one per number; each interval contains a single-precision number.
 
     Returns
     -------
     ndarray of float
-        nan stays nan.
+        NaN stays NaN.
     """
     with np.errstate(over="ignore", under="ignore"):
         near = np.clip(np.asarray(values, dtype=np.float64), least, most).astype(np.float32)
         above, below = (np.nextafter(near, np.float32(end)) for end in (np.inf, -np.inf))
-        exact = near.astype(np.float64)  # else the bounds would be rounded before they are compared
+        exact = near.astype(np.float64)  # otherwise the bounds would be rounded before the comparison
         return np.where(exact < least, above, np.where(exact > most, below, near)).astype(np.float64)
 
 
 def round_single(values: ArrayLike) -> FloatArray:
-    """Return numbers as single precision holds them, on the same side of every bound of a model as they are.
+    """Return single-precision numbers, on the same side of every bound of a model as the originals.
 
-    The one place where a number loses digits: what keeps to the bounds of this file does so afterwards. What is not
-    zero does not become zero, and what is finite stays finite.
+    Numbers are rounded only here: values that satisfy the bounds of this module still do so afterwards. Non-zero values
+    do not become zero, and finite values stay finite.
 
     Parameters
     ----------
     values : array-like of float
-        nan and infinities stay as they are.
+        NaN and infinities stay unchanged.
 
     Returns
     -------
     ndarray of float
-        Array of the same shape. A row that increases strictly still does.
+        Array of the same shape. A strictly increasing row stays strictly increasing.
     """
     exact = np.asarray(values, dtype=np.float64)
     size = np.abs(exact)
@@ -108,7 +108,7 @@ def round_single(values: ArrayLike) -> FloatArray:
 
 
 def _spread(rising: FloatArray, most: FloatArray) -> FloatArray:
-    """Return numbers that rise, of which some have become the same, a step of single precision apart."""
+    """Return increasing numbers with equal neighbours separated by one step of single precision."""
     found = rising.astype(np.float32)
     for k in range(1, len(found)):
         found[k] = max(found[k], np.nextafter(found[k - 1], np.float32(np.inf)))
@@ -119,7 +119,7 @@ def _spread(rising: FloatArray, most: FloatArray) -> FloatArray:
 
 
 def check_finite(owner: str, most: float = COEFFICIENT, **numbers: Any) -> None:
-    """Refuse numbers that are not finite, or beyond a bound.
+    """Reject numbers that are not finite or exceed a bound.
 
     Parameters
     ----------
@@ -128,12 +128,12 @@ def check_finite(owner: str, most: float = COEFFICIENT, **numbers: Any) -> None:
     most : float
         Largest magnitude.
     **numbers : float or nested sequence of float
-        By what they are called.
+        Values by name.
 
     Raises
     ------
     SettingError
-        Names all that hold such a number, and the first of each.
+        Lists every name with an invalid number, and its first invalid value.
     """
     wrong = []
     for name, values in numbers.items():
@@ -146,7 +146,7 @@ def check_finite(owner: str, most: float = COEFFICIENT, **numbers: Any) -> None:
 
 
 def check_between(owner: str, least: float, most: float, **numbers: Any) -> None:
-    """Refuse numbers that are not between two bounds.
+    """Reject numbers outside two bounds.
 
     Parameters
     ----------
@@ -154,12 +154,12 @@ def check_between(owner: str, least: float, most: float, **numbers: Any) -> None
         Owner of the values, for messages.
     least, most : float
     **numbers : float or nested sequence of float
-        By what they are called.
+        Values by name.
 
     Raises
     ------
     SettingError
-        Names all that hold such a number, and the first of each.
+        Lists every name with an invalid number, and its first invalid value.
     """
     wrong = []
     for name, values in numbers.items():
@@ -172,7 +172,7 @@ def check_between(owner: str, least: float, most: float, **numbers: Any) -> None
 
 
 def check_count(owner: str, most: int, **entries: Sequence[object]) -> None:
-    """Refuse what is too much.
+    """Reject sequences that are too long.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def check_count(owner: str, most: int, **entries: Sequence[object]) -> None:
     Raises
     ------
     SettingError
-        Names all that have more.
+        Lists every sequence with more than `most` entries.
     """
     wrong = [f"{len(found):,} {name}, at most {most:,}" for name, found in entries.items() if len(found) > most]
     if wrong:
@@ -193,7 +193,7 @@ def check_count(owner: str, most: int, **entries: Sequence[object]) -> None:
 
 
 def check_name(what: str, name: str, most: int = NAME) -> None:
-    """Refuse what is not a name: empty, too long, or with characters that break a line or a terminal.
+    """Reject an invalid name: empty, too long, or with characters that break a line or a terminal.
 
     Parameters
     ----------
@@ -201,7 +201,7 @@ def check_name(what: str, name: str, most: int = NAME) -> None:
         Kind of the named object.
     name : str
     most : int
-        Characters it may have.
+        Maximum number of characters.
 
     Raises
     ------

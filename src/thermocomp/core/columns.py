@@ -1,4 +1,4 @@
-"""Tables that a model is replayed through: anything that gives a column by its name."""
+"""Tables for model replay: any object that returns a column by name."""
 
 from collections.abc import Iterator
 from typing import Any, Protocol
@@ -13,20 +13,20 @@ FloatArray = NDArray[np.float64]
 
 
 class Columns(Protocol):
-    """A table that gives a column by its name: a DataFrame, or a dict of arrays."""
+    """A table that returns a column by name: a DataFrame, or a dict of arrays."""
 
     def __getitem__(self, name: str, /) -> Any:
         """Return a column."""
 
     def __contains__(self, name: object, /) -> bool:
-        """Return whether there is a column of that name."""
+        """Return whether a column of this name exists."""
 
     def __iter__(self) -> Iterator[Any]:
-        """Return the names."""
+        """Return an iterator over the column names."""
 
 
 def read_column(table: Columns, name: str, owner: str) -> NDArray[Any]:
-    """Return a column; raise `InputError` if there is none of that name."""
+    """Return a column; raise `InputError` if it does not exist."""
     try:
         return np.asarray(table[name])
     except (KeyError, ValueError, IndexError, TypeError) as e:
@@ -34,7 +34,7 @@ def read_column(table: Columns, name: str, owner: str) -> NDArray[Any]:
 
 
 def read_numbers(table: Columns, name: str, owner: str) -> FloatArray:
-    """Return a column of numbers; raise `InputError` if it is none."""
+    """Return a numeric column; raise `InputError` if it is missing or not numeric."""
     values = read_column(table, name, owner)
     try:
         if values.dtype.kind in "mM":
@@ -45,27 +45,27 @@ def read_numbers(table: Columns, name: str, owner: str) -> FloatArray:
 
 
 def count_rows(table: Columns) -> int:
-    """Return the number of rows of a table of which no column is needed."""
+    """Return the number of rows of a table when no particular column is needed."""
     return max((np.size(table[name]) for name in table), default=0)
 
 
 def read_clock(table: Columns, time: ArrayLike | str | None, owner: str, *, needed: bool) -> FloatArray | None:
-    """Return the time of the rows of a table [s]; None if there is none.
+    """Return the time of each row of a table [s]; None if the table has no time.
 
     Parameters
     ----------
     table : mapping of str to array-like
     time : str or array-like or None
-        Times, or the name of their column; None: the column ``time_s``, if there is one.
+        Times, or the name of their column; None: the column ``time_s``, if present.
     owner : str
         Caller, for messages.
     needed : bool
-        There must be one.
+        The time is required.
 
     Raises
     ------
     InputError
-        It is missing, or something else than times.
+        The time is missing, or the values are not times.
     """
     if time is None and "time_s" in table:
         time = "time_s"

@@ -13,23 +13,23 @@ Group = Literal["axis", "squareness", "spindle", "origin"]
 
 @dataclass(frozen=True)
 class ErrorComponent:
-    """One way in which a machine's tool point may be wrong.
+    """One component of the tool-point error of a machine.
 
     Parameters
     ----------
     code : str
-        ISO 230-1 code where there is one (``EXX``, ``C0Y``), else the code of this house (``XOY``: shift along X of the
+        ISO 230-1 code where one exists (``EXX``, ``C0Y``), otherwise a thermocomp code (``XOY``: shift along X of the
         reference of Y).
     group : {'axis', 'squareness', 'spindle', 'origin'}
         Location of the error.
     unit : {'um', 'urad'}
-        Unit of its value.
+        Unit of the error.
     depends_on : str or None
-        The axis along whose travel it varies; None for a scalar (C-02).
+        Axis along whose travel the error varies; None for a scalar (C-02).
     description : str
-        In words.
+        Description as text.
     axes : tuple of str
-        Axes that a machine must have for it to exist.
+        Axes that a machine must have for the component to exist.
     """
 
     code: str
@@ -110,7 +110,7 @@ def _spindle() -> list[ErrorComponent]:
 
 
 def _origins() -> list[ErrorComponent]:
-    # One axis (here Z) is the reference for the two others: two times three translations (C-01).
+    # One axis (here Z) is the reference for the other two: two times three translations (C-01).
     return [
         ErrorComponent(
             code=f"{along}O{axis}",
@@ -125,7 +125,7 @@ def _origins() -> list[ErrorComponent]:
     ]
 
 
-#: all 32, in the order axis, squareness, spindle, origin
+#: all 32 components, in the order axis, squareness, spindle, origin
 COMPONENTS: tuple[ErrorComponent, ...] = (*_axis_components(), *_squareness(), *_spindle(), *_origins())
 
 BY_CODE: dict[str, ErrorComponent] = {c.code: c for c in COMPONENTS}

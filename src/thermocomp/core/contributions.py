@@ -13,38 +13,38 @@ from thermocomp.core.paceddynamic import PacedDynamic
 
 
 class Gain(NamedTuple):
-    """Gain of an input: of a temperature per degree, of a spindle speed at the top speed of the training."""
+    """Gain of an input: per degree for a temperature, at the highest trained speed for a spindle speed."""
 
     name: str
     quantity: str
-    instantaneous: float  #: followed within one step between rows [unit per degC, or unit]
-    settled: float  #: followed in the end, itself and all its lags [unit per degC, or unit]
-    bound: float  #: most that it can add, whatever it reads: inputs are clipped [unit]
+    instantaneous: float  #: effect within one step between rows [unit per degC, or unit]
+    settled: float  #: steady-state effect, including all lags [unit per degC, or unit]
+    bound: float  #: largest possible contribution at any reading; inputs are clipped [unit]
 
 
 def contributions(
     model: ErrorModel, table: Columns, time: ArrayLike | str | None = None, *, reference: ArrayLike | None = None
 ) -> dict[str, FloatArray]:
-    """Return the contribution of each input, with its lags or states, to the deviation.
+    """Return the contribution of each input, including its lags or states, to the deviation.
 
-    With the intercept they sum up to what the model predicts, unless it holds or fades outside its trained range.
+    With the intercept they sum to the model prediction, except where it holds or fades outside its trained range.
 
     Parameters
     ----------
     model : PacedDynamic
-        Model of the method `averaged`; for no other family it is known.
+        Model of the method `averaged`; other families are not supported.
     table, time, reference
         See `thermocomp.core.model.ErrorModel.predict`.
 
     Returns
     -------
     dict of str to ndarray of shape (n_rows,)
-        By name of the input [unit of the model]; 0 before the first complete row of a test.
+        By input name [unit of the model]; 0 before the first complete row of a test.
 
     Raises
     ------
     InputError
-        A model of another family; see also `thermocomp.core.model.ErrorModel.predict`.
+        The model belongs to another family; see also `thermocomp.core.model.ErrorModel.predict`.
     """
     model = _paced(model)
     direct, weights = model.read_out
@@ -61,12 +61,12 @@ def contributions(
 
 
 def gains(model: ErrorModel, step: float) -> list[Gain]:
-    """Return the gain of each input, the largest bound first.
+    """Return the gain of each input, in descending order of the bound.
 
     Parameters
     ----------
     model : PacedDynamic
-        Model of the method `averaged`; for no other family it is known.
+        Model of the method `averaged`; other families are not supported.
     step : float
         Time between two rows [s].
 
@@ -77,7 +77,7 @@ def gains(model: ErrorModel, step: float) -> list[Gain]:
     Raises
     ------
     InputError
-        A model of another family, or a step that is not positive.
+        The model belongs to another family, or the step is not positive.
     """
     model = _paced(model)
     if not step > 0:
@@ -85,7 +85,7 @@ def gains(model: ErrorModel, step: float) -> list[Gain]:
     direct, weights = model.read_out
     owners, bank = _owners(model), model.bank
     rates = bank.rates.copy()
-    rates[len(rates) - len(bank.gain) :] += bank.gain  # of a speed: at top speed
+    rates[len(rates) - len(bank.gain) :] += bank.gain  # for speed states: at top speed
     followed = weights * lagbank.step_response(step, 1.0 / rates)
     low, high = model.clip(np.full(len(model.inputs), -np.inf))[0], model.clip(np.full(len(model.inputs), np.inf))[0]
     found = []
@@ -114,6 +114,6 @@ def _paced(model: ErrorModel) -> PacedDynamic:
 
 
 def _owners(model: PacedDynamic) -> NDArray[np.intp]:
-    """Return the input that each state of the memory follows."""
+    """Return the index of the input that each state of the memory follows."""
     bank = model.bank
     return np.append(np.tile(bank.temperatures, bank.taus), bank.speeds)

@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError, SettingError
 
-#: one position, or an array of them
+#: scalar or array of positions
 _Position = TypeVar("_Position", float, NDArray[np.float64])
 
 
 @dataclass(frozen=True)
 class Deviation:
-    """Actual minus commanded tool point along one axis, at a position and a slope over the travel.
+    """Actual minus commanded tool point along one axis: an offset at a position, and a slope along the travel.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class Deviation:
         _check_finite("deviation", self.offset, self.slope, self.reference_position)
 
     def at(self, position: _Position) -> _Position:
-        """Deviation [um] at a position [mm] (Chen 1996, Eq. 2 to first order)."""
+        """Return the deviation [um] at a position [mm] (Chen 1996, Eq. 2 to first order)."""
         return self.offset + self.slope * 1e-3 * (position - self.reference_position)
 
     def less(self, other: "Deviation") -> "Deviation":
@@ -59,7 +59,7 @@ class Deviation:
 class Correction:
     """Correction that a controller adds along one axis: minus the deviation.
 
-    ``K(T, P) = K0(T) + tan b(T) (P - P0)`` is the form that Siemens, Beckhoff/ISG and in effect Heidenhain use.
+    Siemens and Beckhoff/ISG use the form ``K(T, P) = K0(T) + tan b(T) (P - P0)``, and Heidenhain an equivalent one.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class Correction:
     Raises
     ------
     InputError
-        A number is NaN or infinite: it must never reach a controller.
+        A number is NaN or infinite, which must never reach a controller.
 
     Examples
     --------
@@ -91,12 +91,12 @@ class Correction:
 
     @classmethod
     def opposing(cls, deviation: Deviation) -> "Correction":
-        """Return the correction that cancels `deviation`: the only place where the sign is changed."""
+        """Return the correction that cancels `deviation`; the sign is changed only here."""
         # "0.0 -" rather than a bare minus: a zero deviation must not become -0.0 in a journal or a controller
         return cls(0.0 - deviation.offset, 0.0 - deviation.slope, deviation.reference_position)
 
     def at(self, position: _Position) -> _Position:
-        """Correction [um] at a position [mm]."""
+        """Return the correction [um] at a position [mm]."""
         return self.offset + self.slope * 1e-3 * (position - self.reference_position)
 
 
@@ -104,7 +104,7 @@ def uncompensated(residual: _Position, correction: _Position) -> _Position:
     """Return the uncompensated deviation: the measured residual minus the correction.
 
     The residual error of the tool point is the sum of the deviation of the machine and the correction added by the
-    controller. Both have the same zero; this is the only place where they are separated.
+    controller. Both have the same zero. They are separated only here.
 
     Parameters
     ----------

@@ -1,25 +1,25 @@
-"""The one exception tree: whatever thermocomp raises on purpose is a `ThermocompError`."""
+"""Exception hierarchy: every error raised deliberately by thermocomp is a `ThermocompError`."""
 
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from typing import Any
 
-#: what would mend an input: a part of a mapping file, as its TOML is read
+#: suggested fix of an input: part of a mapping file, as parsed TOML
 Remedy = Mapping[str, Any]
 
 
 class ThermocompError(Exception):
-    """Base of all errors thermocomp raises on purpose; its text states what was found and what to do."""
+    """Base of all errors raised deliberately by thermocomp; the text states what was found and what to do."""
 
 
 class InputError(ThermocompError):
-    """Something handed in cannot be used: a file, a column, an option, a channel name.
+    """Unusable input: a file, a column, an option, a channel name.
 
     Parameters
     ----------
     message : str
     remedies : sequence of Remedy
-        What could mend it, the likeliest first; several where it can be read in several ways.
+        Suggested fixes, most likely first; several if the input is ambiguous.
     """
 
     def __init__(self, message: str = "", remedies: Iterable[Remedy] = ()) -> None:
@@ -28,15 +28,15 @@ class InputError(ThermocompError):
 
 
 class SettingError(InputError, ValueError):
-    """A value of a setting cannot be used.
+    """Invalid value of a setting.
 
-    It is a `ValueError` too, so that pydantic, which reads settings from files, reports the location of the value.
+    Also a `ValueError`, so that pydantic, which reads settings from files, reports the location of the value.
 
     Parameters
     ----------
     message : str
     path : tuple of str or int
-        Keys and positions that lead to the value from the object that refuses it.
+        Keys and indices that lead to the value from the object that rejects it.
     """
 
     def __init__(self, message: str, path: tuple[str | int, ...] = ()) -> None:
@@ -62,18 +62,18 @@ def explain_unknown(what: str, name: str, known: Iterable[str], path: tuple[str 
 
 
 def tell_nearest(name: str, known: Iterable[str], cutoff: float = 0.4) -> str:
-    """Return in words the known names that are similar to an unknown one, or else all known names."""
+    """Return text that lists the known names similar to an unknown one, or all known names if none is similar."""
     known = list(known)
     near = get_close_matches(name, known, n=3, cutoff=cutoff)
     return f"the nearest are {', '.join(near)}" if near else f"there are {', '.join(known)}"
 
 
 class RecordingError(InputError):
-    """A recording, or the file it comes from, cannot be used."""
+    """A recording or its source file cannot be used."""
 
 
 class TwoReadingsError(RecordingError):
-    """The times of a recording can be read in several ways with different durations: the program must not guess."""
+    """The times of a recording can be read in several ways with different durations; the program must not guess."""
 
 
 class UnitError(InputError):
@@ -90,7 +90,7 @@ class ProgramError(InputError):
     Parameters
     ----------
     line : int
-        Number of the line, from 1.
+        Line number, from 1.
     reason : str
         Value found, why it is invalid, and what to do.
     """
@@ -101,8 +101,8 @@ class ProgramError(InputError):
         self.reason = reason
 
 
-class Unprovable(InputError):  # noqa: N818 - it is no error of anybody: nothing can be said
-    """Nothing can be proved of a revised program: no interpreter, or one that does not run the original."""
+class Unprovable(InputError):  # noqa: N818 - not an error, but an inconclusive result
+    """A revised program cannot be verified: no interpreter, or one that does not run the original program."""
 
 
 class FitError(ThermocompError):
@@ -121,7 +121,7 @@ class MissingExtraError(ThermocompError):
     extra : str
         Name of the extra, such as ``"study"``.
     missing : str
-        The module that could not be imported.
+        Module that could not be imported.
     """
 
     def __init__(self, extra: str, missing: str) -> None:

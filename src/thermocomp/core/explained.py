@@ -11,47 +11,48 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.core.paceddynamic import PacedDynamic
 from thermocomp.core.watch import LASTING, Watched
 
-#: a sensor that may drift further than this before it is found off wants a spare beside it [degC]
+#: undetected drift of a sensor from which a spare sensor is recommended [degC]
 FAR = 3.0
-#: the same if what stands in for it leaves so many times the error with all
+#: the same for the error with the substitute value, as a multiple of the error with all sensors
 DEAR = 2.0
-#: a time constant or a time step changes nothing of what is settled [s]
+#: arbitrary time constant or time step; settled values do not depend on it [s]
 _ANY = 60.0
 
 
 @dataclass(frozen=True)
 class SensorExplanation:
-    """An input of a model: how much it counts, how its failure is found, and what is done then.
+    """An input of a model: its influence, how its failure is detected, and the response to it.
 
     Parameters
     ----------
     name, quantity, unit : str
     low, high : float
-        Training range, relative to its zero where it has a separate one [unit].
+        Training range, relative to the reference of the input if it has a separate one [unit].
     settled : float or None
-        Followed in the end: per degree, or a spindle speed at the top speed of the training [unit of the model]; None:
-        not known of this family.
+        Steady-state gain: per degree, or for a spindle speed at the highest trained speed [unit of the model]; None:
+        unknown for this family.
     bound : float or None
-        Most that it can add, whatever it reads [unit of the model].
+        Largest possible contribution at any reading [unit of the model].
     watched : bool
-        It is predicted from the others and the spindle speed; this detects a failure, and the prediction replaces it.
+        The input is predicted from the others and the spindle speed; a failure is detected by the difference, and the
+        prediction replaces the reading.
     jump, off, moved : float or None
-        Limits: change within `pace`, difference from its prediction, change of the prediction while it reads the same
-        [degC].
+        Limits: change within `pace`, difference from the prediction, change of the prediction while the reading is
+        constant [degC].
     pace : float or None
         [s]
     still : float or None
-        Longest constant reading while another one changes [s]; None: time alone is no criterion.
+        Longest constant reading while another input changes [s]; None: time alone is not a criterion.
     unseen : float or None
-        RMS error of its prediction in cycles that were left out [degC].
+        RMS error of the prediction in cycles that were left out [degC].
     undetected : float or None
-        Effect of a drift up to `off` on the output of the model, once settled [unit of the model].
+        Effect of an undetected drift up to `off` on the output of the model, once settled [unit of the model].
     lost : float or None
-        RMS error on unseen cycles without it [unit of the model]; None: never judged.
+        RMS error on unseen cycles without the input [unit of the model]; None: never judged.
     runs_on : bool
-        The correction continues with the prediction in its place; otherwise it is held, then fades.
+        The correction continues with the predicted value; otherwise it is held, then fades.
     spare : str
-        Reason why a spare sensor for it is recommended; empty if none is.
+        Reason why a spare sensor is recommended; empty if none is.
     """
 
     name: str
@@ -76,31 +77,31 @@ class SensorExplanation:
 
 @dataclass(frozen=True)
 class Explanation:
-    """Explanation of a model. Print it to read it.
+    """Explanation of a model; `print` shows it as text.
 
     Parameters
     ----------
     target, unit, method, family : str
     remembers : bool
-        Its answer depends on earlier readings.
+        The output depends on earlier readings.
     sensors : tuple of SensorExplanation
-        Inputs with an influence; those that can add most first where that is known.
+        Inputs with an influence, by descending bound where it is known.
     zero : str
         Reference of its inputs.
     word, reason : str
-        Verdict of the do-no-harm gate, and why.
+        Verdict of the do-no-harm gate, and the reason for it.
     rms, max_abs, none_rms : float or None
-        On unseen cycles; the last without compensation [unit]; None: never judged.
+        Errors on unseen cycles; `none_rms` without compensation [unit]; None: never judged.
     cycles : dict of str to float
         RMS error per unseen cycle [unit].
     band : str
-        In words; empty without one.
+        Band as text; empty without one.
     outside : str
         Behaviour outside its training range.
     covered : str
         Conditions covered by the judged cycles; empty if unknown.
     pairs : tuple of int
-        Pairs of sensors that were judged lost together, and those of them with which the correction runs on.
+        Number of sensor pairs whose joint failure was judged, and of those with which the correction continues.
     """
 
     target: str
@@ -122,7 +123,7 @@ class Explanation:
     pairs: tuple[int, int]
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as plain numbers and words."""
+        """Return the explanation as plain numbers and text."""
         return asdict(self)
 
     def __str__(self) -> str:
@@ -131,7 +132,7 @@ class Explanation:
 
 @dataclass(frozen=True)
 class Explanations:
-    """Explanations of the models of several targets. Print it to read it.
+    """Explanations of the models of several targets; `print` shows them as text.
 
     Parameters
     ----------
@@ -141,7 +142,7 @@ class Explanations:
     models: tuple[Explanation, ...]
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as plain numbers and words."""
+        """Return the explanations as plain numbers and text."""
         return asdict(self)
 
     def __str__(self) -> str:
@@ -351,7 +352,7 @@ def _sensor_line(s: SensorExplanation, unit: str) -> str:
 
 
 def _span(seconds: float) -> str:
-    """Return a time in words."""
+    """Return a duration as text."""
     if seconds < 60.0 or not math.isfinite(seconds):
         return f"{seconds:g} s"
     return f"{seconds / 60:g} min" if seconds < 7200.0 else f"{seconds / 3600:g} h"

@@ -1,7 +1,7 @@
 """Expression of a frozen model as a small tree: the printed formula and all exports use it, independent of the family.
 
-The leaves are the inputs minus what counts as zero. A tree is the model within its trained range: inputs are clipped to
-that range, widened by the margin, and what `Support` adds beyond (``hold``, ``fade``) is not in the tree.
+The leaves are the inputs minus their reference values. A tree represents the model within its trained range: inputs are
+clipped to that range, widened by the margin; the effect of `Support` beyond it (``hold``, ``fade``) is not included.
 """
 
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ class Input:
     Parameters
     ----------
     index : int
-        Its place in ``ErrorModel.inputs``.
+        Position in ``ErrorModel.inputs``.
     name : str
     """
 
@@ -35,7 +35,7 @@ class Input:
 
 @dataclass(frozen=True)
 class Clip:
-    """A value kept between two bounds."""
+    """A value clipped to two bounds."""
 
     of: "Node"
     low: float
@@ -44,7 +44,7 @@ class Clip:
 
 @dataclass(frozen=True)
 class Sum:
-    """The sum of its terms; 0 without any."""
+    """The sum of its terms; 0 if there are none."""
 
     terms: tuple["Node", ...]
 
@@ -59,14 +59,14 @@ class Difference:
 
 @dataclass(frozen=True)
 class Product:
-    """The product of its factors; 1 without any."""
+    """The product of its factors; 1 if there are none."""
 
     factors: tuple["Node", ...]
 
 
 @dataclass(frozen=True)
 class Power:
-    """A value to a power; one that is no whole number is of no negative value."""
+    """A value raised to a power; the value is not negative if the exponent is not an integer."""
 
     of: "Node"
     exponent: float
@@ -74,7 +74,7 @@ class Power:
 
 @dataclass(frozen=True)
 class Magnitude:
-    """A value without its sign."""
+    """Absolute value."""
 
     of: "Node"
 
@@ -96,7 +96,7 @@ class Lookup:
     x, y : tuple of float
     kind : {'linear', 'step'}
     name : str
-        Such as ``phi1``.
+        Name in the formula, such as ``phi1``.
     """
 
     of: "Node"
@@ -108,7 +108,7 @@ class Lookup:
 
 @dataclass(frozen=True)
 class Lag:
-    """A first-order lag: tau dx/dt = value - x, the value being constant over a step; at rest in the first reading.
+    """A first-order lag: tau dx/dt = value - x; the value is constant over a step, and the lag starts at steady state.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ class PacedLag:
     stopped, running : float
         Time constants at a pace of 0 and of 1 [s].
     pace : Node
-        At the end of the step.
+        Value at the end of the step.
     """
 
     of: "Node"
@@ -142,16 +142,16 @@ class PacedLag:
 
 @dataclass(frozen=True)
 class Past:
-    """In a `Recurrence`: what it was some ticks ago; 1 is the last tick."""
+    """Value of a `Recurrence` a number of ticks ago; 1 is the last tick."""
 
     ticks: int
 
 
 @dataclass(frozen=True)
 class Mean:
-    """In a `Recurrence`: the mean of a value over the interval that ended some ticks ago; 0 is the one that ends now.
+    """Mean of a value over the interval that ended a number of ticks ago, in a `Recurrence`; 0: the one that ends now.
 
-    A reading is valid for the time since the previous reading; before the first, the value is 0 but at the very start.
+    A reading represents the time since the previous one. The value before the first reading is 0, except at the start.
     """
 
     of: "Node"
@@ -162,14 +162,14 @@ class Mean:
 class Recurrence:
     """A value that is updated at every tick of a separate clock; see `thermocomp.core.autoregressive`.
 
-    Between ticks it goes in a straight line towards what the next would be if the inputs continued as since the last.
+    Between ticks it is interpolated linearly towards the next value at the mean of the inputs since the last tick.
 
     Parameters
     ----------
     tick : Node
-        With `Past` and `Mean` among its leaves.
+        Expression with `Past` and `Mean` among its leaves.
     interval : float
-        From tick to tick [s].
+        Time between two ticks [s].
     """
 
     tick: "Node"
@@ -178,7 +178,7 @@ class Recurrence:
 
 @dataclass(frozen=True)
 class Named:
-    """A part that has a separate name in the printed formula, such as ``T6-T7``."""
+    """A subexpression with a separate name in the printed formula, such as ``T6-T7``."""
 
     name: str
     of: "Node"
@@ -205,12 +205,12 @@ Node = (
 
 
 def scale_node(factor: float, of: Node) -> Node:
-    """Return a node times a number."""
+    """Return a node multiplied by a number."""
     return of if factor == 1.0 else Product((Constant(factor), of))
 
 
 def sum_weighted(weights: Sequence[float], of: Sequence[Node], constant: float = 0.0) -> Node:
-    """Return the sum of nodes times numbers, and of a constant; what is zero is left out."""
+    """Return the weighted sum of nodes plus a constant; terms with zero weight are omitted."""
     found: list[Node] = [Constant(constant)] if constant else []
     found += [Product((Constant(w), x)) for w, x in zip(weights, of, strict=True) if w != 0]
     return Sum(tuple(found))
@@ -281,6 +281,6 @@ def _product(factors: Sequence[Node]) -> str:
 
 
 def _bracketed(node: Node) -> str:
-    """Return a part of a product, in brackets if it is a sum."""
+    """Return a factor of a product as text, in brackets if it is a sum."""
     inner = node.of if isinstance(node, Named | Clip) else node
     return f"({format_node(node)})" if isinstance(inner, Sum | Difference) else format_node(node)

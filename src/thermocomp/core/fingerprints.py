@@ -1,4 +1,4 @@
-"""`Prints`: what a model file keeps of the rows it learned from, so that they are known again in another file."""
+"""`Prints`: fingerprints of the training rows in a model file, used to recognise these rows in another file."""
 
 import base64
 import binascii
@@ -13,17 +13,17 @@ Marks = NDArray[np.uint32]
 
 
 def pack_marks(marks: Marks) -> str:
-    """Return numbers of 32 bits as base64 text, lowest byte first."""
+    """Return 32-bit numbers as base64 text, lowest byte first."""
     return base64.b64encode(marks.astype("<u4").tobytes()).decode("ascii")
 
 
 def unpack_marks(text: str) -> Marks:
-    """Return the numbers in the text that `packed` gives.
+    """Return the numbers in a text written by `pack_marks`.
 
     Raises
     ------
     InputError
-        It is no such text.
+        The text is invalid.
     """
     try:
         content = base64.b64decode(text.encode("ascii"), validate=True)
@@ -44,11 +44,11 @@ class Runs:
     ----------
     stride : int
     rows : str
-        First row of each run, rising, as `pack_marks` has it; counted through all tests.
+        First row of each run, in ascending order, as text of `pack_marks`; counted through all tests.
     moving : str
-        1 where target and an input move beyond their noise around the run, else 0.
+        1 where target and an input change by more than their noise around the run, otherwise 0.
     marks : dict of str to str
-        Per channel the hash of each run, the target first; 0 where the channel has no information there.
+        Hash of each run per channel, the target first; 0 where the channel has no information.
     """
 
     stride: int
@@ -71,18 +71,18 @@ class Runs:
 
 @dataclass(frozen=True)
 class Prints:
-    """Fingerprints of the rows a model learned from; made by `thermocomp.recordings.fingerprints`.
+    """Fingerprints of the training rows of a model; made by `thermocomp.recordings.fingerprints`.
 
     Parameters
     ----------
     interval : float
         Median time between two rows [s].
     learned : tuple of (int, int)
-        First row, and the row after the last, of each stretch that was learned from; counted through all tests.
+        First row, and the row after the last, of each training section; counted through all tests.
     steps : dict of str to float
-        Step to which differences are rounded, per channel, the target first [its unit].
+        Rounding step of differences per channel, the target first [its unit].
     runs : tuple of Runs
-        Per stride.
+        One per stride.
     """
 
     interval: float

@@ -10,27 +10,27 @@ from thermocomp.core.units import HOUSE_UNITS
 
 @dataclass(frozen=True)
 class Input:
-    """One input of a model, with the range it was trained in.
+    """One input of a model, with its training range.
 
     Parameters
     ----------
     name : str
         Channel name.
     quantity, unit : str
-        Measured quantity, a key of `HOUSE_UNITS`, and its internal unit.
+        Measured quantity, a key of `HOUSE_UNITS`, and its house unit.
     reference : float
         Value that counts as zero [unit].
     rezero : bool
-        True: the mean of the first readings after a start (or a re-zeroing) replaces `reference`, as the temperatures
-        of a drift test are counted from its start (`ErrorModel.zeroing`); False: `reference` is absolute, as for a
-        spindle speed.
+        True: the mean of the first readings after a start (or a re-zeroing) replaces `reference`, as temperatures in a
+        drift test are relative to its start (`ErrorModel.zeroing`); False: `reference` is absolute, as for a spindle
+        speed.
     low, high : float
         Trained range of value minus reference [unit].
 
     Raises
     ------
     SettingError
-        No such quantity, another unit, an empty range, no name, or a number beyond `thermocomp.core.bounds.RANGE`.
+        Unknown quantity, wrong unit, empty range, empty name, or a number beyond `thermocomp.core.bounds.RANGE`.
     """
 
     name: str
@@ -56,22 +56,22 @@ class Input:
 class Support:
     """Behaviour of a model outside its training range.
 
-    Inputs are always clipped to the trained range widened by `margin`; on top of that
+    Inputs are always clipped to the trained range widened by `margin`. In addition:
 
-    - ``clip``: nothing, the deviation at the clipped inputs is given,
-    - ``hold``: the last deviation from inside the range is given until all inputs are back,
-    - ``fade``: the deviation is faded to zero, linearly, over `fade_over` beyond the range.
+    - ``clip``: no further action; the deviation at the clipped inputs is returned,
+    - ``hold``: the last deviation from inside the range is returned until all inputs are back,
+    - ``fade``: the deviation is faded linearly to zero over `fade_over` beyond the range.
 
-    A model with a `JointSupport` is outside, too, where its inputs together are unlike all that was trained: ``hold``
-    and ``fade`` act on that as well, ``clip`` gives what it gives (see `ErrorModel.distance`).
+    With a `JointSupport`, a reading is also outside where the combination of its inputs is unlike the training data:
+    ``hold`` and ``fade`` act on this too, ``clip`` does not (see `ErrorModel.distance`).
 
     Parameters
     ----------
     policy : {'clip', 'hold', 'fade'}
     margin : float
-        Share of each input's trained span that is still taken as inside.
+        Fraction of each input's trained span that still counts as inside.
     fade_over : float
-        Share of each input's trained span over which ``fade`` reaches zero; of the joint distance: share of its limit.
+        Fraction of each input's trained span over which ``fade`` reaches zero; for the joint distance, of its limit.
     """
 
     policy: Literal["clip", "hold", "fade"] = "clip"

@@ -1,4 +1,4 @@
-"""Times as seconds, whatever they come as: numbers, datetimes with or without a time zone, timedeltas."""
+"""Conversion of times to seconds: numbers, datetimes with or without a time zone, timedeltas."""
 
 from datetime import UTC, datetime, timedelta
 from typing import Any
@@ -15,18 +15,18 @@ def seconds(times: NDArray[Any]) -> FloatArray:
     Parameters
     ----------
     times : ndarray
-        Numbers, datetimes or timedeltas, also as objects of Python or pandas.
+        Numbers, datetimes or timedeltas, also as Python or pandas objects.
 
     Returns
     -------
     ndarray of the same shape
-        Numbers as they are; the others since the first one [s], and those with a time zone as they pass in UTC: a
-        clock that is put forward or back does not count. nan where there is no time.
+        Numbers unchanged; other times relative to the first one [s], those with a time zone as elapsed UTC time, so
+        that daylight-saving changes have no effect. NaN where the time is missing.
 
     Raises
     ------
     TypeError, ValueError
-        One of them is neither a number nor a time, or only some have a time zone.
+        A value is neither a number nor a time, or only some have a time zone.
     """
     if times.dtype.kind in "mM":
         return np.asarray((times - times.ravel()[:1]) / np.timedelta64(1, "s"), dtype=np.float64)

@@ -1,8 +1,8 @@
-"""Joint support: how far a reading is, in all inputs together, from what a model was trained on.
+"""Joint support: distance of a reading, in all inputs together, from the training data of a model.
 
-A range per input takes every corner of the box for known: a hot front beside a cold rear, or a speed between the
-trained ones. Here the distance to the nearest of a few training states counts, and for speeds the distance to the
-nearest trained speed. How it is calibrated stands in `thermocomp.models.covering`.
+A range per input treats every corner of the box as known: a hot front with a cold rear, or a speed between the trained
+ones. Here the distance to the nearest of a few training states counts, and for speeds the distance to the nearest
+trained speed. The calibration is described in `thermocomp.models.covering`.
 """
 
 import math
@@ -25,24 +25,24 @@ class JointSupport:
     Parameters
     ----------
     columns : tuple of int
-        Inputs (all but speeds and feeds) whose changes are compared together.
+        Inputs (all but speeds and feeds) whose changes are compared jointly.
     scale : tuple of float
-        One distance in each of them, so that the mean square over all is the square of a distance [their units].
+        Scale of each of these inputs; the distance is the RMS of the scaled differences [their units].
     points : tuple of tuple of float
         Representative training states: changes of these inputs, in units of `scale`.
     limit : float
-        Distance to the nearest point from which on a state is outside [-].
+        Distance to the nearest point beyond which a state is outside [-].
     speeds : tuple of int
         Inputs that are speeds or feeds.
     levels : tuple of tuple of float
-        Trained values of each of them [their units].
+        Trained values of each of these inputs [their units].
     tolerances : tuple of float
-        Distance to the nearest level from which on a speed is outside [their units].
+        Distance to the nearest level beyond which a speed is outside [their units].
 
     Raises
     ------
     InputError
-        The numbers do not fit together, or one is not finite.
+        The sizes are inconsistent, or a number is not finite.
     """
 
     columns: tuple[int, ...]
@@ -73,19 +73,19 @@ class JointSupport:
         return 1 + max([*self.columns, *self.speeds], default=-1)
 
     def distance(self, change: FloatArray) -> FloatArray:
-        """Return the distance of states from the training data, normalised by the limit; above 1 or nan: outside.
+        """Return the distance of states from the training data, normalised by the limit; above 1 or NaN: outside.
 
         Parameters
         ----------
         change : ndarray of shape (..., n_inputs)
-            Inputs minus their reference, before they are clipped [their units].
+            Inputs minus their reference, before clipping [their units].
 
         Returns
         -------
         ndarray of shape (...,)
-            The larger of the distance to the nearest point, by `limit`, and of that to the nearest trained speed, by
-            its tolerance; nan for a state with a nan. Rounded to a millionth, so that a batch gives what each of its
-            states gives alone.
+            The larger of the distance to the nearest point divided by `limit` and the distance to the nearest trained
+            speed divided by its tolerance; NaN for a state with a NaN. Rounded to 1e-6, so that a batch and its
+            individual states give the same result.
         """
         if change.ndim == 1:
             return np.asarray(self._distance_of_one(change))
@@ -101,7 +101,7 @@ class JointSupport:
         return np.asarray(np.rint(far * 1e6) / 1e6)
 
     def _distance_of_one(self, change: FloatArray) -> float:
-        """Return the same of a single state, live, where the calls of numpy would take twice as long."""
+        """Return the distance of a single state; live, the numpy calls would take twice as long."""
         columns, weights, points, squares = self._numbers
         far = 0.0
         if self.columns:
@@ -119,7 +119,7 @@ class JointSupport:
 
     @cached_property
     def _numbers(self) -> tuple[NDArray[np.intp], FloatArray, FloatArray, FloatArray]:
-        """Columns, and weights and points such that a squared difference is that of a distance by the limit."""
+        """Return the columns, and weights and points that give squared distances relative to the limit."""
         unit = self.limit * np.sqrt(max(len(self.columns), 1))
         points = np.array(self.points, dtype=np.float64).reshape(len(self.points), len(self.columns)) / unit
         return (

@@ -1,4 +1,4 @@
-"""First-order lags, one step at a time or over a whole recording: the same lines of code for both."""
+"""First-order lags, one step at a time or over a whole recording, with the same code for both."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,12 +7,12 @@ FloatArray = NDArray[np.float64]
 
 
 def step_response(dt: float | FloatArray, time_constants: FloatArray) -> FloatArray:
-    """Return 1 - exp(-dt / tau): the share of a step that a first-order lag follows within `dt`."""
+    """Return 1 - exp(-dt / tau): the fraction of a step that a first-order lag reaches within `dt`."""
     return -np.expm1(-dt / time_constants)
 
 
 def advance(memory: FloatArray, signals: FloatArray, dt: float, time_constants: FloatArray) -> FloatArray:
-    """Advance a bank of first-order lags, the signal being constant over the step.
+    """Advance a bank of first-order lags with signals that are constant over the step.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def follow(memory: FloatArray, signals: FloatArray, paces: FloatArray) -> FloatA
     memory, signals : ndarray of shape (..., n_lags)
         As in `advance`.
     paces : ndarray of shape (..., n_lags)
-        Time step by time constant.
+        Time step divided by time constant.
 
     Returns
     -------
@@ -57,18 +57,18 @@ def run(
     ----------
     signals : ndarray of shape (n_rows, n_lags)
     dt : ndarray of shape (n_rows,)
-        Time since the previous row [s]. A value of ``inf`` starts again, at rest: the first row of each test.
+        Time since the previous row [s]. ``inf`` restarts the lags at steady state: the first row of each test.
     time_constants : ndarray of shape (n_lags,) or (n_rows, n_lags)
-        [s]; of each row where they change.
+        [s]; one row each if they vary.
     memory : ndarray of shape (n_lags,), optional
-        State before the first row. Default: at rest in the first row.
+        State before the first row. Default: steady state in the first row.
 
     Returns
     -------
     ndarray of shape (n_rows, n_lags)
     """
     out = np.empty_like(signals)
-    if np.isinf(dt).all():  # every row at rest by itself
+    if np.isinf(dt).all():  # every row restarts at steady state
         out[:] = signals
         return out
     if time_constants.ndim == 1:

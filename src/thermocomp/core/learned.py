@@ -12,14 +12,14 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Learned:
-    """A target in the rows that were learned from.
+    """Statistics of a target over the training rows.
 
     Parameters
     ----------
     mean : float
-        Mean deviation: the best that a constant could do [unit of the model].
+        Mean deviation: the best constant prediction [unit of the model].
     last : float
-        The last value learned.
+        Last training value.
     noise : float
         Standard deviation of the probe's noise.
     largest : float
@@ -37,12 +37,12 @@ class Learned:
 
 
 def probe_noise(y: FloatArray) -> float:
-    """Return the noise of a displacement, from its second differences: a drift has next to none.
+    """Return the noise of a displacement from its second differences, to which drift contributes almost nothing.
 
     Parameters
     ----------
     y : ndarray of shape (n_rows,)
-        One test's deviations at a steady interval, nan where they are unknown [um].
+        Deviations of one test at a constant interval, NaN where unknown [um].
 
     Returns
     -------
@@ -53,5 +53,5 @@ def probe_noise(y: FloatArray) -> float:
     bends = np.abs(bends[np.isfinite(bends)])
     if bends.size < 5:
         return 0.0
-    # white noise of 1 um bends by sqrt(6) um; the median does not see spikes and steps
+    # for white noise of 1 um, second differences have a standard deviation of sqrt(6) um; the median ignores outliers
     return float(1.4826 * np.median(bends) / np.sqrt(6))

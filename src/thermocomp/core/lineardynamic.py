@@ -1,4 +1,4 @@
-"""LinearDynamic family: a bank of first-order lags and a linear read-out."""
+"""LinearDynamic family: a bank of first-order lags and a linear readout."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,22 +21,22 @@ class LinearDynamic(ErrorModel):
     """Deviation = intercept + direct . s + lagged . x, with tau dx/dt = s - x.
 
     ``s`` are signals: products of the inputs (mostly the inputs themselves, or the square of the spindle speed); each
-    lag follows one signal with its own time constant. The bank starts at rest in the first reading.
+    lag follows one signal with a separate time constant. The bank starts at steady state in the first reading.
 
     Parameters
     ----------
     family : str
-        Its word in a file.
+        Name of the family in a file.
     signals : tuple of tuple of int
-        Each the indices of the inputs it multiplies.
+        Per signal, the indices of the inputs that are multiplied.
     direct : tuple of float
-        Read-out of each signal.
+        Readout coefficient of each signal.
     lag_signals : tuple of int
         Index of the signal followed by each lag.
     time_constants : tuple of float
         Time constant of each lag [s].
     lagged : tuple of float
-        Read-out of each lag.
+        Readout coefficient of each lag.
 
     Examples
     --------
@@ -81,7 +81,7 @@ class LinearDynamic(ErrorModel):
         check_count(owner, ENTRIES, signals=self.signals, lags=self.lagged)
         check_between(owner, LEAST, GAP, time_constants=self.time_constants)
         check_finite(owner, direct=self.direct, lagged=self.lagged, intercept=self.intercept)
-        self._table  # noqa: B018 - refuses indices that point nowhere
+        self._table  # noqa: B018 - rejects invalid indices
 
     @cached_property
     def _table(self) -> TermTable:

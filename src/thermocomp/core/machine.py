@@ -14,9 +14,9 @@ from thermocomp.core.structure import Structure
 from thermocomp.core.units import find_unit
 
 Vector = tuple[float, float, float]
-#: what may tell the value of a component: a constant [um or urad], a model of time, a model of time and position
+#: source of the value of a component: a constant [um or urad], a model of time, a model of time and position
 Source = float | ErrorModel | PositionModel
-#: a constant beyond that, 10 mm or 10 mrad, is one in another unit [um or urad]
+#: a larger constant (10 mm or 10 mrad) is assumed to be in a wrong unit [um or urad]
 PLAUSIBLE = 10_000.0
 
 
@@ -33,15 +33,15 @@ class Axis:
     reference_position : float
         Position at which its squareness has no effect [mm].
     measured_at : tuple of float
-        Where X, Y and Z stood while its errors were measured [mm]; its own coordinate matters only if it was measured
-        on the workpiece's side.
+        Positions of X, Y and Z during the measurement of the errors [mm]; the coordinate of the axis itself matters
+        only for a measurement on the workpiece side.
     measured_tool : tuple of float
-        From the spindle's gauge point to where its translations were measured, such as a reflector [mm]. This and
-        `measured_at` are its reference point: there its angles move nothing.
+        Vector from the spindle's gauge point to the point where the translations were measured, such as a reflector
+        [mm]. With `measured_at` it defines the reference point of the axis, where its angles cause no displacement.
     measured_on : {'tool', 'workpiece'}
-        What carried that place while the axis moved: the tool's side, such as a probe or a reflector in the spindle, or
-        the workpiece's, such as a reflector on the table. In the second case the tool was at it with the axis at its
-        own coordinate of `measured_at`, and from there the axis' own way is a lever too.
+        Side that carried the measuring point while the axis moved: the tool side, such as a probe or a reflector in the
+        spindle, or the workpiece side, such as a reflector on the table. In the second case the tool was at this point
+        with the axis at its coordinate of `measured_at`, and travel of the axis from there adds to the lever.
     rapid : float or None
         Maximum speed [mm/min]; None: unknown.
     acceleration : float or None
@@ -50,7 +50,7 @@ class Axis:
     Raises
     ------
     SettingError
-        The name is none, the travel does not rise, `measured_on` is none of the two, or a speed or an acceleration is
+        The name is invalid, the travel is not increasing, `measured_on` is invalid, or a speed or an acceleration is
         not positive.
     """
 
@@ -96,7 +96,7 @@ class Channel:
     unit : str
         House unit of the quantity.
     place : str
-        Location of the sensor, in words; empty if unknown.
+        Location of the sensor as text; empty if unknown.
     """
 
     name: str
@@ -110,7 +110,7 @@ class Channel:
 
 @dataclass(frozen=True, eq=False)
 class Machine:
-    """A machine tool of up to three linear axes, and what is known of its errors.
+    """A machine tool with up to three linear axes, and its known errors.
 
     Parameters
     ----------
@@ -121,23 +121,22 @@ class Machine:
     axes : tuple of Axis
         One per axis of the structure.
     components : mapping of str to Source
-        By code of the component; one that is not there is zero.
+        By code of the component; missing components are zero.
     spindle_tool : tuple of float
-        From the spindle's gauge point to where its drift was measured, such as the tip of a test bar [mm]: there its
-        tilts move nothing.
+        Vector from the spindle's gauge point to the point where its drift was measured, such as the tip of a test bar
+        [mm]; there its tilts cause no displacement.
     tool : tuple of float
-        From the gauge point to the tool's tip [mm]; a tool of length L is (0, 0, -L).
+        Vector from the gauge point to the tool tip [mm]; (0, 0, -L) for a tool of length L.
     channels : tuple of Channel
-        Its sensors.
+        Sensors of the machine.
     reference_temperature : float
-        Temperature at which its geometry is defined [degC]; 20 by ISO 1.
+        Temperature at which the geometry is defined [degC]; 20 according to ISO 1.
 
     Raises
     ------
     SettingError
-        Axes and structure differ, a number is not finite, or a component is unknown, belongs to an axis that is not
-        there, has a source of another unit or axis, one that was measured beside the axis' travel, or a constant that
-        no machine has.
+        Axes and structure differ, a number is not finite, or a component is unknown, belongs to a missing axis, has a
+        source with another unit or axis, was measured outside the travel of the axis, or has an implausible constant.
     """
 
     name: str

@@ -1,7 +1,8 @@
-"""`ErrorModel`: plain numbers with ``init`` and ``step``; where the training wing and the running wing meet.
+"""`ErrorModel`: plain numbers with ``init`` and ``step``; the interface between training and operation.
 
 Estimators freeze into one of the families (`thermocomp.core.polynomial`, `thermocomp.core.lineardynamic`). The same
-object is evaluated live, replayed in every assessment and written as JSON. State in, state out: nothing hides in it.
+object is evaluated live, replayed in every assessment and written as JSON. It has no hidden state: `step` takes a state
+and returns the next one.
 """
 
 import math
@@ -40,9 +41,9 @@ class State(NamedTuple):
     Leading axes, if any, are a batch of independent runs.
     """
 
-    reference: FloatArray  #: (..., n_inputs), what counts as zero
+    reference: FloatArray  #: (..., n_inputs), values that count as zero
     memory: FloatArray | None  #: (..., n_memory); None before the first reading
-    deviation: FloatArray  #: (...,), last deviation given
+    deviation: FloatArray  #: (...,), last deviation returned
     outside: BoolArray  #: (..., n_inputs), inputs beyond the trained range
 
 
@@ -53,13 +54,13 @@ class ErrorModel(ABC):
     Parameters
     ----------
     family : str
-        Name of the family, as in a file.
+        Name of the family in a file.
     target : str
-        Displacement channel (or error component) it predicts.
+        Displacement channel (or error component) that is predicted.
     unit : str
-        Unit of the deviation it gives: um or urad; of a factor along an axis um/m, urad/m^2 and so on.
+        Unit of the deviation: um or urad; for a factor along an axis um/m, urad/m^2 and so on.
     inputs : tuple of Input
-        Inputs, in this order.
+        Inputs, in the order of their values.
     intercept : float
         Deviation in the reference state [unit].
     support : Support
@@ -67,17 +68,17 @@ class ErrorModel(ABC):
     provenance : Provenance or None
         Origin of the model.
     honest_error : HonestError or None
-        Error on unseen cycles; None if it was never judged.
+        Error on unseen cycles; None if the model was never judged.
     validity : Validity or None
         Conditions covered by these cycles.
     joint : JointSupport or None
-        Training region in the space of its inputs; None: only a range per input is known.
+        Joint support in the space of the inputs; None: only a range per input is known.
     zeroing : Zeroing
-        Over how long a compensator averages what the inputs with ``rezero`` count from, as in its training.
+        Averaging time for the reference of the inputs with ``rezero``, as in the training.
     band : Band or None
         Uncertainty band; None if not estimated.
     watch : Watch or None
-        Over its temperatures: which are believed, and a substitute value for each that is rejected.
+        Checks of the temperatures, and substitute values for rejected ones.
 
     Examples
     --------
@@ -88,7 +89,7 @@ class ErrorModel(ABC):
     [0.0, 8.0]
     """
 
-    remembers: ClassVar[bool]  #: False: the deviation depends on the last reading alone
+    remembers: ClassVar[bool]  #: False: the deviation depends only on the current reading
 
     family: str
     target: str
@@ -118,24 +119,24 @@ class ErrorModel(ABC):
             raise SettingError(f"{owner}: its band has more inputs than the model, which has {len(names)}")
         self._check()
 
-    # -- what a family fills in --------------------------------------------------------------------------------------
+    # -- methods implemented by a family ------------------------------------------------------------------------------
 
     @abstractmethod
     def _check(self) -> None:
-        """Raise `InputError` if the numbers do not fit together."""
+        """Raise `InputError` if the numbers are inconsistent."""
 
     @abstractmethod
     def _begin(self, change: FloatArray) -> FloatArray:
-        """Return the memory of a machine resting in the state `change`."""
+        """Return the memory of a machine at steady state for `change`."""
 
     @abstractmethod
     def _advance(self, memory: FloatArray, change: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
-        """Return (memory, deviation) `dt` seconds later, the inputs having changed to `change`."""
+        """Return (memory, deviation) `dt` seconds later, after the inputs changed to `change`."""
 
     def _directions(self, memory: FloatArray, change: FloatArray) -> FloatArray:  # noqa: ARG002
-        """Return the main directions of what the structures differ in that the model is the average of, [unit].
+        """Return the principal directions in which the structures averaged by the model differ [unit].
 
-        (..., n_directions): the root of the sum of their squares is the structures' spread.
+        Shape (..., n_directions); the root of the sum of their squares is the spread of the structures.
         """
         return np.zeros((*change.shape[:-1], 0))
 
@@ -153,9 +154,10 @@ class ErrorModel(ABC):
         """Names of the inputs that have an influence on the deviation."""
 
     def may_lose(self, names: Sequence[str]) -> bool:
-        """Return whether it was judged without some of its inputs, and leaves less than no compensation then.
+        """Return whether the model was judged without these inputs and then leaves less error than no compensation.
 
-        Also without each of them alone: a second failure does not let run what the first one stopped.
+        This must hold for each input alone as well: a second failure must not re-enable a correction stopped by the
+        first one.
         """
         found = self.honest_error
         own = [i.name for i in self.inputs if i.name in names]
@@ -163,11 +165,11 @@ class ErrorModel(ABC):
         return found is not None and max(left) <= found.none_rms
 
     def widening(self, names: Collection[str]) -> float:
-        """Return the factor by which its error on unseen cycles increases without some of its inputs; at least 1."""
+        """Return the factor by which the error on unseen cycles increases without some of the inputs; at least 1."""
         found, key = self.honest_error, ", ".join(i.name for i in self.inputs if i.name in names)
         return 1.0 if found is None or not found.rms else max(1.0, found.lost.get(key, 0.0) / found.rms)
 
-    # -- the one way in ----------------------------------------------------------------------------------------------
+    # -- evaluation ---------------------------------------------------------------------------------------------------
 
     def init(self, reference: ArrayLike | None = None) -> State:
         """Return the state of a machine that has just been zeroed.
@@ -175,8 +177,8 @@ class ErrorModel(ABC):
         Parameters
         ----------
         reference : array-like of shape (n_inputs,), optional
-            Values that count as zero. Without it the first reading decides for inputs with ``rezero``, and the
-            reference in the model for the others.
+            Values that count as zero. Default: the first reading for inputs with ``rezero``, and the reference stored
+            in the model for the others.
 
         Returns
         -------
@@ -191,7 +193,7 @@ class ErrorModel(ABC):
         return State(zero, None, np.zeros(()), np.zeros(len(self.inputs), dtype=np.bool_))
 
     def step(self, state: State, inputs: FloatArray, dt: float) -> tuple[State, FloatArray]:
-        """Process one reading and return the deviation at its instant.
+        """Process one reading and return the deviation at its time.
 
         Parameters
         ----------
@@ -200,7 +202,7 @@ class ErrorModel(ABC):
         inputs : ndarray of shape (..., n_inputs)
             Values in the order of `inputs` [their units]. Leading axes are a batch of independent runs.
         dt : float
-            Time since the previous reading [s]; without meaning in the first step.
+            Time since the previous reading [s]; ignored in the first step.
 
         Returns
         -------
@@ -230,11 +232,11 @@ class ErrorModel(ABC):
         return State(reference, memory, deviation, outside), deviation
 
     def settle(self, reference: FloatArray, inputs: FloatArray) -> FloatArray:
-        """Return the reference, (..., n_inputs), the first reading deciding where it is not known."""
+        """Return the reference, (..., n_inputs), with unknown values taken from the first reading."""
         return np.where(np.isnan(reference), inputs, reference)
 
     def clip(self, change: FloatArray) -> tuple[FloatArray, BoolArray]:
-        """Return inputs minus their reference within the trained range and its margin, and which were beyond."""
+        """Return the inputs minus their reference, clipped to the trained range and margin, and which were outside."""
         low, high = self._bounds
         clipped = np.minimum(np.maximum(change, low), high)
         return clipped, np.asarray(clipped != change)
@@ -245,14 +247,14 @@ class ErrorModel(ABC):
         Parameters
         ----------
         state : State
-            After the step that took the reading in.
+            State after the step that processed the reading.
         inputs : ndarray of shape (..., n_inputs)
             The reading.
 
         Returns
         -------
         ndarray of shape (...,)
-            See `JointSupport.distance`; a reading is outside unless it is at most 1. 0 without a joint support.
+            See `JointSupport.distance`; a reading is outside if this exceeds 1 or is NaN. 0 without a joint support.
         """
         if self.joint is None:
             return np.zeros(np.shape(inputs)[:-1])
@@ -264,15 +266,15 @@ class ErrorModel(ABC):
         Parameters
         ----------
         state : State
-            After the step that took the reading in.
+            State after the step that processed the reading.
         inputs : ndarray of shape (..., n_inputs)
             The reading.
 
         Returns
         -------
         ndarray of shape (...,)
-            [unit]; nan without a band. Where ``hold`` or ``fade`` let less pass than the model says, it is wider by
-            what they keep back.
+            [unit]; NaN without a band. Where ``hold`` or ``fade`` changes the output of the model, the half-width grows
+            by the difference.
         """
         if self.band is None or state.memory is None:
             return np.full(np.shape(inputs)[:-1], np.nan)
@@ -289,15 +291,15 @@ class ErrorModel(ABC):
         Parameters
         ----------
         state : State
-            After the step that took the reading in.
+            State after the step that processed the reading.
         inputs : ndarray of shape (..., n_inputs)
             The reading.
 
         Returns
         -------
         ndarray of shape (..., n_directions)
-            [unit]; the deviation is off by a sum of these, each times a number that is 0 give or take 1. None in a
-            model that is no average.
+            [unit]; the error of the deviation is modelled as a sum of these, each multiplied by a random number with
+            mean 0 and standard deviation 1. n_directions is 0 if the model is not an average.
         """
         change = self.change(state, inputs)
         memory = self._begin(change) if state.memory is None else state.memory
@@ -329,15 +331,15 @@ class ErrorModel(ABC):
         Parameters
         ----------
         table : mapping of str to array-like of shape (n_rows,)
-            A DataFrame, or anything that gives a column by its name; columns of the same names as `inputs`, in their
-            units. A row in which one is missing (nan) is passed over: the deviation before it is held, 0 at the start.
+            A DataFrame, or any object that returns a column by name; columns with the names and units of `inputs`. A
+            row with a missing value (NaN) is skipped: the previous deviation is held, 0 at the start.
         time : str or array-like of shape (n_rows,), optional
-            Time: numbers [s], or datetimes with or without a time zone; or the name of its column; without it the
-            column ``time_s``. A row that is not later than the one before starts a new test, from rest and from a zero
-            of its own: the mean over its start, see `Zeroing`; whether the spindle is stopped there is read from its
-            column, if there is one. A model without memory does without; then the first row is the zero.
+            Time: numbers [s], or datetimes with or without a time zone; or the name of its column. Default: the column
+            ``time_s``. A row that is not later than the previous one starts a new test, from rest and with a separate
+            zero: the mean over its start, see `Zeroing`; its spindle column, if present, shows whether the spindle is
+            stopped. A model without memory needs no time; then the first row is the zero.
         reference : array-like of shape (n_inputs,), optional
-            Zero of the inputs, as in `init`.
+            Reference of the inputs, as in `init`.
 
         Returns
         -------
@@ -347,7 +349,7 @@ class ErrorModel(ABC):
         Raises
         ------
         InputError
-            A column is missing or contains a non-numeric value; or the time is missing for a model with a memory.
+            A column is missing or contains a non-numeric value; or a model with memory has no time.
         """
         said = [state.deviation for state, _ in self.walk(table, time, reference=reference)]
         return np.array(said, dtype=np.float64)
@@ -365,7 +367,7 @@ class ErrorModel(ABC):
         Returns
         -------
         ndarray of shape (n_rows,)
-            [unit]; nan without a band, and before the first complete row of a test.
+            [unit]; NaN without a band, and before the first complete row of a test.
         """
         found = [self.half_width(state, last) for state, last in self.walk(table, time, reference=reference)]
         return np.array(found, dtype=np.float64)
@@ -384,7 +386,7 @@ class ErrorModel(ABC):
         ------
         state : State
         values : ndarray of shape (n_inputs,)
-            The last complete reading [units of the inputs]; nan before there is one.
+            Last complete reading [units of the inputs]; NaN before the first.
         """
         columns = [read_numbers(table, i.name, f"model of {self.target}") for i in self.inputs]
         clock = read_clock(table, time, f"model of {self.target}", needed=self.remembers)
@@ -418,11 +420,11 @@ class ErrorModel(ABC):
                 since, last = 0.0, values[k]
             yield state, last
 
-    # -- derived numbers ---------------------------------------------------------------------------------------------
+    # -- derived numbers ----------------------------------------------------------------------------------------------
 
     @cached_property
     def _reference(self) -> FloatArray:
-        """Reference of each input; nan where the first reading decides."""
+        """Reference of each input; NaN where the first reading decides."""
         return np.array([np.nan if i.rezero else i.reference for i in self.inputs])
 
     @cached_property
@@ -439,17 +441,17 @@ class ErrorModel(ABC):
 
     @property
     def bounds(self) -> tuple[list[float], list[float], list[float]]:
-        """Least and greatest change of each input with its margin, and over how much a deviation fades beyond it."""
+        """Minimum and maximum change of each input with its margin, and the fade distance beyond them."""
         low, high = self._bounds
         return low.tolist(), high.tolist(), self._fade_span.tolist()
 
     def expression(self, change: Sequence[Node] | None = None) -> Node:
-        """Return the computation of the model as a tree: that of `step` with the support policy ``clip``.
+        """Return the computation of the model as a tree, equal to `step` with the support policy ``clip``.
 
         Parameters
         ----------
         change : sequence of Node, optional
-            Expressions of the inputs minus their zero, clipped to the training range.
+            Expressions of the inputs minus their reference, clipped to the trained range.
         """
         bounds = zip(self.inputs, *(b.tolist() for b in self._bounds), strict=True)
         return self._expression(change or [Clip(Leaf(k, i.name), low, high) for k, (i, low, high) in enumerate(bounds)])
@@ -460,7 +462,7 @@ class ErrorModel(ABC):
 
     @property
     def accepted(self) -> bool:
-        """True if the do-no-harm gate has let this model pass."""
+        """True if the do-no-harm gate accepted this model."""
         return self.honest_error is not None and self.honest_error.word == "accepted"
 
     def taken(self, by: str | None) -> Self:
@@ -474,7 +476,7 @@ class ErrorModel(ABC):
         Raises
         ------
         InputError
-            It has no name or no reason.
+            Name or reason is missing.
         """
         if by is None:
             return self
@@ -489,12 +491,13 @@ class ErrorModel(ABC):
         return replace(self, honest_error=replace(found, taken=f"{name.strip()}, {reason.strip()}"))
 
     def check_may_run(self) -> None:
-        """Refuse to run a model that the do-no-harm gate did not accept, unless a person approved it as unproven.
+        """Reject a model that the do-no-harm gate did not accept, unless a person approved it as unproven.
 
         Raises
         ------
         InputError
-            It was never judged, or by other rules than today's; it was refused, or is unproven and not taken.
+            The model was never judged, was judged by other rules than the current ones, was refused, or is unproven and
+            not approved.
         """
         found = self.honest_error
         if found is None:
@@ -516,5 +519,5 @@ class ErrorModel(ABC):
 
 
 def _bounded(inputs: FloatArray) -> FloatArray:
-    """Return a reading, no number of it so large that a difference to it is none."""
+    """Return a reading clipped such that differences to it stay finite."""
     return np.minimum(np.maximum(inputs, -READING), READING)

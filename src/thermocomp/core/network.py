@@ -1,4 +1,4 @@
-"""Network family: a net with one hidden layer; no memory."""
+"""Network family: a neural net with one hidden layer; no memory."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ Activation = Literal["sigmoid", "tanh", "identity"]
 
 
 def sigmoid(net: FloatArray) -> FloatArray:
-    """Return 1 / (1 + exp(-net)) (C-25), written such that nothing overflows."""
+    """Return 1 / (1 + exp(-net)) (C-25), in a form that does not overflow."""
     return 0.5 + 0.5 * np.tanh(0.5 * net)
 
 
@@ -44,7 +44,7 @@ class Affine:
     Parameters
     ----------
     gain, offset : tuple of float
-        One each per channel. A gain of 0 cuts the channel off.
+        One each per channel. A gain of 0 disables the channel.
     """
 
     gain: tuple[float, ...]
@@ -126,7 +126,7 @@ class Perceptron:
         hidden: Activation = "sigmoid",
         output: Activation = "sigmoid",
     ) -> "Perceptron":
-        """Make a net of arrays.
+        """Return a net made from arrays.
 
         Parameters
         ----------
@@ -157,12 +157,12 @@ class Perceptron:
 
     @property
     def kind(self) -> str:
-        """Functions and shape, such as ``sigmoid net 9-20-1``."""
+        """Activation and shape, such as ``sigmoid net 9-20-1``."""
         functions = self.hidden if self.hidden == self.output else f"{self.hidden}-{self.output}"
         return f"{functions} net {'-'.join(map(str, self.shape))}"
 
     def expression(self, inputs: Sequence[Node], input_scaling: "Affine", output_scaling: "Affine") -> Node:
-        """Return the first output, with the scalings around it, as a part of an expression."""
+        """Return the first output, including the scalings, as a node of an expression."""
         (gain, *_), (offset, *_) = output_scaling.gain, output_scaling.offset
         scale = zip(input_scaling.gain, inputs, input_scaling.offset, strict=True)
         given = [Sum((scale_node(g, x), Constant(o))) for g, x, o in scale]
@@ -195,12 +195,12 @@ class Perceptron:
         Parameters
         ----------
         x : ndarray of shape (..., n_inputs)
-            Scaled.
+            Scaled inputs.
 
         Returns
         -------
         ndarray of shape (..., n_outputs)
-            Scaled.
+            Scaled outputs.
         """
         first, first_thresholds, second, second_thresholds = self._arrays
         inner = _FUNCTIONS[self.hidden](x @ first + first_thresholds)
@@ -209,21 +209,21 @@ class Perceptron:
 
 @dataclass(frozen=True, kw_only=True)
 class Network(ErrorModel):
-    """Deviation = intercept + the one output of a net with one hidden layer (Chen 1996, section 4; C-25).
+    """Deviation = intercept + the only output of a net with one hidden layer (Chen 1996, section 4; C-25).
 
-    A sigmoid output cannot leave 0 to 1: the deviation saturates at the ends of its scaling, ``output_scaling.offset``
-    and ``offset + gain``, whatever the inputs.
+    A sigmoid output stays between 0 and 1: the deviation saturates at the ends of its scaling,
+    ``output_scaling.offset`` and ``offset + gain``, whatever the inputs.
 
     Parameters
     ----------
     family : str
-        Its word in a file.
+        Name of the family in a file.
     net : Perceptron
-        With one output.
+        Net with one output.
     input_scaling : Affine
-        From the inputs minus their reference to what the net takes.
+        Scaling of the inputs minus their reference to the inputs of the net.
     output_scaling : Affine
-        From what the net gives to the deviation [unit].
+        Scaling of the output of the net to the deviation [unit].
     """
 
     family: Literal["network"] = "network"
@@ -265,14 +265,14 @@ class Network(ErrorModel):
 
     @property
     def sensors(self) -> tuple[str, ...]:
-        """Names of the inputs that have an influence on the deviation: a weight that is not zero on the way out."""
+        """Names of the inputs that influence the deviation through non-zero weights."""
         first, _, second, _ = self.net._arrays
         reached = (first != 0) & (second[:, 0] != 0)
         alive = reached.any(axis=1) & (np.array(self.input_scaling.gain) != 0) & (self.output_scaling.gain[0] != 0)
         return tuple(x.name for x, used in zip(self.inputs, alive.tolist(), strict=True) if used)
 
     def coefficients_by_name(self) -> dict[str, float]:
-        """Return all weights and thresholds; ``w(T1, h2)`` leads from input T1 to the second hidden node."""
+        """Return all weights and thresholds; ``w(T1, h2)`` connects input T1 to the second hidden node."""
         net = self.net
         found: dict[str, float] = {}
         for j, (weights, threshold) in enumerate(zip(net.hidden_weights, net.hidden_thresholds, strict=True), start=1):

@@ -1,4 +1,4 @@
-"""Check of output paths: before any work is done, and again on writing."""
+"""Checks of output paths: before any work is done, and again on writing."""
 
 import errno
 import os
@@ -8,7 +8,7 @@ from pathlib import Path
 from thermocomp.core.exceptions import InputError
 
 OTHERWISE = "choose another name or allow overwriting with --overwrite"
-#: of a file beside the target, where the draft has to be
+#: errors when creating the draft next to the target
 _NOT_ALLOWED = {errno.EACCES, errno.EPERM, errno.EROFS}
 
 
@@ -18,18 +18,18 @@ def refuse_existing(paths: Sequence[Path], overwrite: bool, inputs: Sequence[Pat
     Parameters
     ----------
     paths : sequence of Path
-        To be written.
+        Output paths.
     overwrite : bool
         Existing files may be replaced.
     inputs : sequence of Path
-        Input files: never overwritten.
+        Input files, which are never overwritten.
     ending : str
-        Extension of such files, such as ``.html``.
+        Required extension, such as ``.html``.
 
     Raises
     ------
     InputError
-        One is there already, is an input, cannot be there, or has another ending.
+        A path exists already, is an input, cannot be written, or has another extension.
     """
     for path in paths:
         place = find_place(path)
@@ -47,19 +47,19 @@ def find_place(target: Path) -> Path:
     Returns
     -------
     Path
-        Its folder is there, and at it is nothing or a file that may be written.
+        Its folder exists, and the path is free or a writable file.
 
     Raises
     ------
     InputError
-        It is none.
+        There is no such path.
     """
     place = Path(os.path.realpath(target))
     try:
         target.stat()
     except FileNotFoundError:
         pass
-    except OSError as e:  # links in a circle, a name that is too long, a file where a folder should be
+    except OSError as e:  # circular links, a name that is too long, a file in place of a folder
         raise cannot_be_written(target, e) from e
     folder = place.parent if target.is_symlink() else target.parent
     if not folder.is_dir():
@@ -75,7 +75,7 @@ def find_place(target: Path) -> Path:
 
 
 def cannot_be_written(target: Path, error: OSError) -> InputError:
-    """Return the message for the user about an error of the disk."""
+    """Return the user message for a disk error."""
     hint = f"; a file must be allowed beside it, in {target.parent}" if error.errno in _NOT_ALLOWED else ""
     why = os.strerror(error.errno) if error.errno else error
     return InputError(f"{target}: cannot be written: {why}{hint}; what was there is as it was")

@@ -1,4 +1,4 @@
-"""The states of paced models: lags of temperatures, and of powers of the speed, at a pace that the speed sets."""
+"""States of paced models: lags of temperatures and of powers of the speed, with time constants that depend on speed."""
 
 from typing import NamedTuple
 
@@ -15,11 +15,11 @@ class Bank(NamedTuple):
     """Inputs and time constants of the states of a `PacedDynamic`."""
 
     temperatures: IntArray  #: (n_temperatures,), inputs that are temperatures
-    taus: int  #: lags of each
+    taus: int  #: lags per temperature
     speeds: IntArray  #: (n_states,), inputs of the speed states
     powers: FloatArray  #: (n_states,)
     rates: FloatArray  #: (n_lags + n_states,), at rest [1/s]
-    gain: FloatArray  #: (n_states,), what the rate grows by to top speed [1/s]
+    gain: FloatArray  #: (n_states,), increase of the rate from rest to top speed [1/s]
     top: float  #: [1/min]
 
     def signals(self, change: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -29,7 +29,7 @@ class Bank(NamedTuple):
         return np.concatenate((*(temperatures,) * self.taus, share**self.powers), axis=-1), share
 
     def advance(self, memory: FloatArray, change: FloatArray, dt: float) -> FloatArray:
-        """Return the states `dt` seconds later, the inputs having changed to `change`."""
+        """Return the states `dt` seconds later, after the inputs changed to `change`."""
         signals, share = self.signals(change)
         lags = len(self.rates) - len(self.gain)
         rates = np.empty(signals.shape)

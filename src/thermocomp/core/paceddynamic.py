@@ -1,4 +1,4 @@
-"""PacedDynamic family: lagged temperatures, and states of the spindle speed whose time constants the speed sets."""
+"""PacedDynamic family: lagged temperatures, and states of the spindle speed with speed-dependent time constants."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,16 +16,16 @@ from thermocomp.core.pacedbank import Bank
 
 @dataclass(frozen=True)
 class LaggedInput:
-    """A temperature, and how much it and its lags count.
+    """A temperature with the readout coefficients of itself and its lags.
 
     Parameters
     ----------
     input : int
         Index into the inputs of the model.
     direct : float
-        Read-out of the temperature itself [um/degC].
+        Readout coefficient of the temperature itself [um/degC].
     lagged : tuple of float
-        Read-out of its lags, one per time constant of the model [um/degC].
+        Readout coefficient of each lag, one per time constant of the model [um/degC].
     """
 
     input: int
@@ -35,7 +35,7 @@ class LaggedInput:
 
 @dataclass(frozen=True)
 class SpeedState:
-    """A state that follows a power of the spindle speed: faster, the faster the spindle turns.
+    """A state that follows a power of the spindle speed, with a time constant that depends on the speed.
 
     Parameters
     ----------
@@ -44,9 +44,9 @@ class SpeedState:
     power : float
         Exponent of the fraction of the top speed.
     stopped, running : float
-        Time constant at rest and at top speed [s]; its reciprocal is linear in the speed.
+        Time constants at rest and at top speed [s]; the reciprocal is linear in the speed.
     weight : float
-        Read-out [um].
+        Readout coefficient [um].
     """
 
     input: int
@@ -58,16 +58,16 @@ class SpeedState:
 
 @dataclass(frozen=True, kw_only=True)
 class PacedDynamic(ErrorModel):
-    """Deviation = intercept + sum of temperatures, their first-order lags and speed states, each by its read-out.
+    """Deviation = intercept + weighted sum of temperatures, their first-order lags and speed states.
 
     A lag of a temperature T follows tau dx/dt = T - x. A state of the speed n follows dx/dt = k (nu^p - x), nu =
     abs(n) / n_top, with k = 1/tau_stopped + nu (1/tau_running - 1/tau_stopped): a turning spindle stirs the air that
-    cools it. All rest in the first reading.
+    cools it. All states start at steady state in the first reading.
 
     Parameters
     ----------
     family : str
-        Its word in a file.
+        Name of the family in a file.
     time_constants : tuple of float
         Time constants of the lags, the same for all temperatures [s].
     temperatures : tuple of LaggedInput
@@ -75,8 +75,8 @@ class PacedDynamic(ErrorModel):
         n_top [1/min].
     states : tuple of SpeedState
     spread : tuple of tuple of float
-        Read-outs of the same parts (temperatures, their lags, lag by lag, and the speed states), the root of the sum of
-        whose squares is the spread of the structures that the model is the average of [unit]; none: it is not known.
+        Readout coefficients of the same terms (temperatures, their lags, lag by lag, and the speed states); the root of
+        the sum of the squared outputs is the spread of the structures averaged by the model [unit]; empty: unknown.
 
     Examples
     --------
@@ -161,7 +161,7 @@ class PacedDynamic(ErrorModel):
 
     @cached_property
     def read_out(self) -> tuple[FloatArray, FloatArray]:
-        """Read-out of the inputs, (n_inputs,), and of the states, (n_memory,)."""
+        """Readout coefficients of the inputs, (n_inputs,), and of the states, (n_memory,)."""
         direct = np.zeros(len(self.inputs))
         for t in self.temperatures:
             direct[t.input] += t.direct
@@ -182,7 +182,7 @@ class PacedDynamic(ErrorModel):
 
     @cached_property
     def spread_out(self) -> tuple[FloatArray, FloatArray]:
-        """Read-outs of the spread: of the inputs, (n_inputs, n_spread), and of the states, (n_memory, n_spread)."""
+        """Readout coefficients of the spread: of inputs, (n_inputs, n_spread), and of states, (n_memory, n_spread)."""
         count = len(self.temperatures)
         table = np.array(self.spread, dtype=np.float64).reshape(len(self.spread), count + len(self.bank.rates)).T
         direct = np.zeros((len(self.inputs), len(self.spread)))
@@ -210,7 +210,7 @@ class PacedDynamic(ErrorModel):
         return tuple(self.inputs[k].name for k in sorted(active))
 
     def coefficients_by_name(self) -> dict[str, float]:
-        """Return the read-out of each part; ``lag(T1, 10 min)`` is a lag, of a speed at rest and at top speed."""
+        """Return the readout coefficient of each term; ``lag(T1, 10 min)`` is a lag (speed: at rest, at top)."""
         found: dict[str, float] = {}
         for t in self.temperatures:
             name = self.inputs[t.input].name

@@ -1,4 +1,4 @@
-"""Parts that are found by entry points: those of this package, and those that other packages bring."""
+"""Plug-ins found by entry points: those of this package and those of other packages."""
 
 import re
 import sys
@@ -21,11 +21,11 @@ def find_plugins(group: Group, report: Callable[[str], object] = lambda _: None)
     ----------
     group : {'commands', 'methods', 'exporters', 'sources', 'sinks', 'pages'}
     report : callable, optional
-        Called with a line of text for each skipped one: names of this package cannot be overridden.
+        Called with a line of text for each skipped plug-in: names of this package cannot be overridden.
     """
     found: dict[str, EntryPoint] = {}
     entries = _read_entries(group, tuple(sys.path))
-    # own ones first: nobody takes their names; an installation keeps no order
+    # entry points of this package first, so that others cannot override their names; installations define no order
     for entry in sorted(entries, key=lambda e: (not e.value.startswith("thermocomp."), e.name)):
         if (first := found.setdefault(entry.name, entry)).value != entry.value:
             report(f"{describe_plugin(entry)} is skipped: {entry.name} is there already, {first.value}")
@@ -36,7 +36,7 @@ def find_plugins(group: Group, report: Callable[[str], object] = lambda _: None)
 
 @cache
 def _read_entries(group: Group, _path: tuple[str, ...]) -> EntryPoints:
-    """Return the entry points installed on a path: this reads a file of every package."""
+    """Return the entry points installed on a path; this reads a file of every package."""
     return entry_points(group=f"thermocomp.{group}")
 
 
@@ -47,12 +47,12 @@ def describe_plugin(entry: EntryPoint) -> str:
 
 
 def load_plugin(entry: EntryPoint) -> Any:
-    """Import what an entry point names.
+    """Import the object named by an entry point.
 
     Raises
     ------
     InputError
-        It cannot be imported: which plug-in, and why.
+        The import failed; the message names the plug-in and the reason.
     """
     try:
         return entry.load()
@@ -63,21 +63,21 @@ def load_plugin(entry: EntryPoint) -> Any:
 
 
 def read_summary(entry: EntryPoint) -> str | None:
-    """Return the first paragraph of a function's docstring, read from its file: nothing of it is imported.
+    """Return the first paragraph of a function's docstring, read from its file; nothing is imported.
 
     Returns
     -------
     str or None
-        None if there is no such module; empty if the function or its docstring is not found in the file.
+        None if the module does not exist; empty if the function or its docstring is not found in the file.
     """
     try:
         spec = find_spec(entry.module)
-    except Exception:  # noqa: BLE001 - a package above it that cannot be imported
+    except Exception:  # noqa: BLE001 - a parent package cannot be imported
         return None
     if spec is None or spec.origin is None:
         return None
     text = Path(spec.origin).read_text(encoding="utf-8", errors="replace")
-    # a command that is made of a verb has the verb's docstring
+    # a command made from a verb uses the docstring of the verb
     if made := re.search(rf'^@command\(\s*"([\w.]+:\w+)"[^@]*?^def {entry.attr}\(', text, re.DOTALL | re.MULTILINE):
         return read_summary(EntryPoint(entry.name, made[1], entry.group))
     found = re.search(rf'^def {entry.attr}\(.*?"""(.*?)(?:\n\s*\n|""")', text, re.DOTALL | re.MULTILINE)

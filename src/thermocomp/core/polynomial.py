@@ -23,11 +23,11 @@ class Polynomial(ErrorModel):
     Parameters
     ----------
     family : str
-        Its word in a file.
+        Name of the family in a file.
     variables : tuple of Variable
         Linear combinations of the inputs (C-12).
     terms : tuple of tuple of int
-        Each the indices of the variables it multiplies.
+        Per term, the indices of the variables that are multiplied.
     coefficients : tuple of float
         One per term.
 
@@ -63,7 +63,7 @@ class Polynomial(ErrorModel):
         check_count(owner, NODES, variables=self.variables)
         check_count(owner, ENTRIES, terms=self.terms)
         check_finite(owner, coefficients=self.coefficients, intercept=self.intercept)
-        self._table  # noqa: B018 - refuses indices that point nowhere
+        self._table  # noqa: B018 - rejects invalid indices
 
     @cached_property
     def _table(self) -> TermTable:

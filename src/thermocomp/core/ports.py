@@ -1,6 +1,6 @@
-"""The two sides of a compensator that the shop floor fills: where readings come from, where corrections go.
+"""Interfaces of a compensator to the shop floor: sources of readings and sinks of corrections.
 
-Both are asynchronous and can be lost at any time: who uses them connects, looks at the status, and connects again.
+Both are asynchronous and can be lost at any time: the caller connects, checks the status, and reconnects.
 """
 
 from collections.abc import AsyncIterator, Mapping
@@ -14,8 +14,8 @@ class LinkStatus(NamedTuple):
     """Status of a connection."""
 
     state: Literal["closed", "connecting", "connected", "failed"]
-    reason: str = ""  #: why it failed
-    since: float | None = None  #: on the clock of the readings [s]
+    reason: str = ""  #: reason of a failure
+    since: float | None = None  #: start of the present status, on the clock of the readings [s]
 
 
 @runtime_checkable
@@ -27,7 +27,7 @@ class Source(Protocol):
         ...
 
     def readings(self) -> AsyncIterator[Reading]:
-        """Return readings as they come, oldest first, until the source ends or fails."""
+        """Return an iterator over readings as they arrive, oldest first, until the source ends or fails."""
         ...
 
     def status(self) -> LinkStatus:
@@ -48,7 +48,7 @@ class Probe(Protocol):
         ...
 
     def measurements(self) -> AsyncIterator[Measurement]:
-        """Return measurements as they come, until the probe ends or fails."""
+        """Return an iterator over measurements as they arrive, until the probe ends or fails."""
         ...
 
     def status(self) -> LinkStatus:
@@ -62,23 +62,23 @@ class Probe(Protocol):
 
 @runtime_checkable
 class Confirming(Protocol):
-    """A sink that knows what is in force at the controller."""
+    """A sink that can report the correction in force at the controller."""
 
     async def confirmed(self) -> Mapping[str, Correction] | None:
-        """Return the correction in force per axis or target; None if that is not known."""
+        """Return the correction in force per axis or target; None if unknown."""
         ...
 
 
 @runtime_checkable
 class Suspending(Protocol):
-    """A sink that knows when the controller can have no correction in force, such as before homing."""
+    """A sink that detects when no correction can be in force at the controller, such as before homing."""
 
     def suspended(self) -> Mapping[str, str]:
         """Return axes or targets without a correction in force, and the reason, as last reported."""
         ...
 
     def alarms(self) -> Mapping[str, str]:
-        """Return axes or targets whose correction in force is not the demanded one, and why, as last reported."""
+        """Return axes or targets whose correction in force differs from the demanded one, and why, as last reported."""
         ...
 
 
@@ -91,7 +91,7 @@ class Sink(Protocol):
         ...
 
     async def apply(self, corrections: Mapping[str, Correction]) -> None:
-        """Hand one correction per axis or target to the controller, or raise `ThermocompError` with the reason."""
+        """Send one correction per axis or target to the controller, or raise `ThermocompError` with the reason."""
         ...
 
     def status(self) -> LinkStatus:
@@ -99,5 +99,5 @@ class Sink(Protocol):
         ...
 
     async def close(self) -> None:
-        """Close the connection; idempotent. What was applied stays in force."""
+        """Close the connection; idempotent. Applied corrections stay in force."""
         ...

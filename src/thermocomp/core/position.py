@@ -22,17 +22,17 @@ class PositionModel:
     """Frozen model of a position-dependent component: profile + offset + slopes (C-04, C-05).
 
     ``d(x, y, z, t) = f_g(x, y, z) + k_0(t) + k_1(t) q + k_2(t) q^2 + ...`` with q = (p - reference position) in metres,
-    p being the axis' own position: k_i in um/m^i or urad/m^i (E-C6). Chen has no k_0 and counts p from the axis' zero.
+    p being the position of this axis: k_i in um/m^i or urad/m^i (E-C6). Chen has no k_0 and counts p from its zero.
 
     Parameters
     ----------
     target : str
-        Component it models, such as ``EYY``.
+        Component that is modelled, such as ``EYY``.
     unit : {'um', 'urad'}
     axis : {'X', 'Y', 'Z'}
         Axis of the position p.
     travel : tuple of float
-        From where to where the slopes were measured [mm]; beyond, the value at the end holds.
+        Range in which the slopes were measured [mm]; outside, the value at the nearer end applies.
     reference_position : float
         Position at which q is zero [mm].
     profile : Profile or None
@@ -77,7 +77,7 @@ class PositionModel:
 
     @property
     def models(self) -> tuple[ErrorModel, ...]:
-        """The models of time: the offset, if there is one, then the slopes."""
+        """Models that depend on time only: the offset, if any, then the slopes."""
         return tuple(m for _, m in self._by_power)
 
     def taken(self, by: str | None) -> "PositionModel":
@@ -87,7 +87,7 @@ class PositionModel:
 
     @property
     def powers(self) -> tuple[int, ...]:
-        """The power of q that each of `models` is the factor of."""
+        """Power of q that is multiplied by each of `models`."""
         return tuple(k for k, _ in self._by_power)
 
     def ranges(self) -> tuple[tuple[str, str, tuple[float, float]], ...]:
@@ -115,7 +115,7 @@ class PositionModel:
         return np.asarray(values) if points.ndim == 1 else np.broadcast_to(values, points.shape[:-1]).copy()
 
     def value(self, xyz: Coordinates, factors: Sequence[float]) -> Numbers:
-        """Return the error at what `coordinates` made of points; a float if it is the same everywhere."""
+        """Return the error at points prepared by `coordinates`; a float if it is the same everywhere."""
         k_0, *others = factors if self.offset is not None else (0.0, *factors)
         value = k_0 if self.profile is None else self.profile.value(xyz) + k_0
         if not self.slopes:

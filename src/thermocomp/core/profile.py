@@ -1,4 +1,4 @@
-"""Profiles: how a position-dependent error varies over the work volume in one thermal state (Chen 1996, Eq. 2: f_g)."""
+"""Profiles: a position-dependent error over the work volume in one thermal state (Chen 1996, Eq. 2: f_g)."""
 
 from bisect import bisect_right
 from collections.abc import Sequence
@@ -34,7 +34,7 @@ class PolynomialProfile:
     Parameters
     ----------
     kind : str
-        Its word in a file.
+        Name of the kind in a file.
     exponents : tuple of (int, int, int)
         i, j, k of each term.
     coefficients : tuple of float
@@ -42,7 +42,7 @@ class PolynomialProfile:
     centre, scale : tuple of float
         For x, y, z [mm]; a polynomial in mm has centre 0 and scale 1.
     low, high : tuple of float
-        Measured range, x, y, z [mm]; beyond, the value at the border holds.
+        Measured range, x, y, z [mm]; outside, the value at the border applies.
     """
 
     kind: Literal["polynomial"] = "polynomial"
@@ -70,16 +70,16 @@ class PolynomialProfile:
 
     @cached_property
     def _axes(self) -> tuple[int, ...]:
-        """Indices of the coordinates that it depends on."""
+        """Indices of the coordinates used by the profile."""
         return tuple(a for a in range(3) if any(e[a] for e in self.exponents))
 
     def ranges(self) -> dict[str, tuple[float, float]]:
-        """Return from where to where it is known along each axis that it depends on [mm]."""
+        """Return the measured range along each axis used by the profile [mm]."""
         return {"XYZ"[a]: (self.low[a], self.high[a]) for a in self._axes}
 
     @cached_property
     def _along_one(self) -> tuple[int, tuple[float, ...]] | None:
-        """The coordinate and the coefficients by falling degree of a polynomial in one coordinate."""
+        """Coordinate, and coefficients by descending degree, of a polynomial in one coordinate."""
         if len(self._axes) > 1:
             return None
         axis = self._axes[0] if self._axes else 0
@@ -89,7 +89,7 @@ class PolynomialProfile:
         return axis, tuple(reversed(by_degree))
 
     def at(self, points: FloatArray) -> FloatArray:
-        """Return its values.
+        """Return the values of the profile.
 
         Parameters
         ----------
@@ -103,7 +103,7 @@ class PolynomialProfile:
         return np.asarray(self.value(coordinates(points)))
 
     def value(self, xyz: Coordinates) -> Numbers:
-        """Return its values at what `coordinates` made of points."""
+        """Return the values at points prepared by `coordinates`."""
         along = self._along_one
         if along is not None:
             axis, coefficients = along
@@ -129,17 +129,17 @@ class PolynomialProfile:
 
 @dataclass(frozen=True, kw_only=True)
 class SplineProfile:
-    """Piecewise cubic along one axis.
+    """Piecewise cubic profile along one axis.
 
     Parameters
     ----------
     kind : str
-        Its word in a file.
+        Name of the kind in a file.
     axis : {'X', 'Y', 'Z'}
     knots : tuple of float
-        Ends of the pieces, rising [mm]; beyond the first and the last the value there holds.
+        Ends of the pieces, increasing [mm]; outside, the value at the nearer end applies.
     pieces : tuple of (float, float, float, float)
-        One per piece: coefficients of ((p - its first knot) / its length)^0..3 [unit of the error].
+        Per piece, the coefficients of ((p - first knot) / length)^0..3 [unit of the error].
     """
 
     kind: Literal["spline"] = "spline"
@@ -159,7 +159,7 @@ class SplineProfile:
         check_finite("profile", pieces=self.pieces)
 
     def ranges(self) -> dict[str, tuple[float, float]]:
-        """Return from where to where it is known [mm], under its axis."""
+        """Return the measured range [mm], by axis."""
         return {self.axis: (self.knots[0], self.knots[-1])}
 
     @cached_property
@@ -167,7 +167,7 @@ class SplineProfile:
         return np.asarray(self.knots, dtype=np.float64), np.asarray(self.pieces, dtype=np.float64)
 
     def at(self, points: FloatArray) -> FloatArray:
-        """Return its values.
+        """Return the values of the profile.
 
         Parameters
         ----------
@@ -181,7 +181,7 @@ class SplineProfile:
         return np.asarray(self.value(coordinates(points)))
 
     def value(self, xyz: Coordinates) -> Numbers:
-        """Return its values at what `coordinates` made of points."""
+        """Return the values at points prepared by `coordinates`."""
         p = clamp(xyz["XYZ".index(self.axis)], self.knots[0], self.knots[-1])
         if isinstance(p, float):
             i = min(bisect_right(self.knots, p), len(self.pieces)) - 1
@@ -195,9 +195,9 @@ Profile = PolynomialProfile | SplineProfile
 
 
 def coordinates(points: FloatArray) -> Coordinates:
-    """Return x, y and z of points (..., 3), apart.
+    """Return x, y and z of points of shape (..., 3), separately.
 
-    Those of a single point are floats: live, their arithmetic is ten times faster than that of arrays of one number.
+    For a single point they are floats: live, float arithmetic is ten times faster than that of one-element arrays.
     """
     if points.ndim == 1:
         x, y, z = points.tolist()
@@ -206,7 +206,7 @@ def coordinates(points: FloatArray) -> Coordinates:
 
 
 def clamp(value: Numbers, low: float, high: float) -> Numbers:
-    """Return numbers, no further out than the borders."""
+    """Return numbers clipped to the bounds."""
     return min(max(value, low), high) if isinstance(value, float) else np.clip(value, low, high)
 
 

@@ -18,21 +18,21 @@ class Provenance:
     method : str
         Name of the method, such as ``dynamic``.
     parameters : dict of str to str
-        Its settings, as text.
+        Settings of the method, as text.
     data_sha256 : tuple of str
-        Hashes of the recordings it was fitted to.
+        Hashes of the training recordings.
     cycles : tuple of str
-        Thermal cycles it was fitted to.
+        Thermal cycles in the training data.
     rows : int
-        Number of rows it was fitted to.
+        Number of training rows.
     version : str
         thermocomp version that fitted it.
     source : str
-        A publication, for models taken from one.
+        Publication from which the model was taken, if any.
     learned : Learned or None
-        Training statistics of the target in those rows.
+        Statistics of the target in the training rows.
     prints : Prints or None
-        Fingerprints of the rows it was fitted to: they are known again in another file.
+        Fingerprints of the training rows, used to recognise them in another file.
     starts : tuple of str
         Initial state of each recording: cold, continued, rezeroed or known; in the order of `data_sha256`.
     """
@@ -52,18 +52,18 @@ class Provenance:
         check_between("provenance", 0, COEFFICIENT, rows=self.rows)
 
 
-#: version of the rules that a verdict is given by; files that do not say were judged by older ones
+#: version of the rules for verdicts; files without this number were judged by older rules
 RULES = 1
 
 
 @dataclass(frozen=True)
 class HonestError:
-    """Error on thermal cycles that the method had not seen.
+    """Error on thermal cycles not used for training.
 
     Parameters
     ----------
     protocol : str
-        Method by which the unseen cycles were chosen.
+        Method by which the unseen cycles were selected.
     mae, rms, max_abs : float
         Figures of the residual over all unseen cycles [unit of the model].
     none_mae, none_rms : float
@@ -73,20 +73,20 @@ class HonestError:
     verdict : {'accepted', 'unproven', 'refused'}
         Verdict of the do-no-harm gate.
     reason : str
-        Reason, in words.
+        Reason for the verdict, as text.
     units : int
-        Independent cycles or files it was judged on.
+        Number of independent cycles or files used for judging.
     tried : int
-        Methods that were tried for the target.
+        Number of methods tried for the target.
     rules : int
-        By which it was judged, see `RULES`; older ones prove nothing.
+        Version of the rules used for judging, see `RULES`; verdicts by older rules are not valid.
     taken : str
-        Person who approved the use of an unproven model, and the reason; empty without.
+        Person who approved the use of an unproven model, and the reason; empty if none.
     harm_margin : float or None
-        Tolerated degradation in a single cycle, as stated before judging; None: by rule.
+        Tolerated degradation in a single cycle, as specified before judging; None: by rule.
     lost : dict of str to float
-        RMS of the residual with a sensor, or with several of them (``t1_C, t2_C``, in the order of the inputs), read
-        as their zero from the start on, the watch being there to find it [unit of the model].
+        RMS of the residual when a sensor, or several of them (``t1_C, t2_C``, in the order of the inputs), reads its
+        reference value from the start, with the watch active [unit of the model].
 
     Raises
     ------
@@ -130,22 +130,22 @@ class HonestError:
 
     @property
     def typical(self) -> float:
-        """RMS of the residual in most unseen cycles: the median over them."""
+        """Median RMS of the residual over the unseen cycles."""
         return median(self.cycles.values()) if self.cycles else self.rms
 
     @property
     def current(self) -> bool:
-        """True if it was judged by the rules of today."""
+        """True if the model was judged by the current rules."""
         return self.rules == RULES
 
     @property
     def word(self) -> Literal["accepted", "unproven", "refused"]:
-        """The verdict as it counts today: accepted by other rules is unproven."""
+        """The verdict under the current rules: accepted by other rules counts as unproven."""
         return self.verdict if self.current or self.verdict != "accepted" else "unproven"
 
     @property
     def why(self) -> str:
-        """The reason as it counts today."""
+        """The reason under the current rules."""
         other = "" if self.current or self.word != "unproven" else "older" if self.rules < RULES else "newer"
         why = f"judged by {other} rules: {self.reason}" if other else self.reason
         return f"{why}. Taken by {self.taken}" if self.taken else why

@@ -7,14 +7,14 @@ from typing import NamedTuple
 
 @dataclass(frozen=True)
 class Reading:
-    """One synchronised sample of a machine's sensors.
+    """One synchronised sample of all sensors of a machine.
 
     Parameters
     ----------
     time : float
-        Time of the reading [s]; any clock that only moves forward.
+        Time of the reading on any monotonic clock [s].
     values : mapping of str to float
-        Channel name to value in internal units: temperatures [degC], spindle speed [1/min].
+        Channel name to value in house units: temperatures [degC], spindle speed [1/min].
     positions : mapping of str to float
         Axis letter to position [mm].
 
@@ -37,7 +37,7 @@ class Measurement(NamedTuple):
     time: float  #: seconds since 1970
     target: str
     measured: float  #: deviation [um]
-    left: bool  #: it is what the correction in force left; otherwise the correction is not in it
+    left: bool  #: True: residual under the correction in force; False: deviation without correction
     repeatability: float = 0.5  #: standard deviation [um]
-    position: float = 0.0  #: on the axis [mm]
-    keys: tuple[str, ...] = ()  #: its id, its time, its content: a measurement with one of them again is the same
+    position: float = 0.0  #: axis position [mm]
+    keys: tuple[str, ...] = ()  #: id, time and content: a measurement that shares one of them is a repetition

@@ -1,21 +1,21 @@
-"""External texts, escaped for display: no name of a file moves a cursor, changes colours or begins a line."""
+"""Escaping of external texts for display: no file name may move a cursor, change colours or start a line."""
 
 from unicodedata import category
 
 
 def replace_unprintable(text: object) -> str:
-    """Return a text with a question mark for all that cannot be printed, and a blank for blanks of other widths."""
+    """Return a text with unprintable characters replaced by question marks, and all white space by blanks."""
     return "".join(c if c.isprintable() else " " if category(c) == "Zs" else "?" for c in str(text))
 
 
 def shorten(text: object, longest: int) -> str:
-    """Return a text that can be printed on one line, with dots for what is too much.
+    """Return a text that prints on one line, shortened with dots.
 
     Parameters
     ----------
     text : object
     longest : int
-        Characters it may have.
+        Maximum number of characters.
 
     Returns
     -------
@@ -26,13 +26,13 @@ def shorten(text: object, longest: int) -> str:
 
 
 def escape(text: object, longest: int) -> str:
-    r"""Return a text with escapes for all that cannot be printed, such as ``\x07`` or ``\ud800``; lines stay.
+    r"""Return a text with unprintable characters escaped, such as ``\x07`` or ``\ud800``; line breaks stay.
 
     Parameters
     ----------
     text : object
     longest : int
-        Number of characters of the text that are shown; dots replace the others.
+        Maximum number of characters of the text that are shown; dots replace the rest.
 
     Returns
     -------
@@ -44,18 +44,18 @@ def escape(text: object, longest: int) -> str:
 
 
 def explain_unfit(text: str, longest: int = 200) -> str:
-    """Return the reason why an external text cannot be a name; empty if it can.
+    """Return the reason why an external text cannot be a name; empty if it is valid.
 
     Parameters
     ----------
     text : str
     longest : int
-        Characters that it may have.
+        Maximum number of characters.
 
     Returns
     -------
     str
-        Fault, with the text escaped.
+        Reason, with the text escaped.
     """
     if len(text) > longest:
         return f"{text[:40]!a}... has {len(text):,} characters; at most {longest:,}"

@@ -1,4 +1,4 @@
-"""`Size`: how large an error is."""
+"""`Size`: magnitude of an error."""
 
 import math
 from dataclasses import dataclass
@@ -16,9 +16,9 @@ class Size:
     Parameters
     ----------
     rms : float
-        Root of the mean square [unit of the errors].
+        Root mean square [unit of the errors].
     largest : float
-        Largest magnitude [unit of the errors].
+        Largest absolute value [unit of the errors].
     """
 
     rms: float
@@ -26,7 +26,7 @@ class Size:
 
     @classmethod
     def of(cls, errors: FloatArray) -> "Size":
-        """Return the size of errors of any shape [their unit]; nan of none."""
+        """Return the size of errors of any shape [their unit]; NaN for an empty array."""
         if not errors.size:
             return cls(math.nan, math.nan)
         return cls(float(np.sqrt(np.mean(errors**2))), float(np.abs(errors).max()))

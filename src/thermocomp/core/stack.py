@@ -1,4 +1,4 @@
-"""`Stack`: many frozen models stepped at once, as the 32 components of a machine are."""
+"""`Stack`: joint evaluation of many frozen models, such as the 32 components of a machine."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -17,27 +17,27 @@ from thermocomp.core.terms import Term, TermTable, Variable
 from thermocomp.core.together import Together, TogetherState
 
 IndexArray = NDArray[np.intp]
-# an input as one model sees it: with that model's zero, bounds, margin and fading
+# an input as used by one model: with the reference, bounds, margin and fading of that model
 Tap = tuple[Input, float, float]
 
 
 class StackState(NamedTuple):
     """State of a stack between two steps; leading axes, if any, are a batch of independent runs."""
 
-    reference: FloatArray  #: (..., n_taps), what counts as zero
+    reference: FloatArray  #: (..., n_taps), values that count as zero
     memory: FloatArray | None  #: (..., n_lags); None before the first reading
-    deviation: FloatArray  #: (..., n_models), last deviations given
+    deviation: FloatArray  #: (..., n_models), last deviations returned
     outside: BoolArray  #: (..., n_taps), inputs beyond the trained range
-    groups: tuple[TogetherState, ...]  #: of the paced models that share their states
-    others: tuple[State, ...]  #: of the models that are stepped one by one
+    groups: tuple[TogetherState, ...]  #: states of the paced models that share their states
+    others: tuple[State, ...]  #: states of the models that are stepped individually
 
 
 class Stack:
-    """Several models behind one `init` and one `step`; each has the same output as alone, to rounding.
+    """Several models with one `init` and one `step`; each gives the same output as on its own, up to rounding.
 
     A `Polynomial` is a `LinearDynamic` without lags: models of the two families share one table of terms, one bank of
-    lags and one read-out, in which an input, variable or term that several of them use is evaluated once. Each
-    `PacedDynamic` goes with those that have the same states. The models of the other families are stepped one by one.
+    lags and one readout, so that an input, variable or term used by several of them is evaluated once. `PacedDynamic`
+    models with the same states are grouped. The models of the other families are stepped individually.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class Stack:
     Raises
     ------
     InputError
-        Two models take an input of the same name for different quantities.
+        Two models use the same input name for different quantities.
     """
 
     def __init__(self, models: Sequence[ErrorModel]) -> None:
@@ -86,12 +86,12 @@ class Stack:
         return np.array([self.inputs.index(i.name) for i in model.inputs], dtype=np.intp)
 
     def _lay(self, linear: Sequence[tuple[int, Polynomial | LinearDynamic]]) -> None:
-        """Arrange the models of the two linear families side by side."""
-        # what is in one of these dicts already is not laid again: it gets the place that it has
+        """Combine the models of the two linear families in one layout."""
+        # entries of these dicts that exist already are reused
         taps: dict[Tap, int] = {}
         variables: dict[tuple[tuple[int, float], ...], int] = {}
         terms: dict[Term, int] = {}
-        bounds: list[list[float]] = []  # of each tap: zero, low, high, span of fading
+        bounds: list[list[float]] = []  # of each tap: reference, low, high, fade span
         read_out: list[tuple[int, int, float]] = []  # term, model, factor
         lags: list[tuple[int, float, int, float]] = []  # term, time constant, model, factor
         used: dict[int, list[int]] = {}  # taps by model
@@ -149,16 +149,16 @@ class Stack:
         )
 
     def step(self, state: StackState, values: FloatArray, dt: float) -> tuple[StackState, FloatArray]:
-        """Process one reading and return the deviations at its instant.
+        """Process one reading and return the deviations at its time.
 
         Parameters
         ----------
         state : StackState
             From `init` or the previous `step`.
         values : ndarray of shape (..., n_inputs)
-            In the order of `inputs` [their units]. Leading axes are a batch of independent runs.
+            Values in the order of `inputs` [their units]. Leading axes are a batch of independent runs.
         dt : float
-            Time since the previous reading [s]; without meaning in the first step.
+            Time since the previous reading [s]; ignored in the first step.
 
         Returns
         -------
@@ -189,7 +189,7 @@ class Stack:
         return linear._replace(deviation=deviation, groups=tuple(groups), others=tuple(others)), deviation
 
     def _step_linear(self, state: StackState, values: FloatArray, dt: float) -> StackState:
-        """Step the models of the two linear families; the deviations of the others are their intercepts or zero."""
+        """Step the models of the two linear families; deviations of other models are set to their intercept or zero."""
         seen, reference, memory = values[..., self._columns], state.reference, state.memory
         if memory is None:
             reference = np.where(np.isnan(reference), seen, reference)
@@ -229,14 +229,14 @@ class Stack:
         Parameters
         ----------
         state : StackState
-            After the step that took the reading in.
+            State after the step that processed the reading.
         values : ndarray of shape (..., n_inputs)
             The reading.
 
         Returns
         -------
         ndarray of shape (..., n_models)
-            One per model [its unit]; nan for a model without a band.
+            One per model [its unit]; NaN for a model without a band.
         """
         found = np.full((*values.shape[:-1], len(self.models)), np.nan)
         for (members, together, _), now in zip(self._groups, state.groups, strict=True):
@@ -260,7 +260,7 @@ class Stack:
 
 
 def _padded(taps: dict[int, list[int]]) -> tuple[IndexArray, IndexArray]:
-    """Return models (n,) and their taps (n, most taps); a model with fewer has its first one several times."""
+    """Return models (n,) and their taps (n, maximum number of taps), padded by repeating the first tap of a model."""
     widest = max((len(t) for t in taps.values()), default=0)
     rows = [t + t[:1] * (widest - len(t)) for t in taps.values()]
     return np.array(list(taps), dtype=np.intp), np.array(rows, dtype=np.intp).reshape(len(taps), widest)

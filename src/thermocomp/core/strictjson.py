@@ -1,4 +1,4 @@
-"""JSON as it comes through doors: UTF-8, and each key once."""
+"""Strict parsing of external JSON: UTF-8, and unique keys."""
 
 import json
 from typing import Any
@@ -14,10 +14,10 @@ def parse_json(text: bytes | str) -> Any:
     Raises
     ------
     ValueError
-        It is not UTF-8, not JSON, nested too deeply, or an object has a key twice.
+        The text is not UTF-8, not JSON, nested too deeply, or an object has a duplicate key.
     """
     try:
-        # json would guess UTF-16 and UTF-32, and take the last of two values
+        # json would guess UTF-16 and UTF-32, and use the last of duplicate keys
         return json.loads(text.decode("utf-8") if isinstance(text, bytes) else text, object_pairs_hook=_once)
     except RecursionError as e:
         raise ValueError("nested too deeply") from e

@@ -1,4 +1,4 @@
-"""Structure codes: which axes carry the workpiece and which the tool."""
+"""Structure codes: axes that carry the workpiece, and axes that carry the tool."""
 
 import re
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ Side = Literal["head", "table"]
 
 _LINEAR = "XYZ"
 _ROTARY = "ABC"
-# a B with a prime or a number is an axis, not the bed
+# a B with a prime or a number denotes an axis, not the bed
 _LONG = re.compile(r"W(?P<workpiece>.*?)B(?!['\d])(?P<tool>.*?)(?P<spindle>C\d?|\(C\d?\))?T")
 _SHORT = re.compile(r"([ABCU-Z]*)(F?)([ABCU-Z]*)")
 _WORD = re.compile(r"\(?[A-Z]\d?'?\)?|.")
@@ -26,11 +26,11 @@ class Structure:
     Parameters
     ----------
     workpiece : tuple of str
-        Axes between workpiece and bed, the nearest to the workpiece first.
+        Axes between workpiece and bed, starting at the workpiece.
     tool : tuple of str
-        Axes between bed and tool, the nearest to the bed first.
+        Axes between bed and tool, starting at the bed.
     rotary : dict of str to {'head', 'table'}
-        Rotary axes A, B, C: on the side of the tool, which they turn, or of the workpiece.
+        Rotary axes A, B, C: ``head`` turns the tool, ``table`` turns the workpiece.
     """
 
     workpiece: tuple[str, ...]
@@ -50,15 +50,15 @@ class Structure:
 
     @classmethod
     def parse(cls, code: str) -> "Structure":
-        """Read a structure code.
+        """Return the structure given by a code.
 
         Parameters
         ----------
         code : str
-            As of ISO 10791, ``w X' b Z Y (C1) t``: from the workpiece over the bed to the tool, axes that carry the
-            workpiece with a prime, rotary ones too (``w C' A' X' b Y Z (C1) t``); or short, ``XFZY``: the letters
-            before F carry the workpiece, those behind it the tool; without F all carry the tool. Blanks and small
-            letters do not matter. A C as the last axis of the tool is the spindle, with or without parentheses.
+            According to ISO 10791, ``w X' b Z Y (C1) t``: from the workpiece over the bed to the tool, axes that carry
+            the workpiece with a prime, including rotary ones (``w C' A' X' b Y Z (C1) t``); or the short form ``XFZY``:
+            the letters before F carry the workpiece, those after it the tool; without F all carry the tool. Blanks and
+            case are ignored. A C as the last axis of the tool is the spindle, with or without parentheses.
 
         Returns
         -------
@@ -67,7 +67,7 @@ class Structure:
         Raises
         ------
         SettingError
-            It is neither, has an axis twice, another one than X Y Z A B C, a prime in the wrong place, or a spindle
+            The code has neither form, a duplicate axis, an axis other than X Y Z A B C, a misplaced prime, or a spindle
             that turns the workpiece.
         """
         text = "".join(code.split()).replace("’", "'").replace("′", "'").upper()
@@ -90,13 +90,13 @@ class Structure:
 
     @property
     def code(self) -> str:
-        """Code of ISO 10791; rotary axes are nearest to workpiece and tool, wherever they were."""
+        """Code according to ISO 10791; rotary axes are placed next to workpiece and tool, whatever their position."""
         table = [f"{a}'" for a, side in self.rotary.items() if side == "table"]
         head = [a for a, side in self.rotary.items() if side == "head"]
         return " ".join(["w", *table, *(f"{a}'" for a in self.workpiece), "b", *self.tool, *head, "(C1)", "t"])
 
     def beyond(self, axis: str) -> tuple[str, ...]:
-        """Return the axes between an axis and the tool: those that move the tool against what the axis guides.
+        """Return the axes between an axis and the tool, which move the tool relative to the slide of this axis.
 
         Parameters
         ----------
@@ -106,7 +106,7 @@ class Structure:
 
 
 def _made(workpiece: Sequence[str], tool: Sequence[str]) -> Structure:
-    """Return the structure of all axes of both sides."""
+    """Return the structure from all axes of both sides."""
     turning: list[tuple[str, Side]] = [(a, "table") for a in workpiece if a in _ROTARY]
     turning += [(a, "head") for a in tool if a in _ROTARY]
     rotary = dict(turning)

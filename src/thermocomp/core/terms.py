@@ -1,4 +1,4 @@
-"""Variables and terms: the alphabet of the polynomial families.
+"""Variables and terms: the elements of the polynomial families.
 
 A *variable* is a linear combination of inputs, such as T2 or T6-T7 (C-12: differences are first-class variables). A
 *term* is a product of variables, written as a tuple of their indices: ``(1,)`` is the second variable, ``(1, 1)`` its
@@ -27,14 +27,14 @@ class Variable:
     Parameters
     ----------
     name : str
-        Such as ``T6-T7``.
+        Name, such as ``T6-T7``.
     weights : tuple of (int, float)
-        Index of an input and its factor.
+        Pairs of input index and factor.
 
     Raises
     ------
     SettingError
-        Something is not a name, not an input, or a factor is NaN or infinite.
+        A name or an input index is invalid, or a factor is NaN or infinite.
     """
 
     name: str
@@ -42,7 +42,7 @@ class Variable:
 
     def __post_init__(self) -> None:
         if self.name:
-            check_name("variable", self.name, INPUTS * NAME)  # of a projection, the names of all inputs
+            check_name("variable", self.name, INPUTS * NAME)  # a projection is named after all its inputs
         check_count(f"variable {self.name}", INPUTS, weights=self.weights)
         check_finite(f"variable {self.name}", weights=[w for _, w in self.weights])
         if not self.weights:
@@ -50,7 +50,7 @@ class Variable:
 
     @classmethod
     def single(cls, name: str, index: int) -> "Variable":
-        """Return the variable that is one input itself."""
+        """Return the variable equal to a single input."""
         return cls(name, ((index, 1.0),))
 
     @classmethod
@@ -62,12 +62,12 @@ class Variable:
         return cls(f"{plus}-{minus}", ((names.index(plus), 1.0), (names.index(minus), -1.0)))
 
     def check_inputs(self, count: int) -> None:
-        """Raise `SettingError` if it is of another input than the `count` that there are."""
+        """Raise `SettingError` if the variable refers to an input beyond `count`."""
         if any(not 0 <= i < count for i, _ in self.weights):
             raise SettingError(f"variable {self.name}: refers to an input beyond the {count} given")
 
     def expression(self, change: Sequence[Node]) -> Node:
-        """Return it as a part of an expression."""
+        """Return the variable as a node of an expression."""
         match self.weights:
             case ((index, 1.0),):
                 return change[index]
@@ -76,13 +76,13 @@ class Variable:
         return Named(self.name, Sum(tuple(scale_node(w, change[i]) for i, w in self.weights)))
 
     def written(self) -> str:
-        """Return the name, in brackets where a product needs them."""
+        """Return the name, in brackets if required in a product."""
         return f"({self.name})" if len(self.weights) > 1 else self.name
 
 
 @dataclass(frozen=True)
 class TermTable:
-    """Evaluates terms for readings, one or many at once.
+    """Evaluator of terms for one or many readings.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ class TermTable:
 
     @cached_property
     def _factors(self) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-        """Per degree: which terms reach it, and the variable they multiply by there."""
+        """Per degree: the terms that reach it, and the variable that is their next factor."""
         by_degree = []
         for k in range(max((len(t) for t in self.terms), default=0)):
             rows = [i for i, t in enumerate(self.terms) if len(t) > k]
@@ -157,12 +157,12 @@ class TermTable:
         return tuple("*".join(self.variables[i].written() for i in t) for t in self.terms)
 
     def expressions(self, change: Sequence[Node]) -> tuple[Node, ...]:
-        """Return the terms as parts of an expression."""
+        """Return the terms as nodes of an expression."""
         made = [v.expression(change) for v in self.variables]
         return tuple(_multiplied([made[i] for i in t]) for t in self.terms)
 
     def inputs_of(self, term: int) -> set[int]:
-        """Return the indices of the inputs that a term needs."""
+        """Return the indices of the inputs used by a term."""
         return {i for v in self.terms[term] for i, _ in self.variables[v].weights}
 
 
@@ -175,7 +175,7 @@ def _multiplied(factors: Sequence[Node]) -> Node:
 
 
 def second_order_terms(n_variables: int) -> tuple[Term, ...]:
-    """Return every linear, square and product term of `n_variables` variables: n + n(n+1)/2 of them (C-09, C-10)."""
+    """Return all linear, square and product terms of `n_variables` variables: n + n(n+1)/2 terms (C-09, C-10)."""
     linear = [(i,) for i in range(n_variables)]
     squares = [(i, i) for i in range(n_variables)]
     products = [(i, j) for i in range(n_variables) for j in range(i + 1, n_variables)]

@@ -1,4 +1,4 @@
-"""Paced models that share their states: the channels of one machine, stepped as one."""
+"""Paced models that share their states: the channels of one machine, evaluated jointly."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -11,17 +11,17 @@ from thermocomp.core.paceddynamic import PacedDynamic
 
 
 class TogetherState(NamedTuple):
-    """State of such models between two steps; leading axes, if any, are a batch of independent runs."""
+    """State of grouped models between two steps; leading axes, if any, are a batch of independent runs."""
 
-    reference: FloatArray  #: (..., n_inputs), what counts as zero
+    reference: FloatArray  #: (..., n_inputs), values that count as zero
     memory: FloatArray | None  #: (..., n_memory); None before the first reading
-    change: FloatArray  #: (..., n_inputs), of the last reading, clipped
+    change: FloatArray  #: (..., n_inputs), clipped changes in the last reading
     outside: NDArray[np.bool_]  #: (..., n_inputs), inputs beyond the trained range
-    spread: FloatArray | None = None  #: (..., n_spread of all), what the structures of each model differ in
+    spread: FloatArray | None = None  #: (..., n_spread of all), differences between the structures of each model
 
 
 class Together:
-    """Models with the same inputs and states, each with a separate read-out; each has the same output as alone.
+    """Models with the same inputs and states, each with a separate readout; each gives the same output as on its own.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class Together:
     def __init__(self, models: Sequence[PacedDynamic]) -> None:
         self.models = tuple(models)
         self._first = models[0]
-        # of inputs and of states, the deviations first, behind them the spread
+        # rows: inputs or states; columns: the deviations, followed by the spread
         self._direct, self._weights = (
             np.column_stack([*(m.read_out[k] for m in models), *(m.spread_out[k] for m in models)]) for k in (0, 1)
         )
@@ -46,7 +46,7 @@ class Together:
 
     @staticmethod
     def key(model: PacedDynamic) -> tuple[object, ...] | None:
-        """Return the key shared by models that can be stepped together; None for one that is stepped alone."""
+        """Return the key shared by models that can be grouped; None for a model that is stepped individually."""
         band = model.band
         if model.support.policy != "clip" or (band is not None and not band.speeds):
             return None

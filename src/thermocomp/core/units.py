@@ -1,4 +1,4 @@
-"""Units at the interfaces: internally all values are in mm, um, urad, degC, s, 1/min."""
+"""Units at the interfaces: internally all values are in house units: mm, um, urad, degC, s, 1/min."""
 
 import math
 import re
@@ -11,22 +11,22 @@ from thermocomp.core.exceptions import UnitError
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit that a file may use, and its conversion to the internal unit of its quantity.
+    """A unit allowed in files, and its conversion to the house unit of its quantity.
 
     ``value_in_house_unit = scale * value + shift``
 
     Parameters
     ----------
     symbol : str
-        As written in files, such as ``degF``.
+        Symbol as written in files, such as ``degF``.
     quantity : str
         A key of `HOUSE_UNITS`.
     house : str
         House unit of that quantity.
     scale : float
-        [internal unit per unit]
+        [house unit per unit]
     shift : float
-        [internal unit]
+        [house unit]
     """
 
     symbol: str
@@ -47,7 +47,7 @@ HOUSE_UNITS: dict[str, str] = {
     "feed": "mm/min",
     "acceleration": "mm/s2",
     "dimensionless": "1",
-    # of a machine under compensation: what is left of a displacement, and what the controller adds
+    # of a machine under compensation: residual displacement, and correction added by the controller
     "residual": "um",
     "correction": "um",
 }
@@ -83,11 +83,11 @@ _UNITS = [
     Unit("m/s2", "acceleration", "mm/s2", 1e3),
     Unit("1", "dimensionless", "1", 1.0),
 ]
-#: measured as displacements are; no message offers them
+#: quantities measured in the same way as displacements; not suggested in messages
 _COMPENSATED = ("residual", "correction")
 _UNITS += [replace(u, quantity=q) for q in _COMPENSATED for u in _UNITS if u.quantity == "displacement"]
 
-#: spellings met in files
+#: alternative spellings found in files
 _ALIASES = {
     "C": "degC",
     "°C": "degC",
@@ -105,7 +105,7 @@ _ALIASES = {
     "Hz": "1/s",
     "": "1",
 }
-#: words met in files, in several languages, in small letters
+#: words found in files, in several languages, in lower case
 _WORDS = {
     word: unit
     for unit, words in {
@@ -134,15 +134,15 @@ _WORDS = {
     }.items()
     for word in words.split()
 }
-#: all spellings of words
+#: all accepted spellings of words
 SPELLINGS = tuple(_WORDS)
-#: signs that stand for others, or are what a wrong encoding makes of them
+#: equivalent characters, including typical results of a wrong encoding
 _SIGNS = str.maketrans(
     {"µ": "u", "μ": "u", "º": "°", "˚": "°", "²": "2", "−": "-", "⁻": "-", "¹": "1", "³": "3", "·": "*", "×": "*"}
 )
-#: a count of a unit, such as 0.001 mm, 1/1000 mm, 10 um
+#: a multiple of a unit, such as 0.001 mm, 1/1000 mm, 10 um
 _COUNT = re.compile(r"(\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)(?:/(\d+))? ?\*? ?([^\d\s/*].*)")
-#: powers of ten in all their spellings: 10^-3 mm, 10-3 mm, 10**3 rpm, E-3 mm, x1000 rpm
+#: powers of ten in all supported spellings: 10^-3 mm, 10-3 mm, 10**3 rpm, E-3 mm, x1000 rpm
 _POWER = re.compile(r"(?<![\d.])(?:10(?:\^|\*\*)?|[eE])([-+]\d)(?=[ *])|(?<![\d.])(?:10(?:\^|\*\*))(\d)(?=[ *])")
 
 #: a number and its unit, such as 12.5 mm, 1e-3urad or 6000 1/min
@@ -153,15 +153,14 @@ _BY_KEY = {(u.symbol, u.quantity): u for u in _UNITS}
 
 
 def find_unit(symbol: str, quantity: str | None = None) -> Unit:
-    """Look a unit up.
+    """Return the unit with a given symbol.
 
     Parameters
     ----------
     symbol : str
         The unit as written in a file, such as ``degC``, ``C``, ``rpm``, ``mm``.
     quantity : str, optional
-        The quantity it must measure; without it the first quantity the unit fits is taken, so a bare ``mm`` is a
-        displacement.
+        Expected quantity. Default: the first quantity with this unit, so that ``mm`` alone is a displacement.
 
     Returns
     -------
@@ -170,7 +169,7 @@ def find_unit(symbol: str, quantity: str | None = None) -> Unit:
     Raises
     ------
     UnitError
-        The unit is unknown, or does not measure the quantity.
+        The unit is unknown, or belongs to another quantity.
     """
     if quantity is not None and quantity not in HOUSE_UNITS:
         raise UnitError(f"unknown quantity {quantity!r}; known are {', '.join(HOUSE_UNITS)}")
@@ -201,14 +200,14 @@ def find_unit(symbol: str, quantity: str | None = None) -> Unit:
 
 @lru_cache(maxsize=4096)
 def is_unit(symbol: str) -> bool:
-    """Return whether `find_unit` knows a unit."""
+    """Return whether a symbol is a known unit."""
     name = _name(symbol)
     counted = _COUNT.fullmatch(name)
     return name in _SYMBOLS or (counted is not None and _name(counted[3]) in _SYMBOLS)
 
 
 def _name(symbol: str) -> str:
-    """Return the symbol under which a unit is kept, of one of its spellings."""
+    """Return the standard symbol of a unit given in any spelling."""
     plain = " ".join(symbol.removeprefix("Â").replace("℃", "°C").replace("℉", "°F").translate(_SIGNS).split())
     plain = _POWER.sub(lambda found: f"1e{found[1] or found[2]}", plain.replace("° ", "°"))
     plain = re.sub(r"^[x*] ?(?=\d)", "", plain)  # x1000 rpm
@@ -217,24 +216,24 @@ def _name(symbol: str) -> str:
 
 
 def read_with_unit(text: object, quantity: str) -> float | None:
-    """Read a value that is written with its unit.
+    """Read a value written with its unit.
 
     Parameters
     ----------
     text : object
-        Such as ``"250 mm"``.
+        Value with unit, such as ``"250 mm"``.
     quantity : str
         Required quantity, a key of `HOUSE_UNITS`.
 
     Returns
     -------
     float or None
-        Value in the internal unit; None: it is not text of a number and a unit.
+        Value in the house unit; None if the text is not a number with a unit.
 
     Raises
     ------
     UnitError
-        The unit is unknown, or does not measure the quantity; or the number is not finite.
+        The unit is unknown, or belongs to another quantity; or the number is not finite.
     """
     found = _MEASURED.fullmatch(text) if isinstance(text, str) else None
     if found is None:

@@ -13,29 +13,29 @@ class Validity:
     Parameters
     ----------
     units : int
-        Cycles, files or blocks that were judged.
+        Number of judged cycles, files or blocks.
     independent : int
-        Number of them when similar ones count once.
+        Number of units, with similar ones counted once.
     nearest : float or None
-        Distance of the two units that are most alike, in standard deviations of the inputs; None with a single unit.
-        Below `thermocomp.judging.coverage.ALIKE` two units are alike.
+        Distance between the two most similar units, in standard deviations of the inputs; None with a single unit.
+        Below `thermocomp.judging.coverage.ALIKE` two units count as alike.
     speeds : tuple of float
-        Spindle speeds that were run; those nearer than 2 % of the largest are one [1/min]; empty if none was recorded.
+        Spindle speeds that were run; speeds within 2 % of the largest are merged [1/min]; empty if not recorded.
     ambient : tuple of float or None
-        Lowest and highest temperature of the surroundings [degC]; None if no channel is named after them.
+        Minimum and maximum ambient temperature [degC]; None if no channel has a corresponding name.
     ambient_channel : str
-        That channel; empty if there is none.
+        Channel of the ambient temperature; empty if there is none.
     start : tuple of float or None
-        Lowest and highest mean of all temperatures at the start of a unit [degC]; None without a temperature.
+        Minimum and maximum of the mean of all temperatures at the start of a unit [degC]; None without temperatures.
     days : int
-        Calendar days with a judged row; 0 if the recordings have no time stamps.
+        Number of calendar days with judged rows; 0 if the recordings have no time stamps.
     hours : float
-        Judged in all [h].
+        Total judged duration [h].
 
     Raises
     ------
     InputError
-        Fewer units than independent ones, or numbers that count or measure nothing.
+        Fewer units than independent ones, or invalid counts or values.
     """
 
     units: int

@@ -1,4 +1,4 @@
-"""`Watch`: what each temperature reads by the others and the spindle speed, and how far off it may be."""
+"""`Watch`: prediction of each temperature from the others and the spindle speed, with limits of the difference."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -26,34 +26,35 @@ from thermocomp.core.zero import FIRST_READING, Zeroing
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
 
-#: how long a jump or a difference has to last before it is a failure [s]
+#: minimum duration of a jump or a difference that counts as a failure [s]
 LASTING = 300.0
-#: how far a speed may be beyond those of the training until nothing is said of differences
+#: largest speed, relative to the highest trained one, at which differences are evaluated
 FASTER = 1.02
-#: error that is reckoned with at least where differences are weighed [degC]
+#: lower bound of the error used to weight differences [degC]
 LEAST_UNSEEN = 0.05
 
 
 @dataclass(frozen=True)
 class Watched:
-    """A temperature, as the others predict it, and what of its readings is not to be believed.
+    """A temperature with its prediction from the others, and the limits for rejecting its readings.
 
     Parameters
     ----------
     input : int
         Index into the inputs of the watch.
     weights : tuple of float
-        Read-out of the temperatures, of their lags, lag by lag, and of the speed states [degC/degC; degC]; of itself 0.
+        Readout coefficients of the temperatures, of their lags, lag by lag, and of the speed states [degC/degC; degC];
+        0 for the temperature itself.
     off : float
-        It is off when it is further from its prediction [degC].
+        Difference from the prediction above which the sensor is off [degC].
     jump : float
-        It has jumped when it changes by more within `Watch.pace` [degC].
+        Change within `Watch.pace` above which the reading has jumped [degC].
     moved : float
-        It is stuck when its prediction moves by more while it reads the same [degC].
+        Change of the prediction, with a constant reading, above which the sensor is stuck [degC].
     still : float
-        Longest constant reading while another one changes; beyond it is stuck; `GAP` where time is no criterion [s].
+        Longest constant reading while another one changes, above which the sensor is stuck; `GAP`: no time limit [s].
     unseen : float
-        Root mean square error of its prediction in cycles that were left out [degC].
+        RMS error of the prediction in cycles that were left out [degC].
     """
 
     input: int
@@ -67,14 +68,14 @@ class Watched:
 
 @dataclass(frozen=True)
 class Watch:
-    """Predictions of temperatures by each other and by states of the spindle speed, with limits: see `PacedDynamic`.
+    """Predictions of temperatures from each other and from spindle speed states, with limits; see `PacedDynamic`.
 
     Parameters
     ----------
     inputs : tuple of Input
         Temperatures and speeds, in this order.
     zeroing : Zeroing
-        Over how long their zero is averaged.
+        Averaging time of their zero.
     time_constants : tuple of float
         Time constants of the lags, the same for all temperatures [s].
     top_speed : float
@@ -84,12 +85,12 @@ class Watch:
     sensors : tuple of Watched
         One per temperature, in the order of the inputs.
     pace : float
-        Time over which a jump is one [s].
+        Time within which a change counts as a jump [s].
 
     Raises
     ------
     SettingError
-        A number is not in its range, or the parts do not fit together.
+        A number is out of range, or the parts are inconsistent.
     """
 
     inputs: tuple[Input, ...]
@@ -131,12 +132,12 @@ class Watch:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Of the temperatures."""
+        """Names of the temperatures."""
         return tuple(self.inputs[s.input].name for s in self.sensors)
 
     @cached_property
     def bank(self) -> Bank:
-        """Bank of its states."""
+        """Bank of the speed states and lags."""
         stopped = [1 / slow for _, _, slow, _ in self.states]
         lags = [1 / tau for tau in self.time_constants for _ in self.sensors]
         return Bank(
@@ -151,13 +152,13 @@ class Watch:
 
     @cached_property
     def read_out(self) -> tuple[FloatArray, FloatArray]:
-        """Read-outs of the temperatures, (n_sensors, n_sensors), and of the states, (n_memory, n_sensors)."""
+        """Readout coefficients: of temperatures, (n_sensors, n_sensors), and of states, (n_memory, n_sensors)."""
         table = np.array([s.weights for s in self.sensors], dtype=np.float64).reshape(len(self.sensors), -1).T
         return table[: len(self.sensors)], table[len(self.sensors) :]
 
     @cached_property
     def signatures(self) -> FloatArray:
-        """Effect of one degree in one sensor on the residuals of all, at once and in the end, (2, n, n), by row."""
+        """Effect of one degree in one sensor on all residuals, immediate and steady-state, (2, n, n), by row."""
         n = len(self.sensors)
         direct, states = self.read_out
         lagged = states[: n * len(self.time_constants)].reshape(-1, n, n).sum(axis=0)
@@ -165,12 +166,12 @@ class Watch:
 
     @cached_property
     def pairs(self) -> tuple[IntArray, IntArray]:
-        """Every two sensors."""
+        """Indices of all pairs of sensors."""
         first, second = np.triu_indices(len(self.sensors), 1)
         return first, second
 
     def limits(self, what: str) -> FloatArray:
-        """Return a limit of each sensor, (n_sensors,): off, jump, moved or still; or what is unseen of it."""
+        """Return a limit of each sensor, (n_sensors,): off, jump, moved or still; or its error on unseen cycles."""
         return self._limits[what]
 
     @cached_property
@@ -182,7 +183,7 @@ class Watch:
 
     @cached_property
     def speeds(self) -> IntArray:
-        """Inputs that are spindle speeds."""
+        """Indices of the inputs that are spindle speeds."""
         return np.array([k for k, i in enumerate(self.inputs) if i.quantity == "spindle_speed"], dtype=np.intp)
 
     @cached_property

@@ -1,8 +1,8 @@
-"""Reference temperatures (zero): not one reading but the mean over the first minutes, while the spindle is stopped.
+"""Reference temperatures (zero): the mean over the first minutes with the spindle stopped, instead of one reading.
 
-The same few lines decide it live, in a replay and in training: a model finds at the machine what it has learned from.
-The readings of the zero are themselves taken as their mean: the machine rests in it, and what has a memory begins
-there, not in the noise of one reading.
+The same code is used live, in a replay and in training, so that a model finds the conditions of its training at the
+machine. The readings of this interval are themselves replaced by their mean: the machine counts as settled there, and
+models with memory start from the mean instead of one noisy reading.
 """
 
 from collections.abc import Sequence
@@ -17,32 +17,32 @@ from thermocomp.core.bounds import GAP, check_between, check_name
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-#: readings that are averaged at most, however fast they come: noise is gone by then, and memory is bounded
+#: maximum number of averaged readings at any rate; it reduces the noise sufficiently, and bounds the memory
 MOST = 600
-#: below this speed the spindle counts as stopped: what a tachometer reads at rest [1/min]
+#: below this speed the spindle counts as stopped: reading of a tachometer at rest [1/min]
 STANDS = 10.0
-#: a value further from the median than this many median deviations is an outlier (four sigma of a normal law)
+#: distance from the median, in median absolute deviations, beyond which a value is an outlier (four sigma if normal)
 FAR = 6.0
 
 
 @dataclass(frozen=True)
 class Zeroing:
-    """Over how long the zero of temperatures is averaged.
+    """Averaging time of the zero of temperatures.
 
     Parameters
     ----------
     at_rest : float
-        From the first reading on, while the spindle is known to be stopped [s].
+        Averaging time from the first reading on, while the spindle is known to be stopped [s].
     otherwise : float
-        The same where it turns from the first reading on, or nothing is known of it [s]: short, for what warms up must
-        not get into the zero. Of a test recorded once a minute it is the first row.
+        Averaging time if the spindle turns from the first reading on, or its state is unknown [s]; short, because the
+        warm-up must not affect the zero. In a test recorded once a minute it is the first row.
     speed : str
         Channel that shows whether the spindle is stopped [1/min]; empty if there is none.
 
     Raises
     ------
     InputError
-        A time is negative or not finite, or the channel has no name.
+        A time is negative or not finite, or the name of the channel is invalid.
     """
 
     at_rest: float = 300.0
@@ -55,23 +55,23 @@ class Zeroing:
             check_name("zero", self.speed)
 
     def stands(self, speed: object) -> bool:
-        """Return whether a reading of `speed` shows that the spindle is stopped; anything but a number does not."""
+        """Return whether a reading of `speed` shows that the spindle is stopped; False if it is not a number."""
         return isinstance(speed, float | int) and type(speed) is not bool and abs(speed) <= STANDS
 
 
-#: the zero is the first reading: of models that were not trained on recordings, and of papers that say so
+#: the zero is the first reading: for models not trained on recordings, and for papers that specify it
 FIRST_READING = Zeroing(0.0, 0.0)
 
 
 class Gathered(NamedTuple):
-    """The readings that a zero is being averaged of."""
+    """Readings collected for averaging the zero."""
 
     times: tuple[float, ...] = ()  #: [s]
     values: tuple[FloatArray, ...] = ()  #: (n_inputs,) each
-    resting: bool = False  #: the spindle was stopped in the first of them
+    resting: bool = False  #: the spindle was stopped in the first reading
 
     def belongs(self, zeroing: Zeroing, time: float, resting: bool) -> bool:
-        """Return whether a reading is one more of them."""
+        """Return whether a reading belongs to the averaging interval."""
         if not self.times:
             return True
         if len(self.times) >= MOST or (self.resting and not resting):
@@ -79,11 +79,11 @@ class Gathered(NamedTuple):
         return time - self.times[0] <= self._span(zeroing)
 
     def complete(self, zeroing: Zeroing) -> bool:
-        """Return whether nothing that comes later can belong to them."""
+        """Return whether no later reading can belong to the averaging interval."""
         return bool(self.times) and (len(self.times) >= MOST or self.times[-1] - self.times[0] >= self._span(zeroing))
 
     def add(self, time: float, values: FloatArray, resting: bool) -> "Gathered":
-        """Return them with one more reading."""
+        """Return the collected readings with one more."""
         return Gathered((*self.times, time), (*self.values, values), self.resting if self.times else resting)
 
     def _span(self, zeroing: Zeroing) -> float:
@@ -91,7 +91,7 @@ class Gathered(NamedTuple):
 
 
 def first_rows(zeroing: Zeroing, time: FloatArray, resting: BoolArray) -> tuple[int, int]:
-    """Return the number of readings from the start of a test over which its zero is averaged, and the time it is known.
+    """Return the number of readings averaged for the zero of a test, and the index of the reading that completes it.
 
     Parameters
     ----------
@@ -99,13 +99,13 @@ def first_rows(zeroing: Zeroing, time: FloatArray, resting: BoolArray) -> tuple[
     time : ndarray of shape (n_readings,)
         Times of the usable readings, increasing [s].
     resting : ndarray of bool of shape (n_readings,)
-        The spindle is known to be stopped.
+        True where the spindle is known to be stopped.
 
     Returns
     -------
     count : int
     known : int
-        Index of the reading at which it is known: the last of them, or the one after.
+        Index of the reading at which the zero is known: the last averaged reading, or the next one.
     """
     gathered, nothing = Gathered(), np.empty(0)
     for k, (t, r) in enumerate(zip(time.tolist(), resting.tolist(), strict=True)):
@@ -118,12 +118,12 @@ def first_rows(zeroing: Zeroing, time: FloatArray, resting: BoolArray) -> tuple[
 
 
 def robust_mean(values: FloatArray | Sequence[FloatArray]) -> FloatArray:
-    """Return the mean over the first axis, without what is further than `FAR` median deviations from the median.
+    """Return the mean over the first axis without values further than `FAR` median deviations from the median.
 
     Parameters
     ----------
     values : array of shape (n_readings, ...)
-        Finite.
+        Finite values.
 
     Returns
     -------
@@ -140,25 +140,25 @@ def robust_mean(values: FloatArray | Sequence[FloatArray]) -> FloatArray:
 def find_zero(
     zeroing: Zeroing, zero: FloatArray, time: FloatArray, values: FloatArray, resting: BoolArray, usable: BoolArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Find what a test counts from.
+    """Find the reference values of a test.
 
     Parameters
     ----------
     zeroing : Zeroing
     zero : ndarray of shape (n_inputs,)
-        Known part of the zero; nan where the first readings decide.
+        Known part of the zero; NaN where the first readings decide.
     time : ndarray of shape (n_rows,)
         [s]
     values : ndarray of shape (n_rows, n_inputs)
     resting, usable : ndarray of bool of shape (n_rows,)
-        The spindle is known to be stopped; every input is a number.
+        Rows with the spindle known to be stopped; rows with a number for every input.
 
     Returns
     -------
     zero : ndarray of shape (n_inputs,)
-        nan where it is not known, for there is no reading.
+        NaN where it is unknown because there is no reading.
     values : ndarray of shape (n_rows, n_inputs)
-        With the readings of the zero taken as their mean.
+        Values with the readings of the zero replaced by their mean.
     """
     rows = np.flatnonzero(usable)
     if not rows.size or not np.isnan(zero).any():

@@ -11,28 +11,28 @@ from thermocomp.export.st.ststatements import SCL, Dialect, array, number, quote
 
 
 class Drive(NamedTuple):
-    """An axis that is corrected."""
+    """An axis to which a correction is applied."""
 
     letter: str
-    target: int  #: which of the corrections it takes
-    position: float  #: where the slope counts from [mm]
-    travel: tuple[float, float]  #: over which it was measured [mm]; the same twice without a slope
+    target: int  #: index of its correction
+    position: float  #: reference position of the slope [mm]
+    travel: tuple[float, float]  #: measured range [mm]; both ends equal without a slope
 
 
 def find_drives(tables: Tables, named: Mapping[str, str]) -> list[Drive]:
-    """Return the axes that are corrected.
+    """Return the axes to which corrections are applied.
 
     Parameters
     ----------
     tables : Tables
         Tables of the compensator.
     named : mapping of str to str
-        Axes by target; those of the names, such as z_um, if there are none.
+        Axes by target; if empty, derived from the target names, such as z_um.
 
     Raises
     ------
     InputError
-        No target has an axis, two have the same, or one is not there.
+        No target has an axis, or two targets have the same axis, or a named target does not exist.
     """
     if unknown := [t for t in named if t not in tables.targets]:
         raise InputError(f"--axes {unknown[0]}: no such target; there are {', '.join(tables.targets)}")
@@ -55,23 +55,23 @@ def find_drives(tables: Tables, named: Mapping[str, str]) -> list[Drive]:
     return list(found.values())
 
 
-#: largest of a whole number (DINT)
+#: largest integer (DINT)
 WHOLE = 2**31 - 1
 
 
 class Value(NamedTuple):
-    """Value that a controller accepts for an axis."""
+    """Input value of a controller for one axis."""
 
     name: str
     about: str
-    factor: float  #: from um, um/m and mm
-    whole: bool = False  #: a whole number
+    factor: float  #: conversion from um, um/m or mm
+    whole: bool = False  #: an integer
 
 
 def write_values(
     name: str, dialect: Dialect, drives: list[Drive], taken: Mapping[str, Value], direction: float
 ) -> SourceUnit:
-    """Return a function block that makes what a controller takes of the corrections.
+    """Return a function block that converts the corrections to the inputs of a controller.
 
     Parameters
     ----------
@@ -82,12 +82,12 @@ def write_values(
     taken : mapping of str to Value
         For ``offset``, ``slope`` and ``position``.
     direction : float
-        1 if the controller adds its input to the command, -1 if it subtracts it; an input that can be changed.
+        1 if the controller adds its input to the command, -1 if it subtracts it; an adjustable input of the block.
 
     Raises
     ------
     InputError
-        A reference position is beyond what the controller's whole numbers hold.
+        A reference position exceeds the range of the controller's integers.
     """
     scl, n = dialect == "scl", len(drives)
     _check_whole(drives, taken["position"])
@@ -134,7 +134,7 @@ def write_values(
 
 
 def _check_whole(drives: list[Drive], taken: Value) -> None:
-    """Refuse reference positions that do not fit into a whole number."""
+    """Reject reference positions that exceed the integer range."""
     for drive in drives:
         if taken.whole and abs(drive.position * taken.factor) >= WHOLE:
             raise InputError(

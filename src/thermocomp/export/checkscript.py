@@ -1,4 +1,4 @@
-"""A script that runs test vectors through what was written for a poor controller; it needs Python alone."""
+"""A script that runs test vectors through an export to a controller with a reduced model; needs plain Python only."""
 
 KLIPPER = """
 def answers(text, rows):
@@ -96,12 +96,12 @@ _FILES = {KLIPPER: "cfg", HEIDENHAIN: "txt", FANUC: "nc"}
 
 
 def write_script(answers: str, name: str) -> str:
-    """Return the script.
+    """Return the source of the script.
 
     Parameters
     ----------
     answers : str
-        `KLIPPER`, `HEIDENHAIN` or `FANUC`: how what was written is read.
+        `KLIPPER`, `HEIDENHAIN` or `FANUC`: code that evaluates the exported file.
     name : str
         Name of the files.
     """

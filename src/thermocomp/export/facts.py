@@ -21,7 +21,7 @@ class Facts:
     date : str
         Date of the export.
     left_out : mapping of str to str
-        Targets of the model file that are not in the export, and why.
+        Targets of the model file that were not exported, with the reason.
     """
 
     source: str
@@ -31,7 +31,7 @@ class Facts:
     left_out: Mapping[str, str] = field(default_factory=dict)
 
     def origin(self) -> list[str]:
-        """Return the origin."""
+        """Return lines of text on the origin of the export."""
         return [
             f"Model: {self.source}, SHA-256 {self.sha256}",
             f"Written by thermocomp {self.version} on {self.date}; change nothing here, export again",

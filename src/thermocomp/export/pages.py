@@ -1,11 +1,11 @@
-"""Page of an exported compensator, for all languages: inputs, outputs, and their meaning."""
+"""Instruction page of an exported compensator, for all languages: inputs, outputs, and their meaning."""
 
 from thermocomp.export.block.tables import Tables
 from thermocomp.runtime.compensator import Compensator
 
 
 def describe(compensator: Compensator, tables: Tables, of: str = "") -> dict[str, object]:
-    """Return parts of a page by name.
+    """Return the parts of the page by name.
 
     Parameters
     ----------
@@ -13,7 +13,7 @@ def describe(compensator: Compensator, tables: Tables, of: str = "") -> dict[str
     tables : Tables
         Tables of the compensator.
     of : str
-        Prefix of the names of the outputs.
+        Prefix of the output names.
     """
     slopes = any(tables.values["to_slope"])
     zeroing = compensator.models[0].zeroing

@@ -1,4 +1,4 @@
-"""The block's functions in another language: what all languages have in common."""
+"""Translation of the block's functions to another language: the part common to all languages."""
 
 import ast
 from abc import ABC, abstractmethod
@@ -8,12 +8,12 @@ from typing import Any, ClassVar
 from thermocomp.export.block.layout import Kind
 from thermocomp.export.block.program import Function, called, kind_of, locals_of, parameters_of
 
-#: operators of one rank: from left to right they need no parentheses
+#: operators of equal precedence: evaluated from left to right, they need no parentheses
 _RANKS = ({ast.Add, ast.Sub}, {ast.Mult, ast.Div})
 
 
 class Printer(ABC):
-    """Prints one function.
+    """Translator of one function.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ class Printer(ABC):
         Sizes of the block's tables.
     """
 
-    #: by the type of the syntax tree
+    #: by type of syntax tree node
     operators: ClassVar[Mapping[type[ast.AST], str]]
 
     def __init__(self, function: Function, sizes: Mapping[str, int]) -> None:
@@ -34,47 +34,47 @@ class Printer(ABC):
 
     @property
     def statements(self) -> list[ast.stmt]:
-        """Those of the function, without its docstring."""
+        """Statements of the function, without its docstring."""
         return [s for s in self.function.tree.body if not isinstance(s, ast.Expr) or isinstance(s.value, ast.Call)]
 
     def block(self, statements: list[ast.stmt], depth: int) -> list[str]:
-        """Return statements, a line each or several."""
+        """Return statements as lines of text, at least one per statement."""
         return [line for s in statements for line in self.statement(s, depth)]
 
     @abstractmethod
     def statement(self, node: ast.stmt, depth: int) -> list[str]:
-        """Return a statement."""
+        """Return the lines of a statement."""
 
     @abstractmethod
     def constant(self, value: float, kind: Kind) -> str:
-        """Return a number."""
+        """Return a numeric constant."""
 
     @abstractmethod
     def variable(self, owner: str, name: str) -> str:
-        """Return a variable of a bag; a size of the block is printed as a number."""
+        """Return a variable of a structure; a size of the block is printed as a number."""
 
     @abstractmethod
     def choice(self, test: str, one: str, other: str) -> str:
-        """Return one of two values."""
+        """Return a conditional expression: one of two values."""
 
     @abstractmethod
     def negated(self, text: str) -> str:
-        """Return the contrary of a condition."""
+        """Return the negation of a condition."""
 
     @abstractmethod
     def call(self, name: str, args: list[ast.expr]) -> str:
-        """Return a call of a function of numbers."""
+        """Return a call of a numeric function."""
 
     def local(self, name: str) -> str:
-        """Return a variable of the function itself."""
+        """Return a local variable of the function."""
         return name
 
     def element(self, array: ast.expr, at: list[ast.expr]) -> str:
         """Return an element of an array."""
         return self.value(array) + "".join(f"[{self.bare(a)}]" for a in at)
 
-    def real(self, text: str, kind: Kind) -> str:  # noqa: ARG002 - some languages do it themselves
-        """Return a number that counts as one that measures."""
+    def real(self, text: str, kind: Kind) -> str:  # noqa: ARG002 - implicit in some languages
+        """Return a number converted to floating point."""
         return text
 
     def kind(self, node: ast.expr) -> Kind:
@@ -82,13 +82,13 @@ class Printer(ABC):
         return kind_of(node, self._known)
 
     def bare(self, node: ast.expr, kind: Kind | None = None) -> str:
-        """Return an expression without parentheses around it."""
+        """Return an expression without outer parentheses."""
         text = self.value(node, kind)
         outer = text.startswith("(") and isinstance(node, ast.BinOp | ast.BoolOp | ast.Compare | ast.IfExp)
         return text[1:-1] if outer else text
 
-    def value(self, node: ast.expr, kind: Kind | None = None) -> str:  # noqa: PLR0911, PLR0912 - a case for every kind
-        """Return an expression; of a kind, if one is asked for."""
+    def value(self, node: ast.expr, kind: Kind | None = None) -> str:  # noqa: PLR0911, PLR0912 - one case per node type
+        """Return an expression, converted to `kind` if given."""
         match node:
             case ast.Constant(value):
                 return self._constant(value, kind)
@@ -142,5 +142,5 @@ def _kind(constant: float) -> Kind:
 
 
 def written(value: Any, one: Callable[[float], str]) -> list[str]:
-    """Return the numbers of a table, row after row, as texts."""
+    """Return the numbers of a table as text, row by row."""
     return [text for v in value for text in written(v, one)] if isinstance(value, list) else [one(value)]

@@ -6,30 +6,30 @@ from thermocomp.core import expression as e
 
 
 class Clock:
-    """A value that is made again at every tick.
+    """A value that is updated at every tick.
 
     Parameters
     ----------
     tick : Node
         New value.
     interval : float
-        From tick to tick [s].
+        Time between two ticks [s].
     """
 
     def __init__(self, tick: e.Node, interval: float) -> None:
         self.tick, self.interval = tick, interval
         parts = list(_walk(tick))
         means = [n for n in parts if isinstance(n, e.Mean)]
-        #: what it takes means of
+        #: nodes that are averaged
         self.leaves: list[e.Node] = list(dict.fromkeys(n.of for n in means)) or [e.Constant(0.0)]
-        #: how many ticks back it looks at itself
+        #: number of past ticks of the value itself that are used
         self.past = max([1, *(n.ticks for n in parts if isinstance(n, e.Past))])
-        #: how many ticks back it looks at the means
+        #: number of past ticks of the means that are used
         self.means = max([1, *(n.ticks for n in means)])
 
 
 def _walk(node: e.Node) -> Iterator[e.Node]:
-    """Give a part and all that it is made of, what a `Mean` is of excepted."""
+    """Yield a node and all its descendants, except the arguments of `Mean` nodes."""
     yield node
     match node:
         case e.Sum(parts) | e.Product(parts):

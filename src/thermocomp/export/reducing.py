@@ -1,4 +1,4 @@
-"""An export to a controller that holds less than a model: which models, along which axes, and what is lost."""
+"""Export to a controller that supports reduced models only: choice of models and axes, and loss of accuracy."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -49,9 +49,9 @@ class ExportOrder:
 class Outcome(NamedTuple):
     """Result of an export."""
 
-    files: dict[str, bytes]  #: by their names
-    refused: dict[str, str]  #: targets that may not be written, and why
-    elsewhere: dict[str, str]  #: targets that the controller does not correct, and why
+    files: dict[str, bytes]  #: by file name
+    refused: dict[str, str]  #: targets that must not be exported, with the reason
+    elsewhere: dict[str, str]  #: targets that the controller does not correct, with the reason
 
 
 def export_reduced(
@@ -62,14 +62,14 @@ def export_reduced(
     accept_unproven: str | None,
     listener: "Listener",
 ) -> Outcome:
-    """Make the files of an export to a target with a shape.
+    """Create the files of an export to a target with a shape.
 
     Parameters
     ----------
     order : ExportOrder
     models : sequence of ErrorModel
     recordings : sequence of Recording
-        That they are reduced on.
+        Recordings on which the models are reduced.
     starts : Start or sequence of Start, optional
         Initial state of the recordings.
     accept_unproven : str or None
@@ -79,8 +79,8 @@ def export_reduced(
     Raises
     ------
     InputError
-        None goes along an axis that the controller corrects, or two along one; a model has to be reduced, and there is
-        no recording; or the correction would run into its limit.
+        No model has an axis that the controller corrects, or two have the same; a model has to be reduced and there is
+        no recording; or the correction would reach its limit.
     """
     to, shape, options = order.to, order.target.shape, order.options
     assert shape is not None
@@ -115,21 +115,21 @@ def export_reduced(
 def along_axes(
     models: Sequence[_Model], options: ReductionOptions, to: str, corrected: str
 ) -> tuple[list[_Model], dict[str, str], dict[str, str]]:
-    """Return the models that a controller takes, the axes by target, and why others are left out.
+    """Return the models supported by a controller, their axes by target, and the reason for each omitted model.
 
     Parameters
     ----------
     models : sequence of ErrorModel or PositionModel
     options : ReductionOptions
     to : str
-        The controller.
+        Name of the controller.
     corrected : str
         Letters of the axes that it corrects.
 
     Raises
     ------
     InputError
-        None goes along one of these, or two along one.
+        No model has one of these axes, or two have the same.
     """
     axes = _find_axes(models, options)
     elsewhere = {m.target: why for m in models if (why := _why_elsewhere(m, axes[m.target], to, corrected))}
@@ -151,7 +151,7 @@ def _why_elsewhere(model: ErrorModel | PositionModel, axis: str, to: str, correc
 
 
 def _has(options: ReductionOptions, model: ErrorModel) -> bool:
-    """Return whether the controller has the temperatures of a model."""
+    """Return whether the controller has all temperatures of a model."""
     return options.sensors is None or {i.name for i in model.inputs} <= set(options.sensors)
 
 
@@ -165,7 +165,7 @@ def _refuse_twice(wanted: Sequence[tuple[str, str]]) -> None:
 
 
 def _check_limit(r: Reduced, limits: Limits, to: str) -> None:
-    """Refuse a limit that the reduced model, which was judged without one, would run into."""
+    """Reject a limit that the reduced model, which was judged without limits, would reach."""
     if r.most > limits.magnitude:
         raise InputError(
             f"{r.model.target}: the reduced model corrects by up to {r.most:.0f} um in these recordings, and was "
@@ -174,7 +174,7 @@ def _check_limit(r: Reduced, limits: Limits, to: str) -> None:
 
 
 def _find_axes(models: Sequence[ErrorModel | PositionModel], options: ReductionOptions) -> dict[str, str]:
-    """Return the axis of each target; empty where none is known, or others are named."""
+    """Return the axis of each target; empty if unknown, or if only other targets are named."""
     named, targets = options.named(), [m.target for m in models]
     if unknown := [t for t in named if t not in targets]:
         raise InputError(f"--axes {', '.join(unknown)}: no such target; there are {', '.join(targets)}")

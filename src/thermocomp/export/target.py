@@ -12,25 +12,25 @@ from thermocomp.export.reduction.reduced import Shape
 
 @dataclass(frozen=True, kw_only=True)
 class Target:
-    """A kind of controller that models are written for; an entry point of ``thermocomp.exporters`` names one.
+    """A kind of controller for which models are written; defined by an entry point of ``thermocomp.exporters``.
 
     Parameters
     ----------
     write : callable
-        Returns the files by their names, the page how to use them the last. Gets a compensator, a name and `Facts`;
-        with `shape` reduced models, limits, a name, `Facts` and ``figure``.
+        Returns the files by name, the page of instructions last. Called with a compensator, a name and `Facts`; with
+        `shape`, called with reduced models, limits, a name, `Facts` and ``figure``.
     shape : Shape or None
-        Form supported by the controller, if simpler than a model: the best reduced one is fitted to recordings.
+        Form supported by the controller if it cannot hold a full model: the best reduced model is fitted to recordings.
     axes : bool
-        `write` takes ``axes``, letters by target.
+        `write` accepts ``axes``, letters by target.
     corrected : str
         Axes that the controller corrects; empty: any.
     dialects : tuple of str
-        `write` takes ``dialect``, one of these.
+        `write` accepts ``dialect``, one of these.
     magnitude : float
-        Largest correction that it can count [um].
+        Largest correction that the controller can represent [um].
     limited : bool
-        It stops at the magnitude of the limits.
+        The controller limits the correction to the magnitude of `Limits`.
     """
 
     write: Callable[..., dict[str, bytes]]
@@ -43,12 +43,12 @@ class Target:
 
 
 def find_target(name: str) -> Target:
-    """Return the target of a name.
+    """Return the target with a given name.
 
     Raises
     ------
     InputError
-        There is none, or what brings it cannot be loaded.
+        The target is unknown, or its plug-in cannot be loaded.
     """
     known = find_plugins("exporters")
     if name not in known:

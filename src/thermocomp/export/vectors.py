@@ -1,4 +1,4 @@
-"""Test vectors: readings, faults among them, and what the compensator itself makes of each."""
+"""Test vectors: readings, including faulty ones, and the compensator's response to each."""
 
 import math
 from collections.abc import Callable
@@ -24,7 +24,7 @@ from thermocomp.runtime.watch import RETURN, WORDS
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-#: words of `thermocomp.runtime.state.Status`, as the block counts them
+#: values of `thermocomp.runtime.state.Status`, in the order of the block's codes
 STATUS = ("restarting", "active", "holding", "fading", "shadow")
 
 
@@ -32,8 +32,8 @@ class Readings(NamedTuple):
     """Readings passed to a block."""
 
     values: FloatArray  #: (n_calls, n_channels), in the order of `Tables.channels`
-    age: FloatArray  #: (n_calls,), of the values [s]
-    dt: FloatArray  #: (n_calls,), since the call before [s]
+    age: FloatArray  #: (n_calls,), age of the values [s]
+    dt: FloatArray  #: (n_calls,), time since the previous call [s]
 
 
 class Answers(NamedTuple):
@@ -41,10 +41,10 @@ class Answers(NamedTuple):
 
     correction: FloatArray  #: (n_calls, n_targets), at the reference position [um]
     slope: FloatArray  #: (n_calls, n_targets) [um/m]
-    status: IntArray  #: (n_calls, n_targets), by `STATUS`
+    status: IntArray  #: (n_calls, n_targets), index into `STATUS`
     deviation: FloatArray  #: (n_calls, n_models)
-    fault: IntArray  #: (n_calls, n_sensors), by `thermocomp.runtime.watch.WORDS`
-    passed: NDArray[np.bool_]  #: (n_calls,), the reading was used
+    fault: IntArray  #: (n_calls, n_sensors), index into `thermocomp.runtime.watch.WORDS`
+    passed: NDArray[np.bool_]  #: (n_calls,), whether the reading was used
 
 
 def replay(
@@ -64,16 +64,16 @@ def replay(
         Tables of the compensator.
     readings : Readings
     start : CompensatorState, optional
-        Another one than that of `Compensator.start`.
+        State to start from. Default: `Compensator.start`.
     rounded : callable, optional
-        Rounding of all numbers that are kept between two calls.
+        Rounding applied to all numbers kept between two calls.
     """
     names, targets = [c.name for c in tables.channels], tables.targets
     state, clock, begun, rows = start or compensator.start(), 0.0, False, []
     for values, age, dt in zip(*(a.tolist() for a in readings), strict=True):
         good = 0.0 <= dt <= GAP
         clock, begun = clock + dt if good and begun else clock, begun or good
-        tick = clock if good else math.nan  # a clock that says nothing moves nothing
+        tick = clock if good else math.nan  # an invalid clock advances nothing
         state, said = compensator.step(state, Reading(tick - age, dict(zip(names, values, strict=True))), tick)
         if rounded is not None:
             corrections = {t: round_all(c, rounded) for t, c in state.corrections.items()}
@@ -103,12 +103,12 @@ def replay(
     )
 
 
-#: of a model, what is in no code: how it was judged decides what it may do, and must not be rounded
+#: parts of a model that are not exported: the judging results decide what is permitted and must not be rounded
 _UNWRITTEN = (Band, HonestError, Provenance, Validity, Zeroing)
 
 
 def round_all(value: Any, rounded: Callable[[FloatArray], FloatArray]) -> Any:
-    """Return a value in which all numbers that a code holds are rounded, unless whole; a row of them at once."""
+    """Return a value with all numbers that the exported code holds rounded, except integers; arrays at once."""
     if isinstance(value, float):
         return float(rounded(np.array(value)))
     if isinstance(value, np.ndarray) and value.dtype == np.float64:
@@ -134,20 +134,20 @@ def find_tolerance(tables: Tables) -> float:
     Returns
     -------
     float
-        As a share of a correction, or in um of one below 1 um.
+        As a fraction of the correction, or in um for corrections below 1 um.
     """
-    # what the last digit makes of a sum that decays, and of many ticks at once
+    # effect of rounding in the last digit on a decaying sum, and on many ticks at once
     slow = [(1.0 - sum(m.a)) * (1.0 - find_largest_root(m.a)) for m in tables.models if isinstance(m, Autoregressive)]
     most = 10.0 * float(np.finfo(np.float64).eps) / min(slow, default=1.0)
     return max(most, 1e-11 if tables.sizes["CLOCKS"] else 1e-12)
 
 
 def make_readings(tables: Tables) -> Readings:
-    """Return readings that take a compensator through all that it does.
+    """Return readings that exercise all functions of a compensator.
 
-    A start at rest and a warm-up at changing speeds; each value missing, wild or impossible for a while; readings that
-    are late, old or out of order; a source that falls silent until corrections have gone to zero, and a return; sensors
-    that stick, jump and drift one after the other; values beyond the trained range.
+    A start at rest and a warm-up at changing speeds; each value missing, erratic or impossible for a while; late, old
+    or out-of-order readings; a source that stops until the corrections have faded to zero, and its return; sensors that
+    stick, step and drift one after the other; values beyond the trained range.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def make_readings(tables: Tables) -> Readings:
             values = machine.run(0.8, 15.0)
             values[c] = wild
             add(values, 15.0)
-        for _ in range(4):  # until it is believed again
+        for _ in range(4):  # until the value is trusted again
             add(machine.run(0.8, RETURN / 3), RETURN / 3)
     _turn(machine, add, 30)
     warm = machine.run(0.8, 10.0)
@@ -180,7 +180,7 @@ def make_readings(tables: Tables) -> Readings:
         add(warm, 10.0, old)
     for dt in (math.nan, -1.0, 0.0):
         add(warm, dt)
-    # silence: just before and just behind the end of the hold, then until all has faded
+    # no readings: until just before and just after the end of the hold time, then until all corrections have faded
     held = math.ceil(min(max(hold / age, 1.0), 200.0))
     waits = [0.998 * hold / held] * held + [0.004 * hold] + [age] * math.ceil(min(3.0 * fade / age, 200.0))
     for dt in waits:
@@ -197,12 +197,12 @@ def make_readings(tables: Tables) -> Readings:
     return Readings(values, ages, steps)
 
 
-#: as fast as a correction may
+#: (fraction of top speed, time step [s]) that moves corrections up and down at their rate limit
 _THERE_AND_BACK = [(1.0, 7.0)] * 8 + [(1.0, 600.0)] * 8 + [(0.0, 4 * 3600.0)] + [(0.0, 7.0)] * 8
 
 
 def _share(k: int) -> float:
-    """Return the share of top speed in a step of a test."""
+    """Return the fraction of top speed at a step of a test."""
     return (0.0, 1.0, 0.4, 0.8)[k // 10 % 4]
 
 
@@ -212,7 +212,7 @@ def _turn(machine: Warming, add: Callable[[FloatArray, float], None], minutes: i
 
 
 def _fail(tables: Tables, machine: Warming, add: Callable[[FloatArray, float], None]) -> None:
-    """Let sensors fail while the machine warms up: first one that may be lost, then others."""
+    """Simulate sensor failures during warm-up: first of a sensor that may be lost, then of others."""
     sensors = np.array(tables.values["sensor_channel"] if tables.sensors else np.flatnonzero(machine.heat))
     if not len(sensors):
         return

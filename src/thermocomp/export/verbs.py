@@ -216,7 +216,7 @@ def _export_whole(order: ExportOrder, models: Models, dialect: Dialect | None) -
     if target.corrected:
         models, axes, elsewhere = along_axes(models, options, order.to, target.corrected)
         writer = partial(target.write, axes=axes)
-    with needs("onnx"):  # one of them does
+    with needs("onnx"):  # needed by one of the targets
         files = writer(Compensator.of(models, order.limits, watching=True), order.name, order.facts)
     return Outcome(files, {}, elsewhere)
 

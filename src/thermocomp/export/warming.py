@@ -1,4 +1,4 @@
-"""A made-up machine that warms up as a compensator knows machines to do: for test vectors."""
+"""A synthetic machine whose warm-up matches the predictions of a compensator: for test vectors."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,15 +7,15 @@ from thermocomp.export.block.tables import Tables
 
 FloatArray = NDArray[np.float64]
 
-#: how fast a temperature follows where nothing is known of it [1/s]
+#: rate of temperatures without a known law [1/s]
 _PACE = 1e-3
 
 
 class Warming:
-    """A machine at rest, which is then run.
+    """A machine at rest that is then started.
 
-    What a watch predicts of each temperature from the others, their past and the speed is solved for all of them at
-    once: so it finds nothing wrong with them. Other channels follow the speed at a common pace.
+    The watch's predictions of all temperatures, each from the others, their past and the speed, are solved
+    simultaneously, so the watch detects no fault. Other channels follow the speed at a common rate.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class Warming:
         self._memory = np.zeros(tables.sizes.get("MEMORY", 0))
 
     def run(self, share: float, dt: float) -> FloatArray:
-        """Return the values of all channels after a while.
+        """Return the values of all channels after a time step.
 
         Parameters
         ----------

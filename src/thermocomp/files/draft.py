@@ -1,12 +1,12 @@
-"""Writing of files: each is written completely next to its target, flushed to the disk, and renamed.
+"""Safe writing of files: each file is written completely next to its target, flushed to disk, and renamed.
 
-Whatever fails, or kills the run, leaves the old file or the new one: never half of one, never none where there was one.
+A failure or a killed run leaves the old file or the new one: never a partial file, and never none where one existed.
 
-- A symbolic link stays: its target is written, in the target's folder. A link to nothing gets its target made if that
-  has a folder; links that lead in a circle, folders, pipes and devices are refused, and so is a read-only file.
-- A file that is replaced hands its permissions on (and its owner, as far as the system lets us); a new one gets those
-  that the umask leaves. Under other hard links the old content stays.
-- What a killed run has left, the next one that writes into the same folder removes: see `thermocomp.files.scratch`.
+- A symbolic link is kept: its target is written, in the target's folder. The target of a dangling link is created if
+  its folder exists; circular links, folders, pipes, devices and read-only files are rejected.
+- The permissions of a replaced file are kept (and its owner, if the system allows it); a new file gets those left by
+  the umask. Other hard links to the file keep the old content.
+- Drafts left by a killed run are removed by the next run that writes to the folder: see `thermocomp.files.scratch`.
 """
 
 import errno
@@ -22,12 +22,12 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.core.outputs import OTHERWISE, cannot_be_written, find_place
 from thermocomp.files.scratch import is_scratch, scratch
 
-#: a disk whose folders are not flushed says so
+#: errors of file systems that cannot flush folders
 _NO_FLUSH = {errno.EINVAL, errno.ENOSYS, errno.ENOTSUP}
 
 
 class Drafts(dict[Path, Path]):
-    """Paths of drafts, which do not exist yet, by what they will be.
+    """Paths of drafts, which do not exist yet, by target path.
 
     Parameters
     ----------
@@ -43,14 +43,14 @@ class Drafts(dict[Path, Path]):
         self._overwrite = overwrite
 
     def publish(self) -> None:
-        """Put the drafts on the disk and move them to their names, the last one last: all of them, or none.
+        """Flush the drafts to disk and rename them to their targets in order: all of them, or none.
 
         Raises
         ------
         InputError
-            A file of such a name has come into being meanwhile, and nothing may be overwritten.
+            A target file was created in the meantime, and overwriting is not allowed.
         OSError
-            The disk does not do it; what was there is there again.
+            A disk error; the previous files have been restored.
         """
         moves = [_Move(path, self._places[target]) for target, path in self.items()]
         for move in moves:
@@ -69,7 +69,7 @@ class Drafts(dict[Path, Path]):
                     ) from e
             for folder in dict.fromkeys(move.place.parent for move in moves):
                 _flush_folder(folder)
-        except BaseException:  # the keyboard too
+        except BaseException:  # including KeyboardInterrupt
             for move in reversed(begun):
                 with suppress(OSError):
                     move.undo()
@@ -77,49 +77,49 @@ class Drafts(dict[Path, Path]):
 
 
 class _Move(NamedTuple):
-    """A draft on its way."""
+    """A draft that is being moved to its target."""
 
     path: Path
     place: Path
 
     @property
     def old(self) -> Path:
-        """Path at which the old file is kept until all is done."""
+        """Path at which the old file is kept until all files are moved."""
         return self.path.with_name(f"{self.path.name}-old")
 
     def seal(self) -> None:
-        """Give the draft the permissions of the file that it replaces, and put it on the disk."""
+        """Give the draft the permissions of the file that it replaces, and flush it to disk."""
         with self.path.open("r+b") as file:
             if (before := _status(self.place)) is not None and os.name == "posix":
-                with suppress(OSError):  # only for members of the group
+                with suppress(OSError):  # allowed only for members of the group
                     os.chown(self.path, -1, before.st_gid)
-                with suppress(OSError):  # only for root
+                with suppress(OSError):  # allowed only for root
                     os.chown(self.path, before.st_uid, -1)
                 self.path.chmod(stat.S_IMODE(before.st_mode))
             os.fsync(file.fileno())
 
     def keep(self) -> None:
-        """Let the old file have a second name."""
+        """Give the old file a second name."""
         if _status(self.place) is None:
             return
         try:
             self.old.hardlink_to(self.place)
-        except OSError:  # a disk without links
+        except OSError:  # a file system without hard links
             shutil.copy2(self.place, self.old)
 
     def replace(self) -> None:
-        """Move the draft to its place."""
+        """Move the draft to its target."""
         self.path.replace(self.place)
 
     def add(self) -> None:
-        """Move the draft to a place where nothing is.
+        """Move the draft to a target that does not exist.
 
-        Where a disk has no hard links, there is an empty file for a moment.
+        On a file system without hard links, an empty file exists at the target for a moment.
 
         Raises
         ------
         FileExistsError
-            Something is there.
+            The target exists.
         """
         try:
             self.place.hardlink_to(self.path)
@@ -134,7 +134,7 @@ class _Move(NamedTuple):
                 raise
 
     def undo(self) -> None:
-        """Restore the previous files, unless another program has written new ones meanwhile."""
+        """Restore the previous file, unless another program has written a new one in the meantime."""
         if self.old.exists():
             self.old.replace(self.place)
         elif not self.path.exists() or (self.place.exists() and self.place.samefile(self.path)):
@@ -143,13 +143,13 @@ class _Move(NamedTuple):
 
 @contextmanager
 def drafts(targets: Sequence[Path], *, overwrite: bool) -> Iterator[Drafts]:
-    """Give a draft for each of some files; they become these files when they are published, all of them or none.
+    """Provide a draft for each target; all drafts become the targets when they are published, or none.
 
     Parameters
     ----------
     targets : sequence of Path
     overwrite : bool
-        Files of these names are replaced. Otherwise one that comes into being until the end is not.
+        Existing files are replaced. Otherwise a file created before the end is kept.
 
     Yields
     ------
@@ -158,8 +158,8 @@ def drafts(targets: Sequence[Path], *, overwrite: bool) -> Iterator[Drafts]:
     Raises
     ------
     InputError
-        A file cannot be there, is there and must not be replaced, or the disk does not take it (it is full, say): what
-        was there is as it was.
+        A file cannot be written, exists and must not be replaced, or a disk error occurred (such as a full disk);
+        previous files are unchanged.
     """
     with ExitStack() as stack:
         folders: dict[Path, Path] = {}
@@ -179,7 +179,7 @@ def drafts(targets: Sequence[Path], *, overwrite: bool) -> Iterator[Drafts]:
 
 @contextmanager
 def draft(target: Path, *, overwrite: bool) -> Iterator[Path]:
-    """Give the path of a draft of one file; it becomes that file if the block ends well.
+    """Provide the path of a draft of one file, which becomes that file if the block ends without an error.
 
     Parameters
     ----------
@@ -202,7 +202,7 @@ def draft(target: Path, *, overwrite: bool) -> Iterator[Path]:
 
 
 def write_text(text: str, target: str | Path, *, overwrite: bool) -> Path:
-    """Write a text, in UTF-8; return its path.
+    """Write a text in UTF-8 and return the path.
 
     Parameters
     ----------
@@ -229,11 +229,11 @@ def _status(path: Path) -> os.stat_result | None:
 
 @contextmanager
 def _telling(places: dict[Path, Path]) -> Iterator[None]:
-    """Turn errors of the disk about drafts into an error that names the file; errors of other files pass."""
+    """Convert disk errors about drafts to an error that names the file; other errors pass unchanged."""
     try:
         yield
     except OSError as e:
-        if not isinstance(e.filename, str | bytes):  # writing and flushing do not say what
+        if not isinstance(e.filename, str | bytes):  # errors of writing and flushing have no file name
             raise cannot_be_written(next(reversed(places)), e) from e
         where = Path(os.fsdecode(e.filename))
         for target, place in places.items():
@@ -244,12 +244,12 @@ def _telling(places: dict[Path, Path]) -> Iterator[None]:
 
 
 def _flush_folder(folder: Path) -> None:
-    """Put the names in a folder on the disk; systems that do that by themselves do not let anybody open one."""
+    """Flush the entries of a folder to disk; systems that do so automatically do not allow opening a folder."""
     if os.name != "posix":
         return
     try:
         handle = os.open(folder, os.O_RDONLY)
-    except PermissionError:  # files may be made there, but not listed
+    except PermissionError:  # files may be created there, but not listed
         return
     try:
         os.fsync(handle)

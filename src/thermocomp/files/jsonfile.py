@@ -16,19 +16,19 @@ from thermocomp.core.shown import replace_unprintable
 from thermocomp.files.draft import write_text
 from thermocomp.files.plaintext import list_errors, read_text
 
-#: bytes of a file, at most; models of additive curves over 9,000 rows had 8 million each before they were thinned
+#: maximum size of a file [bytes]; models of additive curves over 9,000 rows had 8 million each before thinning
 MOST = 64_000_000
-#: the same of what stands in it: memory is bounded, whatever is made of the bytes
+#: maximum counts of characters in the content, so that the memory for any file is bounded
 _COUNTS = {",": 4_000_000, "[": 500_000, "{": 20_000, '"': 300_000}
-#: digits of an integer
+#: maximum number of digits of an integer
 _DIGITS = 18
-#: characters of a text from a file that an error repeats
+#: maximum number of characters quoted from a file in an error
 _REPEATED = 60
 
 
 @dataclass(frozen=True)
 class Format:
-    """A kind of file.
+    """A file format.
 
     Parameters
     ----------
@@ -38,9 +38,9 @@ class Format:
     words : str
         Name of the format in messages.
     command : str
-        Command that writes it.
+        Command that writes the format.
     shared : tuple of str
-        Keys that are stored once for all of its models.
+        Keys stored once for all models of a file.
     """
 
     name: str
@@ -57,7 +57,7 @@ _KNOWN = {f.name: f for f in (MODELS, POSITION_MODELS)}
 
 
 def pack(kind: Format, body: list[Any], shared: dict[str, Any] | None = None) -> str:
-    """Return the text of a file; floats are written so that reading gives the same bits.
+    """Return the text of a file; floats are written such that reading restores them bit for bit.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def pack(kind: Format, body: list[Any], shared: dict[str, Any] | None = None) ->
     body : list
         The models.
     shared : dict, optional
-        Data stored once in the file, for all of them.
+        Data stored once for all models of the file.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def pack(kind: Format, body: list[Any], shared: dict[str, Any] | None = None) ->
 
 
 def _lay_out(value: Any, depth: int = 1) -> str:
-    """Return JSON with a line per key, and per entry of a list of tables; other lists take one line."""
+    """Return JSON with one line per key and per entry of a list of tables; other lists take one line."""
     if isinstance(value, dict) and value:
         parts = [f"{json.dumps(k, ensure_ascii=False)}: {_lay_out(v, depth + 1)}" for k, v in value.items()]
     elif isinstance(value, list | tuple) and any(isinstance(v, dict) for v in value):
@@ -106,12 +106,12 @@ def unpack(kind: Format, entry: Any, text: str, source: str, **shared: Any) -> A
     source : str
         Name of the source in an error.
     **shared : type
-        Types of data stored once for all of them.
+        Types of the data stored once for all models.
 
     Raises
     ------
     ModelFileError
-        Not JSON, of another kind or version, altered or incomplete, or not what they must be.
+        Not JSON, of another kind or version, altered or incomplete, or with invalid models.
     """
     content = _parse(text, f"{source}: not a {kind.words}", source, kind.command)
     _check_kind(kind, content, source)
@@ -120,7 +120,7 @@ def unpack(kind: Format, entry: Any, text: str, source: str, **shared: Any) -> A
         raise ModelFileError(f"{source}: contains no model")
     try:
         found_digest = digest(body, {k: content[k] for k in kind.shared if k in content})
-    except (ValueError, RecursionError) as e:  # 1e999, half a character, a hundred brackets
+    except (ValueError, RecursionError) as e:  # 1e999, half a surrogate pair, a hundred brackets
         raise ModelFileError(f"{source}: not a {kind.words}: holds what no {kind.words} can: {_short(str(e))}") from e
     if content.get("sha256") != found_digest:
         raise ModelFileError(
@@ -128,7 +128,7 @@ def unpack(kind: Format, entry: Any, text: str, source: str, **shared: Any) -> A
             f"'{kind.command}'"
         )
     try:
-        return _reader_of(entry, **shared).validate_json(text)  # the text: keys in the order of the file
+        return _reader_of(entry, **shared).validate_json(text)  # the text keeps the order of the keys
     except ValidationError as e:
         errors = [_tell(error, content) for error in e.errors(include_url=False)]
         raise ModelFileError(list_errors(source, errors)) from e
@@ -138,8 +138,8 @@ def unpack(kind: Format, entry: Any, text: str, source: str, **shared: Any) -> A
 def _reader_of(entry: Any, **shared: Any) -> SchemaValidator:
     """Return the reader of the models of a file, each of the type `entry`, and of the data common to all of them.
 
-    Strict: a number in quotes, a missing or an unknown key is damage, not something to guess at. Of a list of numbers
-    the first wrong one is enough: the errors of a million would take a gigabyte.
+    Validation is strict: a number in quotes, a missing or an unknown key is an error and is not guessed. In a list of
+    numbers only the first invalid one is reported: the errors of a million would take a gigabyte.
     """
     head = [("format", str), ("version", int), ("sha256", str), ("models", list[entry])]
     rest = [(name, kind | None, field(default=None)) for name, kind in shared.items()]
@@ -173,12 +173,12 @@ def write(text: str, path: str | Path, *, overwrite: bool) -> None:
 
 
 def read(kind: Format, path: str | Path) -> tuple[str, str]:
-    """Return the text of a file, and what to call it.
+    """Return the text of a file, and its name for messages.
 
     Raises
     ------
     ModelFileError
-        There is no such file, it is none, too large, or no text.
+        The file does not exist, is not a regular file, is too large, or is not text.
     """
     return read_text(path, kind.words, MOST, ModelFileError), str(path)
 
@@ -265,13 +265,13 @@ def _check_kind(kind: Format, content: Any, source: str) -> None:
         )
 
 
-# -- what is wrong with the models -------------------------------------------------------------------------------------
+# -- errors in the models ----------------------------------------------------------------------------------------------
 
 
 def _tell(error: ErrorDetails, content: Any) -> str:
     message, found, context = error["msg"], error["input"], error.get("ctx", {})
     keys: list[str | int] = []
-    for key in error["loc"]:  # the rest are members of a union, which do not stand in the file
+    for key in error["loc"]:  # the other keys are members of a union, which are not in the file
         try:
             content = content[key]
         except (KeyError, IndexError, TypeError):

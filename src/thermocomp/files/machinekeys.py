@@ -1,4 +1,4 @@
-"""Keys of a machine file: their types, and the conversion to internal units; all errors are collected."""
+"""Keys of a machine file: their types, and the conversion to house units; all errors are collected."""
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -11,10 +11,10 @@ from thermocomp.core.structure import Structure
 from thermocomp.core.units import read_with_unit
 
 Keys = tuple[str | int, ...]
-#: turns what stands under a key into house units; gets the key's path for its error
+#: converts the value of a key to house units; takes the path of the key for error messages
 Convert = Callable[[Any, Keys], Any]
 
-#: what a value with a unit is called, and an example of it
+#: name of a value with a unit, and an example of it
 _SAID = {
     "position": ("length", "600 mm"),
     "displacement": ("length", "12 um"),
@@ -27,7 +27,7 @@ QUANTITY = {"um": "displacement", "urad": "angle"}
 
 
 class ManyError(SettingError):
-    """Collected errors, and the other findings."""
+    """Collected errors, and the valid values."""
 
     def __init__(self, errors: Sequence[SettingError], found: dict[str, Any]) -> None:
         super().__init__(str(errors[0]))
@@ -36,7 +36,7 @@ class ManyError(SettingError):
 
 @contextmanager
 def kept(errors: list[SettingError]) -> Iterator[None]:
-    """Continue behind an error, and keep it."""
+    """Store an error and continue after the block."""
     try:
         yield
     except SettingError as e:
@@ -60,7 +60,7 @@ def each(values: Mapping[str, Any], convert: Callable[[str, Any], Any]) -> dict[
 
 
 def read_table(value: Any, known: Mapping[str, Convert], where: Keys) -> dict[str, Any]:
-    """Return a table in internal units."""
+    """Return a table in house units."""
     if not isinstance(value, dict):
         raise SettingError(f"{value!r}: must be a table", where)
 
@@ -73,7 +73,7 @@ def read_table(value: Any, known: Mapping[str, Convert], where: Keys) -> dict[st
 
 
 def measure(quantity: str) -> Convert:
-    """Return a reader of texts with a number and a unit."""
+    """Return a reader of text with a number and a unit."""
     what, example = _SAID[quantity]
 
     def convert(value: Any, where: Keys) -> float:
@@ -149,7 +149,7 @@ AXIS: dict[str, Convert] = {
     "rapid": measure("feed"),
     "acceleration": measure("acceleration"),
 }
-#: keys that say from where the lever of a component in urad counts
+#: keys that define the point from which the lever of a component in urad counts
 COUNTED_FROM = {
     "axis": ("measured_at", "measured_tool"),
     "squareness": ("reference_position",),

@@ -1,4 +1,4 @@
-"""Machine files: axes, lengths and what is known of the 32 components, written as TOML; see :doc:`/machine_file`."""
+"""Machine files: axes, lengths and the known error components, as TOML; see :doc:`/machine_file`."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -34,10 +34,10 @@ from thermocomp.files.tomlfile import read_toml
 
 
 def read_machine(path: str | Path) -> Machine:
-    """Read a machine TOML.
+    """Read a machine file (TOML).
 
-    Every value with a dimension is a text with its unit: a bare number is refused. Model files are looked for beside
-    the machine file. A model that was refused when it was judged is refused here too, as it is everywhere else.
+    Every value with a dimension is text with a unit; a bare number is rejected. Model files are looked up next to the
+    machine file. A model that was refused when it was judged is also rejected here.
 
     Parameters
     ----------
@@ -50,8 +50,8 @@ def read_machine(path: str | Path) -> Machine:
     Raises
     ------
     InputError
-        No such file, not TOML, a key or value that is not understood, an axis or component that is not there, or a
-        model file that cannot be used; the message names the file and, of all that is wrong, the key's path.
+        The file does not exist, is not TOML, has an invalid key or value, or refers to an axis or component that does
+        not exist, or to an unusable model file; the message names the file and the key path of every fault.
 
     Examples
     --------
@@ -149,7 +149,7 @@ def _axis(name: str, tables: Mapping[str, Any], structure: Structure) -> Axis:
 
 
 def _check_measured_at(axis: Axis, axes: Sequence[Axis]) -> None:
-    """Raise an error if one of the axes cannot have been at its stated position."""
+    """Raise an error if one of the axes cannot have been at its specified position."""
     for other in axes:
         if other is axis and axis.measured_on == "tool":
             continue
@@ -164,7 +164,7 @@ def _check_measured_at(axis: Axis, axes: Sequence[Axis]) -> None:
 def _check_counted(
     component: ErrorComponent, axes: Mapping[str, Mapping[str, Any]], spindle: Mapping[str, Any]
 ) -> None:
-    """Raise an error if a component in urad is given, but not the place from which its lever counts."""
+    """Raise an error if a component in urad is given, but not the point from which its lever counts."""
     if component.unit != "urad":
         return
     where: Keys = ("axes", component.axes[0]) if component.axes else ("spindle",)
@@ -184,7 +184,7 @@ class _Sources:
         Folder of the model files.
     structure : Structure
     axes : mapping of str to Axis
-        Those of it that could be read.
+        Axes of the structure that could be read.
     """
 
     def __init__(self, folder: Path, structure: Structure, axes: Mapping[str, Axis]) -> None:
@@ -192,7 +192,7 @@ class _Sources:
         self._files: dict[Path, Sequence[ErrorModel | PositionModel]] = {}
 
     def read(self, code: str, value: Any) -> Source:
-        """Return the content of ``components.CODE``."""
+        """Return the source specified by ``components.CODE``."""
         where: Keys = ("components", code)
         if code not in BY_CODE:
             raise explain_unknown("component", code, BY_CODE, where)
@@ -230,7 +230,7 @@ class _Sources:
                 raise SettingError(f"{p:g} mm follows {before:g} mm: positions must increase", where)
         pieces = tuple((a, b - a, 0.0, 0.0) for (_, a), (_, b) in pairwise(points))
         if axis is None:
-            return 0.0  # what is wrong with the axis is told
+            return 0.0  # the fault of the axis is reported separately
         return PositionModel(
             target=component.code,
             unit=component.unit,
@@ -259,7 +259,7 @@ class _Sources:
             raise SettingError(f"{path} holds a model of {model.target}, not of {component.code}", here)
         for part in model.models if isinstance(model, PositionModel) else (model,):
             try:
-                if part.honest_error is not None:  # what was never judged is shown as such, and runs nowhere
+                if part.honest_error is not None:  # a model that was never judged is shown as such and never runs
                     part.check_may_run()
             except InputError as e:
                 raise SettingError(f"{path}: {e}; fit a better one, or leave {component.code} out", here) from e
@@ -276,7 +276,7 @@ def read_models(path: Path) -> Sequence[ErrorModel | PositionModel]:
     Raises
     ------
     ModelFileError
-        It is neither.
+        The file contains neither.
     """
     text, source = jsonfile.read(jsonfile.MODELS, path)
     if re.search(rf'"format"\s*:\s*"{jsonfile.POSITION_MODELS.name}"', text):

@@ -1,4 +1,4 @@
-"""Models as JSON: versioned, bit-exact, damaged or unknown files refused."""
+"""Models as JSON: versioned and bit-exact; damaged or unknown files are rejected."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, replace
@@ -18,11 +18,11 @@ from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.watch import Watch
 from thermocomp.files import jsonfile
 
-#: as it stands in the file
+#: name of the format in the file
 FORMAT = jsonfile.MODELS.name
-#: every family that a file may hold
+#: all families that a file can contain
 Family = Polynomial | LinearDynamic | PacedDynamic | Network | Additive | Autoregressive | AutoregressiveNet
-#: as it stands in a file, by its ``family``
+#: entry of a file, distinguished by its ``family``
 Entry = Annotated[Family, Discriminator("family")]
 FAMILIES: dict[str, type[ErrorModel]] = {f.family: f for f in get_args(Family)}
 
@@ -30,13 +30,13 @@ FAMILIES: dict[str, type[ErrorModel]] = {f.family: f for f in get_args(Family)}
 def dumps(models: Sequence[ErrorModel]) -> str:
     """Return models as the text of a model file.
 
-    Floats are written so that reading gives the same bits.
+    Floats are written such that reading restores them bit for bit.
 
     Raises
     ------
     ModelFileError
-        A model is of a family that no file holds: not plain numbers, such as a Gaussian process; or two are watched
-        over in different ways.
+        A model belongs to a family that cannot be stored, such as a Gaussian process, which is not plain numbers; or
+        two models have different watches.
     """
     _check_judged(models, "model file")
     watch = next((m.watch for m in models if m.watch is not None), None)
@@ -58,7 +58,7 @@ def loads(text: str, source: str = "model") -> tuple[ErrorModel, ...]:
     Raises
     ------
     ModelFileError
-        Not JSON, not a model file, of a newer version, altered or incomplete; the message lists all places.
+        Not JSON, not a model file, of a newer version, altered or incomplete; the message lists all faults.
     """
     found = jsonfile.unpack(jsonfile.MODELS, Entry, text, source, watch=Watch)
     if any(m.watch is not None for m in found.models):
@@ -85,7 +85,7 @@ def read(path: str | Path) -> tuple[ErrorModel, ...]:
     Raises
     ------
     ModelFileError
-        There is no such file, or it cannot be used; see `loads`.
+        The file does not exist or cannot be used; see `loads`.
     """
     return loads(*jsonfile.read(jsonfile.MODELS, path))
 
@@ -96,7 +96,7 @@ def entry_of(model: ErrorModel) -> dict[str, Any]:
     Raises
     ------
     ModelFileError
-        It is of a family that no file holds.
+        The family of the model cannot be stored.
     """
     if model.family not in FAMILIES:
         raise ModelFileError(
@@ -104,12 +104,12 @@ def entry_of(model: ErrorModel) -> dict[str, Any]:
             f"a file may hold {', '.join(FAMILIES)}"
         )
     entry = asdict(replace(model, watch=None))
-    del entry["watch"]  # it stands once in the file
+    del entry["watch"]  # stored once per file
     return entry
 
 
 def _check_judged(models: Sequence[ErrorModel], source: str) -> None:
-    """Refuse a verdict that its own figures contradict; that of a position model is on more than one of its factors."""
+    """Reject a verdict that contradicts its own figures; the verdict of a position model covers several factors."""
     for k, model in enumerate(models, start=1):
         found = model.honest_error
         if found is None:

@@ -1,4 +1,4 @@
-"""Small text files, read completely: of a bounded size, no pipes and devices, UTF-8; and their error messages."""
+"""Small text files, read completely: limited size, no pipes or devices, UTF-8; and their error messages."""
 
 import stat
 from collections.abc import Sequence
@@ -7,9 +7,9 @@ from pathlib import Path
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.shown import replace_unprintable
 
-#: errors that are listed
+#: maximum number of errors listed
 _LISTED = 20
-#: characters of one that are told
+#: maximum number of characters per error
 _MOST = 600
 
 
@@ -22,19 +22,19 @@ def read_text(path: str | Path, what: str, most: int, failure: type[InputError] 
     what : str
         Name of the kind of file, such as ``machine file``.
     most : int
-        Bytes it may have.
+        Maximum size in bytes.
     failure : type of InputError
         Exception type to raise.
 
     Returns
     -------
     str
-        Without a byte order mark.
+        Content without a byte order mark.
 
     Raises
     ------
     InputError
-        There is no such file, it is none (a folder, a pipe, a device), too large, or not UTF-8.
+        The file does not exist, is not a regular file (a folder, a pipe, a device), is too large, or is not UTF-8.
     """
     source = Path(path)
     try:
@@ -57,7 +57,7 @@ def read_text(path: str | Path, what: str, most: int, failure: type[InputError] 
 
 
 def list_errors(source: str | Path, errors: Sequence[str]) -> str:
-    """Return one text of all errors of a file, up to `_LISTED`, fit to be printed."""
+    """Return one printable text of all errors of a file, up to `_LISTED`."""
     told = [replace_unprintable(e if len(e) <= _MOST else f"{e[:_MOST]}...") for e in dict.fromkeys(errors)]
     if len(told) == 1:
         return f"{source}: {told[0]}"

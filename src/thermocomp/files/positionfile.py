@@ -1,4 +1,4 @@
-"""Position models as JSON: versioned, bit-exact, damaged or unknown files refused."""
+"""Position models as JSON: versioned and bit-exact; damaged or unknown files are rejected."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields
@@ -12,13 +12,13 @@ from thermocomp.core.profile import Profile
 from thermocomp.core.provenance import Provenance
 from thermocomp.files import jsonfile, modelfile
 
-#: as it stands in the file
+#: name of the format in the file
 FORMAT = jsonfile.POSITION_MODELS.name
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Entry(PositionModel):
-    """A position model as stored in a file: no key may be missing, and its parts state their types."""
+    """A position model as stored in a file: no key may be missing, and its parts specify their types."""
 
     reference_position: float = field()
     profile: Annotated[Profile, Discriminator("kind")] | None = field()
@@ -30,16 +30,16 @@ class _Entry(PositionModel):
 def dumps(models: Sequence[PositionModel]) -> str:
     """Return position models as the text of a file.
 
-    Floats are written so that reading gives the same bits.
+    Floats are written such that reading restores them bit for bit.
 
     Raises
     ------
     ModelFileError
-        A model of time is of a family that no file holds.
+        A model of time belongs to a family that cannot be stored.
     """
     for model in models:
         for part in model.models:
-            modelfile.entry_of(part)  # says so if no file holds its family
+            modelfile.entry_of(part)  # raises an error if the family cannot be stored
     return jsonfile.pack(jsonfile.POSITION_MODELS, [asdict(m) for m in models])
 
 
@@ -55,7 +55,7 @@ def loads(text: str, source: str = "position model") -> tuple[PositionModel, ...
     Raises
     ------
     ModelFileError
-        Not JSON, no position model, of a newer version, altered or incomplete; the message lists all places.
+        Not JSON, not a position model file, of a newer version, altered or incomplete; the message lists all faults.
     """
     entries = jsonfile.unpack(jsonfile.POSITION_MODELS, _Entry, text, source).models
     return tuple(PositionModel(**{f.name: getattr(e, f.name) for f in fields(e)}) for e in entries)
@@ -78,6 +78,6 @@ def read(path: str | Path) -> tuple[PositionModel, ...]:
     Raises
     ------
     ModelFileError
-        There is no such file, or it cannot be used; see `loads`.
+        The file does not exist or cannot be used; see `loads`.
     """
     return loads(*jsonfile.read(jsonfile.POSITION_MODELS, path))

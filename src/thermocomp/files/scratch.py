@@ -1,7 +1,7 @@
-"""Folders for work in progress; what a killed run leaves of them the next run clears away.
+"""Temporary working folders; those left by a killed run are removed by the next run.
 
-The system holds a lock on each for as long as the run lives that has made it, however that ends: whoever can lock one
-knows that its run is dead, and removes it.
+Each folder has a file that the run locks for its lifetime, and the system releases the lock however the run ends: if
+the lock can be acquired, the run is dead and the folder is removed.
 """
 
 import os
@@ -20,15 +20,15 @@ _LOCK = "lock"
 
 @contextmanager
 def scratch(folder: Path | None = None) -> Iterator[Path]:
-    """Give a new folder in another one; it is removed at the end.
+    """Provide a new folder inside another one; it is removed at the end.
 
-    What killed runs have left in `folder` is removed too, what living ones use is not.
+    Folders left in `folder` by killed runs are removed as well, those of active runs are not.
 
     Parameters
     ----------
     folder : Path, optional
-        Where files will go that are moved out of it: that is one step, as both are on one disk. The system's folder for
-        temporary files if not given.
+        Destination of the files that will be moved out: on the same disk, a move is a single step. Default: the
+        system's folder for temporary files.
 
     Yields
     ------
@@ -45,35 +45,35 @@ def scratch(folder: Path | None = None) -> Iterator[Path]:
 
 
 def is_scratch(name: str) -> bool:
-    """Return whether a folder of that name is one of these."""
+    """Return whether a folder name is that of a temporary working folder."""
     return _NAME.fullmatch(name) is not None
 
 
 def _made(folder: Path) -> tuple[Path, int]:
-    """Return a new folder, and its lock."""
+    """Return a new folder and its open lock file."""
     while True:
         path = folder / f"{_PREFIX}{uuid4().hex}"
         path.mkdir(0o700)
         try:
             lock = os.open(path / _LOCK, os.O_RDWR | os.O_CREAT, 0o666)
-        except FileNotFoundError:  # taken for a dead one before it had its lock
+        except FileNotFoundError:  # another run removed it before it was locked
             continue
         except OSError:  # a full disk
             path.rmdir()
             raise
-        if _locked(lock) and not (path / _LOCK).exists():  # or just after
+        if _locked(lock) and not (path / _LOCK).exists():  # removed just after it was created
             os.close(lock)
             continue
         return path, lock
 
 
 def _locked(lock: int, *, wait: bool = True) -> bool:
-    """Lock a file; return False where that cannot be: then nothing of others is removed either."""
+    """Lock a file; return False where this is impossible: then no folder of another run is removed either."""
     try:
         import fcntl  # not on Windows
 
         fcntl.flock(lock, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-    except (ImportError, OSError):  # or somebody has it, or the disk knows no locks
+    except (ImportError, OSError):  # locked by another run, or locks are not supported
         return False
     return True
 
@@ -88,7 +88,7 @@ def _clear(folder: Path) -> None:
             lock = os.open(path / _LOCK, os.O_RDWR)
         except FileNotFoundError:
             with suppress(OSError):
-                path.rmdir()  # killed before it had a lock: there is nothing in it
+                path.rmdir()  # killed before it had a lock file: the folder is empty
             continue
         except OSError:
             continue
@@ -99,11 +99,11 @@ def _clear(folder: Path) -> None:
 
 
 def _remove(path: Path, lock: int) -> None:
-    """Remove a folder, its lock last: one without a lock is empty, wherever this is killed.
+    """Remove a folder, its lock file last: a folder without a lock file is empty, even after a kill at any point.
 
-    The lock is held until its file is gone: who waits for it, having just made the folder, then sees that.
+    The lock is held until its file is deleted, so that a run waiting for it, having just created the folder, notices.
     """
-    closed = os.name != "posix"  # Windows removes no file that is open, and knows no such locks
+    closed = os.name != "posix"  # Windows cannot delete an open file, and has no such locks
     if closed:
         os.close(lock)
     with suppress(OSError):

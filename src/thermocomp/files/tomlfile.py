@@ -9,11 +9,11 @@ from typing import Any
 from thermocomp.core.exceptions import InputError
 from thermocomp.files.plaintext import read_text
 
-#: bytes of a file: a mapping of 10,000 columns has one million
+#: maximum size of a file [bytes]: a mapping of 10,000 columns has one million
 MOST = 1_500_000
-#: dots of a key: the standard library's reader takes time and memory by their square
+#: maximum number of dots in a key: the time and memory of the standard library's reader grow with its square
 DOTS = 32
-#: tables and lists within each other
+#: maximum nesting depth of tables and lists
 DEPTH = 32
 
 
@@ -29,12 +29,12 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
     Returns
     -------
     dict
-        Its content.
+        Content of the file.
 
     Raises
     ------
     InputError
-        No such file, too large, no text, or not TOML; the message names the file.
+        The file does not exist, is too large, or is not text or TOML; the message names the file.
     """
     source = Path(path)
     text = read_text(source, what, MOST)
@@ -49,7 +49,7 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
         return content
     except RecursionError as e:
         raise InputError(f"{source}: not a {what}: nested too deeply") from e
-    except ValueError as e:  # TOMLDecodeError, and an integer of too many digits
+    except ValueError as e:  # TOMLDecodeError, or an integer with too many digits
         raise InputError(f"{source}: not valid TOML: {e}") from e
 
 
@@ -59,8 +59,8 @@ def _depth(value: Any) -> int:
 
 
 def as_json(content: dict[str, Any]) -> str:
-    """Return the content of a TOML file for strict validation by pydantic: a list for a tuple, no text for a number.
+    """Return TOML content as JSON for strict validation by pydantic: lists match tuples, text does not match numbers.
 
-    A date, which JSON has not, becomes a list: nothing that takes a text takes it.
+    A date, which JSON does not support, becomes a list, so that it never passes as text.
     """
     return json.dumps(content, default=lambda date: [str(date)])

@@ -1,4 +1,4 @@
-"""Named tuples and dataclasses with arrays as JSON, and back by their types: nothing is guessed at."""
+"""Named tuples and dataclasses with arrays as JSON, decoded strictly by their types."""
 
 import math
 from collections.abc import Mapping
@@ -8,13 +8,13 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-#: no number is larger
+#: largest permitted number
 _LARGEST = 1e15
 _WORDS = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
 
 
 def encode(value: Any) -> Any:
-    """Return a value as JSON: arrays with their shape, numbers that are none as words."""
+    """Return a value as JSON: arrays with their shape, NaN and infinities as words."""
     if isinstance(value, np.ndarray):
         return {"shape": list(value.shape), "values": [encode(v) for v in value.ravel().tolist()]}
     if isinstance(value, float) and not math.isfinite(value):
@@ -29,12 +29,12 @@ def encode(value: Any) -> Any:
 
 
 def decode(kind: Any, value: Any, place: str) -> Any:
-    """Return a value of a type.
+    """Return a value of a given type.
 
     Parameters
     ----------
     kind : type
-        Made of named tuples, dataclasses, tuples, dicts, arrays, plain values and ``None``.
+        Type made of named tuples, dataclasses, tuples, dicts, arrays, plain values and ``None``.
     value : Any
         Result of `encode`.
     place : str
@@ -43,7 +43,7 @@ def decode(kind: Any, value: Any, place: str) -> Any:
     Raises
     ------
     ValueError
-        It is invalid; the message contains the location and the value found.
+        The value is invalid; the message contains the location and the value found.
     """
     if get_origin(kind) in (Union, UnionType):
         (inner,) = (p for p in get_args(kind) if p is not NoneType)
@@ -54,7 +54,7 @@ def decode(kind: Any, value: Any, place: str) -> Any:
         return _plain(kind, value, place)
     hints = get_type_hints(kind)
     names = list(getattr(kind, "_fields", None) or [f.name for f in fields(kind)])
-    if isinstance(value, dict):  # a file of before these fields were there
+    if isinstance(value, dict):  # a file from before these fields existed
         defaults = getattr(kind, "_field_defaults", {})
         names = [n for n in names if n in value or n not in defaults]
     want(isinstance(value, dict) and list(value) == names, value, place, f"a table of {', '.join(names)}")
@@ -62,13 +62,13 @@ def decode(kind: Any, value: Any, place: str) -> Any:
 
 
 def want(right: bool, value: Any, place: str, what: str) -> None:
-    """Raise `ValueError` unless something is right.
+    """Raise `ValueError` unless a condition holds.
 
     Parameters
     ----------
     right : bool
     value : Any
-        Value found; None is not repeated.
+        Value found; None is not shown.
     place, what : str
         Location, and expected value.
     """

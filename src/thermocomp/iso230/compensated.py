@@ -20,7 +20,7 @@ FloatArray = NDArray[np.float64]
 def replay_models(
     recording: Recording, models: Sequence[ErrorModel], start: Start | None, limits: Limits
 ) -> tuple[dict[str, FloatArray], list[str]]:
-    """Replay models over a thermal test, behind the gate and with limits, as a compensator would run them.
+    """Replay models over a thermal test, with gate and limits, as a compensator would run them.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def replay_models(
     Raises
     ------
     InputError
-        No model is of a channel, or the initial state of the recording cannot be determined.
+        A model belongs to no channel, or the initial state of the recording cannot be determined.
     """
     found: dict[str, FloatArray] = {}
     notes = []

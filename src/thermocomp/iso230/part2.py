@@ -1,19 +1,19 @@
-"""Positioning of a linear axis after ISO 230-2: accuracy A, repeatability R, systematic E, M, reversal B.
+"""Positioning of a linear axis according to ISO 230-2: accuracy A, repeatability R, systematic E, M, reversal B.
 
-The text of ISO 230-2:2014 was not at hand; quantities, symbols and formulas are the standard's as textbooks and control
-makers quote them. With x[i, j] the deviation at target i in run j of one direction (up or down), n runs:
+The text of ISO 230-2:2014 was not available; quantities, symbols and formulas are those of the standard as quoted by
+textbooks and control makers. With x[i, j] the deviation at target i in run j of one direction (up or down), n runs:
 
 - mean unidirectional deviation ``x_up[i]``, and ``s_up[i]``, its estimator of the standard deviation (n - 1);
 - mean bidirectional deviation ``x[i] = (x_up[i] + x_down[i]) / 2``;
 - reversal ``B[i] = x_up[i] - x_down[i]``, ``B = max |B[i]|``, and its mean;
 - repeatability ``R_up[i] = 4 s_up[i]``, ``R[i] = max(2 s_up[i] + 2 s_down[i] + |B[i]|, R_up[i], R_down[i])``, ``R``
-  their largest;
+  the largest of them;
 - systematic deviation ``E_up = max x_up - min x_up``; ``E`` the same over both directions; ``M = max x - min x``;
 - accuracy ``A_up = max(x_up + 2 s_up) - min(x_up - 2 s_up)``; ``A`` the same over both directions.
 
-An axis over 2 m is approached once in each direction, every 250 mm on average: E, M and B come of that; s, R and A take
-at least two runs and are left out. The uncertainty of the measurement, which the 2014 edition wants to be told with the
-results, is not known from the deviations and not reported here.
+An axis over 2 m is approached once in each direction, every 250 mm on average: this gives E, M and B; s, R and A need
+at least two runs and are omitted. The measurement uncertainty, which the 2014 edition requires to be stated with the
+results, cannot be determined from the deviations and is not reported here.
 """
 
 from dataclasses import dataclass
@@ -25,11 +25,11 @@ from thermocomp.volumetric.positioning import Positioning
 
 FloatArray = NDArray[np.float64]
 
-#: what ISO 230-2 requires of an axis up to 2 m: targets per axis, targets per metre, runs in each direction
+#: ISO 230-2 requirements for an axis up to 2 m: targets per axis, targets per metre, runs in each direction
 TARGETS, TARGETS_PER_METRE, RUNS = 5, 5.0, 5
-#: an axis is long from here on; it wants one run in each direction, targets so far apart on average [mm]
+#: travel above which an axis is long: one run in each direction; mean interval of its targets [mm]
 LONG, LONG_INTERVAL = 2000.0, 250.0
-#: what every report of these values has to say
+#: note required in every report of these values
 UNCERTAINTY = "The measurement uncertainty is not given: ISO 230-2:2014 requires it stated with these values."
 
 
@@ -40,7 +40,7 @@ class Direction:
     Parameters
     ----------
     mean, s : ndarray of shape (n_targets,)
-        Mean deviation and estimator of the standard deviation at each target [unit]; s is nan, and with it R and A, of
+        Mean deviation and estimator of the standard deviation at each target [unit]; s, and with it R and A, is nan for
         a single run.
     """
 
@@ -53,33 +53,33 @@ class Direction:
         return 4.0 * self.s
 
     @property
-    def R(self) -> float:  # noqa: N802 - the standard's symbol
-        """Unidirectional repeatability: the largest."""
+    def R(self) -> float:  # noqa: N802 - symbol of the standard
+        """Unidirectional repeatability: the largest R of the targets."""
         return float(self.repeatability.max())
 
     @property
-    def E(self) -> float:  # noqa: N802 - the standard's symbol
+    def E(self) -> float:  # noqa: N802 - symbol of the standard
         """Unidirectional systematic positioning error."""
         return float(np.ptp(self.mean))
 
     @property
-    def A(self) -> float:  # noqa: N802 - the standard's symbol
+    def A(self) -> float:  # noqa: N802 - symbol of the standard
         """Unidirectional accuracy."""
         return float((self.mean + 2.0 * self.s).max() - (self.mean - 2.0 * self.s).min())
 
 
 @dataclass(frozen=True, eq=False)
 class PositioningResult:
-    """A positioning test, evaluated. All in the unit of its deviations.
+    """An evaluated positioning test, in the unit of its deviations.
 
-    What takes both directions is nan or None without them, and so is what takes several runs in each.
+    Values that need both directions, or several runs in each, are nan or None if these are missing.
 
     Parameters
     ----------
     test : Positioning
     up, down : Direction or None
     mean : ndarray of shape (n_targets,) or None
-        Mean bidirectional deviation.
+        Mean bidirectional deviation at each target.
     reversal : ndarray of shape (n_targets,) or None
         B of each target.
     repeatability : ndarray of shape (n_targets,) or None
@@ -106,12 +106,12 @@ class PositioningResult:
 
     @property
     def directions(self) -> dict[str, Direction]:
-        """Directions that were measured, by ``+`` and ``-``."""
+        """Measured directions of approach, denoted ``+`` and ``-``."""
         return {name: d for name, d in (("+", self.up), ("-", self.down)) if d is not None}
 
     @property
     def axis_values(self) -> dict[str, float]:
-        """Values of the axis by symbol; an arrow shows the direction. Without those that were not measured."""
+        """Measured values of the axis by symbol; an arrow shows the direction."""
         values: dict[str, float] = {}
         for name, arrow in (("+", "↑"), ("-", "↓")):
             if name in self.directions:
@@ -180,7 +180,7 @@ def _direction(deviations: FloatArray) -> Direction:
 
 def _shortfalls(test: Positioning) -> tuple[str, ...]:
     notes = []
-    # the travel is not known: what lies between the first and the last target is
+    # the travel is unknown: the distance between the first and the last target is used
     n, travel = len(test.positions), float(np.ptp(test.positions))
     long = travel > LONG
     if long:

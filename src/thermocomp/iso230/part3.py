@@ -1,10 +1,10 @@
-"""Thermal tests after ISO 230-3: environment, rotating spindle, moving linear axis; with and without a model.
+"""Thermal tests according to ISO 230-3: environment, rotating spindle, moving linear axis; with and without a model.
 
-The text of ISO 230-3:2020 was not at hand. Taken from it, as the field quotes it: the three tests (its fourth, of
-rotary motion, is not built), the name ETVE, the probes X1, Y1, Z at the tip of the test bar and X2, Y2 nearer to the
-spindle, the tilts A and B from their differences, that the distance between them is stated, and that ranges are told
-over the first 60 min and over the whole period. All other names and symbols (``range_60``, ``at_60``, ``t90`` ...) and
-the exact bounds of each period are ours, and said at each quantity.
+The text of ISO 230-3:2020 was not available. Taken from the standard, as quoted in the literature: the three tests (its
+fourth, for rotary motion, is not implemented), the name ETVE, the probes X1, Y1, Z at the tip of the test bar and X2,
+Y2 nearer to the spindle, the tilts A and B from their differences, the statement of the probe distance, and ranges over
+the first 60 min and over the whole period. All other names and symbols (``range_60``, ``at_60``, ``t90`` ...) and the
+exact limits of each period are specific to this package and defined for each quantity.
 """
 
 import re
@@ -29,28 +29,28 @@ from thermocomp.recordings.starts import Start
 FloatArray = NDArray[np.float64]
 
 _PAIR = re.compile(r"([xy])([12])", re.IGNORECASE)
-# EXX_0, EYX_z600_100: an error of an axis at a station (ISO 230-1 code)
+# EXX_0, EYX_z600_100: error of an axis at a station (ISO 230-1 code)
 _STATION = re.compile(r"(E[XYZABC][XYZ])(?:_\w+)?_-?\d+(?:\.\d+)?")
-#: a spindle test may end before 4 h if the last 60 min change by this share of the first, or less (from memory)
+#: largest change in the last 60 min, relative to the first, for a spindle test to end before 4 h (from memory)
 CALM = 0.15
 _TARGET = re.compile(r"(([xyz])(?:_[a-z]+)*)_(-?\d+(?:\.\d+)?)", re.IGNORECASE)
 
 
 def detect(recording: Recording) -> Kind:
-    """Return the type of test of a recording: spindle if it turns, else axis if one feeds, else ETVE."""
+    """Return the type of test of a recording: spindle if the spindle turns, else axis if an axis moves, else ETVE."""
     turns = any(np.nan_to_num(recording.table[c.name]).any() for c in recording.of_quantity("spindle_speed"))
     feeds = any(np.nan_to_num(recording.table[c.name]).any() for c in recording.of_quantity("feed"))
     return "spindle" if turns else "axis" if feeds else "etve"
 
 
 def find_pairs(recording: Recording, distance: float) -> tuple[Pair, ...]:
-    """Return the probes named x1 and x2, y1 and y2, as pairs `distance` [mm] apart."""
+    """Return the probes named x1 and x2, y1 and y2 as pairs, `distance` [mm] apart."""
     named = paired_names(recording)
     return tuple(Pair(named[a, 1], named[a, 2], distance) for a in "yx" if (a, 1) in named and (a, 2) in named)
 
 
 def paired_names(recording: Recording) -> dict[tuple[str, int], str]:
-    """Return the displacement channels that are named x1, x2, y1 or y2, by letter and number."""
+    """Return the displacement channels named x1, x2, y1 or y2, by letter and number."""
     found = {}
     for c in recording.displacements:
         named = _PAIR.fullmatch(_base(c))
@@ -60,12 +60,12 @@ def paired_names(recording: Recording) -> dict[tuple[str, int], str]:
 
 
 def find_probe(recording: Recording, name: str) -> str:
-    """Return the full name of a displacement; ``y1`` will do for ``y1_um``.
+    """Return the full channel name of a displacement; ``y1`` is accepted for ``y1_um``.
 
     Raises
     ------
     InputError
-        There is none, or it is no displacement.
+        Channel missing, or not a displacement.
     """
     short = [c for c in recording.displacements if _base(c) == name]
     channel = short[0] if short else recording.channel(name)
@@ -75,7 +75,7 @@ def find_probe(recording: Recording, name: str) -> str:
 
 
 def find_stations(recording: Recording) -> dict[str, str]:
-    """Return the channels that are stations of an axis' error profile, such as ``EXX_300``, and whose: code by name."""
+    """Return the error code by channel name of the stations of error profiles, such as ``EXX_300``."""
     measured = (c for c in recording.channels if c.quantity in ("displacement", "angle"))
     return {c.name: named[1] for c in measured if (named := _STATION.fullmatch(_base(c)))}
 
@@ -90,23 +90,23 @@ def assess(
     start: Start | None = None,
     limits: Limits = Limits(),
 ) -> tuple[ThermalTest, ...]:
-    """Evaluate the thermal tests that a recording holds.
+    """Evaluate the thermal tests in a recording.
 
-    A test begins where the drives start (the row before, the state it begins in) and continues until they start
-    again; an ETVE test is the whole recording. Stops shorter than 20 min, as in a spectrum of speeds, do not end it.
+    A test begins when the drives start (one row earlier, in its initial state) and continues until they start again; an
+    ETVE test is the whole recording. Stops shorter than 20 min, as in a speed spectrum, do not end it.
 
     Parameters
     ----------
     recording : Recording
     kind : {'etve', 'spindle', 'axis'}, optional
-        That of `detect` if not given.
+        Type of test. Default: determined by `detect`.
     pairs : sequence of Pair
         Paired probes; see `find_pairs`.
     ambient : str, optional
-        Temperature of the surroundings; `Recording.ambient` if not given.
+        Channel of the ambient temperature. Default: `Recording.ambient`.
     models : sequence of ErrorModel
-        Of displacements or angles of the recording: what they leave is told beside each quantity. They are replayed
-        reading by reading from the start of the recording, as a compensator would run them.
+        Models of displacements or angles of the recording: the residual of each quantity is reported, too. They are
+        replayed reading by reading from the start of the recording, as a compensator would run them.
     start : Start, optional
         Initial state of the recording. Default: determined from the recording.
     limits : Limits
@@ -115,13 +115,13 @@ def assess(
     Returns
     -------
     tuple of ThermalTest
-        In the order of time.
+        In chronological order.
 
     Raises
     ------
     InputError
-        There is no displacement, a channel is not there, no model belongs to the recording, or it cannot be told how
-        the recording begins, which matters to a model.
+        There is no displacement, a channel is missing, no model belongs to the recording, or the initial state of the
+        recording, which a model needs, cannot be determined.
     """
     kind = detect(recording) if kind is None else kind
     if not _probes(recording):
@@ -162,22 +162,22 @@ def assess(
 
 
 class _Stretch(NamedTuple):
-    """The rows of one test, and the rest before it."""
+    """Rows of one test, and the rest period before it."""
 
     recording: Recording
     kind: Kind
-    rows: tuple[int, int, int]  #: where it starts, where the drives stop, where it ends
-    lead: int  #: rows before it that tell what it starts from
-    rests: bool  #: nothing ran before
+    rows: tuple[int, int, int]  #: first row, row of the stop of the drives, last row
+    lead: int  #: number of preceding rows that define the initial state
+    rests: bool  #: whether no drive ran before
     warm: Phase
 
     @property
     def part(self) -> slice:
-        """Its rows, with those before it."""
+        """Its rows, including those before it."""
         return slice(self.rows[0] - self.lead, self.rows[2] + 1)
 
     def curve(self, label: str, unit: str, place: str, measured: FloatArray, left: FloatArray | None) -> ThermalCurve:
-        """Return the figures of one channel, and of what a model leaves of it."""
+        """Return the characteristic values of one channel, and of its residual with a model."""
         start, stop, _ = self.rows
         lead, rests, calm = self.lead, self.rests, self.kind == "etve"
         clock = self.recording.time[self.part] - self.recording.time[start]
@@ -250,7 +250,7 @@ def _evaluate(
 def _lengths(
     part: _Stretch, measured: dict[str, FloatArray], after: dict[str, FloatArray], drawn: dict[str, ThermalCurve]
 ) -> list[Targets]:
-    """Return the targets of each axis, with what lies between the first and the last; they leave `drawn`."""
+    """Return the targets of each axis with the length between the first and the last; they are removed from `drawn`."""
     targets = []
     for group, members in _target_groups(part.recording).items():
         ordered = sorted(members, key=lambda m: m[0])
@@ -266,7 +266,7 @@ def _lengths(
 
 
 def _about_curves(kind: Kind, curves: Sequence[ThermalCurve], targets: Sequence[Targets]) -> list[str]:
-    """Return notes on constant curves, the settling of a spindle test, and ranges that increase with a model."""
+    """Return notes on constant curves, on settling in a spindle test, and on ranges that increase with a model."""
     notes = []
     still = [c.name for c in curves if np.isfinite(c.values).any() and not c.course.noise.moves]
     if still:
@@ -281,7 +281,7 @@ def _about_curves(kind: Kind, curves: Sequence[ThermalCurve], targets: Sequence[
 
 
 def _about(recording: Recording, kind: Kind, pairs: Sequence[Pair], air: Channel | None) -> list[str]:
-    """Return notes on data that the standard requires but are missing, or that do not match the kind of test."""
+    """Return notes on missing data that the standard requires, and on data that do not match the type of test."""
     notes = []
     runs = detect(recording)
     if kind == "etve" and not (recording.speed or recording.of_quantity("feed")):
@@ -308,7 +308,7 @@ def _about(recording: Recording, kind: Kind, pairs: Sequence[Pair], air: Channel
 
 
 def _probes(recording: Recording) -> list[Channel]:
-    """Return the curves evaluated in a thermal test: displacements and angles, without stations of error profiles."""
+    """Return the channels evaluated in a thermal test: displacements and angles, without stations of error profiles."""
     stations = find_stations(recording)
     return [c for c in recording.channels if c.quantity in ("displacement", "angle") and c.name not in stations]
 
@@ -323,7 +323,7 @@ def _stations_words(stations: dict[str, str]) -> str:
 
 
 def _about_the_end(curves: Sequence[ThermalCurve]) -> list[str]:
-    """Return the settling of a spindle test at its end, compared with the criterion of the standard."""
+    """Return the settling at the end of a spindle test, compared with the criterion of the standard."""
     shares = {c.name: c.figures.range_last / c.figures.range_60 for c in curves if c.figures.range_60 > 0}
     told = [f"{name} {100 * share:.0f} %" for name, share in shares.items() if np.isfinite(share)]
     if not told:
@@ -368,7 +368,7 @@ def _about_rows(recording: Recording, kind: Kind, rows: tuple[int, int, int], nu
 
 
 def _load(recording: Recording, kind: Kind, start: int, stop: int) -> str:
-    """Return the load of the spindle or the axis while it ran, in words."""
+    """Return the load of the spindle or the axis during running, as text."""
     if kind == "etve":
         return "machine at rest" if recording.of_quantity("spindle_speed") else "taken as at rest"
     quantity, word = ("spindle_speed", "spindle at") if kind == "spindle" else ("feed", "feed of")
@@ -385,7 +385,7 @@ def _load(recording: Recording, kind: Kind, start: int, stop: int) -> str:
 
 
 def _target_groups(recording: Recording) -> dict[str, list[tuple[float, Channel]]]:
-    """Return the displacements that are named after a position, by the prefix of their names; at least two each."""
+    """Return displacements named after positions, by the prefix of their names; at least two per prefix."""
     groups: dict[str, list[tuple[float, Channel]]] = {}
     for c in recording.displacements:
         named = _TARGET.fullmatch(_base(c))

@@ -1,4 +1,4 @@
-"""Tables of ISO 230 tests and time constants, for people, pages and programs alike."""
+"""Tables of ISO 230 tests and time constants, for terminal, page and JSON."""
 
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -20,7 +20,7 @@ _WORDS = {
     "returns": "; returns: it comes back before",
     "peaks": "; peaks: it overshoots its last value, then settles back",
 }
-#: the word for a curve that a model has been taken from
+#: label of the residual of a curve with a model
 WITH = "with model"
 
 
@@ -89,7 +89,7 @@ def with_uncertainty(value: float, expanded: float) -> str:
         return ""
     if not np.isfinite(expanded):
         return f"{value:.4g}"
-    # one digit of the uncertainty at least, but no finer than any probe
+    # at least one digit of the uncertainty, but not finer than any probe
     digits = min(2, max(1, -int(np.floor(np.log10(expanded))))) if expanded > 0 else 2
     return f"{value:.{digits}f} ± {max(expanded, 0.5 * 10.0**-digits):.{digits}f}"
 
@@ -113,7 +113,7 @@ def _minutes(s: Settling, seconds: float) -> str:
 
 
 def _slopes(test: ThermalTest, targets: Targets) -> Table:
-    """Return the slope of an axis at a few times: change of its length per metre."""
+    """Return the slope of an axis at several times: change of length per metre."""
     length = targets.length
     metres = targets.distance / 1e3
     rows: list[tuple[Cell, ...]] = []
@@ -135,7 +135,7 @@ def _slopes(test: ThermalTest, targets: Targets) -> Table:
 
 
 def time_constant_tables(settlings: Sequence[Settling]) -> tuple[Table, ...]:
-    """Return the time constants of all channels, a table per phase.
+    """Return the time constants of all channels, one table per phase.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def _taus(s: Settling, n: int) -> list[str]:
 
 
 def positioning_tables(results: Sequence[PositioningResult]) -> tuple[Table, ...]:
-    """Return the values of each axis, all states side by side, and what they come from at each target.
+    """Return the values of each axis, all states next to each other, and the values at each target.
 
     Parameters
     ----------
@@ -272,7 +272,7 @@ def thermal_content(test: ThermalTest) -> dict[str, Any]:
 
 
 def positioning_content(r: PositioningResult) -> dict[str, Any]:
-    """Return a positioning test for programs, in the unit of its deviations."""
+    """Return the JSON content of a positioning test, in the unit of its deviations."""
     return {
         "source": r.test.source,
         "axis": r.test.axis,
@@ -291,7 +291,7 @@ def positioning_content(r: PositioningResult) -> dict[str, Any]:
 
 
 def settling_content(s: Settling) -> dict[str, Any]:
-    """Return the time constants of one channel for programs, in s."""
+    """Return the JSON content of the time constants of one channel, in s."""
     return {
         "channel": s.channel,
         "unit": s.unit,

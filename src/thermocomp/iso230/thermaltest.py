@@ -1,6 +1,6 @@
-"""Result of a thermal test after ISO 230-3: curves, and their characteristic values.
+"""Result of a thermal test according to ISO 230-3: curves and their characteristic values.
 
-`thermocomp.iso230.part3` documents which names are from the standard and which are ours.
+See `thermocomp.iso230.part3` for the names that are from the standard and those specific to this package.
 """
 
 from dataclasses import dataclass, replace
@@ -18,7 +18,7 @@ from thermocomp.recordings.recording import Recording
 FloatArray = NDArray[np.float64]
 
 Kind = Literal["etve", "spindle", "axis"]
-#: what each test is called
+#: titles of the tests
 TITLES: dict[Kind, str] = {
     "etve": "Environmental temperature variation error (ETVE)",
     "spindle": "Thermal distortion caused by the rotating spindle",
@@ -31,20 +31,20 @@ HOUR = 3600.0
 class Pair:
     """Two parallel probes along the test bar, whose difference is a tilt of the spindle.
 
-    Signs as everywhere here (ISO 841): ``A = (y1 - y2) / L`` and ``B = (x2 - x1) / L`` with 1 at the tip of the test
-    bar and 2 towards the spindle, which points to -Z.
+    Signs according to ISO 841, as in the whole package: ``A = (y1 - y2) / L`` and ``B = (x2 - x1) / L`` with 1 at the
+    tip of the test bar and 2 towards the spindle, which points to -Z.
 
     Parameters
     ----------
     tip, spindle : str
         Channels of the probe at the tip (X1 or Y1) and of the one nearer to the spindle (X2 or Y2).
     distance : float
-        L, between the two [mm].
+        Distance L between the probes [mm].
 
     Raises
     ------
     InputError
-        The distance is not positive, or the two do not begin with the same x or y.
+        The distance is not positive, or the names do not begin with the same letter, x or y.
     """
 
     tip: str
@@ -62,7 +62,7 @@ class Pair:
 
     @property
     def axis(self) -> str:
-        """Letter of the direction both measure in."""
+        """Letter of the measuring direction of both probes."""
         return self.tip[:1].lower()
 
     @property
@@ -71,36 +71,36 @@ class Pair:
         return "A" if self.axis == "y" else "B"
 
     def angle(self, tip: FloatArray, spindle: FloatArray) -> FloatArray:
-        """Return the tilt [urad] of the two displacements [um]; the same number in um/m."""
+        """Return the tilt from two displacements [um], in urad, which equals um/m."""
         difference = tip - spindle if self.tilt == "A" else spindle - tip
         return np.asarray(1e3 * difference / self.distance)
 
 
 @dataclass(frozen=True)
 class Figures:
-    """Characteristic values of one curve; counted from the start of the test, in the curve's unit.
+    """Characteristic values of one curve, relative to the start of the test, in the unit of the curve.
 
     Parameters
     ----------
     range_60 : float
-        Largest minus smallest average over the first 60 min; nan if the period is shorter.
+        Largest minus smallest averaged value over the first 60 min; nan if the period is shorter.
     range_run : float
-        The same over the time the drives run; of an ETVE test, over all of it.
+        The same over the running time of the drives; for an ETVE test over all of it.
     range_all : float
-        The same over the whole recording of this test, cool-down included. Of an ETVE test: its ETVE.
+        The same over the whole recording of this test, including cool-down. For an ETVE test: its ETVE.
     at_60, at_end : float
-        Value at 60 min (linear between rows), and when the drives stop: the drift of the warm-up.
+        Value at 60 min (interpolated linearly), and at the stop of the drives: the drift of the warm-up.
     largest : float
-        Value farthest from the start, with its sign, while the drives run.
+        Value farthest from that at the start, with its sign, while the drives run.
     cool_down : float
-        Last value minus that when the drives stop; nan without a cool-down.
+        Last value minus the value at the stop of the drives; nan without a cool-down.
     range_last : float
-        Largest minus smallest over the last 60 min that the drives run; nan if they run for less than 2 h.
+        Largest minus smallest value over the last 60 min of running; nan if the drives run for less than 2 h.
     range_rows : float
-        `range_all` of the single rows: their noise is in it.
+        `range_all` of the single rows, including their noise.
     U_60, U_end, U_cool_down : float
-        Expanded uncertainties (k = 2) of `at_60`, `at_end` and `cool_down` by the noise, that of the zero included; nan
-        if it is not known.
+        Expanded uncertainties (k = 2) of `at_60`, `at_end` and `cool_down` by the noise, including that of the zero;
+        nan if unknown.
     """
 
     range_60: float
@@ -124,12 +124,12 @@ class ThermalCurve:
     Parameters
     ----------
     name : str
-        Channel; of a tilt its letter, of a length what it is between.
+        Channel; for a tilt its letter, for a length its end points.
     unit : {'um', 'urad'}
     place : str
-        In words.
+        Location as text.
     values : ndarray of shape (n_rows,)
-        Since the start of the test, row by row; nan where missing.
+        Change since the start of the test, for each row; nan where missing.
     course : AveragedCurve
         Averaged curve, from which `figures` are taken.
     figures : Figures
@@ -163,11 +163,11 @@ class Targets:
         Prefix of the channels' names, such as ``x_laser``.
     axis : {'X', 'Y', 'Z'}
     positions : ndarray of shape (n_targets,)
-        Rising [mm].
+        Target positions, increasing [mm].
     curves : tuple of ThermalCurve
-        Error at each target, in their order.
+        Error at each target, in order of position.
     length : ThermalCurve
-        Change of the length between the first and the last target: error at the last minus error at the first [um].
+        Change of the distance between the first and the last target: error at the last minus error at the first [um].
     """
 
     name: str
@@ -178,36 +178,36 @@ class Targets:
 
     @property
     def distance(self) -> float:
-        """Between the first and the last target [mm]."""
+        """Distance between the first and the last target [mm]."""
         return float(self.positions[-1] - self.positions[0])
 
 
 @dataclass(frozen=True, eq=False)
 class ThermalTest:
-    """One thermal test, evaluated.
+    """An evaluated thermal test.
 
     Parameters
     ----------
     kind : {'etve', 'spindle', 'axis'}
     name : str
     recording : Recording
-        It is part of.
+        Recording of which it is a part.
     start, stop, end : int
-        Its first row, from which everything is counted, the one in which the drives stop (`end` if they do not), and
-        its last one.
+        First row, to which all values are relative; row of the stop of the drives (`end` if they do not stop); last
+        row.
     load : str
-        Load of the spindle or the axis, in words.
+        Load of the spindle or the axis, as text.
     curves : tuple of ThermalCurve
-        Curves of every displacement and angle that is not a target.
+        Curves of all displacements and angles that are not targets.
     tilts : tuple of ThermalCurve
-        From paired probes [urad].
+        Tilts from paired probes [urad].
     pairs : tuple of Pair
     targets : tuple of Targets
         Linear axis only.
     ambient : Channel or None
-        Temperature of the surroundings.
+        Channel of the ambient temperature.
     ambient_range : tuple of float
-        Its lowest and highest value during the test [degC]; nan if there is none.
+        Lowest and highest ambient temperature during the test [degC]; nan if not measured.
     notes : tuple of str
         Cautions on the characteristic values.
     """
@@ -229,7 +229,7 @@ class ThermalTest:
 
     @property
     def time(self) -> FloatArray:
-        """Seconds since the start of the test, (n_rows,)."""
+        """Time since the start of the test, (n_rows,) [s]."""
         time = self.recording.time
         return np.asarray(time[self.start : self.end + 1] - time[self.start])
 
@@ -240,7 +240,7 @@ class ThermalTest:
 
     @property
     def described(self) -> str:
-        """Test conditions in one line: load, surroundings, distance between the probes."""
+        """Test conditions in one line: load, ambient temperature, distance between the probes."""
         parts = [self.load]
         hours = [self.running / HOUR, (self.time[-1] - self.running) / HOUR]
         parts.append(f"{hours[0]:.3g} h" if self.kind == "etve" else f"{hours[0]:.3g} h, cool-down {hours[1]:.3g} h")
@@ -252,7 +252,7 @@ class ThermalTest:
 
     @property
     def all_curves(self) -> tuple[ThermalCurve, ...]:
-        """Everything that was evaluated: displacements, tilts, targets, lengths."""
+        """All evaluated curves: displacements, tilts, targets, lengths."""
         at_targets = (c for t in self.targets for c in (*t.curves, t.length))
         return (*self.curves, *self.tilts, *at_targets)
 
@@ -263,12 +263,12 @@ def evaluate_averaged_curve(time: FloatArray, course: AveragedCurve, rows: Float
     Parameters
     ----------
     time : ndarray of shape (n_rows,)
-        Since the start of the test [s].
+        Time since the start of the test [s].
     course : AveragedCurve
     rows : ndarray of shape (n_rows,)
-        The curve before it was averaged; nan where missing.
+        The curve before averaging; nan where missing.
     stop : int
-        Row in which the drives stop; the last one if they do not.
+        Row of the stop of the drives; the last one if they do not stop.
 
     Returns
     -------
@@ -291,21 +291,21 @@ def evaluate_averaged_curve(time: FloatArray, course: AveragedCurve, rows: Float
 
 
 def evaluate_curve(time: FloatArray, values: FloatArray, stop: int) -> Figures:
-    """Return the characteristic values of a curve, from its rows without averaging.
+    """Return the characteristic values of a curve from its rows, without averaging.
 
     Parameters
     ----------
     time : ndarray of shape (n_rows,)
-        Since the start of the test [s].
+        Time since the start of the test [s].
     values : ndarray of shape (n_rows,)
-        Since the start of the test; nan where missing.
+        Change since the start of the test; nan where missing.
     stop : int
-        Row in which the drives stop; the last one if they do not.
+        Row of the stop of the drives; the last one if they do not stop.
 
     Returns
     -------
     Figures
-        All nan without a value.
+        All nan if there is no value.
     """
     nan = float("nan")
     there = np.isfinite(values)
@@ -324,11 +324,11 @@ def evaluate_curve(time: FloatArray, values: FloatArray, stop: int) -> Figures:
     first = there & (time <= HOUR)
     at_60 = float(np.interp(HOUR, time[there], values[there]))
     hour = time[run][-1] >= HOUR
-    # the value at 60 min belongs to the first 60 min, even if no row is at that very time
+    # the value at 60 min belongs to the first 60 min, even if no row has exactly that time
     range_60 = float(np.ptp([*values[first], at_60])) if hour else nan
     v, at_end = values[run], float(values[run][-1])
     ends = float(time[run][-1])
-    # the value an hour before the end belongs to the last hour, even if no row is at that very time
+    # the value one hour before the end belongs to the last hour, even if no row has exactly that time
     an_hour_before = float(np.interp(ends - HOUR, time[there], values[there]))
     last = float(np.ptp([*v[time[run] >= ends - HOUR], an_hour_before])) if ends >= 2.0 * HOUR else nan
     after = values[there & (np.arange(len(values)) > stop)]

@@ -147,7 +147,7 @@ def iso230(
     for recording, start in zip(tests, begun, strict=True):
         paired = _pairs(recording, distance, pairs)
         mine = part3.assess(recording, test, pairs=paired, ambient=ambient, models=models, start=start, limits=limits)
-        # where nothing was recorded of the drives, a test is told to be a warm-up
+        # without records of the drives, a test is regarded as a warm-up
         phases = find_phases(recording) or tuple(Phase("warm-up", 1, t.start, t.stop) for t in mine if t.kind != "etve")
         thermal += mine
         settlings.append((recording, time_constants(recording, phases, part3.find_stations(recording))))
@@ -162,7 +162,7 @@ def length(text: str, what: str) -> float:
     Raises
     ------
     InputError
-        It is not a number with a unit of length.
+        The text is not a number with a unit of length.
     """
     try:
         found = read_with_unit(text, "position")

@@ -1,4 +1,4 @@
-"""The sensor budget: what each further sensor buys on thermal cycles that were not seen, for all targets at once."""
+"""Sensor budget: reduction of the error on unseen thermal cycles by each further sensor, for all targets together."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -23,15 +23,15 @@ from thermocomp.recordings.samples import Samples
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-#: more sensors have to gain so much to be worth their cables [um, urad] ...
+#: minimum gain of further sensors that justifies their cost [um, urad] ...
 WORTH = 0.5
-#: ... or this share of the error without compensation, where that is less, or targets have different units
+#: ... or this fraction of the error without compensation, if smaller, or if the targets have different units
 SHARE = 0.05
 
 
 @dataclass(frozen=True, eq=False)
 class Budget:
-    """Error on unseen blocks against the number of temperature sensors, which are the same for all targets.
+    """Error on unseen blocks as a function of the number of temperature sensors, which are the same for all targets.
 
     Parameters
     ----------
@@ -39,27 +39,27 @@ class Budget:
     unit : str
         Common unit of the targets, see `thermocomp.judging.sensorsets.weigh_targets`.
     scales : ndarray of shape (n_targets,)
-        One such unit, in that of each target.
+        Size of one common unit in the unit of each target.
     candidates : tuple of str
-        The temperatures there are.
+        All temperatures.
     sensors : tuple of tuple of str
-        For 1, 2, ... sensors: the set chosen in all rows, each with all of the one before; at the end all temperatures.
+        Sets of 1, 2, ... sensors selected on all rows, each including the previous one; the last has all temperatures.
     models : tuple of str
     blocks : tuple of str
         Unseen blocks.
     rms : ndarray of shape (n_models, n_sizes, n_targets, n_blocks)
-        Of the residual, sensors and model chosen without the block [unit of the target]; nan where it could not be
-        fitted.
+        RMS of the residual, with sensors and model selected without the block [unit of the target]; nan where the model
+        could not be fitted.
     none : ndarray of shape (n_targets, n_blocks)
         RMS without compensation [unit of the target].
     frequency : ndarray of shape (n_sizes, n_candidates)
-        Share of the blocks without which a sensor is among the best.
+        Fraction of the splits in which a sensor belongs to the best set.
     condition : ndarray of shape (n_sizes,)
         Condition number of the correlation matrix of `sensors`.
     answer : StandInAnswer
-        Output of `averaged` with all temperatures and rows, for the substitutes; targets in `unit`.
+        Output of `averaged` with all temperatures and rows, for the virtual sensors; targets in `unit`.
     failures : mapping of str to str
-        Reason why a model could not be judged somewhere, by model.
+        Reason why a model could not be judged on some block, by model.
     """
 
     targets: tuple[str, ...]
@@ -89,37 +89,37 @@ class Budget:
         return np.asarray(self.rms.mean(axis=3))
 
     def none_of_targets(self) -> FloatArray:
-        """Return the same without compensation, (n_targets,) [unit of the target]."""
+        """Return the mean RMS without compensation over the unseen blocks, (n_targets,) [unit of the target]."""
         return np.asarray(self.none.mean(axis=1))
 
     def mean(self) -> FloatArray:
-        """Return the mean over blocks and targets, by which sets are compared, (n_models, n_sizes) [`unit`]."""
+        """Return the mean RMS over blocks and targets, by which sets are compared, (n_models, n_sizes) [`unit`]."""
         return np.asarray(self.of_blocks().mean(axis=2))
 
     def none_mean(self) -> float:
-        """Return the same without compensation [`unit`]."""
+        """Return the mean RMS without compensation over blocks and targets [`unit`]."""
         return float(self.none_of_blocks().mean())
 
     def gains(self, model: str) -> tuple[FloatArray, FloatArray]:
-        """Return the gain of the next sensor after each number but the last [`unit`].
+        """Return the gain of the next sensor for each number of sensors but the last [`unit`].
 
         Returns
         -------
         gain : ndarray of shape (n_sizes - 1,)
             Mean over the unseen blocks.
         of_blocks : ndarray of shape (n_sizes - 1, n_blocks)
-            On each.
+            Gain on each block.
         """
         found = -np.diff(self.of_blocks()[self.models.index(model)], axis=0)
         return np.asarray(found.mean(axis=1)), found
 
     @property
     def sizes(self) -> tuple[int, ...]:
-        """Numbers of sensors."""
+        """Numbers of sensors of the sets."""
         return tuple(len(s) for s in self.sensors)
 
     def enough(self, model: str) -> int | None:
-        """Return the smallest number of sensors whose mean RMS over the blocks is within `margin` of the smallest one.
+        """Return the smallest number of sensors whose mean RMS over the blocks is within `margin` of the smallest.
 
         None if the model could not be fitted in one of the blocks, or no number is better than no compensation.
         """
@@ -127,10 +127,10 @@ class Budget:
         return None if found is None else self.sizes[found[1]]
 
     def recommended(self) -> tuple[str, int] | None:
-        """Return the model, and the place in `sensors`, with the fewest sensors that are enough among all models.
+        """Return the model, and the index in `sensors`, with the smallest sufficient number of sensors of all models.
 
-        What is not better than no compensation is not enough: in its mean over the blocks it gains less than a sensor
-        has to gain to be worth it, or no more than one standard error of that gain between the blocks.
+        A set is not better than no compensation, and so not sufficient, if its mean gain over the blocks is less than
+        the minimum gain of a sensor, or at most one standard error of this gain between the blocks.
 
         Returns
         -------
@@ -144,8 +144,8 @@ class Budget:
     def margin(self) -> tuple[float, float, float] | None:
         """Return the tolerated excess of the mean RMS over the smallest one, and its origin [`unit`].
 
-        The larger of one standard error of the smallest between the blocks (Breiman 1984, Classification and Regression
-        Trees, section 3.4.3), and of `WORTH`, but of no more than `SHARE` of what there is without compensation.
+        The larger of one standard error of the smallest mean between the blocks (Breiman 1984, Classification and
+        Regression Trees, section 3.4.3) and `WORTH`, the latter at most `SHARE` of the error without compensation.
 
         Returns
         -------
@@ -178,7 +178,7 @@ class Budget:
 
 
 def _standard_error(of_blocks: FloatArray) -> FloatArray:
-    """Return the standard error of the mean over the last axis; 0 with one block, of which none is known."""
+    """Return the standard error of the mean over the last axis; 0 for a single block, where it is unknown."""
     n = of_blocks.shape[-1]
     return np.asarray(of_blocks.std(axis=-1, ddof=1) / np.sqrt(n) if n > 1 else np.zeros(of_blocks.shape[:-1]))
 
@@ -192,24 +192,23 @@ def budget(
     jobs: int = 1,
     progress: Progress = lambda _, steps=1: None,  # noqa: ARG005
 ) -> Budget:
-    """Judge one set of temperatures of each number on unseen blocks.
+    """Judge one set of temperatures of each size on unseen blocks.
 
-    In each split the sets are chosen by the rows that may be learned from
-    (`thermocomp.models.selection.standins.reduce_sensors`), the same for all targets; every model is then trained on
-    these sensors, and on the spindle speed if it has a use for it. A block without a number of one of the targets is
-    left out.
+    In each split the sets are selected on the training rows (`thermocomp.models.selection.standins.reduce_sensors`),
+    the same for all targets; every model is then trained on these sensors, and on the spindle speed if the model uses
+    it. A block without a value of one of the targets is left out.
 
     Parameters
     ----------
     samples : Samples
     judging : Judging
     models : sequence of str
-        Methods that are trained on the chosen sensors.
+        Methods to be trained on the selected sensors.
     max_sensors : int
     jobs : int
-        Processes to share the work among; -1 takes all cores.
+        Number of parallel processes; -1: one per core.
     progress : callable
-        Called with a line of text after each piece of work; there are `n_pieces` of them.
+        Called with a line of text after each task; there are `n_pieces` of them.
 
     Returns
     -------
@@ -220,7 +219,7 @@ def budget(
     InputError
         `max_sensors` is below 1, or there is no temperature.
     FitError
-        There is no block with numbers of all targets, or too few rows to choose sensors by.
+        There is no block with values of all targets, or there are too few rows for selecting sensors.
     """
     names, targets = expand(models), samples.targets
     temperatures = [c.name for c in samples.inputs if c.quantity == "temperature"]
@@ -242,7 +241,7 @@ def budget(
         [[rms(samples.deviations[r, t], np.zeros(r.sum())) for r in blocks] for t, blocks in enumerate(judged)]
     )
     unit, scales = weigh_targets(samples, np.any([split.judge for split in splits], axis=0))
-    if unit == PERCENT:  # of what is compared: the mean over the blocks
+    if unit == PERCENT:  # percent of the compared figure: the mean over the blocks
         scales = np.where(none.any(axis=1), none.mean(axis=1) / 100, 1.0)
     return Budget(
         targets=tuple(c.name for c in targets),
@@ -264,7 +263,7 @@ def budget(
 def _chosen(
     samples: Samples, splits: Sequence[Split], max_sensors: int, jobs: int, progress: Progress
 ) -> list[SensorSets]:
-    """Return the sets of each size, of all rows first, then of what each split learns from."""
+    """Return the sets of each size, first for all rows, then for the training rows of each split."""
     learned, chosen = [samples.cycle >= 0, *(split.learn for split in splits)], []
     for sets in work_through(partial(choose_sets, samples, max_sensors), learned, _no_sets, jobs=jobs):
         if isinstance(sets, str):
@@ -282,7 +281,7 @@ def _judged(
     jobs: int,
     progress: Progress,
 ) -> tuple[FloatArray, dict[str, str]]:
-    """Return the RMS on unseen blocks, (n_models, n_sizes, n_targets, n_splits), and why models failed."""
+    """Return the RMS on unseen blocks, (n_models, n_sizes, n_targets, n_splits), and the reasons for failures."""
     pieces = [
         (split, subset, name)
         for split, subsets in zip(splits, sensors, strict=True)
@@ -300,12 +299,12 @@ def _judged(
 
 
 def judged_blocks(samples: Samples, target: int, judging: Judging) -> BoolArray:
-    """Return the blocks in which a target has a number to judge by, (n_splits,).
+    """Return the blocks in which a target has a value for judging, (n_splits,).
 
     Raises
     ------
     FitError
-        There is none.
+        There is no such block.
     """
     found = np.array([np.isfinite(samples.deviations[split.judge, target]).any() for split in judging.splits])
     if not found.any():
@@ -314,7 +313,7 @@ def judged_blocks(samples: Samples, target: int, judging: Judging) -> BoolArray:
 
 
 def n_pieces(samples: Samples, judging: Judging, models: Sequence[str], max_sensors: int) -> int:
-    """Return the number of pieces of work of `budget`, at most.
+    """Return the maximum number of tasks of `budget`.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """The temperatures a selector may choose from, and what they shall predict.
+    """Temperatures available to a selector, and the deviation to be predicted.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class Candidates:
 
     @classmethod
     def of(cls, samples: Samples, target: int) -> "Candidates":
-        """Extract the temperatures and one target of the complete rows."""
+        """Return the temperatures and one target in the complete rows."""
         temperatures = [j for j, c in enumerate(samples.inputs) if c.quantity == "temperature"]
         name = samples.targets[target].name
         if not temperatures:
@@ -57,7 +57,7 @@ class Candidates:
         return [str(n) for n in self.X.columns]
 
     def called(self, columns: Sequence[int]) -> tuple[str, ...]:
-        """Return the names of some of them."""
+        """Return the names of some of the temperatures."""
         return tuple(self.names[j] for j in columns)
 
     def repeats(self, sensors: Sequence[str]) -> Table:

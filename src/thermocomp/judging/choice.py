@@ -136,10 +136,10 @@ class Choice:
     ----------
     method : str
     target : str
-        Displacement channel, or several with commas in between if the choice is for all of them.
+        Displacement channel, or several separated by commas if sensors are selected for all of them.
     sensors : tuple of str
     reason : str
-        Reason for the selection, in words.
+        Reason for the selection, as text.
     tables : tuple of Table
     notes : tuple of str
         Cautions for the user.

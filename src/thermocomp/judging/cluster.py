@@ -1,4 +1,4 @@
-"""Work in pieces on the workers of a Dask cluster, in place of this machine's processes."""
+"""Execution of tasks by the workers of a Dask cluster, instead of the processes of this machine."""
 
 import logging
 import socket
@@ -21,21 +21,21 @@ from threadpoolctl import threadpool_limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.judging.pieces import DIED, attempt, explain
 
-#: a scheduler that does not answer when it is called is not there [s]
+#: a scheduler that does not answer a connection within this time is regarded as absent [s]
 ANSWERS = 10.0
-#: without a result for so long, the scheduler is asked whether it is still there; it may take as long to answer [s]
+#: interval without a result after which the scheduler is checked; also the time limit for its answer [s]
 ASKED = 15.0
-#: a cluster that has no worker for so long gets none [s]
+#: time without a worker after which a cluster is given up [s]
 WORKERLESS = 30.0
-#: what has to be the same here and there, for the same figures
+#: packages whose versions must agree for identical results
 ALIKE = ("python", "thermocomp", "numpy", "scipy", "scikit-learn", "numba", "pandas")
 
-#: a worker does one piece at a time, whatever its threads: it bounds its memory, and warnings are caught per process
+#: a worker does one task at a time, whatever its threads: this bounds its memory, and warnings are per process
 _turn = Lock()
 
 
 class ClusterError(InputError):
-    """A cluster cannot be used, or was lost; its text names the scheduler's address."""
+    """A cluster cannot be used, or was lost; the message names the address of the scheduler."""
 
 
 @contextmanager
@@ -59,7 +59,7 @@ def connect(address: str) -> Iterator["Cluster"]:
     host, port, speaks = _read_address(address)
     with _unlogged():
         try:
-            # The client would wait for ever for the first word of one that only listens.
+            # The client would wait forever for the first message of a server that only listens.
             with socket.create_connection((host, port), ANSWERS) as line:
                 if speaks and not line.recv(1):
                     raise ConnectionError("the connection was closed")
@@ -89,12 +89,12 @@ def _unlogged() -> Iterator[None]:
 
 
 def _read_address(address: str) -> tuple[str, int, bool]:
-    """Return host and port, and whether the scheduler speaks first there."""
+    """Return host and port, and whether the scheduler sends the first message."""
     try:
         parts = urlsplit(address)
         if parts.scheme in ("tcp", "tls") and parts.hostname and parts.port:
             return parts.hostname, parts.port, parts.scheme == "tcp"
-    except ValueError:  # of the port
+    except ValueError:  # invalid port
         pass
     raise ClusterError(
         f"scheduler {address!r}: expected the address that 'dask scheduler' prints, such as tcp://192.168.1.20:8786"
@@ -102,7 +102,7 @@ def _read_address(address: str) -> tuple[str, int, bool]:
 
 
 class Cluster:
-    """A scheduler and its workers, all with this machine's versions.
+    """A scheduler and its workers, with the same package versions as this machine.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ class Cluster:
     def _results(
         self, work: Callable[[Any], Any], pieces: Sequence[Any], failed: Callable[[Any, str], Any]
     ) -> Iterator[tuple[int, Any]]:
-        """Yield numbers of tasks and their results, as they are completed."""
+        """Yield indices of tasks and their results, as they are completed."""
         unsendable = {k: why for k, piece in enumerate(pieces) if (why := _unsendable(piece))}
         for k, why in unsendable.items():
             yield k, failed(pieces[k], why)
@@ -156,7 +156,7 @@ class Cluster:
         suspects = []
         for k, found in self._run(shared, [k for k in range(len(pieces)) if k not in unsendable]):
             if isinstance(found, KilledWorker):
-                suspects.append(k)  # or another piece on the same worker was the cause
+                suspects.append(k)  # or another task on the same worker was the cause
             else:
                 yield k, found
         for k in suspects:
@@ -164,11 +164,11 @@ class Cluster:
                 yield k, failed(pieces[k], DIED) if isinstance(found, KilledWorker) else found
 
     def _run(self, shared: Future, numbers: Sequence[int]) -> Iterator[tuple[int, Any]]:
-        """Yield numbers and results, or the `KilledWorker` of a piece whose workers died; what is left is cancelled."""
+        """Yield indices and results, or `KilledWorker` for a task whose workers died; remaining tasks are cancelled."""
         done: SimpleQueue[int] = SimpleQueue()
         name = f"thermocomp-{uuid4().hex}"
         futures = {
-            # first things first, or progress, which is told in their order, lags behind
+            # submitted in order; otherwise the progress, reported in order, would lag behind
             k: self._client.submit(_do, shared, k, self._versions, key=f"{name}-{k}", priority=-k)
             for k in numbers
         }
@@ -181,7 +181,7 @@ class Cluster:
                     found = cloudpickle.loads(futures[k].result(timeout=ASKED))
                 except KilledWorker as e:
                     found = e
-                except TimeoutError:  # its worker died before the result was fetched: it is done again
+                except TimeoutError:  # the worker died before the result was fetched: the task is repeated
                     self._ask()
                     done.put(k)
                     continue
@@ -191,14 +191,14 @@ class Cluster:
                     raise self._lost() from e
                 except Exception as e:
                     raise ClusterError(f"{self._address}: a worker cannot accept the task: {explain(e)}") from e
-                del futures[k]  # its worker forgets the result
+                del futures[k]  # the worker releases the result
                 yield k, found
         finally:
-            if self._client.status == "running":  # a client that is closed has taken them with it
+            if self._client.status == "running":  # a closed client has already cancelled them
                 self._client.cancel(list(futures.values()), force=True)
 
     def _next(self, done: SimpleQueue[int]) -> int:
-        """Return the next completed number; in between, ensure that a worker is processing it."""
+        """Return the index of the next completed task; while waiting, check for scheduler and workers."""
         lonely = False
         while True:
             try:
@@ -232,26 +232,26 @@ class Cluster:
 
 
 def _do(shared: tuple[Any, Sequence[Any], Any], number: int, versions: Mapping[str, str | None]) -> bytes:
-    """Do one piece in a worker."""
-    # of a worker that came later
+    """Do one task in a worker."""
+    # check a worker that joined later
     _check_versions(versions, _alike(get_versions(ALIKE)["packages"]), get_worker().address)
     work, pieces, failed = shared
     with _turn, parallel_config("sequential"):
-        threadpool_limits(1)  # stays so: the next piece of any user wants it, too
+        threadpool_limits(1)  # permanent: the next task of any user needs it, too
         found = attempt(work, pieces[number], failed)
         sent: bytes
         try:
             sent = cloudpickle.dumps(found)
-        except Exception as e:  # noqa: BLE001 - whatever it raises on its way
+        except Exception as e:  # noqa: BLE001 - any exception of the task
             sent = cloudpickle.dumps(failed(pieces[number], explain(e)))
     return sent
 
 
 def _unsendable(what: Any) -> str:
-    """Return the reason why it cannot be sent to another process; empty if it can."""
+    """Return the reason why an object cannot be sent to another process; empty if it can."""
     try:
         cloudpickle.dumps(what)
-    except Exception as e:  # noqa: BLE001 - whatever it raises on its way
+    except Exception as e:  # noqa: BLE001 - any exception of the serialisation
         return f"it cannot be sent to another process: {explain(e)}"
     return ""
 

@@ -30,7 +30,7 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
 
-#: name of the block that holds all unseen cycles together
+#: name of the block of all unseen cycles together
 ALL = "all unseen cycles"
 
 
@@ -48,15 +48,15 @@ def compare(
     jobs: int = 1,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Comparison:
-    """Train every method for every target and judge it on what it has not seen.
+    """Train every method for every target and judge it on unseen data.
 
-    Stopped by the keyboard, it returns the methods that were judged on all blocks, and how many were not.
+    After a keyboard interrupt, the methods already judged on all blocks are returned, with the number of the others.
 
     Parameters
     ----------
     samples : Samples
     methods : sequence of str or estimator
-        ``all`` denotes all of them; see `thermocomp.models.methods.expand`.
+        ``all`` selects all methods; see `thermocomp.models.methods.expand`.
     judging : Judging
         Training and validation data.
     rules : Rules
@@ -66,16 +66,16 @@ def compare(
     robustness : bool
         Also replay with noise and lost sensors.
     refit : bool
-        With `robustness`: also try what is accepted as it would be written, fitted to all rows.
+        With `robustness`: also test accepted models as written to the file, fitted to all rows.
     limits : Limits or None
-        Of the compensator that is judged; None: the models alone are judged, as they are compared in papers, and
-        nothing watches over their sensors.
+        Limits of the judged compensator. None: the models alone are judged, as in papers, and their sensors are not
+        monitored.
     watched : sequence of str, optional
-        Inputs that a watch is made of; all if not given.
+        Inputs of the sensor watch. Default: all.
     jobs : int
-        Processes to share the work among; -1 takes all cores.
+        Number of parallel processes; -1: one per core.
     progress : callable
-        Called with a line of text after each piece of work; there are `n_pieces` of them.
+        Called with a line of text after each task; there are `n_pieces` of them.
 
     Returns
     -------
@@ -84,7 +84,7 @@ def compare(
     Raises
     ------
     InputError
-        A method is unknown, or the primary one is not among them.
+        A method is unknown, or the primary method is not among them.
         Rows occur twice in the samples and would be used for training and judging at the same time.
     """
     refuse_leaks(samples, judging)
@@ -133,7 +133,7 @@ def compare(
 def _guards(
     samples: Samples, by_target: Sequence[Judging], watched: Sequence[str] | None, jobs: int
 ) -> dict[str, Guard | None]:
-    """Return the readings that a watch passes in each block, trained on the training rows of the block."""
+    """Return the readings that a watch passes in each block, with the watch trained on the block's training rows."""
     splits = {split.name: split for own in by_target for split in own.splits}
     known = samples if watched is None else samples.only(watched)
     found = work_through(partial(_guard, known), list(splits.values()), _unwatched, jobs=jobs)
@@ -151,7 +151,7 @@ def _unwatched(_split: Split, _why: str) -> None:
 
 
 def _complete(parts: Iterable[tuple[str, Assessment]], blocks: int) -> dict[str, list[Assessment]]:
-    """Return the assessments by model; a method that was judged on some of the blocks only is left out."""
+    """Return the assessments by model; methods not judged on all blocks are left out."""
     found: dict[str, list[Assessment]] = {}
     for name, a in parts:
         found.setdefault(name, []).append(a)
@@ -165,7 +165,7 @@ def _concluded(
     best: Recommendation | None,
     caps: tuple[str, ...],
 ) -> list[Assessment]:
-    """Return the results for one target: each method in each block, and over all of them with its verdict."""
+    """Return the results for one target: each method in each block, and over all blocks with its verdict."""
     whole = {name: do_no_harm.join_verdicts(v, caps=caps) for name, v in verdicts.items()}
     after = correct_verdicts(whole, rules.primary, best)
     found = []
@@ -183,7 +183,7 @@ def _heat(samples: Samples) -> Collinearity:
 
 
 def _inners(names: Sequence[str], judging: Judging, rules: Rules) -> list[Inner]:
-    """Return the training parts that a recommendation needs; none if there is nothing to choose."""
+    """Return the inner splits needed for a recommendation; empty if there is no choice."""
     choices = sum(deployable(name) for name in names)
     return inner_splits(judging) if choices > 1 and rules.primary is None else []
 
@@ -196,7 +196,7 @@ def _scores(
     jobs: int,
     progress: Callable[[str], None],
 ) -> dict[int, dict[str, list[list[float]]]]:
-    """Return the inner scores per target and method that may be chosen."""
+    """Return the inner scores per target and eligible method."""
     kept = [name for name in names if deployable(name)]
     pieces = [(k, name, inner) for k, own in enumerate(inners) for name in kept for inner in own]
     found: dict[int, dict[str, list[list[float]]]] = {
@@ -210,7 +210,7 @@ def _scores(
 
 
 def n_pieces(samples: Samples, methods: Sequence[Any], judging: Judging, rules: Rules = Rules()) -> int:
-    """Return the number of pieces of work of `compare`.
+    """Return the number of tasks of `compare`.
 
     Parameters
     ----------
@@ -228,7 +228,7 @@ def n_pieces(samples: Samples, methods: Sequence[Any], judging: Judging, rules: 
 
 
 def split_by_cycle(whole: Assessment) -> list[Assessment]:
-    """Split an assessment into its thermal cycles; parts that need a separate replay stay with the whole."""
+    """Split an assessment into its thermal cycles; results that need a separate replay stay with the whole."""
     found = []
     blocks = [b for b in join_short_cycles(whole.cycle, whole.test) if np.isin(whole.cycle, b).sum() >= MIN_ROWS]
     for unit, block in zip(whole.verdict.units, blocks, strict=True):
@@ -285,7 +285,7 @@ def _assess_method(
 
 
 def _refused(samples: Samples, piece: tuple[int, str, Split], why: str) -> Assessment:
-    """Return the assessment of a method that failed, in its fit or on what noise makes of its inputs."""
+    """Return the assessment of a method that failed, in its fit or in the replay with noise."""
     target, name, split = piece
     return refuse_method(samples, name, target, split, why)
 

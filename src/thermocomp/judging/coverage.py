@@ -1,11 +1,11 @@
 """Conditions covered by the judged units, and their similarity: the conditions for which an honest error is valid.
 
-Alike: each unit's inputs (as recorded, so that the room counts) are averaged over `PLACES` parts of its time. The
-squared distance of two units is the mean square difference over these parts, summed over the inputs of a quantity and
-divided by their summed variance over all judged rows, averaged over the quantities; and the squared logarithm of the
-ratio of their durations. So a sensor counts as much as it moves: one that stands idle in its noise makes no two units
-different. Two units below `ALIKE` are alike: a copy of a unit, or the same program on the same kind of day, tells
-nothing new. Alike units count once (single linkage).
+Similarity: each unit's inputs (as recorded, so that the ambient temperature counts) are averaged over `PLACES` parts of
+its duration. The squared distance of two units is the mean square difference over these parts, summed over the inputs
+of a quantity and divided by their summed variance over all judged rows, averaged over the quantities; plus the squared
+logarithm of the ratio of their durations. So sensors are weighted by their variation: the noise of an idle sensor makes
+no two units different. Two units with a distance below `ALIKE` are alike: a copy of a unit, or the same program on a
+similar day, adds no information. Alike units count once (single linkage).
 """
 
 from collections.abc import Sequence
@@ -24,22 +24,22 @@ BoolArray = NDArray[np.bool_]
 
 #: distance below which two units are alike [standard deviations of the inputs]
 ALIKE = 0.1
-#: times at which two units are compared
+#: number of parts of a unit that are compared
 PLACES = 32
-#: speeds nearer than this share of the largest are one
+#: speeds that differ by less than this fraction of the largest are merged
 _SAME_SPEED = 0.02
 
 
 def find_validity(samples: Samples, judging: Judging, recordings: Sequence[Recording] = ()) -> Validity:
-    """Return the conditions covered by the units of a judgement.
+    """Return the conditions covered by the units of a judging scheme.
 
     Parameters
     ----------
     samples : Samples
     judging : Judging
-        Its blocks are the units.
+        Scheme whose blocks are the units.
     recordings : sequence of Recording
-        The tests of `samples`, in their order: for the surroundings.
+        Tests of `samples`, in the same order: for the ambient temperature.
 
     Returns
     -------
@@ -66,13 +66,13 @@ def find_validity(samples: Samples, judging: Judging, recordings: Sequence[Recor
 
 
 def unit_distances(samples: Samples, blocks: Sequence[BoolArray]) -> FloatArray:
-    """Return the distance of every two units, (n_units, n_units); see the rule above.
+    """Return the distances between all units, (n_units, n_units); see the module docstring.
 
     Parameters
     ----------
     samples : Samples
     blocks : sequence of ndarray of bool of shape (n_rows,)
-        Rows of each unit, in which every input is a number.
+        Rows of each unit; every input must be finite in them.
 
     Returns
     -------
@@ -96,7 +96,7 @@ def unit_distances(samples: Samples, blocks: Sequence[BoolArray]) -> FloatArray:
 
 
 def _curve(values: FloatArray, steps: FloatArray) -> FloatArray:
-    """Return the means of a unit's inputs in `PLACES` parts of its time, (n_places, n_inputs)."""
+    """Return the means of a unit's inputs in `PLACES` parts of its duration, (n_places, n_inputs)."""
     time = np.cumsum(steps)
     part = np.minimum((PLACES * time / max(time[-1], 1e-9)).astype(np.intp), PLACES - 1)
     known, at = np.unique(part, return_inverse=True)
@@ -106,7 +106,7 @@ def _curve(values: FloatArray, steps: FloatArray) -> FloatArray:
 
 
 def _groups(alike: BoolArray) -> int:
-    """Return the number of groups if similar units belong together."""
+    """Return the number of groups of similar units."""
     left, found = set(range(len(alike))), 0
     while left:
         found += 1
@@ -122,7 +122,7 @@ def _groups(alike: BoolArray) -> int:
 def _speeds(samples: Samples, judged: BoolArray, recordings: Sequence[Recording]) -> tuple[float, ...]:
     columns = [j for j, c in enumerate(samples.inputs) if c.quantity == "spindle_speed"]
     measured = [samples.values[judged][:, columns].ravel()]
-    for k, recording in enumerate(recordings):  # a model may do without the speed that it was judged at
+    for k, recording in enumerate(recordings):  # a model may not use the speed at which it was judged
         if recording.speed is not None:
             measured.append(recording.values([recording.speed])[samples.row[judged & (samples.test == k)], 0])
     known = np.concatenate(measured)
@@ -150,12 +150,12 @@ def _ambient(
 
 
 def table(named: dict[str, Validity]) -> Table:
-    """Return the covered conditions as a short table: one column for each judgement.
+    """Return the covered conditions as a short table: one column per judging scheme.
 
     Parameters
     ----------
     named : dict of str to Validity
-        Judgements by name; at least one.
+        Validity by name; at least one.
 
     Returns
     -------

@@ -18,9 +18,9 @@ class Collinearity:
     ----------
     names : tuple of str
     condition_number : float
-        Largest over smallest eigenvalue of the correlation matrix; that of X'X itself is in `Diagnosis.spectrum`.
+        Largest over smallest eigenvalue of the correlation matrix; for X'X itself see `Diagnosis.spectrum`.
     vif : tuple of float
-        Variance inflation factor of each input; inf for one that the others determine.
+        Variance inflation factor of each input; inf if determined by the other inputs.
     """
 
     names: tuple[str, ...]
@@ -29,7 +29,7 @@ class Collinearity:
 
 
 def collinearity(values: FloatArray, names: tuple[str, ...]) -> Collinearity:
-    """Return condition number and variance inflation factors.
+    """Return the condition number and the variance inflation factors.
 
     Parameters
     ----------
@@ -79,12 +79,12 @@ class Diagnosis:
 
 
 def diagnose(values: FloatArray, deviation: FloatArray, names: tuple[str, ...]) -> Diagnosis:
-    """Analyse the variables of a linear model.
+    """Analyse the collinearity of the variables of a linear model.
 
     Parameters
     ----------
     values : ndarray of shape (n_rows, n_variables)
-        Finite: temperatures minus their reference, as the model multiplies them [degC].
+        Temperatures minus their reference, as used in the model; finite [degC].
     deviation : ndarray of shape (n_rows,)
     names : tuple of str
 

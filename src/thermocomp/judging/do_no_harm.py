@@ -1,8 +1,9 @@
 """The do-no-harm gate: accepted, unproven or refused, by independent units.
 
 A unit is a thermal cycle or a file that the model has not seen: rows of a drift depend on each other, units do not. A
-model is better if the logarithm of its error over that of every baseline is below zero by a one-sided t-test over
-units; it is harmful if it does much worse than none in a single one. ``docs/decisions/0020-verdict.md`` says why.
+model is better if the logarithm of the ratio of its error to that of every baseline is below zero by a one-sided t-test
+over units; it is harmful if it is much worse than no compensation in a single unit. For the reasons see
+``docs/decisions/0020-verdict.md``.
 """
 
 from collections.abc import Sequence
@@ -21,24 +22,24 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 Word = Literal["accepted", "unproven", "refused"]
 
-#: fewest units: below, too few for a significance test
+#: minimum number of units for a significance test
 MIN_UNITS = 3
-#: noise that a probe has at least [um]
+#: lower bound of the noise of a probe [um]
 NO_NOISE = 1e-3
-#: of the one-sided test
+#: significance level of the one-sided test
 LEVEL = 0.05
-#: what a model is held against
+#: baselines for comparison
 BASELINES = ("no compensation", "the learned mean", "the last learned value")
-#: a fourth one, where one stretch is judged: both are counted from its first rows, so many of them
+#: fourth baseline for a single continuous block: without model, both relative to the mean of the block's first rows
 NAMES = (*BASELINES, "none, both re-zeroed where the block begins")
 REZERO_ROWS = 5
-#: harm that is let pass at most, unless the user states another [um], [urad]: 10 urad are 2 um at 200 mm
+#: largest harm tolerated by default [um], [urad]: 10 urad are 2 um at 200 mm
 MOST_MARGIN = {"um": 2.0, "urad": 10.0}
-#: a margin is so many times the probe's noise, and such a share of the largest drift learned
+#: the margin is the larger of this multiple of the probe's noise and this fraction of the largest training drift
 TIMES_NOISE, SHARE = 3.0, 0.05
-#: caps what would be accepted where noise and lost sensors were left out
+#: cap on acceptance where noise and lost sensors were not tried
 UNTRIED = "noise and lost sensors were not tried: compare with robustness=True"
-#: a unit that moves by less than this share of the largest drift learned shows nothing
+#: a unit that moves by less than this fraction of the largest training drift is not informative
 MOVES = 0.1
 
 
@@ -51,13 +52,13 @@ class JudgedUnit:
     name : str
     rows : int
     rms, largest : float
-        Figures of the residual [um].
+        RMS and largest absolute value of the residual [um].
     baselines : tuple of float
         RMS left by each of `BASELINES` [um].
     none_largest : float
         Largest deviation without compensation [um].
     noise : float
-        Noise of the probe: smaller errors are replaced by this value [um].
+        Noise of the probe [um]; smaller errors are set to this value.
     margin : float
         Tolerated degradation [um].
     moves : bool
@@ -84,17 +85,17 @@ class JudgedUnit:
 
     @property
     def harm(self) -> float:
-        """By how much RMS or largest error are above those without compensation, whichever is more [um]."""
+        """Excess of the RMS or the largest error over that without compensation, whichever is larger [um]."""
         return max(self.rms - self.none_rms, self.largest - self.none_largest)
 
     @property
     def harmful(self) -> bool:
-        """True if that is more than the margin."""
+        """True if the harm exceeds the margin."""
         return self.harm > self.margin
 
     @property
     def log_ratios(self) -> tuple[float, ...]:
-        """Logarithm of the error over that of each baseline; what lies below the noise counts as noise."""
+        """Logarithm of the ratio of the error to that of each baseline; errors are at least the noise."""
         least = max(self.noise, NO_NOISE)
         pairs = [(self.rms, b) for b in self.baselines] + ([self.rezeroed] if self.rezeroed else [])
         return tuple(float(np.log(max(model, least) / max(other, least))) for model, other in pairs)
@@ -102,7 +103,7 @@ class JudgedUnit:
 
 @dataclass(frozen=True)
 class Verdict:
-    """The gate's decision over several units.
+    """Decision of the gate over several units.
 
     Parameters
     ----------
@@ -110,15 +111,15 @@ class Verdict:
     unit : str
         Unit of the deviations.
     caps : tuple of str
-        Reasons that prevent acceptance whatever the figures: a single stretch, trouble in the data.
+        Reasons that prevent acceptance whatever the errors: a single continuous block, faults in the data.
     refusal : str
-        Reason that refuses it, whatever the figures: no sensor.
+        Reason to refuse the model whatever the errors: no sensor.
     tried : int
-        Methods that were tried for this target.
+        Number of methods tried for this target.
     p : float or None
-        P-value of the test, corrected for their number; that of the units if None.
+        P-value of the test, corrected for the number of methods; None: computed from the units.
     about : str
-        Reason why it is not corrected for that number, if it is not.
+        Reason why it is not corrected for this number; empty if it is.
     names : tuple of str
         Names of the baselines.
     stated : float or None
@@ -154,7 +155,7 @@ class Verdict:
 
     @property
     def p_value(self) -> float:
-        """The p-value that decides."""
+        """The decisive p-value."""
         return self.p_values[self.worst] if self.p is None else self.p
 
     @property
@@ -164,7 +165,7 @@ class Verdict:
 
     @cached_property
     def word(self) -> Word:
-        """Whether the model may run, may run in shadow only, or may not."""
+        """Decision: the model may run, may run in shadow only, or may not run."""
         if self.refusal or any(u.harmful for u in self.units):
             return "refused"
         if not self.units or not self._moving:
@@ -185,7 +186,7 @@ class Verdict:
 
     @property
     def reason(self) -> str:
-        """Reason for the verdict, in one sentence, by the unit or baseline that decided."""
+        """Reason for the verdict in one sentence, with the decisive unit or baseline."""
         if self.refusal or not self.units:
             return self.refusal or f"fewer than {MIN_ROWS} rows of any cycle to judge on"
         stated = "" if self.stated is None else f"; the harm margin of {self.stated:g} {self.unit} was stated"
@@ -223,13 +224,13 @@ class Verdict:
 
     @property
     def told(self) -> str:
-        """Return the reason, and for what is unproven which test would decide it."""
+        """Return the reason, and for an unproven model the test that would decide the verdict."""
         return f"{self.reason}; {self.advice}" if self.advice else self.reason
 
     @property
     def advice(self) -> str:
         """Test that would decide an unproven verdict; empty for the other verdicts."""
-        if self.word != "unproven" or self.caps == (UNTRIED,):  # which says it itself
+        if self.word != "unproven" or self.caps == (UNTRIED,):  # the reason already gives the advice
             return ""
         if any("not alike" in cap for cap in self.caps):
             return "record cycles at other speeds or on other days"
@@ -246,11 +247,11 @@ class Verdict:
         return f"about {more} cycles or files in all would decide" if more else "many more cycles would be needed"
 
     def _units_for(self, level: float) -> int | None:
-        """Return the number of units of this kind that would be sufficient; None if it is over 50."""
+        """Return the sufficient number of units of this kind; None if it exceeds 50."""
         ratios = np.array([u.log_ratios[self.worst] for u in self.units])
         effect = -ratios.mean() / max(ratios.std(ddof=1), 1e-9)
         for n in range(len(ratios) + 1, 51):
-            if stats.t.sf(effect * np.sqrt(n), n - 1) <= level / 2:  # half the level: they must not just touch it
+            if stats.t.sf(effect * np.sqrt(n), n - 1) <= level / 2:  # half the level: clearly below
                 return n
         return None
 
@@ -276,7 +277,7 @@ def measure(
     margin: float | None = None,
     stretch: bool = False,
 ) -> JudgedUnit:
-    """Measure one unit.
+    """Return the results in one unit.
 
     Parameters
     ----------
@@ -290,7 +291,7 @@ def measure(
     margin : float, optional
         Tolerated degradation [um], stated before judging; see `margin_of`.
     stretch : bool
-        It continues the training data: compare also with both re-zeroed at its start.
+        The block continues the training data: compare also with both curves re-zeroed at its start.
 
     Returns
     -------
@@ -299,7 +300,7 @@ def measure(
     residual = measured - predicted
     allowed = margin_of(learned, unit) if margin is None else margin
     baselines = (0.0, learned.mean, learned.last)
-    span = float(np.ptp(measured)) - 4 * learned.noise  # what noise alone would span
+    span = float(np.ptp(measured)) - 4 * learned.noise  # minus the span of the noise alone
     return JudgedUnit(
         name=name,
         rows=len(measured),
@@ -315,7 +316,7 @@ def measure(
 
 
 def join_verdicts(parts: Sequence[Verdict], about: str = "", caps: tuple[str, ...] = ()) -> Verdict:
-    """Return the verdict over the units of several: a refusal or cap of one of them applies to the whole."""
+    """Return the verdict over the units of several verdicts; any refusal or cap applies to the whole."""
     return Verdict(
         units=tuple(u for v in parts for u in v.units),
         unit=parts[0].unit,
@@ -327,7 +328,7 @@ def join_verdicts(parts: Sequence[Verdict], about: str = "", caps: tuple[str, ..
 
 
 def margin_of(learned: Learned, unit: str = "um") -> float:
-    """Return the tolerated degradation in a single unit, unless the user specifies another [unit]."""
+    """Return the tolerated degradation in a single unit by default [unit]."""
     return min(max(TIMES_NOISE * learned.noise, SHARE * learned.largest), MOST_MARGIN.get(unit, np.inf))
 
 
@@ -342,7 +343,7 @@ def holm(verdicts: Sequence[Verdict]) -> list[Verdict]:
     Returns
     -------
     list of Verdict
-        With their corrected p-values.
+        Verdicts with corrected p-values.
     """
     n = len(verdicts)
     raw = np.array([v.p_values[v.worst] if v.units else 1.0 for v in verdicts])

@@ -1,4 +1,4 @@
-"""Failed temperature sensors in recordings, their substitutes, and the loss of accuracy: a replay of the watch."""
+"""Failed temperature sensors in recordings, replacement values, and loss of accuracy, from a replay of the watch."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -23,14 +23,14 @@ IntArray = NDArray[np.int8]
 
 
 class Fault(NamedTuple):
-    """A temperature that was not believed for a while."""
+    """A period in which a temperature was not trusted."""
 
     sensor: str
     word: str  #: missing, stepped, stuck or off
-    begin: float  #: when it was found, on the clock of its recording [s]
-    end: float  #: when it was believed again, or the recording ends [s]
-    returned: bool  #: it was believed again
-    beside: float  #: mean of its reading minus what stood in; nan where it was missing [degC]
+    begin: float  #: time of detection, on the clock of its recording [s]
+    end: float  #: time when it was trusted again, or end of the recording [s]
+    returned: bool  #: whether it was trusted again
+    beside: float  #: mean of its reading minus the replacement value; nan if the reading was missing [degC]
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,18 +40,18 @@ class FaultLog:
     Parameters
     ----------
     recording : int
-        Its place among the recordings.
+        Index of the recording.
     name : str
     time : ndarray of shape (n_rows,)
         [s]
     watch : Watch
-        That found it.
+        Watch that detected the faults.
     fault : ndarray of int of shape (n_rows, n_sensors)
         See `thermocomp.runtime.watch.WORDS`.
     read, stood_in : ndarray of shape (n_rows, n_sensors)
-        Recorded values, and substitutes; nan where there was none, or the sensor was trusted [degC].
+        Recorded and replacement values [degC]; nan where there was none, or the sensor was trusted.
     faults : tuple of Fault
-        In the order in which they were found.
+        In order of detection.
     """
 
     recording: int
@@ -65,25 +65,26 @@ class FaultLog:
 
     @property
     def failed(self) -> tuple[str, ...]:
-        """Names of the sensors that failed, the first one first."""
+        """Names of the sensors that failed, in order of the first failure."""
         return tuple(dict.fromkeys(f.sensor for f in self.faults))
 
 
 class Cost(NamedTuple):
-    """Residual of a model while the same of its sensors had failed."""
+    """Residual of a model during the failure of a given set of its sensors."""
 
-    failed: tuple[str, ...]  #: of the model's sensors; none: all were good
-    hours: float  #: judged rows of that, in all [h]
-    rms: float  #: of what would have run [unit of the model]
-    none_rms: float  #: without compensation, in these rows [unit of the model]
-    honest: float | None  #: on unseen cycles with these lost [unit of the model]; None: never judged
-    runs_on: bool  #: with what stands in; otherwise the correction is held, then fades
+    failed: tuple[str, ...]  #: failed sensors of the model; empty: all were good
+    hours: float  #: total duration of the judged rows in this state [h]
+    rms: float  #: RMS with the compensator as it would run [unit of the model]
+    none_rms: float  #: RMS without compensation in these rows [unit of the model]
+    honest: float | None  #: RMS on unseen cycles without these sensors [unit of the model]; None: never judged
+    runs_on: bool  #: True: runs on with replacement values; False: the correction is held, then fades
 
 
 def find_faults(judged: Judged, recordings: Sequence[Recording]) -> tuple[FaultLog, ...]:
-    """Let the watch of models go through the recordings they were judged on, as the machine would have read them.
+    """Replay the watch of models over the recordings on which they were judged, as it would run at the machine.
 
-    What `thermocomp.recordings.checks.quality.check` finds, long after, is not left out: at the machine nobody had.
+    Data-quality problems that `thermocomp.recordings.checks.quality.check` detects afterwards are not excluded, since
+    they would be unknown at the machine.
 
     Parameters
     ----------
@@ -94,7 +95,7 @@ def find_faults(judged: Judged, recordings: Sequence[Recording]) -> tuple[FaultL
     Returns
     -------
     tuple of FaultLog
-        One per recording, and per watch if the models have several; none without a watch, or without its speeds.
+        One per recording and per distinct watch; empty without a watch or without the speeds it needs.
     """
     watches = list[Watch]()
     for m in judged.models:
@@ -117,7 +118,7 @@ def find_costs(model: ErrorModel, assessment: Assessment, logs: Sequence[FaultLo
     Returns
     -------
     tuple of Cost
-        In the order in which they came up; a single one if none of its sensors failed.
+        In order of appearance; a single one if none of its sensors failed.
     """
     own = {log.recording: log for log in logs if log.watch == model.watch}
     if assessment.failure or not own:
@@ -157,7 +158,7 @@ def _log(watch: Watch, samples: Samples, test: int, recording: Recording) -> Fau
             read[:, j] = samples.values[(samples.test == test) & (samples.row >= 0), names.index(name)]
     fault, stood_in = np.zeros(read.shape, np.int8), np.full(read.shape, np.nan)
     for row, state, let in look_through(watch, samples, test):
-        if (own := int(samples.row[row])) >= 0:  # not of a file that it continues from
+        if (own := int(samples.row[row])) >= 0:  # not a row of the file that it continues from
             fault[own] = state.fault
             stood_in[own] = np.where(state.fault != GOOD, let[heat], np.nan)
     found = [
@@ -186,7 +187,7 @@ def _log(watch: Watch, samples: Samples, test: int, recording: Recording) -> Fau
 
 
 def _runs(fault: IntArray) -> Iterator[tuple[int, int]]:
-    """Yield first row and row after the last of each stretch of the same fault."""
+    """Yield the first row, and the row after the last, of each run of the same fault."""
     edges = [0, *(np.flatnonzero(np.diff(fault)) + 1).tolist(), len(fault)]
     for a, b in pairwise(edges):
         if fault[a] != GOOD:

@@ -1,4 +1,4 @@
-"""Inputs of models while a sensor fails and a watch is present: the readings that it passes."""
+"""Inputs of models during sensor failures in the presence of a watch: the readings that the watch passes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,60 +16,60 @@ from thermocomp.runtime.watch import begin, look
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-#: temperatures up to which every two that fail together are tried
+#: largest number of temperatures for which simultaneous failures of two are tried
 FEW = 6
 
 
 @dataclass(frozen=True)
 class Guard:
-    """Readings that a watch lets through while sensors read as their zero from the start on (C-34).
+    """Readings that a watch passes while sensors read their zero from the start on (C-34).
 
     Parameters
     ----------
     watch : Watch
     readings : dict of (tuple of str) to dict of int to ndarray of shape (n_rows,)
-        By the sensors that fail: columns of the samples in which what is let through is not what was recorded.
+        By failed sensors: columns of the samples in which the passed readings differ from the recorded ones.
     """
 
     watch: Watch
     readings: dict[tuple[str, ...], dict[int, FloatArray]]
 
     def among(self, place: Sequence[int]) -> "Guard":
-        """Return the same for samples with more inputs, where each column is in its `place`."""
+        """Return the guard for samples with more inputs, with each column moved to its `place`."""
         moved = {lost: {place[c]: v for c, v in of.items()} for lost, of in self.readings.items()}
         return Guard(self.watch, moved)
 
 
 def find_guard(samples: Samples, learn: BoolArray, rows: BoolArray) -> Guard | None:
-    """Let each temperature fail in turn, and every two of few; see what a watch makes of it.
+    """Return the readings that a watch passes while each temperature, or each pair of few temperatures, fails.
 
     Parameters
     ----------
     samples : Samples
     learn : ndarray of bool of shape (n_rows,)
-        Rows that the watch may learn from.
+        Training rows of the watch.
     rows : ndarray of bool of shape (n_rows,)
-        Rows that are judged: their tests are gone through up to the last of them.
+        Judged rows: their tests are replayed up to the last of these rows.
 
     Returns
     -------
     Guard or None
-        None if nothing can be watched; see `thermocomp.models.watching.find_watch`.
+        None if no sensor can be monitored; see `thermocomp.models.watching.find_watch`.
     """
     watch = find_watch(samples, learn)
     return None if watch is None else let_fail(watch, samples, rows)
 
 
 def let_fail(watch: Watch, samples: Samples, rows: BoolArray) -> Guard:
-    """Let each temperature fail in turn, and every two of few; see what a watch makes of it.
+    """Return the readings that a given watch passes while each temperature, or each pair of few, fails.
 
     Parameters
     ----------
     watch : Watch
     samples : Samples
-        With all its inputs.
+        Samples with all inputs of the watch.
     rows : ndarray of bool of shape (n_rows,)
-        Rows that are judged: their tests are gone through up to the last of them.
+        Judged rows: their tests are replayed up to the last of these rows.
 
     Returns
     -------
@@ -104,7 +104,7 @@ def _go_through(
     cut: BoolArray,
     found: FloatArray,
 ) -> None:
-    """Go through a test, the sensors of each row of `cut` reading as their zero; put what is let through in place."""
+    """Replay a test with the sensors of each row of `cut` reading their zero; write the readings passed to `found`."""
     zero = samples.reference()[samples.test[mine[0]]][columns] if mine.size else np.empty(0)
     state = begin(watch, given_zero(samples, columns, samples.test[mine[0]]) if mine.size else None, (len(cut),))
     for row in mine.tolist():

@@ -1,4 +1,4 @@
-"""Judge one model on one block that it has not seen: what it leaves, and whether it may run."""
+"""Judge one model on one unseen block: residual, and whether the model may run."""
 
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import replace
@@ -25,7 +25,7 @@ BoolArray = NDArray[np.bool_]
 
 
 def drop_unreadable(samples: Samples, target: int, judging: Judging) -> Judging:
-    """Return a judgement without the blocks in which a target has too few readings for a result.
+    """Return a judging scheme without the blocks in which a target has too few values for a result.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def drop_unreadable(samples: Samples, target: int, judging: Judging) -> Judging:
     Returns
     -------
     Judging
-        With all blocks if there are too few readings in each of them.
+        Unchanged if there are too few values in every block.
     """
     known = np.isfinite(samples.deviations[:, target])
     kept = tuple(s for s in judging.splits if np.count_nonzero(s.judge & known) >= MIN_ROWS)
@@ -60,10 +60,10 @@ def judge(
     widening: FloatArray | None = None,
     watched: Collection[str] = (),
 ) -> Assessment:
-    """Judge a frozen model on a block: what a compensator with it would have left there.
+    """Judge a frozen model on a block by the residual of a compensator with it.
 
-    The verdict is taken, in each part that is judged, on the worse of what would run and the model alone: a model does
-    not pass because limits clip what it says.
+    The verdict is based, in each judged part, on the worse of the compensator and the model alone: a model does not
+    pass because limits clip its output.
 
     Parameters
     ----------
@@ -73,25 +73,25 @@ def judge(
     samples : Samples
         With all of the model's inputs, and its target.
     split : Split
-        Only its block is looked at.
+        Only its block is used.
     learned : Learned, optional
         Reference for the model. Default: its own training statistics.
     rules : Rules
         Rules stated before judging.
     fit_s : float
-        The fit took [s].
+        Duration of the fit [s].
     robustness : bool
         Also replay with noise and lost sensors.
     limits : Limits or None
         Limits of the compensator; None: the model alone is judged.
     guard : Guard, optional
-        Readings that a watch, trained without the block, passes while sensors fail. Default: no failure is noticed.
+        Readings that a watch, trained without the block, passes while sensors fail. Default: failures go undetected.
     probings : Probings, optional
-        Made in the block.
+        Probings made in the block.
     widening : ndarray of shape (n_rows,), optional
         See `replay_compensated`.
     watched : collection of str
-        Temperatures that a watch has looked after in these samples.
+        Temperatures monitored by a watch in these samples.
 
     Returns
     -------
@@ -149,7 +149,7 @@ def _verdict(
     both: tuple[FloatArray, FloatArray],
     watched: Collection[str],
 ) -> do_no_harm.Verdict:
-    """Return the verdict on `rows`, by the worse of what would run and the model alone, in each part that is judged."""
+    """Return the verdict on `rows`, in each judged part on the worse of the compensator and the model alone."""
     target = [c.name for c in samples.targets].index(model.target)
     segments = [(split.name, rows[rows])] if split.whole else list(_segments(samples, rows))
     against = learned or samples.learned(target, rows)
@@ -178,14 +178,14 @@ def _verdict(
 
 
 def _worse(both: Iterable[do_no_harm.JudgedUnit]) -> do_no_harm.JudgedUnit:
-    """Return the worse result of a unit, of the compensator or of the model alone: limits make no model pass."""
+    """Return the worse result of a unit, compensator or model alone, so that limits cannot make a model pass."""
     ran, alone = both
     rezeroed = max((u.rezeroed for u in (ran, alone) if u.rezeroed), default=None)
     return replace(ran, rms=max(ran.rms, alone.rms), largest=max(ran.largest, alone.largest), rezeroed=rezeroed)
 
 
 def cap_alike_units(samples: Samples, judging: Judging) -> tuple[str, ...]:
-    """Return that the units are too alike to count as several, if they are."""
+    """Return the cap that the units are too alike to count separately; empty if they are not."""
     covered = find_validity(samples, judging)
     needed = do_no_harm.MIN_UNITS
     if covered.independent >= needed or covered.units < needed:
@@ -198,7 +198,7 @@ def _caps(
 ) -> tuple[str, ...]:
     """Return the reasons that prevent acceptance of a model, whatever its errors.
 
-    What is wrong with temperatures that a watch looks after (`watched`) is judged with what stood in for them.
+    Faults of monitored temperatures (`watched`) are no reason: they are judged with the replacement values.
     """
     others = {c.name for k, c in enumerate(samples.targets) if k != target} | set(watched)
     found = [text for channel, text in samples.trouble if channel not in others]
@@ -210,7 +210,7 @@ def _caps(
 
 
 def refuse_method(samples: Samples, name: str, target: int, split: Split, why: str) -> Assessment:
-    """Return the assessment of a method that gave no prediction: refused.
+    """Return the assessment of a method without a prediction: refused.
 
     Parameters
     ----------
@@ -221,7 +221,7 @@ def refuse_method(samples: Samples, name: str, target: int, split: Split, why: s
         Index into ``samples.targets``.
     split : Split
     why : str
-        Reason.
+        Reason for the missing prediction.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Rows that are learned from and judged on at once: found, left out of a judgement, or refused."""
+"""Rows used for both training and judging: detect them, and leave them out or reject the judging scheme."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,26 +12,26 @@ from thermocomp.recordings.samples import Samples
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
 
-#: a test of which less than this share is new is no test
+#: a test with a smaller fraction of new rows is not judged
 LEAST_NEW = 0.05
 
 
 def find_learned_rows(model: ErrorModel, samples: Samples, target: int = 0) -> BoolArray:
-    """Return the rows that a model has learned from.
+    """Return the rows that were used for training a model.
 
     Parameters
     ----------
     model : ErrorModel
     samples : Samples
-        With the model's inputs, and its target.
+        With the inputs and the target of the model.
     target : int
-        Index into ``samples.targets`` of the model's.
+        Index of the model's target in ``samples.targets``.
 
     Returns
     -------
     ndarray of bool of shape (n_rows,)
-        All rows of a test whose hash is in the model's provenance, rows that its fingerprints know, and what little is
-        left of a test then.
+        All rows of a test whose hash is in the model's provenance, rows that match its fingerprints, and the remaining
+        rows of a test if they are few.
     """
     known = np.zeros(len(samples), dtype=np.bool_)
     if model.provenance is None:
@@ -48,7 +48,7 @@ def find_learned_rows(model: ErrorModel, samples: Samples, target: int = 0) -> B
 
 
 def refuse_leaks(samples: Samples, judging: Judging) -> None:
-    """Refuse rows that occur twice in the data if one of them is used for training and the other for judging.
+    """Reject rows that occur twice in the data if one of them is used for training and the other for judging.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def refuse_leaks(samples: Samples, judging: Judging) -> None:
     Raises
     ------
     InputError
-        There are such rows: which files, which rows, and what to do.
+        There are such rows; the message names the files and rows, and the remedy.
     """
     for target in range(len(samples.targets)):
         source = repeats(samples, target)
@@ -72,7 +72,7 @@ def refuse_leaks(samples: Samples, judging: Judging) -> None:
 
 
 def _told(samples: Samples, copies: IntArray, origin: IntArray, k: int, block: str) -> str:
-    # one stretch: rows one after the other that repeat rows one after the other
+    # one stretch: consecutive rows that repeat consecutive rows
     breaks = np.flatnonzero((np.diff(copies) > 1) | (np.abs(np.diff(origin)) > 100)) + 1
     a = int(breaks[breaks <= k].max(initial=0))
     b = int(breaks[breaks > k].min(initial=len(copies))) - 1

@@ -1,4 +1,4 @@
-"""Figures of merit that know their unit and which way is good."""
+"""Figures of merit with their unit and direction of improvement."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ class Metric:
     best : {'low', 'high', 'zero'}
         Best value.
     unit : str
-        ``um`` denotes the unit of the deviation; ``%`` and ``1`` themselves.
+        ``um`` denotes the unit of the deviation; ``%`` and ``1`` are literal.
     description : str
     function : callable
         (measured, predicted) -> value.

@@ -1,4 +1,4 @@
-"""Choice by the sensor budget: the smallest sufficient set, the gain of each further sensor, and substitutes."""
+"""Selection by sensor budget: the smallest sufficient set, the gain of each further sensor, and virtual sensors."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -13,12 +13,12 @@ from thermocomp.judging.sensorsets import PERCENT
 from thermocomp.judging.splits import Judging
 from thermocomp.recordings.samples import Samples
 
-#: of a temperature that is made up: a sensor that has less part in it is not named
+#: sensors that contribute a smaller fraction to a virtual temperature are not named
 PART = 0.2
 
 
 def choose(samples: Samples, judging: Judging, settings: Settings, *, jobs: int, progress: Progress) -> Choice:
-    """Choose for all targets at once by the error on unseen blocks against the number of sensors.
+    """Select sensors for all targets together by the error on unseen blocks as a function of their number.
 
     Parameters
     ----------
@@ -26,9 +26,9 @@ def choose(samples: Samples, judging: Judging, settings: Settings, *, jobs: int,
     judging : Judging
     settings : Settings
     jobs : int
-        Processes to share the work among; -1 takes all cores.
+        Number of parallel processes; -1: one per core.
     progress : callable
-        Called with a line of text after each piece of work; there are `thermocomp.judging.budget.n_pieces` of them.
+        Called with a line of text after each task; there are `thermocomp.judging.budget.n_pieces` of them.
 
     Returns
     -------
@@ -41,7 +41,7 @@ def choose(samples: Samples, judging: Judging, settings: Settings, *, jobs: int,
 
     Notes
     -----
-    Where no set is better than no compensation it is a choice without sensors, with `Choice.failure`.
+    Without a set better than no compensation, the choice has no sensors, and `Choice.failure` states the reason.
     """
     candidates = [Candidates.of(samples, t) for t in range(len(samples.targets))]
     most = settings.most("pareto")
@@ -85,7 +85,7 @@ def choose(samples: Samples, judging: Judging, settings: Settings, *, jobs: int,
 
 
 def _notes(found: Budget, judging: Judging) -> list[str]:
-    """Return the reason for the number of sensors, and what could not be judged."""
+    """Return the reason for the number of sensors, and the cases that could not be judged."""
     notes = [_rule(found)]
     if found.failures:
         notes.append(f"Not judged with some numbers of sensors: {_failed(found)}")
@@ -114,7 +114,7 @@ def _failed(found: Budget) -> str:
 
 
 def _rms(found: Budget) -> str:
-    """Name what is compared: a block's RMS, mean over the blocks."""
+    """Return the name of the compared figure: a block's RMS, or its mean over the blocks."""
     if len(found.blocks) == 1:
         return "% of the RMS without compensation" if found.unit == PERCENT else f"{found.unit} RMS"
     return "% of the mean RMS without compensation" if found.unit == PERCENT else f"{found.unit} mean RMS"
@@ -185,20 +185,20 @@ def _next(found: Budget, model: str, place: int) -> Table:
 
 
 def _joins(found: Budget, place: int) -> str:
-    """Return the name of the sensor that joins next; from the largest set to all, how many do."""
+    """Return the name of the sensor that joins next; for the step from the largest set to all, their number."""
     new = [s for s in found.sensors[place + 1] if s not in found.sensors[place]]
     return new[0] if len(new) == 1 else f"all {len(new)} others"
 
 
 def next_to_buy(found: Budget, model: str, place: int) -> str:
-    """Return which sensor to buy next, and whether it is worth its cost.
+    """Return a recommendation for the next sensor, and whether it is worth its cost.
 
     Parameters
     ----------
     found : Budget
     model : str
     place : int
-        Place in ``found.sensors`` of what there is.
+        Index of the current set in ``found.sensors``.
 
     Returns
     -------
@@ -214,7 +214,7 @@ def next_to_buy(found: Budget, model: str, place: int) -> str:
     spread = f" ({own.min():.2f} to {own.max():.2f} {unit} from block to block)" if len(own) > 1 else ""
     would = f"{_joins(found, place)} would gain {gains[place]:.2f} {unit}{spread}"
     none = f"{would}; {least:.2f} {unit} is what a further sensor has to gain."
-    # what one does not bring, several may
+    # if a single sensor gains too little, several may gain enough
     for k, gain in enumerate(np.cumsum(gains[place:]).tolist(), start=place + 1):
         new = [s for s in found.sensors[k] if s not in found.sensors[place]]
         if gain > len(new) * least:
@@ -246,7 +246,7 @@ def _frequency(found: Budget, place: int) -> Table:
 
 
 def _stand_ins(found: Budget, place: int) -> Table:
-    """Return the substitute of each temperature, and the loss of accuracy with it."""
+    """Return a table of the virtual sensor of each temperature, and the loss of accuracy with it."""
     names, kept = found.candidates, [found.candidates.index(s) for s in found.sensors[place]]
     made = found.answer.stand_ins(kept)
     own = np.sqrt(np.diag(found.answer.temperatures))
@@ -301,14 +301,14 @@ def _repeats(candidates: Sequence[Candidates], sensors: Sequence[str]) -> Table:
 
 
 def trade_off(found: Budget, model: str, place: int) -> str:
-    """Return the loss of accuracy from the sensors saved, compared with the best of the table and with all sensors.
+    """Return the loss of accuracy due to fewer sensors, compared with the best set of the table and with all sensors.
 
     Parameters
     ----------
     found : Budget
     model : str
     place : int
-        Place in ``found.sensors`` of what was chosen.
+        Index of the chosen set in ``found.sensors``.
 
     Returns
     -------
@@ -332,7 +332,7 @@ def trade_off(found: Budget, model: str, place: int) -> str:
 
 
 def _rule(found: Budget) -> str:
-    """Return the rule by which the number of sensors was chosen, with numbers."""
+    """Return the rule for the number of sensors, with numbers."""
     margins = found.margin()
     assert margins is not None
     margin, error, least = margins

@@ -1,4 +1,4 @@
-"""Work in pieces, shared among processes: what fails in one piece is that piece's, whatever it is."""
+"""Parallel execution of tasks in processes: a failure affects only its own task."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextvars import ContextVar
@@ -12,10 +12,10 @@ from thermocomp.core.exceptions import ThermocompError
 _Piece = TypeVar("_Piece")
 _Found = TypeVar("_Found")
 
-#: why nothing came of a piece whose process died
+#: reason reported for a task whose process died
 DIED = "its process died: it crashed, or was killed, as the system does if the memory is full"
 
-#: what does the work in place of this machine's processes, if anything: takes what `work_through` takes, but for `jobs`
+#: executor used instead of this machine's processes, if any: called with the arguments of `work_through` except `jobs`
 elsewhere: ContextVar[Callable[[Any, Sequence[Any], Any], Iterator[Any]] | None] = ContextVar("elsewhere", default=None)
 
 
@@ -28,24 +28,24 @@ def work_through(
 ) -> Iterator[_Found]:
     """Yield the results of the tasks, in their order.
 
-    A process that dies takes the others' results with it, and nobody knows whose fault it was: what is missing is done
-    again, piece by piece, until the one is found that kills its process.
+    A process that dies loses the results of other tasks, too, and the cause is unknown: missing tasks are repeated one
+    by one until the task that kills its process is found.
 
     Parameters
     ----------
     work : callable
-        Takes a piece.
+        Function of a task.
     pieces : sequence
     failed : callable
         Called with a task and the reason of its failure; returns the replacement of the result.
     jobs : int
-        Processes to share the work among; 1 is this one, -1 takes all cores. Within
-        `thermocomp.judging.cluster.shared_among` it is of no account.
+        Number of parallel processes; 1: in this process, -1: one per core. Ignored within
+        `thermocomp.judging.sharing.shared_among`.
 
     Yields
     ------
     object
-        From `work`, or from `failed` where anything was raised or the process died.
+        Result of `work`, or of `failed` if an exception was raised or the process died.
     """
     if (share := elsewhere.get()) is not None:
         yield from share(work, pieces, failed)
@@ -53,13 +53,13 @@ def work_through(
     done, alone = 0, False
     while done < len(pieces):
         tried = pieces[done : done + 1] if alone else pieces[done:]
-        # with two there is another process than this one
+        # n_jobs=2 ensures a process other than this one
         parallel = Parallel(n_jobs=2 if alone else jobs, return_as="generator")
         try:
             for found in parallel(delayed(attempt)(work, piece, failed) for piece in tried):
                 yield found
                 done += 1
-        except Exception as e:  # noqa: BLE001 - a dead process, or what cannot be sent to one
+        except Exception as e:  # noqa: BLE001 - a dead process, or an object that cannot be sent to a process
             if alone:
                 yield failed(pieces[done], explain(e))
                 done += 1
@@ -67,15 +67,15 @@ def work_through(
 
 
 def attempt(work: Callable[[_Piece], _Found], piece: _Piece, failed: Callable[[_Piece, str], _Found]) -> _Found:
-    """Return the result of one task; that of `failed` if an exception is raised."""
+    """Return the result of one task; the result of `failed` if an exception is raised."""
     try:
         return work(piece)
-    except (Exception, SystemExit) as e:  # noqa: BLE001 - whatever a method raises, the others have their results
+    except (Exception, SystemExit) as e:  # noqa: BLE001 - whatever a method raises, the other tasks keep their results
         return failed(piece, explain(e))
 
 
 def explain(error: BaseException) -> str:
-    """Return the reason of a failure in one line; for foreign exceptions with the type."""
+    """Return the reason of a failure in one line; for foreign exceptions, including the type."""
     if isinstance(error, ThermocompError):
         return str(error)
     if isinstance(error, BrokenProcessPool):

@@ -1,4 +1,4 @@
-"""Probings of a test: when they are made, and what came of them."""
+"""Probings of a test: their schedule and their effect."""
 
 import re
 from dataclasses import dataclass, replace
@@ -17,7 +17,7 @@ _SECONDS = {"h": 3600.0, "m": 60.0}
 
 @dataclass(frozen=True)
 class Probings:
-    """Probings of a running machine, one after the other.
+    """Probings of a running machine at regular intervals.
 
     Parameters
     ----------
@@ -50,12 +50,12 @@ class Probings:
 
     @classmethod
     def parse(cls, text: str) -> "Probings":
-        """Understand probings as written on the command line, such as ``every 2 h`` or ``every 30 min, 0.3 um``.
+        """Parse probings as written on the command line, such as ``every 2 h`` or ``every 30 min, 0.3 um``.
 
         Raises
         ------
         InputError
-            It is neither.
+            The text has neither form.
         """
         found = _WRITTEN.fullmatch(text.strip())
         if found is None:
@@ -68,12 +68,12 @@ class Probings:
 
     @classmethod
     def of(cls, given: object) -> "Probings | None":
-        """Return probings as given in Python: in words, as they are, or none.
+        """Return probings as given in Python: as text, as an object, or None.
 
         Raises
         ------
         InputError
-            It is something else.
+            The argument has another type.
         """
         if given is None or isinstance(given, Probings):
             return given
@@ -87,9 +87,9 @@ class Probings:
         Parameters
         ----------
         time : ndarray of shape (n_rows,)
-            Rising [s].
+            In ascending order [s].
         usable : ndarray of bool of shape (n_rows,)
-            Rows in which there is something to probe; the first is the start.
+            Rows with a value to be probed; the first is the start.
 
         Returns
         -------
@@ -104,14 +104,14 @@ class Probings:
 
     @property
     def words(self) -> str:
-        """Name of the probings wherever they are shown."""
+        """Name of the probings in all outputs."""
         often = f"{self.every / 3600:g} h" if self.every >= 3600 else f"{self.every / 60:g} min"
         return f"a probing every {often}"
 
 
 @dataclass(frozen=True, eq=False)
 class Probed:
-    """Effect of probings, by judged row.
+    """Effect of probings on the judged rows.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ class Probed:
     shift : ndarray of shape (n_judged,)
         Learned shift, which is included in the correction [um].
     without : ndarray of shape (n_judged,)
-        Minus the correction that would have been in force without any [um].
+        Minus the correction that would have been in force without probings [um].
     refused : tuple of str
         Reasons why probings were not used.
     """
@@ -140,6 +140,6 @@ class Probed:
         """Return the correction from probings alone: the last one, held; zero before the first of a test [um]."""
         rows = np.arange(len(measured))
         last = np.maximum.accumulate(np.where(self.at, rows, -1))
-        before = np.concatenate([[-1], last[:-1]])[: len(rows)]  # it counts from the next row on
+        before = np.concatenate([[-1], last[:-1]])[: len(rows)]  # it takes effect from the next row on
         known = (before >= 0) & (test == test[before])
         return np.where(known, measured[before], 0.0)

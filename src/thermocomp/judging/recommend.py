@@ -1,8 +1,8 @@
-"""Recommended method: chosen inside the training part of every left-out unit, so that the choice is judged too.
+"""Recommended method: chosen inside the training part of every left-out unit, so that the choice itself is judged.
 
-The error of a choice among methods is not the error of the method that comes out best: the best of twenty is partly
-luck. So the choice is made again for every left-out unit, by the error on units left out of the rest (nested
-cross-validation, Varma and Simon 2006), and what was chosen then is judged on the left-out unit.
+The error of a choice among methods is not the error of the method with the best result: the best of twenty is partly
+luck. Therefore the choice is repeated for every left-out unit, by the error on units left out of the rest (nested
+cross-validation, Varma and Simon 2006), and the method chosen is judged on the left-out unit.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,23 +19,23 @@ from thermocomp.recordings.samples import Samples
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
 
-#: up to so many units every pair is left out; with more, the others go out in `GROUPS` groups for each unit
+#: up to this number of units every pair is left out; above, the other units are left out in `GROUPS` groups per unit
 PAIRS = 8
 GROUPS = 3
-#: units without which nothing is left to choose by
+#: minimum number of units for a choice
 LEAST = 3
 
 
 @dataclass(frozen=True)
 class Inner:
-    """A training part inside others: what is left out of it, and for which units it counts.
+    """An inner split, with the pairs of units that it scores.
 
     Parameters
     ----------
     split : Split
-        Its `judge` is what was left out of some unit's training part, and that unit itself for a pair.
+        Its `judge` has all units left out: an outer unit, and the inner unit or units.
     scores : tuple of (int, int)
-        (left-out unit, unit to choose by) for which it gives an error.
+        (outer left-out unit, inner unit) pairs for which it gives an error.
     """
 
     split: Split
@@ -43,7 +43,7 @@ class Inner:
 
 
 def inner_splits(judging: Judging) -> list[Inner]:
-    """Return the training parts that a choice inside each unit's training part needs.
+    """Return the inner splits needed for a choice inside each unit's training part.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def inner_splits(judging: Judging) -> list[Inner]:
     Returns
     -------
     list of Inner
-        None with fewer than 3 units.
+        Empty with fewer than 3 units.
     """
     splits = judging.splits
     n = len(splits)
@@ -77,7 +77,7 @@ def _inner(splits: Sequence[Split], out: Sequence[int], scores: tuple[tuple[int,
 
 
 def score(samples: Samples, name: str, target: int, judging: Judging, inner: Inner) -> list[float]:
-    """Return a method's RMS for each of an inner training part's scores.
+    """Return a method's RMS for each score of an inner split.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def score(samples: Samples, name: str, target: int, judging: Judging, inner: Inn
     target : int
         Index into ``samples.targets``.
     judging : Judging
-        The units.
+        Scheme whose blocks are the units.
     inner : Inner
 
     Returns
@@ -98,7 +98,7 @@ def score(samples: Samples, name: str, target: int, judging: Judging, inner: Inn
     Raises
     ------
     FitError
-        It cannot be fitted.
+        The method cannot be fitted.
     """
     predicted = fit_method(name, samples, target, inner.split.learn).predicted
     found = []
@@ -111,15 +111,15 @@ def score(samples: Samples, name: str, target: int, judging: Judging, inner: Inn
 
 @dataclass(frozen=True)
 class Recommendation:
-    """The method that comes out best for a target, and what the way of choosing it is worth.
+    """The recommended method for a target, and the verdict on the procedure of choosing.
 
     Parameters
     ----------
     target, method : str
     chosen : tuple of str
-        Choice without each unit.
+        Method chosen without each unit.
     verdict : Verdict
-        On the choosing: each unit is predicted by what was chosen without it.
+        Verdict on the choice: each unit is predicted by the method chosen without it.
     """
 
     target: str
@@ -135,29 +135,29 @@ def recommend(
     inner: Mapping[str, Sequence[Sequence[float]]],
     inners: Sequence[Inner],
 ) -> Recommendation | None:
-    """Choose a method for a target.
+    """Recommend a method for a target.
 
     Parameters
     ----------
     target : str
     methods : sequence of str
-        That may be chosen.
+        Eligible methods.
     parts : mapping of str to sequence of Verdict
-        Per method, on each left-out unit.
+        Verdicts per method, on each left-out unit.
     inner : mapping of str to sequence of sequence of float
-        Per method, from `score` for each of `inners`; infinite where it failed.
+        Scores per method, from `score` for each of `inners`; infinite where the method failed.
     inners : sequence of Inner
         From `inner_splits`.
 
     Returns
     -------
     Recommendation or None
-        None if there is nothing to choose by, or nothing to choose.
+        None if there are too few units or too few methods for a choice.
     """
     if not inners or not methods:
         return None
     n = len(parts[methods[0]])
-    logs = np.full((len(methods), n, n), np.nan)  # method, left-out unit, unit to choose by
+    logs = np.full((len(methods), n, n), np.nan)  # axes: method, outer left-out unit, inner unit
     for k, name in enumerate(methods):
         for found, values in zip(inners, inner[name], strict=True):
             for (u, v), rms in zip(found.scores, values, strict=True):
@@ -172,7 +172,7 @@ def recommend(
 
 
 def _log(verdict: do_no_harm.Verdict) -> float:
-    """Return a method's logarithm of the error on a unit; infinite if it failed, nan if there was too little to see."""
+    """Return the logarithm of a method's error on a unit; infinite if it failed, nan if there were too few rows."""
     if not verdict.units:
         return np.inf if verdict.refusal else np.nan
     return float(np.mean([np.log(max(u.rms, do_no_harm.NO_NOISE)) for u in verdict.units]))
@@ -181,16 +181,16 @@ def _log(verdict: do_no_harm.Verdict) -> float:
 def correct_verdicts(
     verdicts: Mapping[str, do_no_harm.Verdict], primary: str | None, found: Recommendation | None
 ) -> dict[str, do_no_harm.Verdict]:
-    """Correct the verdicts on the methods that were tried for one target for their number.
+    """Correct the verdicts on the methods tried for one target for the number of methods.
 
     Parameters
     ----------
     verdicts : mapping of str to Verdict
-        Per method, over all units.
+        Verdicts per method, over all units.
     primary : str or None
-        Method that was named before judging: it is judged as if it were the only one.
+        Method named before judging: not corrected, as if it were the only one.
     found : Recommendation or None
-        Judged as a whole: if the choosing is accepted, so is what it comes out with, unless that does harm itself.
+        Judged as a whole: if the choice is accepted, so is the method chosen, unless it does harm itself.
 
     Returns
     -------

@@ -1,6 +1,6 @@
-"""Model to be written: a method fitted to all rows, tested with noise and lost sensors.
+"""Model written to the file: a method fitted to all rows, tested with noise and lost sensors.
 
-It has seen more than the models that were judged, and may lean on a sensor as they did not.
+It was trained on more data than the judged models, and may depend more on a single sensor than they do.
 """
 
 from collections.abc import Sequence
@@ -21,14 +21,14 @@ from thermocomp.recordings.samples import Samples
 
 
 def stress_written(judged: Assessment, model: ErrorModel, samples: Samples, guard: Guard | None = None) -> Assessment:
-    """Return an assessment with the robustness of the model that is written, where that is worse.
+    """Return an assessment with the robustness of the written model, where that is worse.
 
     Parameters
     ----------
     judged : Assessment
-        Over all blocks.
+        Assessment over all blocks.
     model : ErrorModel
-        Fitted to all rows.
+        Model fitted to all rows.
     samples : Samples
     guard : Guard, optional
         Readings that a watch, trained on all rows, passes while sensors fail.
@@ -36,7 +36,7 @@ def stress_written(judged: Assessment, model: ErrorModel, samples: Samples, guar
     Returns
     -------
     Assessment
-        The same if noise and lost sensors were not tried.
+        Unchanged if noise and lost sensors were not tried.
     """
     if judged.robustness is None:
         return judged
@@ -49,23 +49,23 @@ def stress_written(judged: Assessment, model: ErrorModel, samples: Samples, guar
 def refit_accepted(
     judged: Sequence[Assessment], samples: Samples, support: Support, *, watch: bool, jobs: int
 ) -> list[Assessment]:
-    """Fit what is accepted to all rows, as `thermocomp.judging.study.fit` does, and try that as well.
+    """Fit accepted methods to all rows, as in `thermocomp.judging.study.fit`, and test the robustness of these models.
 
     Parameters
     ----------
     judged : sequence of Assessment
     samples : Samples
     support : Support
-        For the models.
+        Support of the models.
     watch : bool
-        A watch is there to notice lost sensors.
+        Whether a watch detects lost sensors.
     jobs : int
-        Processes to share the work among; -1 takes all cores.
+        Number of parallel processes; -1: one per core.
 
     Returns
     -------
     list of Assessment
-        The same, less sure of what noise or a lost sensor would make worse than none.
+        Assessments with the worse robustness of the judged and the refitted models.
     """
     wanted = [a for a in judged if a.overall and a.accepted and a.deployable]
     everything = np.ones(len(samples), dtype=np.bool_)
@@ -91,5 +91,5 @@ def fit_whole(method: str, samples: Samples, target: int) -> ErrorModel:
 
 
 def describe_method(name: str) -> str:
-    """Return a sentence on a method."""
+    """Return a sentence that describes a method."""
     return METHODS[name].summary if name in METHODS else "an estimator that was handed in"

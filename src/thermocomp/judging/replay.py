@@ -1,4 +1,4 @@
-"""Replay: what is judged comes out of `ErrorModel.step` and the compensator around it, as it would live."""
+"""Replay: judged predictions are computed by `ErrorModel.step` and the compensator, as in live operation."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -21,33 +21,33 @@ from thermocomp.runtime.watch import WatchState, begin, look
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-#: turns one reading (n_inputs,) into a batch of disturbed ones (n_variants, n_inputs); gets its row and the test's
-#: reference too
+#: converts one reading (n_inputs,) to a batch of disturbed readings (n_variants, n_inputs); its other arguments are the
+#: row and the reference of the test
 Disturb = Callable[[int, FloatArray, FloatArray], FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
 class Replayed:
-    """Outputs of the models that would have run in the judged rows.
+    """Outputs of the models in the judged rows, as they would have run.
 
     Parameters
     ----------
     deviation : ndarray of shape (n_wanted,)
-        Output of the model alone: no gate except for missing values, no limits [its unit].
+        Output of the model alone, without limits and without a gate except for missing values [its unit].
     compensated : ndarray of shape (n_wanted,)
         Minus the correction that the compensator had in force: gate, model, limits [its unit].
     outside : ndarray of bool of shape (n_wanted,)
         An input was outside the trained range.
     rejected : ndarray of bool of shape (n_wanted,)
-        The gate turned the reading away, though it was complete.
+        The gate rejected the reading although it was complete.
     why : str
-        The first reading it turned away; empty if none.
+        Description of the first rejected reading; empty if there was none.
     limits : Limits or None
-        None: they were not applied, because the model does not predict micrometres.
+        None: not applied, because the model does not predict micrometres.
     half_width : ndarray of shape (n_wanted,)
         Half-width of the band about `deviation` [its unit]; nan where there is none.
     probed : Probed or None
-        Effect of probings; None: there were none.
+        Effect of probings; None: without probings.
     """
 
     deviation: FloatArray
@@ -68,25 +68,24 @@ def replay_compensated(
     probings: Probings | None = None,
     widening: FloatArray | None = None,
 ) -> Replayed:
-    """Replay a model and a compensator with it over the tests that hold `rows`, from the start of each test.
+    """Replay a model and a compensator with it over the tests that contain `rows`, from the start of each test.
 
-    A live compensator gets its readings more often than every `Limits.reading_age`, however slowly a test was recorded:
-    rows that lie further apart count as so many readings on time, so the rate limit has the whole time between them.
+    A live compensator receives readings at least every `Limits.reading_age`, however slowly a test was recorded: rows
+    further apart count as several readings in time, so the rate limit applies to the whole time between them.
 
     Parameters
     ----------
     model : ErrorModel
     samples : Samples
     rows : ndarray of bool of shape (n_rows,)
-        Rows that are judged.
+        Judged rows.
     limits : Limits
-        Limits of the corrections [um]; a model of another unit runs without them, behind the gate.
+        Limits of the corrections [um]; a model in another unit runs with the gate but without limits.
     probings : Probings, optional
-        Made in the rows that are judged, from the first of each test on: the only displacements that are used, each
-        from the next row on.
+        Made in the judged rows, from the first of each test on: the only displacements used, each from the next row on.
     widening : ndarray of shape (n_rows,), optional
-        The samples are what a watch lets through, and this is what came with them: see `believe`. Without it the
-        model's own watch looks at them first.
+        Band widening that belongs to samples already passed by a watch: see `believe`. Default: the samples are first
+        passed through the model's own watch.
 
     Returns
     -------
@@ -125,7 +124,7 @@ def replay_compensated(
         refused += [f"{samples.test_names[test]}: {why}" for why in found.refused]
         deviation[mine], compensated[mine] = found.deviation, found.compensated
         outside[mine], rejected[mine] = found.outside, found.rejected
-        # how wrong the model is where it must not run was never judged: no band
+        # the error was never judged where the model must not run: no band
         half_width[mine] = found.half_width * np.where(np.isinf(widening[mine]), np.nan, widening[mine])
         if found.why and not why:
             why = f"{samples.test_names[test]}: {found.why}"
@@ -149,10 +148,9 @@ def replay_compensated(
 def believe(
     model: ErrorModel, samples: Samples, rows: BoolArray, watched: Samples | None = None
 ) -> tuple[Samples, FloatArray]:
-    """Return samples as a model's watch lets them through, and what that does to its band, in the tests of `rows`.
+    """Return samples as passed by a model's watch, and the widening of its band, in the tests of `rows`.
 
-    They are the same, and it stays as it is, without a watch or its speeds. Rows without a speed are passed on as they
-    are.
+    Both are unchanged without a watch, or without the speeds it needs. Rows without a speed are passed on unchanged.
 
     Parameters
     ----------
@@ -160,14 +158,14 @@ def believe(
     samples : Samples
     rows : ndarray of bool of shape (n_rows,)
     watched : Samples, optional
-        The same rows with all inputs of the model's watch, as they were recorded: see `stack_watched`. What the watch
-        finds failed is replaced.
+        The same rows with all inputs of the model's watch, as recorded: see `stack_watched`. Values of failed sensors
+        are replaced.
 
     Returns
     -------
     samples : Samples
     widening : ndarray of shape (n_rows,)
-        See `ErrorModel.widening`; infinite where the model must not run, and its correction is held.
+        See `ErrorModel.widening`; infinite where the model must not run and its correction is held.
     """
     widening, watch, seen = np.ones(len(samples)), model.watch, watched or samples
     if watch is None or not can_look(watch, seen):
@@ -193,16 +191,16 @@ def believe(
 def stack_watched(
     watch: Watch, target: str, recordings: Sequence[Recording], starts: Sequence[Start] | Start | None
 ) -> Samples | None:
-    """Return all rows of recordings with the inputs of a watch, as they were recorded; None if none has any.
+    """Return all rows of recordings with the inputs of a watch, as recorded; None if there are no such inputs.
 
     Parameters
     ----------
     watch : Watch
     target : str
-        A displacement channel: samples have one.
+        Any displacement channel, since samples must have one.
     recordings : sequence of Recording
     starts : Start or sequence of Start or None
-        Initial state of each.
+        Initial state of each recording.
     """
     known = [i.name for i in watch.inputs if all(r.has(i.name) for r in recordings)]
     if not known:
@@ -214,28 +212,28 @@ def stack_watched(
 
 
 def can_look(watch: Watch, samples: Samples) -> bool:
-    """Return whether samples have the speeds that a watch needs."""
+    """Return whether samples have the spindle speeds that a watch needs."""
     names = [c.name for c in samples.inputs]
     return all(i.name in names for i in watch.inputs if i.quantity != "temperature")
 
 
 def look_through(watch: Watch, samples: Samples, test: int) -> Iterator[tuple[int, WatchState, FloatArray]]:
-    """Go through a test with a watch; an input of it that the samples have not got is missing to it.
+    """Replay a watch over a test; inputs of the watch that the samples lack are treated as missing.
 
     Parameters
     ----------
     watch : Watch
     samples : Samples
-        With its speeds.
+        Samples with the speeds of the watch.
     test : int
 
     Yields
     ------
     row : int
     state : WatchState
-        After the reading.
+        State after the reading.
     let : ndarray of shape (n_inputs,)
-        Readings passed, in the order of its inputs.
+        Readings passed, in the order of the watch's inputs.
     """
     names = [c.name for c in samples.inputs]
     known = [i.name in names for i in watch.inputs]
@@ -249,7 +247,7 @@ def look_through(watch: Watch, samples: Samples, test: int) -> Iterator[tuple[in
 
 
 def replay(model: ErrorModel, samples: Samples, rows: BoolArray) -> tuple[FloatArray, BoolArray]:
-    """Replay a model over the tests that hold `rows`, from the start of each test.
+    """Replay a model over the tests that contain `rows`, from the start of each test.
 
     Parameters
     ----------
@@ -275,9 +273,9 @@ def replay(model: ErrorModel, samples: Samples, rows: BoolArray) -> tuple[FloatA
 def walk(model: ErrorModel, samples: Samples, rows: BoolArray, disturb: Disturb | None = None) -> Iterator[State]:
     """Step a model through the tests that contain `rows`; yield its state at each requested row, in their order.
 
-    The model runs without a break from the start of a test, or of the files that it continues from, as it would on the
-    machine; its only inputs are those of `samples`, never a displacement. A row with a missing input is what the gate
-    turns away live: the last deviation is held. A test that is re-zeroed is told minus what the model says there.
+    The model runs continuously from the start of a test, or of the files that it continues from, as at the machine; its
+    only inputs are those of `samples`, never a displacement. A row with a missing input is rejected by the gate, as
+    live: the last deviation is held. In a re-zeroed test, the output at the new zero is subtracted.
 
     Parameters
     ----------
@@ -286,7 +284,7 @@ def walk(model: ErrorModel, samples: Samples, rows: BoolArray, disturb: Disturb 
     rows : ndarray of bool of shape (n_rows,)
         Rows whose state is requested.
     disturb : callable, optional
-        Makes several variants of each reading; see `Disturb`.
+        Returns several variants of each reading; see `Disturb`.
 
     Yields
     ------
@@ -323,7 +321,7 @@ def walk(model: ErrorModel, samples: Samples, rows: BoolArray, disturb: Disturb 
 
 
 def are_absolute(models: Sequence[ErrorModel]) -> bool:
-    """Return whether models take temperatures as they are, so that the zero of a recording does not matter to them."""
+    """Return whether models use absolute temperatures, so that the zero of a recording does not affect them."""
     heat = [i for m in models for i in m.inputs if i.quantity == "temperature"]
     return bool(heat) and not any(i.rezero for i in heat)
 
@@ -335,7 +333,7 @@ def _begun(
     reference: FloatArray | None,
     read: Callable[[int], FloatArray],
 ) -> tuple[State, dict[int, FloatArray]]:
-    """Return the initial state of a test with known zero, and the readings of the zero, which give its mean."""
+    """Return the initial state of a test with known zero, and the readings of the zero, replaced by their mean."""
     state = model.init(reference)
     if not np.isnan(state.reference).any():
         return state, {}
@@ -348,7 +346,7 @@ def _begun(
 
 
 def _window(model: ErrorModel, samples: Samples, readings: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the first of some readings: those from which a zero is averaged."""
+    """Return the first readings, from which a zero is averaged."""
     return readings[: first_rows(model.zeroing, samples.time[readings], samples.stands[readings])[0]]
 
 
@@ -388,7 +386,7 @@ def rows_until(
 
 
 def given_zero(samples: Samples, columns: Sequence[int], test: int) -> FloatArray | None:
-    """Return the given zero of a test, if any; without it the first readings determine the zero."""
+    """Return the given zero of a test; None if the first readings determine it."""
     given = samples.zero is not None and not np.isnan(samples.zero[test]).any()
     return samples.reference()[test, columns] if given else None
 
@@ -397,7 +395,7 @@ def _needed(model: ErrorModel, usable: BoolArray, wanted: BoolArray) -> BoolArra
     """Return the rows of a test that must be stepped through to know the requested ones."""
     if model.remembers or model.support.policy == "hold" or not usable.any():
         return usable
-    # A model without memory needs the wanted readings, and for a wanted row without one the reading before.
+    # A model without memory needs the requested readings; where one is unusable, the reading before.
     needed = usable & wanted
     before = np.maximum.accumulate(np.where(usable, np.arange(len(usable)), 0))
     needed[before[wanted]] = True

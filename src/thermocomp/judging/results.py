@@ -1,4 +1,4 @@
-"""Rules of judging, and its results."""
+"""Rules and results of judging."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -29,9 +29,9 @@ class Rules:
     Parameters
     ----------
     margin : float or None
-        Tolerated degradation in a single unit [unit of the target]; None takes that of `do_no_harm.margin_of`.
+        Tolerated degradation in a single unit [unit of the target]; None: by `do_no_harm.margin_of`.
     primary : str or None
-        Method that the judging is about: it is not corrected for the number of methods, all others are.
+        Method under test: not corrected for the number of methods, unlike all others.
     """
 
     margin: float | None = None
@@ -63,39 +63,39 @@ class Assessment:
     verdict : Verdict
         Verdict of the do-no-harm gate.
     sensors : tuple of str
-        Inputs with an influence; those of all models, if several were trained.
+        Inputs with an influence; if several models were trained, those of all models.
     fit_s : float
-        The fits took [s].
+        Total duration of the fits [s].
     n_effective : float
-        Independent rows the residual is worth.
+        Effective sample size of the residual.
     robustness : Robustness or None
     frozen : ErrorModel or None
-        The model that was replayed; None for several blocks together, or if it could not be fitted.
+        The model replayed; None for several blocks together, or if it could not be fitted.
     failure : str
         Reason why the method could not be fitted; empty if it could.
     caveat : str
-        Reason why this is not an honest test, whatever the figures; empty if it is one.
+        Reason why the test is not honest, whatever the errors; empty if it is.
     overall : bool
-        It is the last word on this model and target: all that was judged, not one cycle of it.
+        True for the final result of this model and target, over all judged data instead of one cycle.
     n_sensors : tuple of (int, int)
-        Fewest and most inputs with an influence in one model.
+        Smallest and largest number of inputs with an influence in one model.
     learned : int
-        Rows that the model had learned from: left out, unless there are no others (see `caveat`).
+        Number of rows used for training the model: left out, unless there are no others (see `caveat`).
     alone : ndarray of shape (n_judged,), optional
         Prediction of the model alone, without gate and limits; `predicted` is the output with them [um].
     limits : Limits or None
-        That `predicted` keeps to; None: there are none, and it is the model behind the gate, or alone.
+        Limits applied to `predicted`; None: no limits, only the model behind the gate, or the model alone.
     rejected : int
-        Judged readings that the gate turned away though they were complete.
+        Number of judged readings rejected by the gate although they were complete.
     turned_away : str
-        The first reading that it turned away, and why.
+        The first rejected reading, and the reason.
     half_widths : ndarray of shape (n_judged,), optional
-        Of the band about what the model alone predicts, by the rows it has learned from alone; nan in rows without one
-        [um].
+        Half-widths of the band about the prediction of the model alone, from the training rows only; nan in rows
+        without a band [um].
     band : str
         Name of the band; empty if no row has one.
     probed : Probed or None
-        Effect of probings; None: there were none, the model ran on its readings alone.
+        Effect of probings; None: the model ran without probings.
     """
 
     model: str
@@ -127,7 +127,7 @@ class Assessment:
 
     @property
     def coverage(self) -> float:
-        """Share of the judged rows that the band holds; nan without a band."""
+        """Fraction of the judged rows inside the band; nan without a band."""
         known = self._banded
         alone = self.predicted if self.alone is None else self.alone
         if self.half_widths is None or not known.any():
@@ -147,7 +147,7 @@ class Assessment:
 
     @property
     def deployable(self) -> bool:
-        """Its method can be frozen, so that it may run at a machine."""
+        """Whether its method can be frozen, so that it may run at a machine."""
         return deployable(self.model)
 
     def metric(self, name: str) -> float:
@@ -155,28 +155,28 @@ class Assessment:
         return float("nan") if self.failure else metrics.METRICS[name](self.measured, self.predicted)
 
     def alone_metric(self, name: str) -> float:
-        """Return the metric of the model alone, without gate and limits."""
+        """Return a metric of the model alone, without gate and limits."""
         alone = self.predicted if self.alone is None else self.alone
         return float("nan") if self.failure else metrics.METRICS[name](self.measured, alone)
 
     def unprobed_metric(self, name: str) -> float:
-        """Return the metric of what would run without probings."""
+        """Return a metric of the compensator without probings."""
         return metrics.METRICS[name](self.measured, self.predicted if self.probed is None else self.probed.without)
 
     @property
     def undisturbed(self) -> float:
-        """RMS that noise and lost sensors are compared with: of the model alone, without probings."""
+        """Reference RMS for noise and lost sensors: of the model alone, without probings."""
         if self.probed is not None or self.alone is None:
             return self.unprobed_metric("rms")
         return metrics.METRICS["rms"](self.measured, self.alone)
 
     def held_metric(self, name: str) -> float:
-        """Return the metric of probings without a model, each held until the next; without one, that of nothing."""
+        """Return a metric of probings alone, each held until the next; without probings, of no compensation."""
         held = np.zeros_like(self.measured) if self.probed is None else self.probed.held(self.measured, self.test)
         return metrics.METRICS[name](self.measured, held)
 
     def none_metric(self, name: str) -> float:
-        """Return the metric without compensation."""
+        """Return a metric without compensation."""
         return (
             metrics.METRICS[name](self.measured, np.zeros_like(self.measured)) if self.measured.size else float("nan")
         )
@@ -195,10 +195,10 @@ class Assessment:
 
     @property
     def _fragile(self) -> str:
-        """Effect of noise or a lost sensor on a model that is good without them; empty if it is harmless."""
+        """Effect of noise or a lost sensor on a model that is accepted without them; empty if it is harmless."""
         if self.robustness is None or self.verdict.word != "accepted":
             return ""
-        margin = max(u.margin for u in self.verdict.units)  # one that was stated is for what was judged, not for this
+        margin = max(u.margin for u in self.verdict.units)  # a stated one applies to the judged errors only
         most = do_no_harm.MOST_MARGIN.get(self.verdict.unit, np.inf)
         return self.robustness.harm_beyond(min(margin, most))
 
@@ -224,13 +224,13 @@ class Comparison:
     ----------
     judging : Judging
     assessments : tuple of Assessment
-        Per target, method and block; with several blocks also one for all of them together.
+        Per target, method and block; with several blocks, also one over all blocks.
     collinearity : Collinearity
         Collinearity of the temperatures.
     left : int
-        Pairs of method and target that were not judged, because the work was stopped.
+        Number of pairs of method and target not judged because the work was interrupted.
     recommended : tuple of Recommendation
-        Per target, where there was something to choose.
+        Per target, if there was a choice.
     starts : tuple of (str, Start)
         Names of the recordings, and their initial states.
     """
@@ -243,13 +243,13 @@ class Comparison:
     starts: tuple[tuple[str, Start], ...] = ()
 
     def overall(self) -> tuple[Assessment, ...]:
-        """Return one assessment per target and method: over all its blocks."""
+        """Return one assessment per target and method, over all its blocks."""
         return tuple(a for a in self.assessments if a.overall)
 
     def best(self, target: str) -> Assessment | None:
-        """Return the assessment of the method to take for a target: the recommended one if it was accepted.
+        """Return the assessment of the method to be used for a target: the recommended one if it was accepted.
 
-        Without one it is the accepted one with the smallest RMS, of the methods that can be deployed.
+        Otherwise the accepted method with the smallest RMS that can be deployed; None if there is none.
         """
         fit = [a for a in self.overall() if a.target == target and a.accepted and a.deployable]
         first = {r.method for r in self.recommended if r.target == target}

@@ -17,28 +17,30 @@ BoolArray = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Robustness:
-    """Errors of a model that is replayed with disturbed readings.
+    """Errors of a model replayed with disturbed readings.
 
     Parameters
     ----------
     noise : float
         Noise on every temperature [degC].
     noise_rms : dict of str to tuple of float
-        Per noise law: mean and largest RMS over the draws [um].
+        Mean and largest RMS over the draws, per noise distribution [um].
     lost_rms : dict of str to float
         RMS with one sensor cut off [um].
     outside : float
-        Share of rows with an input outside the trained range.
+        Fraction of rows with an input outside the trained range.
     outside_rms : float
         RMS in these rows [um]; nan without any.
     none_rms : float
         RMS without compensation in all rows [um].
     unlike : float
-        Share of rows outside the joint support: inputs together unlike all that was trained, or a speed that was not.
+        Fraction of rows outside the joint support: inputs that together are unlike the training data, or an untrained
+        speed.
     unlike_rms : float
         RMS in these rows [um]; nan without any.
     together_rms : dict of str to float
-        RMS with several sensors cut off at once (``t1_C, t2_C``), of which nothing depends but what may run then [um].
+        RMS with several sensors cut off at once (``t1_C, t2_C``); used only to decide whether the model may then run
+        [um].
     """
 
     noise: float
@@ -53,25 +55,25 @@ class Robustness:
 
     @property
     def worse_than_none(self) -> tuple[str, ...]:
-        """The disturbances under which the model leaves more than no compensation: it does harm then.
+        """Disturbances under which the error of the model exceeds that without compensation, so that it does harm.
 
-        Such as ``noise of 0.4 degC`` (the mean over the draws of one of its laws) and ``loss of t3_C``.
+        Such as ``noise of 0.4 degC`` (the mean over the draws of one of its distributions) and ``loss of t3_C``.
         """
         return tuple(self._above(self.none_rms))
 
     @property
     def harm(self) -> str:
-        """Disturbance that makes it worse than no compensation, and by how much, in words; empty if none."""
+        """Disturbances that make the model worse than no compensation, with the RMS, as text; empty if none do."""
         return self.harm_beyond(0.0)
 
     def harm_beyond(self, margin: float) -> str:
-        """Return what makes it worse than no compensation by more than a margin [um], in words; empty if nothing."""
+        """Return the disturbances that make it worse than no compensation by more than a margin [um], as text."""
         told = [f"{what} ({rms:.2f} um)" for what, rms in self._above(self.none_rms + margin).items()]
         more = f" and {len(told) - 4} more" if len(told) > 4 else ""
         return f"worse than none ({self.none_rms:.2f} um RMS) with {', '.join(told[:4])}{more}" if told else ""
 
     def _above(self, limit: float) -> dict[str, float]:
-        """Return the disturbances that leave more than a limit, and what [um]: noise, then losses, the worst first."""
+        """Return the disturbances whose RMS exceeds a limit, with the RMS [um]: noise, then losses, the worst first."""
         loud = max((mean for mean, _ in self.noise_rms.values()), default=0.0)
         lost = sorted(self.lost_rms.items(), key=lambda item: -item[1])
         found = {f"noise of {self.noise:g} degC": loud} | {f"loss of {name}": rms for name, rms in lost}
@@ -79,12 +81,12 @@ class Robustness:
 
     @property
     def worst_lost(self) -> tuple[str, float]:
-        """The sensor whose loss hurts most, and the RMS without it [um]."""
+        """Sensor whose loss causes the largest error, and the RMS without it [um]."""
         return max(self.lost_rms.items(), key=lambda item: item[1], default=("", float("nan")))
 
 
 def worse(one: Robustness, other: Robustness) -> Robustness:
-    """Return one, with noise and lost sensors of whichever of the two leaves more.
+    """Return `one`, with the worse results of both for noise and lost sensors.
 
     Parameters
     ----------
@@ -107,9 +109,9 @@ def worse(one: Robustness, other: Robustness) -> Robustness:
 
 
 def pool_robustness(parts: Sequence[tuple[Robustness | None, int]]) -> Robustness | None:
-    """Pool several blocks, each with its number of rows; None if one of them was not stressed.
+    """Pool the results of several blocks, each with its number of rows; None if a block has no result.
 
-    RMS values are pooled as the root of the mean square; the largest over the draws stays the largest.
+    RMS values are pooled as the root of the mean square; for the largest over the draws, the maximum is used.
     """
     known = [(r, n) for r, n in parts if r is not None]
     if not known or len(known) < len(parts):
@@ -151,7 +153,7 @@ def pool_robustness(parts: Sequence[tuple[Robustness | None, int]]) -> Robustnes
 
 @dataclass(frozen=True)
 class Replayed:
-    """A clean prediction and what disturbances make of it."""
+    """Undisturbed prediction, and the effect of disturbances."""
 
     predicted: FloatArray
     outside: BoolArray
@@ -169,12 +171,12 @@ def stress(
     seed: int = 0,
     guard: Guard | None = None,
 ) -> Replayed:
-    """Replay a model once, clean and disturbed side by side.
+    """Replay a model once, undisturbed and disturbed in parallel.
 
-    - Noise on every temperature, independent from row to row (C-33). The paper gives a level and no law (E-C9), so both
-      are drawn: uniform within +-`noise`, and normal with `noise` as standard deviation.
-    - Each sensor cut off: its change reads zero from the start on (C-34), the worst way to fail. With a guard a watch
-      has to notice it; without one nothing does.
+    - Noise on every temperature, independent from row to row (C-33). The paper states an amplitude but no distribution
+      (E-C9), so both are drawn: uniform within +-`noise`, and normal with `noise` as standard deviation.
+    - Each sensor cut off: its change reads zero from the start on (C-34), the worst kind of failure. With a guard, a
+      watch may detect it; without, it goes undetected.
 
     Parameters
     ----------
@@ -187,11 +189,11 @@ def stress(
     noise : float
         [degC]
     draws : int
-        Number of noise draws of each law.
+        Number of noise draws per distribution.
     seed : int
         Seed of the noise.
     guard : Guard, optional
-        Readings passed while sensors fail, also several at once.
+        Readings passed by a watch while sensors fail, also several at once.
 
     Returns
     -------
@@ -222,7 +224,7 @@ def stress(
                 batch[variant, places] = reference[places]
         return batch
 
-    # sums, not a table: a long recording times two hundred variants would not fit into memory
+    # sums instead of a table: a long recording times two hundred variants would not fit into memory
     predicted, beyond = np.empty(len(measured)), np.empty(len(measured), dtype=np.bool_)
     squares = np.zeros(1 + 2 * draws + len(lost))
     for k, state in enumerate(walk(model, samples, rows, disturb)):
@@ -248,7 +250,7 @@ def stress(
 
 
 def unlike_rows(model: ErrorModel, samples: Samples, rows: BoolArray) -> BoolArray:
-    """Return a mask of the rows outside the joint support of a model; rows with a missing input are not.
+    """Return a mask of the rows outside the joint support of a model; rows with a missing input are not included.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Selection of sensors by each method, brought to one form: the sensors, why, and the tables behind it."""
+"""Selection of sensors by each method, in a common form: the sensors, the reason, and the underlying tables."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -34,18 +34,18 @@ from thermocomp.models.subsets import BestSubset
 from thermocomp.recordings.samples import Samples
 
 FloatArray = NDArray[np.float64]
-#: N of the boxcar of maximal correlation (W-04)
+#: half-width N of the boxcar of maximal correlation (W-04)
 HALF_WINDOW = 10
 
-#: Psi from which on more sensors are not worth having (W-12)
+#: Psi above which further sensors are not worthwhile (W-12)
 ENOUGH_PSI = 0.99
 
-#: methods whose work the workers of a cluster can share
+#: methods whose tasks can be shared among the workers of a cluster
 SHARED = ("pareto", "ace")
 
 
 def n_pieces(method: str, samples: Samples, judging: Judging, settings: Settings) -> int:
-    """Return the number of pieces of work of `select`, at most.
+    """Return the maximum number of tasks of `select`.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def select(
     jobs: int = 1,
     progress: Progress = lambda _, steps=1: None,  # noqa: ARG005
 ) -> tuple[Choice, ...]:
-    """Choose sensors for every target.
+    """Select sensors for every target.
 
     Parameters
     ----------
@@ -82,25 +82,25 @@ def select(
         grouping, partial-f, stepwise, subsets, ace or pareto.
     samples : Samples
     judging : Judging
-        Unseen blocks; only ``pareto`` has a use for them.
+        Unseen blocks; used by ``pareto`` only.
     settings : Settings
     jobs : int
-        Processes (or threads) to share the work among; -1 takes all cores.
+        Number of parallel processes (or threads); -1: one per core.
     progress : callable
-        Called with a line of text after each piece of work, of which there are `n_pieces`; and with ``steps=0`` about
+        Called with a line of text after each task; there are `n_pieces` of them. Also called with ``steps=0`` about
         once a second during a long search.
 
     Returns
     -------
     tuple of Choice
-        One per target; for ``pareto`` and ``ace`` one for all targets together. Where a method fails for a target it is
-        one without sensors, with `Choice.failure`.
+        One per target; for ``pareto`` and ``ace`` one for all targets together. If a method fails for a target, its
+        choice has no sensors, and `Choice.failure` states the reason.
 
     Raises
     ------
     InputError
         Rows occur twice in the samples and would be used for training and judging at the same time (``pareto``).
-        A cluster shall do the work of another method than ``pareto`` and ``ace``.
+        A cluster is requested for a method other than ``pareto`` and ``ace``.
     Exception
         Failure of the method, if it fails for all targets.
     """
@@ -128,7 +128,7 @@ def select(
             else:
                 found.append(choosers[method](candidates))
                 progress(f"{target.name}: chosen")
-        except Exception as e:  # noqa: BLE001 - whatever fails for one target, the others have their choice
+        except Exception as e:  # noqa: BLE001 - whatever fails for one target, the other targets keep their choice
             errors.append(e)
             why = explain(e)
             found.append(
@@ -151,7 +151,7 @@ def select(
 
 
 def _by_grouping(candidates: Candidates, settings: Settings) -> Choice:
-    """Choose by correlation grouping and successive regression (H-01 to H-06)."""
+    """Select by correlation grouping and successive regression (H-01 to H-06)."""
     found = CorrelationGrouping(
         threshold=settings.threshold, absolute=settings.unsigned, reference=settings.reference
     ).fit(candidates.X, candidates.y)
@@ -194,7 +194,7 @@ def _other_thresholds(candidates: Candidates, found: CorrelationGrouping, settin
     kept = list(found.candidates_)
     tri = triangle(join_columns(values[:, kept], candidates.y), intercept=True)
     swept = grouping.sweep(X[:, kept], tri, absolute=settings.unsigned)
-    # thresholds that change the groups but not what is chosen from them are one row
+    # thresholds that change the groups but not the sensors chosen are merged into one row
     alike = [
         list(part)
         for _, part in groupby(swept, lambda s: (len(s.interval.groups), s.choice.selected if s.choice else s.failure))
@@ -223,7 +223,7 @@ def _other_thresholds(candidates: Candidates, found: CorrelationGrouping, settin
 
 
 def _by_steps(candidates: Candidates, method: str) -> Choice:
-    """Choose by stepwise regression: ``partial-f`` (T-02 to T-06) or ``stepwise``, Chen's second-order one (C-15)."""
+    """Select by stepwise regression: ``partial-f`` (T-02 to T-06) or ``stepwise``, Chen's second-order one (C-15)."""
     estimator: PartialF | SecondOrderRegression = PartialF() if method == "partial-f" else SecondOrderRegression()
     found = estimator.fit(candidates.X, candidates.y)
     log: tuple[StepwiseStep, ...] = found.log_
@@ -248,7 +248,7 @@ def _by_steps(candidates: Candidates, method: str) -> Choice:
 
 
 def _by_subsets(candidates: Candidates, settings: Settings, *, jobs: int, progress: Progress) -> Choice:
-    """Choose the exact best subset of every size (H-05), and a size."""
+    """Select the exact best subset of every size (H-05), and a size."""
     most = min(settings.most("subsets"), len(candidates.names))
     found = BestSubset(
         criterion=settings.criterion,
@@ -298,7 +298,7 @@ def _by_subsets(candidates: Candidates, settings: Settings, *, jobs: int, progre
 
 
 def _by_maximal_correlation(samples: Samples, settings: Settings, *, jobs: int, progress: Progress) -> Choice:
-    """Choose for all targets together by maximal correlation (W-10 to W-12); every thermal cycle is a data set."""
+    """Select for all targets together by maximal correlation (W-10 to W-12); every thermal cycle is a data set."""
     temperatures = [j for j, c in enumerate(samples.inputs) if c.quantity == "temperature"]
     names = [samples.inputs[j].name for j in temperatures]
     targets = tuple(c.name for c in samples.targets)

@@ -1,4 +1,4 @@
-"""Effect of random sensor error on the R2 of unchanged models (Hwang, section 3.2.4 and Fig. 6; H-18)."""
+"""Effect of random sensor error on the R2 of frozen models (Hwang, section 3.2.4 and Fig. 6; H-18)."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -23,9 +23,9 @@ class Sensitivity:
     Parameters
     ----------
     r_squared : float
-        Without the error, about the mean.
+        R2 about the mean, without sensor error.
     draws : ndarray of shape (n_draws,)
-        With it, draw by draw.
+        R2 with sensor error, for each draw.
     """
 
     r_squared: float
@@ -52,10 +52,11 @@ def sensitivity(
     draws: int = 100,
     seed: int = 0,
 ) -> dict[str, Sensitivity]:
-    """Replay models with random error on every temperature, the same error for all of them.
+    """Replay models with random error on every temperature, the same error for all models.
 
-    Nothing is fitted again. The error is independent from sensor to sensor and from row to row, and also on the reading
-    that counts as zero. The paper gives neither its law nor its size (E-H8): the size here is that of C-33.
+    The models are not refitted. The error is independent from sensor to sensor and from row to row, and also affects
+    the readings of the zero. The paper states neither its distribution nor its size (E-H8): the default size is that of
+    C-33.
 
     Parameters
     ----------
@@ -64,7 +65,7 @@ def sensitivity(
     samples : Samples
         With the inputs of all models.
     rows : ndarray of bool of shape (n_rows,)
-        Rows to judge; those without a measured deviation are passed over.
+        Rows to judge; rows without a measured deviation are ignored.
     size : float
         Uniform: within +-size; normal: standard deviation [degC].
     law : {'uniform', 'normal'}
@@ -80,9 +81,9 @@ def sensitivity(
     Raises
     ------
     InputError
-        Models of different targets or none, or a bad size, law or number of draws.
+        The models have different targets or none are given, or size, distribution or number of draws is invalid.
     FitError
-        The deviation in these rows is constant, and R2 not defined.
+        The deviation in these rows is constant, so R2 is undefined.
     """
     targets = {m.target for m in models.values()}
     if len(targets) != 1:
@@ -118,10 +119,10 @@ def _squares(
     draws: int,
     seed: int,
 ) -> FloatArray:
-    """Return the residual sum of squares without error, then with each draw of it; shape (1 + draws,)."""
+    """Return the residual sum of squares without error, then for each draw; shape (1 + draws,)."""
     columns = [[c.name for c in samples.inputs].index(i.name) for i in model.inputs]
     temperatures = np.array([c.quantity == "temperature" for c in samples.inputs], dtype=np.bool_)
-    # each row has its own error, whatever the model asks for
+    # each row has its own error, whatever rows the model needs
     walked = np.isin(samples.test, samples.test[judged])
     order = np.argsort(samples.test[walked], kind="stable")
     row_numbers = np.flatnonzero(walked)[order]

@@ -1,4 +1,4 @@
-"""Sets of 1, 2, ... temperatures for all targets at once, by the rows that may be learned from."""
+"""Sets of 1, 2, ... temperatures for all targets together, selected on the training rows."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,25 +13,25 @@ from thermocomp.recordings.samples import Samples
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-#: what targets of different units are counted in: the share of what there is without compensation
+#: common unit for targets of different units: percent of the error without compensation
 PERCENT = "%"
 
 
 def weigh_targets(samples: Samples, rows: BoolArray) -> tuple[str, FloatArray]:
-    """Return the unit that all targets are counted in, and what one of it is in each target's own, (n_targets,).
+    """Return a common unit of all targets, and its size in the unit of each target, (n_targets,).
 
     Parameters
     ----------
     samples : Samples
     rows : ndarray of bool of shape (n_rows,)
-        Without compensation the targets' root mean square is that of these.
+        Rows for the root mean square of the targets without compensation.
 
     Returns
     -------
     unit : str
-        Unit of the targets; `PERCENT` of the error without compensation where they have several.
+        Unit of the targets; `PERCENT` of the error without compensation if their units differ.
     scales : ndarray of shape (n_targets,)
-        1 in the first case. A target without a number, or that does not move, counts in its own unit.
+        1 if the unit is common. Targets without values or without variation keep their own unit.
     """
     units = {c.unit for c in samples.targets}
     if len(units) == 1:
@@ -43,26 +43,26 @@ def weigh_targets(samples: Samples, rows: BoolArray) -> tuple[str, FloatArray]:
 
 
 def choose_sets(samples: Samples, most: int, learn: BoolArray) -> SensorSets:
-    """Choose sets of temperatures by what the model `averaged` loses without the others.
+    """Select sets of temperatures by the loss of accuracy of the model `averaged` without the others.
 
     Parameters
     ----------
     samples : Samples
         The inputs are temperatures and spindle speeds.
     most : int
-        Largest set, in addition to that of all.
+        Size of the largest set, apart from the set of all temperatures.
     learn : ndarray of bool of shape (n_rows,)
-        Rows whose deviations may be seen.
+        Training rows.
 
     Returns
     -------
     SensorSets
-        Places among the temperatures, in the order of the inputs; errors and losses in the unit of `weigh_targets`.
+        Indices among the temperatures, in the order of the inputs; errors and losses in the unit of `weigh_targets`.
 
     Raises
     ------
     FitError
-        Too few rows with a number in every input and target.
+        There are too few rows with values of every input and target.
     """
     seen = learn & samples.valid & np.isfinite(samples.deviations).all(axis=1)
     if seen.sum() < MIN_ROWS:
@@ -73,7 +73,7 @@ def choose_sets(samples: Samples, most: int, learn: BoolArray) -> SensorSets:
             f"at least {MIN_ROWS} are needed to choose sensors by{several}"
         )
     _, scales = weigh_targets(samples, seen)
-    # a model with a memory also gets what the machine went through between the rows it learns from
+    # a model with memory also receives the rows between its training rows
     rows = samples.valid & np.isin(samples.test, samples.test[seen])
     driven, change, learned = samples.take(rows), samples.change()[rows], seen[rows]
     speeds = [j for j, c in enumerate(samples.inputs) if c.quantity == "spindle_speed"]

@@ -9,17 +9,17 @@ from thermocomp.judging.pieces import elsewhere
 
 @contextmanager
 def shared_among(scheduler: str | None) -> Iterator[None]:
-    """Have `thermocomp.judging.pieces.work_through` share its work among the workers of a Dask cluster.
+    """Distribute the tasks of `thermocomp.judging.pieces.work_through` among the workers of a Dask cluster.
 
     Parameters
     ----------
     scheduler : str or None
-        Address of the scheduler, such as ``tcp://192.168.1.20:8786``; None: the work stays on this machine.
+        Address of the scheduler, such as ``tcp://192.168.1.20:8786``; None: tasks run on this machine.
 
     Raises
     ------
     ClusterError
-        The cluster cannot be used, or is lost later on; see `thermocomp.judging.cluster.connect`.
+        The cluster cannot be used, or is lost later; see `thermocomp.judging.cluster.connect`.
     MissingExtraError
         Dask is not installed.
     """

@@ -1,4 +1,4 @@
-"""Training and validation data: rows, spans of time, thermal cycles, days or files, never at random."""
+"""Training and validation data: split by rows, time, thermal cycles, days or files, never at random."""
 
 from dataclasses import dataclass
 
@@ -12,15 +12,15 @@ BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
 
 
-#: [s]
+#: length of a day [s]
 DAY = 86400.0
-#: rows below which a stretch says nothing about a cycle
+#: minimum number of rows of an informative cycle
 MIN_ROWS = 20
 
 
 @dataclass(frozen=True, eq=False)
 class Split:
-    """One training and the unseen block it is judged on.
+    """A training part and the unseen block judged with it.
 
     Parameters
     ----------
@@ -28,9 +28,9 @@ class Split:
         Name of the unseen block.
     learn, judge : ndarray of bool of shape (n_rows,)
     whole : bool
-        The gate judges the block as one; without it, each thermal cycle in it.
+        The gate judges the block as one unit; otherwise each thermal cycle in it.
     stretch : bool
-        It continues from what was learned: its cycles are not independent of that.
+        The block continues the training data: its cycles are not independent of them.
     """
 
     block: str
@@ -41,18 +41,18 @@ class Split:
 
     @property
     def name(self) -> str:
-        """Name of the left-out unit, without the word for its kind."""
+        """Name of the left-out unit, without its kind."""
         return self.block.partition(" ")[2]
 
 
 @dataclass(frozen=True)
 class Judging:
-    """Split or splits by which models are judged.
+    """Scheme of one or more splits by which models are judged.
 
     Parameters
     ----------
     name : str
-        In words, for tables and reports.
+        Description for tables and reports.
     splits : tuple of Split
     """
 
@@ -61,22 +61,22 @@ class Judging:
 
 
 def by_rows(samples: Samples, train: float, test: float) -> Judging:
-    """Learn from the first share of the rows, judge on the next.
+    """Train on the first fraction of the rows, judge on the next.
 
     Parameters
     ----------
     samples : Samples
     train, test : float
-        Shares of all rows, such as 0.75 and 0.25.
+        Fractions of all rows, such as 0.75 and 0.25.
 
     Raises
     ------
     InputError
-        A share is not between 0 and 1, or their sum is above 1.
+        A fraction is not between 0 and 1, or their sum exceeds 1.
     """
     if not (0 < train < 1 and 0 < test < 1 and train + test <= 1 + 1e-9):
         raise InputError(f"split {train:g}/{test:g}: expected two shares between 0 and 1 whose sum is at most 1")
-    own = np.flatnonzero(samples.cycle >= 0)  # not those of earlier files, which tests continue from
+    own = np.flatnonzero(samples.cycle >= 0)  # without rows of earlier files that tests continue from
     n = len(own)
     ends = [*own.tolist(), len(samples)]
     first, stop = ends[round(n * train)], ends[min(n, round(n * (train + test)))]
@@ -85,9 +85,9 @@ def by_rows(samples: Samples, train: float, test: float) -> Judging:
 
 
 def by_time(samples: Samples, train_s: float, test_s: float) -> Judging:
-    """Learn from the first seconds of the recordings, judge on the next.
+    """Train on the first seconds of the recordings, judge on the next.
 
-    Time runs through the tests one after the other, without the breaks between them.
+    Time is counted through consecutive tests, without the breaks between them.
 
     Parameters
     ----------
@@ -109,24 +109,24 @@ def by_time(samples: Samples, train_s: float, test_s: float) -> Judging:
 
 
 def join_short_cycles(cycle: IntArray, test: IntArray, least: int = MIN_ROWS) -> list[IntArray]:
-    """Return the thermal cycles to judge by: those that are too short join the previous one in their test.
+    """Return the thermal cycles for judging: cycles that are too short are joined to the previous one of their test.
 
     Parameters
     ----------
     cycle, test : ndarray of int of shape (n_rows,)
         Cycle and test of each row, in chronological order.
     least : int
-        Smallest number of informative rows.
+        Minimum number of rows.
 
     Returns
     -------
     list of ndarray of int
-        Cycles of each stretch. The first of a test joins the next; a test that is too short as a whole stays one.
+        Cycles of each block. If the first of a test is too short, it joins the next; a test is never joined to another.
     """
     found: list[IntArray] = []
     for k in np.unique(test):
         mine: list[list[int]] = []
-        short = True  # what came before is
+        short = True  # True if the previous block is too short
         for c in np.unique(cycle[(test == k) & (cycle >= 0)]).tolist():
             n = int((cycle == c).sum())
             if mine and (short or n < least):
@@ -139,13 +139,13 @@ def join_short_cycles(cycle: IntArray, test: IntArray, least: int = MIN_ROWS) ->
 
 
 def name_cycles(samples: Samples, block: IntArray) -> str:
-    """Return the name of a cycle, or of several one after the other."""
+    """Return the name of a cycle, or of several consecutive cycles."""
     first, last = (samples.cycle_names[c] for c in (block[0], block[-1]))
     return first if len(block) == 1 else f"{first} to {last}"
 
 
 def leave_one_cycle_out(samples: Samples) -> Judging:
-    """Judge on each thermal cycle in turn, learn from all others; see `join_short_cycles`.
+    """Judge on each thermal cycle in turn, train on all others; see `join_short_cycles`.
 
     Raises
     ------
@@ -160,7 +160,7 @@ def leave_one_cycle_out(samples: Samples) -> Judging:
         )
     blocks = join_short_cycles(samples.cycle, samples.test)
     joined = f", {n - len(blocks)} of them too short: out with the one before" if 1 < len(blocks) < n else ""
-    if len(blocks) == 1:  # all together: there would be nothing to learn from
+    if len(blocks) == 1:  # all cycles joined: no training data would be left
         blocks = [np.array([k]) for k in range(n)]
     splits = []
     for block in blocks:
@@ -170,7 +170,7 @@ def leave_one_cycle_out(samples: Samples) -> Judging:
 
 
 def leave_one_file_out(samples: Samples) -> Judging:
-    """Judge on each file in turn, learn from all others; what a day of several jobs leaves is judged as one.
+    """Judge on each file in turn, train on all others; each file is judged as one unit.
 
     Raises
     ------
@@ -187,9 +187,9 @@ def leave_one_file_out(samples: Samples) -> Judging:
 
 
 def leave_one_day_out(samples: Samples) -> Judging:
-    """Judge on each day in turn, learn from all others; one with too few rows goes with the day before.
+    """Judge on each day in turn, train on all others; a day with too few rows is joined to the previous day.
 
-    A thermal cycle belongs to the day on which it begins, unless it is longer than a day: then midnight splits it.
+    A thermal cycle belongs to the day on which it begins, unless it is longer than a day: then it is split at midnight.
 
     Raises
     ------
@@ -204,7 +204,7 @@ def leave_one_day_out(samples: Samples) -> Judging:
             f"leaving one day out: {name} has no time stamps, so its days are unknown; write date and time into its "
             "time column, or leave out cycles or files"
         )
-    own = samples.cycle >= 0  # not those of earlier files, which tests continue from
+    own = samples.cycle >= 0  # without rows of earlier files that tests continue from
     for k in np.unique(samples.cycle[own]):
         rows = np.flatnonzero(samples.cycle == k)
         if samples.time[rows[-1]] - samples.time[rows[0]] <= DAY:
@@ -222,18 +222,18 @@ def leave_one_day_out(samples: Samples) -> Judging:
 
 
 def parse(text: str, samples: Samples) -> Judging:
-    """Understand a split as written on the command line.
+    """Parse a split as written on the command line.
 
     Parameters
     ----------
     text : str
-        Shares of the rows (``0.75/0.25``) or hours (``20h/8h``).
+        Fractions of the rows (``0.75/0.25``) or hours (``20h/8h``).
     samples : Samples
 
     Raises
     ------
     InputError
-        It is neither.
+        The text has neither form.
     """
     parts = text.split("/")
     try:

@@ -1,4 +1,4 @@
-"""Whole jobs: fit one method with its honest error, judge model files on recordings."""
+"""Complete workflows: fit one method with its honest error, judge model files on recordings."""
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -46,18 +46,18 @@ def _silent(_: str) -> None:
 
 @dataclass(frozen=True)
 class Fitted:
-    """A method fitted to everything, with its error on what it had not seen.
+    """A method fitted to all rows, with its error on unseen data.
 
     Parameters
     ----------
     models : tuple of ErrorModel
         One per target.
     estimators : tuple of ThermalRegressor
-        The same before freezing.
+        Estimators of the models, before freezing.
     r_squared : tuple of float
-        In-sample, about the mean: what a fit promises, not what it keeps.
+        In-sample R2, about the mean: goodness of fit, not of prediction.
     comparison : Comparison
-        The method on the unseen blocks.
+        Results of the method on the unseen blocks.
     """
 
     models: tuple[ErrorModel, ...]
@@ -89,15 +89,15 @@ def fit(
     rules : Rules
         Rules stated before judging.
     support : Support
-        For the models.
+        Support of the models.
     recordings : sequence of Recording
-        The tests of `samples`, in their order: for the surroundings and the days in the models' validity.
+        Tests of `samples`, in the same order: for ambient temperatures and days in the models' validity.
     limits : Limits
-        Limits of the compensator that is judged with them.
+        Limits of the judged compensator.
     jobs : int
-        Processes to share the work among; -1 takes all cores.
+        Number of parallel processes; -1: one per core.
     progress : callable
-        Called with a line of text after each piece of work: ``n_pieces`` of them and one per target.
+        Called with a line of text after each task: ``n_pieces`` times, and once per target.
 
     Returns
     -------
@@ -155,7 +155,7 @@ def honest_error(overall: Assessment, judging: Judging) -> HonestError:
     Raises
     ------
     InputError
-        The method could not be fitted in one of the splits, so there is no error to state.
+        The method could not be fitted in one of the splits, so no error can be stated.
     """
     if overall.failure:
         raise InputError(f"{overall.target}: cannot be judged: {overall.failure}")
@@ -191,7 +191,7 @@ class Judged:
     assessments : tuple of Assessment
         Per model and cycle, and per model over all cycles.
     seen : tuple of str
-        Names of recordings that a model was fitted to, as they are: they are not judged on if there is another.
+        Names of recordings to which a model was fitted unchanged: not judged on if there are others.
     validity : Validity or None
         Conditions covered by the thermal cycles of these recordings.
     starts : tuple of (str, Start)
@@ -221,22 +221,22 @@ def assess(
 ) -> Judged:
     """Judge frozen models on recordings: per cycle, with noise, with lost sensors, outside the trained range.
 
-    Rows that a model has learned from are left out and counted, whatever file they stand in; if no others are there,
-    the model is refused: see `thermocomp.recordings.fingerprints`.
+    Rows on which a model was trained are left out and counted, whichever file contains them; if there are no other
+    rows, the model is refused: see `thermocomp.recordings.fingerprints`.
 
     Parameters
     ----------
     models : sequence of ErrorModel
     recordings : sequence of Recording
-        With the models' inputs and targets.
+        With the inputs and targets of the models.
     rules : Rules
         Rules stated before judging.
     limits : Limits
-        Limits of the compensator that is judged with them.
+        Limits of the judged compensator.
     starts : Start or sequence of Start, optional
         Initial state of each recording, or of all of them. Default: determined from the recordings.
     probings : Probings, optional
-        Made in the rows that are judged: see `thermocomp.runtime.adaptation`.
+        Made in the judged rows: see `thermocomp.runtime.adaptation`.
     progress : callable
         Called with a line of text per model.
 
@@ -247,8 +247,8 @@ def assess(
     Raises
     ------
     InputError
-        There is no model, one that is to be probed was never judged, a channel that all models need is not in the
-        recordings, or it cannot be told how one of these begins. A model that fails where others do not is refused.
+        There is no model, a model to be probed was never judged, a channel that all models need is missing from the
+        recordings, or the initial state of a recording is unknown. A model that fails alone is refused.
     """
     if not models:
         raise InputError("no model given: name a model file, or give at least one model")
@@ -285,7 +285,7 @@ def assess(
             overall, judged = _assess(model, samples, known, rules, limits, probings, widening, guard, names)
             covered = covered or coverage.find_validity(samples, judged, recordings)
             cut = [replace(a, learned=0) for a in split_by_cycle(overall)]
-        except Exception as e:  # noqa: BLE001 - whatever fails for one model, the others have their results
+        except Exception as e:  # noqa: BLE001 - whatever fails for one model, the other models keep their results
             errors.append(e)
             found.append(_refused(model, explain(e)))
             continue
@@ -297,7 +297,7 @@ def assess(
 
 
 def _known_targets(models: Sequence[ErrorModel], recordings: Sequence[Recording]) -> list[Channel]:
-    """Return the targets that the first recording has; it must have one."""
+    """Return the targets available in the first recording; there must be at least one."""
     found = []
     for recording in recordings[:1]:
         for model in models:
@@ -309,7 +309,7 @@ def _known_targets(models: Sequence[ErrorModel], recordings: Sequence[Recording]
 
 
 def _stacked(model: ErrorModel, recordings: Sequence[Recording], starts: Start | Sequence[Start]) -> Samples:
-    """Return the data of recordings that a model needs, without rows in trouble."""
+    """Return the data of recordings that a model needs, without faulty rows."""
     samples = stack(
         recordings,
         [model.target],
@@ -322,7 +322,7 @@ def _stacked(model: ErrorModel, recordings: Sequence[Recording], starts: Start |
 
 
 def _refused(model: ErrorModel, why: str) -> Assessment:
-    """Return the assessment of a model for which there was nothing to judge it on."""
+    """Return the assessment of a model without data for judging."""
     nothing, nowhere = np.empty(0), np.empty(0, np.intp)
     return Assessment(
         model=_name(model),
@@ -347,7 +347,7 @@ def _name(model: ErrorModel) -> str:
 
 
 def _called_as_in(model: ErrorModel, samples: Samples) -> Samples:
-    """Return samples whose channels have the names of the model: a file may have others for them."""
+    """Return samples whose channels have the names used in the model: names in a file may differ."""
     (target,) = samples.targets
     inputs = zip(samples.inputs, model.inputs, strict=True)
     return replace(
@@ -372,13 +372,13 @@ def _assess(
     guard: Guard | None,
     looked_after: Sequence[str],
 ) -> tuple[Assessment, Judging]:
-    """Judge a model on unseen rows (not `known`); on all rows if there are no others, and report this.
+    """Judge a model on unseen rows (not `known`); on all rows if there are no others, with a caveat.
 
     Returns
     -------
     Assessment
     Judging
-        Its units.
+        Scheme with its units.
     """
     judged = np.isfinite(samples.deviations[:, 0])
     n, of = int((known & judged).sum()), int(judged.sum())
@@ -402,7 +402,7 @@ def _assess(
 
 
 def _guard(model: ErrorModel, samples: Samples, watched: Samples | None, known: list[Guard]) -> Guard | None:
-    """Return the readings that a model's watch passes while sensors fail; models of one file share it (`known`)."""
+    """Return the readings that a model's watch passes while sensors fail; shared by models of one file (`known`)."""
     watch = model.watch
     if watch is None or watched is None or not can_look(watch, watched):
         return None
@@ -419,7 +419,7 @@ def _guard(model: ErrorModel, samples: Samples, watched: Samples | None, known: 
 
 
 def _goes_on(model: ErrorModel, samples: Samples, known: BoolArray) -> bool:
-    """Return whether what is judged continues from what was learned: its level is that of the learned part."""
+    """Return whether the judged rows continue the training data, so that their level is that of the training part."""
     judged = np.unique(samples.test[~known & np.isfinite(samples.deviations[:, 0])])
     earlier = {r.fingerprint for k in judged for r in (samples.starts[k].earlier if samples.starts else ())}
     return bool(np.isin(samples.test[known], judged).any() or not earlier.isdisjoint(_hashes(model)))

@@ -1,4 +1,4 @@
-"""The service that a configuration describes."""
+"""Construction of a service from its configuration."""
 
 from collections.abc import Sequence
 
@@ -28,7 +28,7 @@ def build(settings: ServiceSettings) -> Service:
     Raises
     ------
     InputError
-        A file or a folder is not there, a model file or an experiment cannot be used, or none of the models may run.
+        A file or directory is missing, a model file or an experiment is invalid, or none of the models may run.
     """
     config, folder = settings
     if missing := list(find_faults(settings)):

@@ -1,4 +1,4 @@
-"""The configuration of the service: a TOML file, read strictly, all that is wrong with it at once."""
+"""Configuration of the service: a TOML file, read strictly, with all its errors reported at once."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -30,7 +30,7 @@ from thermocomp.live.adapters.sections import (
 
 @dataclass(frozen=True, kw_only=True)
 class Page:
-    """The page to watch it on.
+    """Web page of the service.
 
     Parameters
     ----------
@@ -70,15 +70,15 @@ class Page:
 
 @dataclass(frozen=True, kw_only=True)
 class MachineOf:
-    """A machine file in place of models: offset and slope of each axis, through one point of the work volume.
+    """Machine file used instead of models: offset and slope of each axis, for lines through one point of the volume.
 
     Parameters
     ----------
     file : str
     at : tuple of 3 float
-        Positions of the other axes while one moves [mm].
+        Positions of the stationary axes while one axis moves [mm].
     tool : tuple of 3 float or None
-        From the gauge point to the tip [mm]; the machine file's own if not given.
+        Vector from the gauge point to the tip [mm]. Default: the tool of the machine file.
     """
 
     file: str
@@ -93,14 +93,14 @@ class JournalOut:
     Parameters
     ----------
     file : str
-        Its files are numbered: ``live.db`` is ``live.000001.db`` and so on.
+        Path of the journal; its files are numbered: ``live.db`` becomes ``live.000001.db`` and so on.
     size_mb : float
-        A file that has become larger is followed by a new one.
+        Size above which a new file is started [MB].
     files : int
-        Maximum number of files: the oldest is removed.
+        Maximum number of files; the oldest is removed.
     channels : dict of str to str
-        Quantity of what readings hold beside the models' inputs, such as ``{t9_C = "temperature"}``: kept, too. A
-        displacement that is named as a target measures what its correction leaves.
+        Quantity of channels recorded in addition to the models' inputs, such as ``{t9_C = "temperature"}``. A
+        displacement with the name of a target measures the residual under its correction.
     """
 
     file: str
@@ -129,23 +129,23 @@ class Config:
     sources, sinks : tuple
         Sources of readings, receivers of corrections.
     models : tuple of str
-        Model files, a target each model; or none, and a machine.
+        Model files, one target each; or none if a machine is given.
     machine : MachineOf or None
     probes : tuple
         Sources of measurements of the tool point.
     state : str
-        File that the state is kept in; without one every start is a cold one.
+        File of the saved state; without one every start is a cold start.
     limits : Limits
     shadow : bool
-        Nothing moves: the models are watched.
+        Apply no corrections: the models are only observed.
     speed : float
-        Seconds of the machine in a second of the world: for the virtual machine and recordings alone.
+        Machine time per unit of real time: for the virtual machine and recordings only.
     page : Page or None
     journal : JournalOut or None
     own_compensation : {'on', 'off', 'unknown'}
         Whether the controller compensates for temperature by itself.
     at_stop : {'hold', 'fade'}
-        Corrections after a stop: stay as they are, or go to zero first, within the limits.
+        Corrections after a stop: unchanged, or faded to zero first, within the limits.
     """
 
     sources: tuple[SourceSection, ...]
@@ -208,7 +208,7 @@ class Config:
 
 
 def _place(one: SourceSection | SinkSection | Probings) -> str:
-    """Return the resource that two links must not share."""
+    """Return the resource of a link, which no other link may share."""
     if isinstance(one, OnBroker):
         return f"topic = {one.topic!r} of {one.host}:{one.port}"
     found = {"file": getattr(one, "file", ""), "socket": getattr(one, "socket", "")}
@@ -216,13 +216,13 @@ def _place(one: SourceSection | SinkSection | Probings) -> str:
 
 
 class ServiceSettings(NamedTuple):
-    """A configuration and the folder that its files are named from."""
+    """A configuration, and the folder against which its file names are resolved."""
 
     config: Config
     folder: Path
 
 
-#: tables whose ``kind`` is the name of an entry point of ``thermocomp.sources`` and ``thermocomp.sinks``
+#: tables whose ``kind`` is the name of an entry point of ``thermocomp.sources`` or ``thermocomp.sinks``
 _KINDS: tuple[Literal["sources", "sinks"], ...] = ("sources", "sinks")
 _PLAIN = {
     "missing": "is missing",
@@ -245,7 +245,7 @@ def read_config(path: str | Path) -> ServiceSettings:
     Raises
     ------
     InputError
-        There is no such file, it is no TOML, or something in it is wrong: all of it is listed, each with its place.
+        File missing, not TOML, or invalid: all errors are listed, each with its position.
     """
     content = read_toml(path, "configuration of the service")
     if unfit := list(_unfit(content)):
@@ -263,7 +263,7 @@ def read_config(path: str | Path) -> ServiceSettings:
 
 
 def _adapter(content: dict[str, Any]) -> TypeAdapter[Config]:
-    """Return the validator of a configuration: sections of this package, and those of plug-ins that it names."""
+    """Return the validator of a configuration: sections of this package, and of the plug-ins that it names."""
     fields = [(group, tuple[_section_of(group, content.get(group)), ...], ()) for group in _KINDS]  # type: ignore[misc]
     made = make_dataclass("Config", [fields[0][:2], fields[1]], bases=(Config,), frozen=True, kw_only=True)
     return TypeAdapter(with_config(ConfigDict(strict=True, extra="forbid", allow_inf_nan=False))(made))
@@ -274,7 +274,7 @@ def _section_of(group: Literal["sources", "sinks"], tables: Any) -> Any:
     named = {kind for kind in found_kinds if isinstance(kind, str)}
     known = find_plugins(group)
     found = [_load_section(e) for name, e in known.items() if e.value.startswith("thermocomp.") or name in named]
-    return Annotated[Union[tuple(found)], Discriminator("kind")]  # noqa: UP007 - made of a list
+    return Annotated[Union[tuple(found)], Discriminator("kind")]  # noqa: UP007 - built from a list
 
 
 def _load_section(entry: EntryPoint) -> type:
@@ -287,7 +287,7 @@ def _load_section(entry: EntryPoint) -> type:
 
 
 def _unfit(value: Any, place: str = "") -> Iterator[str]:
-    """Yield the keys and texts that cannot be printed, or are longer than any topic."""
+    """Yield errors for keys and texts that are not printable or exceed the length limit."""
     if isinstance(value, str) and (why := explain_unfit(value, 65_535)):
         yield f"{place}: {why}"
     pairs = value.items() if isinstance(value, dict) else enumerate(value, 1) if isinstance(value, list) else ()
@@ -301,7 +301,7 @@ def _unfit(value: Any, place: str = "") -> Iterator[str]:
 def _behind(
     adapter: TypeAdapter[Config], content: dict[str, Any], errors: Sequence[ErrorDetails]
 ) -> list[ErrorDetails]:
-    """Return the other faults in tables with a key of a wrong type: these are then not validated as a whole."""
+    """Return further errors in tables that have a key of a wrong type: such tables are not fully validated."""
     content = deepcopy(content)
     tables = set[tuple[int | str, ...]]()
     for error in errors:
@@ -320,7 +320,7 @@ def _behind(
 
 
 def _keys(loc: tuple[int | str, ...]) -> tuple[int | str, ...]:
-    """Return the keys and places in lists that lead to an error: the kind of an entry, behind its place, is none."""
+    """Return keys and list indices of an error location, without the kind of an entry after its list index."""
     kinds = {"mqtt", "simulated", *find_plugins("sources"), *find_plugins("sinks")}
     pairs = zip((None, *loc), loc, strict=False)
     return tuple(k for before, k in pairs if not (k in kinds and isinstance(before, int)))

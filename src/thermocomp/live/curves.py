@@ -1,4 +1,4 @@
-"""Curves of the page over time: a row of numbers at intervals."""
+"""Curves shown on the page: rows of values at fixed intervals."""
 
 from collections import deque
 
@@ -6,12 +6,12 @@ from thermocomp.live.latest import Latest
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.state import Compensated
 
-#: points of each curve that are kept to be shown, and time between two [s of the machine]
+#: number of points kept per curve, and interval between two points [s of machine time]
 POINTS, EVERY = 720, 30.0
 
 
 class Curves(deque[dict[str, float]]):
-    """Rows of numbers by name, ``time`` first; the oldest go.
+    """Rows of values by name, ``time`` first; the oldest rows are dropped.
 
     Parameters
     ----------
@@ -23,12 +23,12 @@ class Curves(deque[dict[str, float]]):
         self._heat = {i.name for m in compensator.models for i in m.inputs if i.quantity == "temperature"}
 
     def take(self, now: float, said: Compensated, latest: Latest) -> None:
-        """Keep a row, if the last one is old enough.
+        """Append a row if the last one is old enough.
 
         Parameters
         ----------
         now : float
-            On the clock of the machine [s].
+            Machine time [s].
         said : Compensated
         latest : Latest
         """

@@ -1,4 +1,4 @@
-"""Recent events for display; the number of frequent kinds is limited so that they cannot displace the others."""
+"""Recent events for display; events of frequent kinds are limited in number so as not to displace others."""
 
 import time
 from collections import deque
@@ -6,20 +6,20 @@ from dataclasses import dataclass
 
 from thermocomp.core.shown import escape
 
-#: events that are kept to be shown, and characters of one
+#: number of events kept for display, and maximum length of an event [characters]
 EVENTS, LONGEST = 200, 1_000
-#: kinds of which others can cause any number, and how many of one kind are shown within a minute
+#: kinds whose number is limited, and maximum number of one kind shown per minute
 LIMITED, MOST = ("link", "probing"), 30
 
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened.
+    """An event of the service.
 
     Parameters
     ----------
     time : float
-        Time of the machine, seconds since 1970.
+        Machine time, seconds since 1970.
     kind : str
         ``reference``, ``state``, ``sensor``, ``probing``, ``link`` or ``service``.
     text : str
@@ -39,12 +39,12 @@ class Events(deque[Event]):
         self._left_out = dict.fromkeys(LIMITED, 0)
 
     def tell(self, time_of_it: float, kind: str, text: str) -> Event | None:
-        """Add an event and return it; None if there were too many of its kind: the next one gives their number.
+        """Add an event and return it; None if the limit of its kind is exceeded: the next states the number omitted.
 
         Parameters
         ----------
         time_of_it : float
-            Time of the machine, seconds since 1970.
+            Machine time, seconds since 1970.
         kind, text : str
             As for `Event`; unprintable characters are shown escaped.
         """

@@ -1,4 +1,4 @@
-"""Files named in a configuration and their state: all faults that would prevent the start of the service, at once."""
+"""Checks of the files named in a configuration: all faults that would prevent the start of the service, at once."""
 
 import os
 import re
@@ -14,12 +14,12 @@ from thermocomp.live.adapters.sections import FileOut, LinuxCncOut, ReplayIn, Si
 from thermocomp.live.config import Page, ServiceSettings
 from thermocomp.live.page import web
 
-#: bytes of a file's name on a disk
+#: maximum length of a file name [bytes]
 _LONG = 255
 
 
 def find_faults(settings: ServiceSettings) -> Iterator[str]:
-    """Yield the files that cannot be read, and those that cannot be written.
+    """Yield faults of files: those that cannot be read, and those that cannot be written.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def find_faults(settings: ServiceSettings) -> Iterator[str]:
             if path.parent.resolve() == journal.parent.resolve() and parts.fullmatch(path.name):
                 yield f"{path}: may be a part of the journal {journal} and would be overwritten; name another file"
     for name in dict.fromkeys(written):
-        if name in locks and not (folder / name).parent.is_dir():  # said of the file itself
+        if name in locks and not (folder / name).parent.is_dir():  # reported for the file itself
             continue
         if why := _unwritable(folder / name):
             yield f"{folder / name}: {why}"
@@ -56,13 +56,13 @@ def find_faults(settings: ServiceSettings) -> Iterator[str]:
 
 
 def find_faults_now(settings: ServiceSettings, page: Page | None) -> Iterator[str]:
-    """Yield other present faults that would prevent the start of the service, or the work of a link.
+    """Yield other present faults that would prevent the start of the service or the operation of a link.
 
     Parameters
     ----------
     settings : ServiceSettings
     page : Page or None
-        As it will be served.
+        Page as it will be served.
     """
     config, folder = settings
     for source in config.sources:
@@ -95,7 +95,7 @@ def runs_now(settings: ServiceSettings) -> bool:
     """
     config, folder = settings
     for name in (config.state, config.journal.file if config.journal else ""):
-        if name and (folder / f"{name}.lock").exists():  # otherwise nobody uses it
+        if name and (folder / f"{name}.lock").exists():  # without a lock file no service is running
             try:
                 with alone(folder / name):
                     pass
@@ -130,7 +130,7 @@ def _unwritable(path: Path) -> str:
 
 
 def _faults_of_setup(socket: Path, axes: set[str]) -> Iterator[str]:
-    """Return the faults of the set-up of a LinuxCNC."""
+    """Yield the faults of a LinuxCNC setup."""
     hal, do = socket.with_name(HAL_NAME), "see 'thermocomp linuxcnc setup', which says where the service connects"
     if socket.exists() and not socket.is_socket():
         yield f"{socket}: is no socket; {do}"

@@ -1,4 +1,4 @@
-"""Corrections in force at the controller, as confirmed by its sinks."""
+"""Corrections in force at the controller, as confirmed by the sinks."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,30 +20,30 @@ class ConfirmedCorrections:
     """
 
     def __init__(self, sinks: Sequence[Sink], clock: ServiceClock) -> None:
-        # what a controller says is in force goes before what a file says
+        # the report of a controller takes precedence over that of a file
         controllers: list[Sink] = [s for s in sinks if isinstance(s, Suspending)]
         self._sure, self._clock = controllers or list(sinks), clock
         self._alarms = dict[str, str]()
-        #: correction and when it was confirmed, by target [um, s]
+        #: correction and time of its confirmation, by target [um, s]
         self.confirmed = dict[str, tuple[Correction, float]]()
 
     def listens_to(self, sink: Sink) -> bool:
-        """Return whether what a sink confirms counts."""
+        """Return whether confirmations of a sink are used."""
         return sink in self._sure
 
     def confirm(self, found: Mapping[str, Correction]) -> None:
-        """Process a confirmation of a controller."""
+        """Store confirmed corrections."""
         self.confirmed |= {t: (c, self._clock.tick()) for t, c in found.items()}
 
     def of(self, target: str, state: CompensatorState) -> Correction | None:
-        """Return the correction in force: as confirmed lately, or as asked for if no sink confirms; None: not known."""
+        """Return the correction in force: recently confirmed, or demanded if no sink confirms; None if unknown."""
         if not any(isinstance(sink, Confirming) for sink in self._sure):
             return state.corrections[target]
         found, at = self.confirmed.get(target, (None, -math.inf))
         return found if self._clock.tick() - at <= CONFIRM_WITHIN * self._clock.speed else None
 
     def new_alarms(self, sink: Suspending) -> Iterator[str]:
-        """Yield what has changed about corrections that are not in force as they shall be."""
+        """Yield changed alarms of corrections in force that differ from their demand."""
         alarms = dict(sink.alarms())
         for target in alarms.keys() | self._alarms.keys():
             if alarms.get(target) != self._alarms.get(target):
@@ -54,7 +54,7 @@ class ConfirmedCorrections:
 def suspensions(
     sink: Suspending, in_force: Mapping[str, Correction], state: CompensatorState
 ) -> Iterator[tuple[str, Status | None]]:
-    """Yield targets that a controller suspends or takes back, and the order that follows; None: it runs again.
+    """Yield targets suspended or resumed by a controller, with the resulting order; None: resumed.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The state file of a service: read at the start, kept aside if it cannot be used, written while it runs."""
+"""State file of a service: read at the start, set aside if unusable, written while the service runs."""
 
 import contextlib
 from collections.abc import Callable
@@ -11,21 +11,21 @@ from thermocomp.live.clock import ServiceClock
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.state import CompensatorState, resume, silence
 
-#: why a target is in shadow that the configuration put there
+#: reason of a target that is in shadow by configuration
 CONFIGURED = "by configuration"
 
 
 class StateKeeper:
-    """Keeps the state of a compensator in a file.
+    """Stores the state of a compensator in a file.
 
     Parameters
     ----------
     path : Path or None
-        None: it is not kept.
+        None: the state is not stored.
     compensator : Compensator
     clock : ServiceClock
     say : callable
-        Takes a line of text for the event list.
+        Called with a line of text for the event list.
     """
 
     def __init__(
@@ -33,16 +33,16 @@ class StateKeeper:
     ) -> None:
         self._path, self._compensator, self._clock, self._say = path, compensator, clock, say
         self._refused: Path | None = None
-        #: why the state was not saved, last; empty if it was
+        #: reason why the last save failed; empty if it succeeded
         self.not_saved = ""
 
     def begin(self) -> CompensatorState:
-        """Return the initial state: that of the file, or a cold one.
+        """Return the initial state: from the file, or a cold one.
 
         Raises
         ------
         InputError
-            The file is of another kind, and would be written over.
+            The file is of another kind and would be overwritten.
         """
         cold = self._compensator.start()
         if self._path is None:
@@ -60,7 +60,7 @@ class StateKeeper:
             return cold
         age = (datetime.now(UTC) - saved.written).total_seconds() * self._clock.speed
         state = resume(saved.state, cold, age, tick=self._clock.tick())
-        # what the controller or the configuration ordered is theirs to say again
+        # orders by the controller or the configuration are not restored: they are issued again
         own = {t: o for t, o in state.orders.items() if o.word != "suspended" and o.reason != CONFIGURED}
         state = state._replace(orders=cold.orders | own)
         how = "continues" if state.references else "begins again, with the corrections that are in force"
@@ -68,13 +68,13 @@ class StateKeeper:
         return state
 
     def put_aside(self) -> None:
-        """Keep a file that could not be used under another name."""
+        """Rename a file that could not be used."""
         if self._refused is not None:
             with contextlib.suppress(OSError):
                 self._refused.replace(self._refused.with_name(f"{self._refused.name}.refused"))
 
     def save(self, state: CompensatorState) -> None:
-        """Write the state; `not_saved` contains the reason if that fails."""
+        """Write the state; on failure `not_saved` contains the reason."""
         if self._path is None:
             self.not_saved = "no file is configured for it"
             return

@@ -1,40 +1,40 @@
-"""Latest value of each channel: the number of kept names that nothing uses is limited."""
+"""Latest value of each channel; the number of unused channels kept is limited."""
 
 from collections.abc import Iterable, Mapping
 
-#: names that nothing uses and that are kept to be shown; further ones are counted, up to so many
+#: number of unused names kept for display; further names are counted up to a maximum
 KEPT, COUNTED = 64, 10_000
 
 
 class Latest(dict[str, tuple[float, float]]):
-    """Value, and when it came, by name of the channel.
+    """Value and time of arrival, by channel name.
 
     Parameters
     ----------
     used : iterable of str
-        Names that are always kept.
+        Names that are used and always kept.
     """
 
     def __init__(self, used: Iterable[str]) -> None:
         super().__init__()
         self.used = set(used)
-        self._left_out = set[int]()  # hashes of names: a name may be long
+        self._left_out = set[int]()  # hashes of names, because names may be long
 
     @property
     def left_out(self) -> int:
-        """Number of names that were not kept; at `COUNTED` it may be more."""
+        """Number of names not kept; `COUNTED` means that number or more."""
         return len(self._left_out)
 
     def take(self, values: Mapping[str, float], tick: float, longest: float) -> str:
-        """Store values; return a name that is not kept if none was left out before.
+        """Store values; return the first name that was not kept, if none was before.
 
         Parameters
         ----------
         values : mapping of str to float
         tick : float
-            Now [s].
+            Present time [s].
         longest : float
-            Time without a value after which a name that nothing uses may be replaced [s].
+            Time without a value after which an unused name may be replaced [s].
         """
         first, others = "", values.keys() - self.used
         if new := others - self.keys():

@@ -1,4 +1,4 @@
-"""Probings of a running service: waiting for the next reading, used ones, and their results."""
+"""Probings of a running service: pending ones, used ones, and their results."""
 
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -22,24 +22,24 @@ class ProbingLedger:
     compensator : Compensator
     clock : ServiceClock
     say : callable
-        Takes a line of text for the event list.
+        Called with a line of text for the event list.
     """
 
     def __init__(self, compensator: Compensator, clock: ServiceClock, say: Callable[[str], None]) -> None:
         self._compensator, self._clock, self._say = compensator, clock, say
-        #: that wait for the next reading, by target
+        #: probings that wait for the next reading, by target
         self.waiting = dict[str, Probing]()
-        #: what was learned before the last one was taken, by target
+        #: adaptation before the probing used last, by target
         self.before = dict[str, Adaptation | None]()
-        #: what probings said, the newest last
+        #: results of probings, newest last
         self.checked = deque[Checked](maxlen=KEPT)
         self._measured = dict[str, tuple[Measurement, Correction | None]]()
 
     def measure(self, found: Measurement, state: CompensatorState, in_force: Correction | None) -> None:
-        """Use a measurement as a probing, with the next reading.
+        """Queue a measurement as a probing for the next reading.
 
-        One that contains the correction (``left`` is false: LinuxCNC's ``#5063`` is a position of the motor) is the
-        deviation as it is.
+        A measurement that includes the correction (``left`` is false: LinuxCNC's ``#5063`` is a motor position) is the
+        uncompensated deviation.
 
         Parameters
         ----------
@@ -61,7 +61,7 @@ class ProbingLedger:
     def _refuse(
         self, found: Measurement, probing: Probing, state: CompensatorState, in_force: Correction | None
     ) -> str:
-        """Return the reason why a measurement is not used with the next reading; empty if it is."""
+        """Return the reason why a measurement cannot be used with the next reading; empty if it can."""
         target, old = found.target, self._clock.now() - self._clock.of(found.time)
         if target not in self._compensator.lines:
             return f"no target is named {target}"
@@ -79,7 +79,7 @@ class ProbingLedger:
         return "what is in force at the controller is not known" if unknown else ""
 
     def take(self) -> dict[str, Probing]:
-        """Return the probings that wait, for a reading; none waits afterwards."""
+        """Return the pending probings for a reading, and clear them."""
         taken, self.waiting = self.waiting, {}
         return taken
 
@@ -91,18 +91,18 @@ class ProbingLedger:
         state: CompensatorState,
         recorder: Recorder | None,
     ) -> None:
-        """Keep what came of probings.
+        """Store the results of probings.
 
         Parameters
         ----------
         probings : mapping of str to Probing
-            That went with a reading.
+            Probings used with a reading.
         said : Compensated
-            After it.
+            Result of the compensator after the reading.
         learned : mapping of str to Adaptation
-            Before it.
+            Adaptations before the reading.
         state : CompensatorState
-            After it.
+            State after the reading.
         recorder : Recorder or None
             Recorder of the journal.
         """
@@ -118,19 +118,19 @@ class ProbingLedger:
         self.checked.append(found)
         if recorder is not None:
             recorder.update(found, after)
-            if not found.refused and found.target in self._measured:  # what is not believed is no deviation
+            if not found.refused and found.target in self._measured:  # a rejected measurement gives no deviation
                 recorder.measure(found.time, *self._measured[found.target])
         if found.beyond:
             limit = f"where {found.limit:.1f} um ask for action"
             self._say(f"{found.target} was wrong by {found.residual:+.1f} um, {limit}: look for the cause")
 
     def forget(self, target: str) -> None:
-        """Drop what counts from a zero that is no longer."""
+        """Drop the probings of a target that refer to a previous zero."""
         self.before.pop(target, None)
         self.waiting.pop(target, None)
 
     def take_back(self, target: str, state: CompensatorState) -> CompensatorState:
-        """Return the state without the last probing of a target; it must be in `before`."""
+        """Return the state without the last probing of a target, which must be in `before`."""
         learned, before = dict(state.learned), self.before.pop(target)
         learned.pop(target, None)
         return state._replace(learned=learned if before is None else learned | {target: before})

@@ -1,6 +1,6 @@
-"""Links of the service: each source and each sink in a separate task, reconnected when it is lost.
+"""Links of the service: each source and each sink in a separate task, reconnected after a loss.
 
-Whatever a source or a sink raises, it is this link's trouble alone: the others and the service continue.
+An exception of a source or a sink affects only its own link: the other links and the service continue.
 """
 
 import asyncio
@@ -18,18 +18,18 @@ from thermocomp.core.shown import escape
 
 _Said = TypeVar("_Said", Reading, Measurement)
 
-#: a connection that takes longer, or a sink that does not answer for so long, has failed [s]
+#: maximum time to connect, or for a sink to answer, before the link has failed [s]
 TIMEOUT = 5.0
-#: between two attempts: at first, and at most [s]
+#: time between two connection attempts: initial and maximum [s]
 FIRST, LONGEST = 0.5, 30.0
-#: a sink is asked what is in force at least so often [s]
+#: interval at which a sink is asked for the correction in force [s]
 OFTEN = 2.0
-#: between two events about messages that a link refused [s]
+#: minimum time between two events about refused messages of a link [s]
 SELDOM = 60.0
 
 
 class Link:
-    """One source, probe or sink, and how it is connected.
+    """Connection of one source, probe or sink.
 
     Parameters
     ----------
@@ -38,12 +38,12 @@ class Link:
 
     def __init__(self, end: Source | Probe | Sink) -> None:
         self.end = end
-        self.trouble = ""  #: why it was lost, until it is connected again
+        self.trouble = ""  #: reason of the last loss, until connected again
         self._wait, self._told, self._refused = FIRST, "", (0, -SELDOM)
-        self._losses = deque[str](maxlen=2)  # that are to be told: one may last shorter than between two looks
+        self._losses = deque[str](maxlen=2)  # losses still to be reported: one may be shorter than the polling interval
 
     async def run(self) -> None:
-        """Connect and work, for ever, or until a source is played to its end."""
+        """Connect and work indefinitely, or until a source has been played to its end."""
         task = asyncio.current_task()
         while True:
             try:
@@ -58,7 +58,7 @@ class Link:
                 if task is None or task.cancelling():
                     raise
                 self.trouble = "cancelled by itself"
-            except Exception as e:  # noqa: BLE001 - whatever it is, the others continue
+            except Exception as e:  # noqa: BLE001 - the other links continue after any exception
                 self.trouble = explain(e)
             if self.trouble != self._told:
                 self._losses.append(self.trouble)
@@ -68,12 +68,12 @@ class Link:
             self._wait = min(2 * self._wait, LONGEST)
 
     def status(self) -> LinkStatus:
-        """Return the status; the reason of a loss remains until it is connected again."""
+        """Return the status; the reason of a loss is kept until connected again."""
         if self.trouble:
             return LinkStatus("failed", self.trouble)
         try:
             return self.end.status()
-        except Exception as e:  # noqa: BLE001 - to be shown
+        except Exception as e:  # noqa: BLE001 - displayed as the status
             return LinkStatus("failed", explain(e))
 
     def news(self) -> Iterator[str]:
@@ -94,17 +94,17 @@ class Link:
         raise NotImplementedError
 
     async def _lose(self) -> None:
-        """Do what has to be done when it is lost."""
+        """Clean up after the loss of the connection."""
 
 
 class Inlet(Link):
-    """A source or a probe.
+    """Link of a source or a probe.
 
     Parameters
     ----------
     source : Source or Probe
     said : callable
-        Its readings, or measurements.
+        Returns its readings or measurements.
     take : callable
         Called with each of them.
     """
@@ -126,13 +126,13 @@ class Inlet(Link):
 
 
 class Outlet(Link):
-    """A sink that gets the newest corrections, as fast as it takes them.
+    """Link of a sink, which gets the newest corrections as fast as it accepts them.
 
     Parameters
     ----------
     sink : Sink
     heard : callable, optional
-        Called with what the sink confirms to be in force, if it does.
+        Called with the corrections in force, if the sink confirms them.
     """
 
     def __init__(self, sink: Sink, heard: Callable[[Sink, Mapping[str, Correction]], None] | None = None) -> None:
@@ -143,12 +143,12 @@ class Outlet(Link):
         self._news = asyncio.Event()
 
     def put(self, corrections: Mapping[str, Correction]) -> None:
-        """Hand corrections over, at once; what was not taken yet is replaced."""
+        """Hand over corrections without blocking; corrections still waiting are replaced."""
         self._newest = dict(corrections)
         self._news.set()
 
     async def flush(self) -> None:
-        """Apply what was put last, if the sink is there; what is in force stays if nothing was."""
+        """Apply the last corrections handed over, if any; otherwise those in force are kept."""
         if self._newest:
             await within(TIMEOUT, self.sink.apply(self._newest))
 
@@ -160,18 +160,18 @@ class Outlet(Link):
             newest = self._newest if self._news.is_set() else {}
             self._news.clear()
             async with asyncio.timeout(TIMEOUT):
-                if newest:  # before the first reading there is nothing to say
+                if newest:  # nothing to send before the first reading
                     await self.sink.apply(newest)
                 if self.heard is not None and isinstance(self.sink, Confirming):
                     self.heard(self.sink, await self.sink.confirmed() or {})
             self._wait = FIRST
 
     async def _lose(self) -> None:
-        self._news.set()  # what was lost is applied after the next connection
+        self._news.set()  # corrections that were lost are applied after reconnection
 
 
 def explain(error: Exception) -> str:
-    """Return the reason why a link does not work, in words.
+    """Return the reason why a link does not work, as text.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def explain(error: Exception) -> str:
 
 
 async def within(seconds: float, work: Coroutine[Any, Any, None]) -> None:
-    """Do something that may fail, be cancelled or take too long, without waiting for ever.
+    """Await a coroutine with a time limit; exceptions and cancellation are ignored.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The service: readings come in, the compensator takes each, corrections go out; whatever fails, the rest continues."""
+"""The service: receives readings, runs the compensator, sends corrections; single failures do not stop it."""
 
 import asyncio
 import time
@@ -66,16 +66,16 @@ class Service:
         self._saved, self._dirty, self._trouble, self._ending = -1e9, False, "", False
         self._heard = self.clock.tick()
 
-    # -- what happens --------------------------------------------------------------------------------------------------
+    # -- interface -----------------------------------------------------------------------------------------------------
 
     async def run(self) -> None:
-        """Run until it is cancelled; then save the state and leave the corrections as they are."""
+        """Run until cancelled; then save the state and leave the corrections unchanged."""
         self.keeper.put_aside()
         if self.recorder is not None:
             await asyncio.to_thread(self.recorder.journal.flush)
         self.inlets = self._make_inlets()
         for sink in self.sinks:
-            await within(TIMEOUT, self._adopt(sink))  # if it fails, its link says why
+            await within(TIMEOUT, self._adopt(sink))  # on failure its link reports the reason
         try:
             async with asyncio.TaskGroup() as group:
                 for one in self.links():
@@ -91,7 +91,7 @@ class Service:
                 self.recorder.journal.close()
 
     def take(self, reading: Reading) -> None:
-        """Process a reading of a source, with the latest readings of the others."""
+        """Process a reading of a source together with the latest readings of the other sources."""
         if self._ending:
             return
         tick, now = self.clock.tick(), self.clock.now()
@@ -117,14 +117,14 @@ class Service:
         """Suspend or resume a target; see `thermocomp.runtime.orders.order`."""
         before = self.state.orders.get(target)
         self.state = order(self.compensator, self.state, target, status)
-        if before == status:  # it is so: no news
+        if before == status:  # unchanged: no event
             return
         word = f"{status.word}: {status.reason}" if status else "runs again"
         self.say("state", f"{target} {word}, as ordered")
         self._dirty = True
 
     def watch_only(self, target: str) -> None:
-        """Let a target run in shadow from the start, as configured."""
+        """Run a target in shadow from the start, as configured."""
         self.state = order(self.compensator, self.state, target, Status("shadow", CONFIGURED))
 
     def rezero(self, target: str, why: str, in_force: Correction | None = None) -> None:
@@ -135,13 +135,13 @@ class Service:
         self._dirty = True
 
     def measure(self, found: Measurement) -> None:
-        """Use a measurement of the tool point as a probing, with the next reading."""
+        """Use a measurement of the tool point as a probing with the next reading."""
         known = found.target in self.compensator.lines
         in_force = self.in_force.of(found.target, self.state) if known else None
         self.probings.measure(found, self.state, in_force)
 
     def roll_back(self, target: str) -> str:
-        """Forget the last probing of a target that was taken; return why not, or the empty string."""
+        """Undo the last probing used for a target; return the reason if impossible, else an empty string."""
         if target not in self.probings.before:
             return "no probing was taken since the start, or it was taken back before"
         self.state = self.probings.take_back(target, self.state)
@@ -150,7 +150,7 @@ class Service:
         return ""
 
     async def fade_out(self) -> None:
-        """Let all corrections go to zero, within the limits, whatever readings come or do not."""
+        """Fade all corrections to zero, within the limits, whether or not readings arrive."""
         self._ending, last = True, self.clock.tick()
         self.say("service", "is being stopped: corrections go to zero")
         while any(c.offset or c.slope for c in self.state.corrections.values()):
@@ -167,14 +167,14 @@ class Service:
         """Return the links of sources, probes and sinks, in this order."""
         return [*self.inlets, *self.outlets]
 
-    # -- inside --------------------------------------------------------------------------------------------------------
+    # -- internals -----------------------------------------------------------------------------------------------------
 
     def _make_inlets(self) -> list[Inlet]:
         sources = [Inlet(source, source.readings, self.take) for source in self.sources]
         return sources + [Inlet(probe, probe.measurements, self.measure) for probe in self.probes]
 
     async def _adopt(self, sink: Sink) -> None:
-        """Begin at what the controller says is in force: what was saved may be a second older."""
+        """Start from the correction in force at the controller: the saved one may be a second older."""
         if not isinstance(sink, Confirming):
             return
         await sink.connect(TIMEOUT)
@@ -187,7 +187,7 @@ class Service:
         return max(abs(correction.at(p)) for p in ends) <= self.compensator.limits.magnitude
 
     async def _watch(self) -> None:
-        """Look after what no reading does: time goes by, the state is saved."""
+        """Perform the periodic work that is independent of readings: elapsed time, saving of the state."""
         while True:
             await asyncio.sleep(min(1.0, max(0.1, 1.0 / self.clock.speed)))
             tick = self.clock.tick()
@@ -231,7 +231,7 @@ class Service:
         self._dirty = True
 
     def _hear(self, sink: Sink, in_force: Mapping[str, Correction]) -> None:
-        """Process the report of a controller on the correction in force, and the reason if there is none."""
+        """Process the correction in force reported by a controller, and the reason if there is none."""
         known = {t: c for t, c in in_force.items() if t in self.state.corrections}
         self.in_force.confirm(known)
         if self.recorder is not None:
@@ -243,7 +243,7 @@ class Service:
                 self.order(target, status)
 
     def say(self, kind: str, text: str) -> None:
-        """Put a line into the event list and the journal."""
+        """Add a line to the event list and the journal."""
         event = self.events.tell(self.clock.now(), kind, text)
         if event is not None and self.recorder is not None and kind != "state":
             self.recorder.alarm(*astuple(event))

@@ -1,4 +1,4 @@
-"""Results of probings on the running machine: a control chart of the model errors, with an action limit."""
+"""Results of probings on the running machine: a control chart of the model errors with an action limit."""
 
 import math
 from typing import NamedTuple
@@ -6,25 +6,25 @@ from typing import NamedTuple
 from thermocomp.core.correction import Deviation
 from thermocomp.runtime.adaptation import Adaptation, Probing
 
-#: standard deviations at which the chart asks for action
+#: action limit of the chart [standard deviations]
 ACTION = 3.0
-#: probings that are kept to be shown
+#: number of probings kept for display
 KEPT = 200
 
 
 class Checked(NamedTuple):
     """A probing compared with the prediction for its instant."""
 
-    time: float  #: of the machine, seconds since 1970
+    time: float  #: machine time, seconds since 1970
     target: str
-    predicted: float  #: where it was probed, without it [um]
+    predicted: float  #: at the probed position, before the probing is used [um]
     residual: float  #: measured minus predicted [um]
-    limit: float  #: beyond it the cause has to be looked for [um]
-    refused: str  #: why it was not used; empty if it was
+    limit: float  #: action limit: beyond it the cause must be found [um]
+    refused: str  #: reason why the probing was not used; empty if it was
 
     @property
     def beyond(self) -> bool:
-        """Whether it is beyond the action limit."""
+        """Whether the residual is beyond the action limit."""
         return not abs(self.residual) <= self.limit
 
 
@@ -36,13 +36,13 @@ def check(
     Parameters
     ----------
     time : float
-        Time of the machine [s].
+        Machine time [s].
     target : str
     probing : Probing
     predicted : Deviation
-        For its instant, without it.
+        Prediction for the time of the probing, before the probing is used.
     learned : Adaptation or None
-        After it: knows the size of the error that was to be expected.
+        Adaptation after the probing; contains the expected size of the error.
     refused : str
     """
     size = math.nan if learned is None else learned.size

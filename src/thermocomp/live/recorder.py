@@ -1,4 +1,4 @@
-"""Records of the service for its journal."""
+"""Recorder of the service for its journal."""
 
 import math
 from collections.abc import Mapping
@@ -28,19 +28,19 @@ from thermocomp.live.probe import Checked
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.state import Compensated, Reference
 
-#: so long after a confirmation the correction in force counts as known [s of the world]
+#: validity of a confirmed correction after its confirmation [s of real time]
 CONFIRM_WITHIN = 10.0
 
 
 class Recorder:
-    """A journal, in the words of the service.
+    """Writes the data of the service to a journal.
 
     Parameters
     ----------
     path : Path
     compensator : Compensator
     own : {'on', 'off', 'unknown'}
-        Whether the controller compensates by itself.
+        Whether the controller has its own compensation.
     clock : ServiceClock
     limits : JournalLimits
     more : mapping of str to str, optional
@@ -72,12 +72,12 @@ class Recorder:
         self._references: dict[str, Reference] = {}
 
     def take(self, time: float, values: Mapping[str, float], said: Compensated) -> None:
-        """Write a reading, and what came of it."""
+        """Write a reading and its result."""
         self.journal.add(ReadingRow(time, values))
         self.tell(time, said)
 
     def tell(self, time: float, said: Compensated) -> None:
-        """Write what has changed."""
+        """Write changed corrections and states."""
         before, self._before = self._before, said
         for target, correction in said.corrections.items():
             if before is None or before.corrections.get(target) != correction:
@@ -87,7 +87,7 @@ class Recorder:
                 self.journal.add(StateRow(time, target, status.word, status.reason))
 
     def count(self, time: float, references: Mapping[str, Reference]) -> None:
-        """Write where targets count from, where that is new."""
+        """Write the references of targets that have changed."""
         for target, reference in references.items():
             if self._references.get(target) != reference:
                 self.journal.add(ReferenceRow(time, target, reference.why, reference.shift))
@@ -113,7 +113,7 @@ class Recorder:
         self.journal.add(row)
 
     def update(self, checked: Checked, after: float) -> None:
-        """Write what a probing changed; `after` is what is added to the deviation from now on [um]."""
+        """Write the change by a probing; `after` is the resulting addition to the deviation [um]."""
         measured = checked.predicted + checked.residual
         if math.isfinite(measured):
             self.journal.add(

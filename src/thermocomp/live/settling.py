@@ -1,30 +1,30 @@
-"""Remaining duration of the drift of a machine: estimated from the curve of the predicted deviation alone."""
+"""Remaining duration of the drift of a machine, estimated from the predicted deviation alone."""
 
 import math
 from collections.abc import Sequence
 
-#: over which a drift is looked at, and for which it is told [s]
+#: period over which the drift is evaluated [s]
 WINDOW = 600.0
 
 
 def minutes_until(times: Sequence[float], deviations: Sequence[float], below: float) -> float:
-    """Return after how many minutes the deviation changes by less than `below` within ten minutes.
+    """Return the number of minutes until the deviation changes by less than `below` within ten minutes.
 
-    Two windows of ten minutes tell how fast the change dies away, and what is to come is taken as an exponential.
+    The decay is determined from two windows of ten minutes and extrapolated as an exponential.
 
     Parameters
     ----------
     times : sequence of float
-        Rising [s].
+        Increasing [s].
     deviations : sequence of float
-        Predicted, in micrometres.
+        Predicted deviations [um].
     below : float
-        [um]
+        Threshold [um].
 
     Returns
     -------
     float
-        0 if it does already; nan if it is not known: too short a curve; infinite if the change does not get smaller.
+        0 if already below; nan if unknown because the curve is too short; infinite if the change does not decrease.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The state of a compensator as a file: whole or not at all, bit-exact, refused where it is damaged or of others."""
+"""State of a compensator as a file: written atomically, bit-exact, refused if damaged or of other models."""
 
 import hashlib
 import json
@@ -23,9 +23,9 @@ from thermocomp.runtime.watch import WORDS
 KIND = jsonfile.Format("thermocomp-state", 1, "state file", "thermocomp serve")
 
 
-#: no error is larger [um]
+#: maximum magnitude of an error [um]
 _LARGEST = 1e6
-#: of a watch
+#: fields of a watch that are instants
 _INSTANTS = ("since", "jumped", "off", "still", "moving", "back", "fast")
 
 
@@ -38,7 +38,7 @@ class _Stored:
 
 @dataclass(frozen=True)
 class Saved:
-    """A state and when it was.
+    """A state and the time of writing.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def dumps(state: CompensatorState, compensator: Compensator, written: datetime) 
     Raises
     ------
     InputError
-        `written` does not know its time zone.
+        `written` has no time zone.
     """
     if written.tzinfo is None:
         raise InputError(f"state of a compensator: {written} has no time zone")
@@ -99,8 +99,8 @@ def loads(text: str, compensator: Compensator, source: str = "state") -> Saved:
     Raises
     ------
     ModelFileError
-        Not JSON, not a state file, of a newer version, altered, incomplete, of other models, or no state that these
-        models can be in.
+        Not JSON, not a state file, of a newer version, altered, incomplete, of other models, or not a possible state of
+        these models.
     """
     (stored,) = jsonfile.unpack(KIND, _Stored, text, source).models[:1]
     if stored.models != fingerprint(compensator):
@@ -114,7 +114,7 @@ def loads(text: str, compensator: Compensator, source: str = "state") -> Saved:
 
 
 def write(state: CompensatorState, compensator: Compensator, path: str | Path, written: datetime) -> None:
-    """Replace the stored state: after a kill one of the two is there, complete.
+    """Replace the state file; after a kill either the old or the new state is complete.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def write(state: CompensatorState, compensator: Compensator, path: str | Path, w
     Raises
     ------
     InputError
-        It cannot be written there.
+        The file cannot be written.
     """
     jsonfile.write(dumps(state, compensator, written), path, overwrite=True)
 
@@ -144,14 +144,14 @@ def read(path: str | Path, compensator: Compensator) -> Saved:
     Raises
     ------
     ModelFileError
-        There is no such file, or it cannot be used; see `loads`.
+        The file is missing or invalid; see `loads`.
     """
     text, source = jsonfile.read(KIND, path)
     return loads(text, compensator, source)
 
 
 def is_ours(path: Path) -> bool:
-    """Return whether a file that cannot be read was a state once: it may be put aside.
+    """Return whether an unreadable file was once a state file and may be set aside.
 
     Parameters
     ----------
@@ -164,11 +164,11 @@ def is_ours(path: Path) -> bool:
     return not begin.strip(b"\0 \r\n") or KIND.name.encode() in begin
 
 
-# -- what these models can be in ---------------------------------------------------------------------------------------
+# -- possible states of these models -----------------------------------------------------------------------------------
 
 
 def _check(state: CompensatorState, compensator: Compensator) -> None:
-    """Raise `ValueError` unless it is a state of this compensator."""
+    """Raise `ValueError` unless `state` is a possible state of this compensator."""
     cold, lines = compensator.start(), compensator.lines
     want(list(state.corrections) == list(lines), list(state.corrections), "corrections", f"those of {', '.join(lines)}")
     for name in ("idle", "learned", "references", "raw", "orders", "probed"):
@@ -197,7 +197,7 @@ def _check(state: CompensatorState, compensator: Compensator) -> None:
     for k, (watch, seen, first) in enumerate(zip(compensator.watches, state.watches, cold.watches, strict=True)):
         for name, value in seen._asdict().items():
             if isinstance(value, np.ndarray):
-                # what is used in the predictions is always a number; instants may be unknown
+                # fields used in predictions are always numbers; instants may be unknown
                 sure = name in ("reference", "memory", "traces", "used", "predicted", "usual", "bridge")
                 _alike(
                     value, getattr(first, name).shape, f"watches.{k}.{name}", finite=sure and not np.isnan(seen.time)

@@ -24,7 +24,7 @@ class SampledFunction:
     Parameters
     ----------
     x : ndarray of shape (n_rows,)
-        Values seen, rising.
+        Training values, sorted in ascending order.
     y : ndarray of shape (n_rows,)
     """
 
@@ -35,26 +35,26 @@ class SampledFunction:
 class TransformRegressor(StaticRegressor):
     """Both sides transformed: theta(y) = phi_1(x_1) + phi_2(x_2) + ... (Wessel 2004, Eq. 2; W-01).
 
-    theta has zero mean and unit variance, each phi has zero mean (E-W3). A constant input has phi = 0. If nothing
-    depends on anything (a constant y, say), psi is 0 and the mean of y is predicted.
+    theta has zero mean and unit variance, each phi has zero mean (E-W3). A constant input has phi = 0. If there is no
+    dependence at all (for example, if y is constant), psi is 0 and the mean of y is predicted.
 
     Attributes
     ----------
     psi_ : float
-        Maximal correlation ``|corr(theta, sum phi)|``, as reached (W-02).
+        Maximal correlation ``|corr(theta, sum phi)|`` that was reached (W-02).
     theta_ : SampledFunction
-        theta over y.
+        theta as a function of y.
     phi_ : tuple of SampledFunction
-        phi over each input.
+        phi as a function of each input.
     sum_phi_ : SampledFunction
-        Sum of phi over theta, row by row of the training data sorted by y: a straight line if the model holds.
+        Sum of phi against theta for each training row, sorted by y: a straight line if the model holds.
     errors_ : ndarray of shape (n_sweeps,)
         E[(theta - sum phi)^2] after each sweep.
     falling_theta_ : float
-        Share of the steps between neighbouring values of y over which theta falls: there its inverse is not unique, and
-        an average of neighbours mixes branches (E-W5).
+        Share of the steps between neighbouring values of y over which theta decreases: there its inverse is not unique,
+        and an average of neighbours mixes branches (E-W5).
     data_min_, data_max_ : ndarray of shape (n_features,)
-        Trained range; beyond it all curves are constant (W-07).
+        Trained range; all curves are constant outside it (W-07).
     """
 
     def _predict(self, change: FloatArray) -> FloatArray:
@@ -64,7 +64,7 @@ class TransformRegressor(StaticRegressor):
         return self._inverse(total)
 
     def outside(self, X: ArrayLike) -> NDArray[np.bool_]:
-        """Return a mask of the values beyond the training range, where the prediction is cropped (W-07).
+        """Return a mask of the values outside the trained range, where the prediction is clipped (W-07).
 
         Parameters
         ----------
@@ -97,10 +97,10 @@ class TransformRegressor(StaticRegressor):
         curves: dict[int, Curve],
         inverse: Curve,
     ) -> None:
-        """Keep the transformations; `theta` and `total`, the sum of phi, are by row, `curves` by input."""
+        """Store the transformations; `theta` and `total` (the sum of phi) are per row, `curves` per input."""
         self._curves = tuple(curves.get(j, _NOTHING) for j in range(X.shape[1]))
         self._inverse = inverse
-        self._rows = X  # what is frozen says the same for them
+        self._rows = X  # the frozen model must predict the same for these rows
         by_y = np.argsort(y, kind="stable")
         self.theta_ = SampledFunction(y[by_y], theta[by_y])
         self.sum_phi_ = SampledFunction(theta[by_y], total[by_y])
@@ -114,46 +114,47 @@ class TransformRegressor(StaticRegressor):
 
 
 class ACE(TransformRegressor):
-    """Alternating conditional expectations with a boxcar on ranks, and nearest neighbours (Wessel 2004; W-01 to W-05).
+    """Alternating conditional expectations with a boxcar on ranks and nearest neighbours (Wessel 2004; W-01 to W-05).
 
-    Appendix A as it stands (unless `converged`), with what it leaves open settled like this. All but the first input
-    start with phi = 0; if the first input has E[y|x_1] = 0, the first that has not takes its place. theta is
-    normalised, phi is not (E-W3). At the ends of the rank list the boxcar holds the ranks that there are; values of
-    tied ranks, ordered as the rows are, get the mean of what the boxcar gives them (E-W4). The functions are those of
-    the last sweep.
+    Follows Appendix A (unless `converged`); details that the paper leaves open are settled as follows. All inputs but
+    the first start with phi = 0; if E[y|x_1] = 0 for the first input, the first input with a non-zero expectation
+    replaces it. theta is normalised, phi is not (E-W3). At the ends of the rank list the boxcar contains only the
+    existing ranks; tied values, kept in row order, receive the mean of their boxcar results (E-W4). The functions are
+    those of the last sweep.
 
-    Frozen, tables of many steps are thinned (`thermocomp.models.ace_thinning`).
+    In a frozen model, large step tables are thinned (`thermocomp.models.ace_thinning`).
 
-    theta need not be monotone, and then has no inverse: see ``falling_theta_`` (E-W5) and
+    theta need not be monotonic, and then has no inverse: see ``falling_theta_`` (E-W5) and
     `thermocomp.models.ace_monotone.MonotoneACE`.
 
     Parameters
     ----------
     half_window : int
-        N: the boxcar holds 2N + 1 ranks (W-04). With n rows it is never more than (n - 1) / 4, so that the window is
-        not wider than half of the data, nor less than 1.
+        N: the boxcar contains 2N + 1 ranks (W-04). With n rows, N is limited to (n - 1) / 4, so that the window covers
+        at most half of the data, but N is at least 1.
     window_share : float, optional
-        N as a share of the number of rows, instead of `half_window`: ten ranks are a lot of 199 rows but noise of
-        10,000 (E-W8).
+        N as a share of the number of rows, instead of `half_window`: ten ranks are many for 199 rows, but capture only
+        noise in 10,000 (E-W8).
     neighbours : int
         k of the nearest-neighbour estimate of phi and of theta^-1 (W-05). With fewer rows, all are used.
     tolerance : float
-        Sweeps end when E[(theta - sum phi)^2] fails to decrease by more than this; 0 is the paper's rule (W-03). If
-        `converged`: when a sweep moves all phi together by no more than this (root mean square; theta has norm 1).
+        Sweeps end when E[(theta - sum phi)^2] fails to decrease by more than this; 0 is the paper's rule (W-03). With
+        `converged`: sweeps end when a sweep changes all phi together by no more than this (root mean square; theta has
+        norm 1).
     max_sweeps : int
-        Sweeps end then at the latest. The paper's rule may take thousands: see ``errors_``.
+        Maximum number of sweeps. The paper's rule may need thousands: see ``errors_``.
     converged : bool
-        Go to the limit of the sweeps, accelerated. The paper's boxcar has none where more than five inputs rise
-        together: its equations become singular and sweeps run away, so that its rule stops after a few. In its place
-        stands a boxcar of half the width, taken twice, mirrored at the ends, and averaged over ties before and after:
-        symmetric, with eigenvalues from 0 to 1.
+        Iterate to convergence, with acceleration. The paper's boxcar has no limit when more than five inputs increase
+        together: its equations become singular and the sweeps diverge, so the paper's rule stops after a few. It is
+        replaced by a boxcar of half the width, applied twice, mirrored at the ends, and averaged over ties before and
+        after: symmetric, with eigenvalues from 0 to 1.
 
     Attributes
     ----------
     psi_, theta_, phi_, sum_phi_, errors_, falling_theta_, data_min_, data_max_
         See `TransformRegressor`.
     half_window_ : int
-        N, as used.
+        N as used.
 
     References
     ----------
@@ -200,7 +201,7 @@ class ACE(TransformRegressor):
         self._alternate(change, deviation)
 
     def _alternate(self, X: FloatArray, y: FloatArray) -> None:
-        from thermocomp.models.kernels import ace as kernel  # numba takes its time
+        from thermocomp.models.kernels import ace as kernel  # importing numba is slow
         from thermocomp.models.kernels import ranks
 
         varied = np.flatnonzero(self.data_max_ > self.data_min_)
@@ -223,16 +224,16 @@ class ACE(TransformRegressor):
         if self.psi_ == 0.0:
             curves, inverse = {}, Curve((), (float(y.mean()),), "step")
         self._keep(X, y, theta, total, curves, inverse)
-        self.phi_ = tuple(tables.get(j, t) for j, t in enumerate(self.phi_))  # as found, not as read from the curves
+        self.phi_ = tuple(tables.get(j, t) for j, t in enumerate(self.phi_))  # as found, not from the curves
 
 
 def half_window(n_rows: int, fixed: int, share: float | None) -> int:
-    """Return the half width of the boxcar, not more than a quarter of the rows.
+    """Return the half width of the boxcar, at most a quarter of the rows.
 
     Raises
     ------
     InputError
-        `fixed` is less than 1, or `share` not between 0 and 1/4.
+        `fixed` is less than 1, or `share` is not between 0 and 1/4.
     """
     if share is None:
         if fixed < 1:
@@ -248,15 +249,15 @@ def half_window(n_rows: int, fixed: int, share: float | None) -> int:
 
 
 def nearest(table: SampledFunction, k: int) -> Curve:
-    """Return the mean of the k entries that are nearest, as a function of the place: a step curve.
+    """Return the mean of the k nearest entries as a function of x, in the form of a step curve.
 
-    The k nearest of sorted entries are neighbours of each other; entry i makes room for entry i + k half way between
-    them, and there the latter counts as the nearer one. Entries at one place are given their mean first.
+    The k nearest of sorted entries are contiguous; entry i + k replaces entry i half way between them, and at that
+    point entry i + k counts as the nearer one. Entries with equal x are averaged first.
 
     Parameters
     ----------
     table : SampledFunction
-        With rising, perhaps equal x.
+        Table with ascending x; equal values are allowed.
     k : int
 
     Returns
@@ -266,7 +267,7 @@ def nearest(table: SampledFunction, k: int) -> Curve:
     _, group, count = np.unique(table.x, return_inverse=True, return_counts=True)
     y = (np.bincount(group, table.y) / count)[group]
     k = min(k, len(y))
-    # half of each first: the sum of two large numbers may be beyond all numbers
+    # halve each first: the sum of two large numbers may overflow
     breaks = table.x[:-k] / 2 + table.x[k:] / 2
     means = np.lib.stride_tricks.sliding_window_view(y, k).mean(axis=1)
     wide = np.append(np.diff(breaks, prepend=-np.inf) > 0, True)

@@ -1,4 +1,4 @@
-"""`ace-monotone`: alternating conditional expectations with a theta that can be inverted."""
+"""`ace-monotone`: alternating conditional expectations with an invertible theta."""
 
 from dataclasses import dataclass
 
@@ -11,46 +11,46 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.models.ace import TransformRegressor
 from thermocomp.models.base import FloatArray
 
-_SAME = 1e-9  # share of its size by which a channel must vary, else it counts as constant: no sensor has as many digits
+_SAME = 1e-9  # relative variation below which a channel counts as constant: no sensor has that many digits
 
 
 class MonotoneACE(TransformRegressor):
-    """Alternating conditional expectations with a rising theta, converged, as smooth curves (E-W5, E-W8).
+    """Alternating conditional expectations with an increasing theta, converged, as smooth curves (E-W5, E-W8).
 
-    The model of `thermocomp.models.ace.ACE`, made fit for unseen cycles and for a controller:
+    The model of `thermocomp.models.ace.ACE`, adapted to unseen cycles and to controllers:
 
-    - The conditional expectations are penalised splines (joined straight lines on equally spaced knots, second
-      differences penalised) instead of a boxcar on ranks. They leave straight lines as they are, where a boxcar
-      flattens the ends of every curve; neither the number of rows nor ties matter to them (E-W4, E-W8).
-    - For a given theta all phi are found at once by solving one linear system: collinear temperatures, among which
-      back-fitting takes thousands of sweeps, cost nothing.
-    - theta is made rising in every sweep (isotonic regression of its knots), so its inverse is unique. Where theta is
-      flat, the inverse has a single point: the mean of y there.
-    - The curves continue straight beyond the trained range for a share of it, and are constant from there on.
+    - The conditional expectations are penalised splines (piecewise linear on equally spaced knots, second differences
+      penalised) instead of a boxcar on ranks. They reproduce straight lines, whereas a boxcar flattens the ends of
+      every curve; they do not depend on the number of rows or on ties (E-W4, E-W8).
+    - For a given theta all phi are found at once by solving one linear system: collinear temperatures, for which
+      back-fitting takes thousands of sweeps, cost nothing extra.
+    - theta is made increasing in every sweep (isotonic regression of its knots), so its inverse is unique. Where theta
+      is flat, the inverse has a single point: the mean of y there.
+    - The curves continue straight outside the trained range for a share of its span and are constant beyond that.
 
     Parameters
     ----------
     points : int
         Knots of each curve.
     smoothing : float
-        Weight of the integrated squared second derivative, the (extended) range of each variable counting as 1. It
-        takes 1 % of the height of one wide arc at 1e-4, and half of it at 0.01; at 1e-6 the curves follow every bump.
+        Weight of the integrated squared second derivative, with the (extended) range of each variable scaled to 1.
+        At 1e-4 it lowers a single wide arc by 1 % of its height, at 0.01 by half; at 1e-6 the curves follow every bump.
     shrinkage : float
-        Weight of the mean square of the curves' knots: decides between collinear inputs.
+        Weight of the mean square of the curves' knots; decides between collinear inputs.
     extend : float
-        Share of the trained span by which curves continue beyond it: the margin at which `Support` clips the inputs
-        unless told otherwise; 0 crops peaks like the paper (W-07).
+        Share of the training span by which curves continue outside it: the default margin at which `Support` clips the
+        inputs; 0 clips peaks as in the paper (W-07).
     tolerance : float
-        Sweeps end when theta moves by less (root mean square; it has norm 1).
+        Sweeps end when theta changes by less than this (root mean square; theta has norm 1).
     max_sweeps : int
-        Sweeps end then at the latest.
+        Maximum number of sweeps.
     max_rows : int
-        With more rows, runs of equally many consecutive rows are averaged first, so that not more are left.
+        With more rows than this, groups of consecutive rows of equal size are averaged first to stay within the limit.
 
     Attributes
     ----------
     psi_, theta_, phi_, sum_phi_, errors_, falling_theta_, data_min_, data_max_
-        See `TransformRegressor`; of the averaged rows, except for the trained range. ``falling_theta_`` is 0.
+        See `TransformRegressor`; based on the averaged rows, except for the trained range. ``falling_theta_`` is 0.
 
     References
     ----------
@@ -164,7 +164,7 @@ class MonotoneACE(TransformRegressor):
 
 @dataclass(frozen=True)
 class _Knots:
-    """Equally spaced places, as the joints of straight lines."""
+    """Equally spaced knots of a piecewise linear curve."""
 
     places: tuple[float, ...]
 
@@ -175,7 +175,7 @@ class _Knots:
         return cls(tuple(np.linspace(low - beyond, high + beyond, points).tolist()))
 
     def basis(self, values: FloatArray) -> FloatArray:
-        """Return the weight of each knot in each value, (n_values, n_points)."""
+        """Return the weight of each knot for each value, shape (n_values, n_points)."""
         places = np.array(self.places)
         left = np.clip(np.searchsorted(places, values, side="right") - 1, 0, len(places) - 2)
         share = (values - places[left]) / (places[left + 1] - places[left])
@@ -198,7 +198,7 @@ def _varies(values: FloatArray) -> bool:
 
 
 def _averaged(values: FloatArray, run: int) -> FloatArray:
-    """Return the means of runs of consecutive rows."""
+    """Return the means of groups of consecutive rows."""
     starts = np.arange(0, len(values), run)
     lengths = np.diff(np.append(starts, len(values)))
     return np.asarray((np.add.reduceat(values, starts, axis=0).T / lengths).T)

@@ -1,9 +1,10 @@
-"""Tables of `ace`, made small for a file: as many steps as rows, times the inputs, take 8 MB of 9,000 rows.
+"""Thinning of the tables of `ace`: one step per row and input makes 8 MB for 9,000 rows.
 
-The transformations of the inputs become straight lines, joined, near each row's value. The inverse of theta, which
-jumps from row to row by more than is to be lost, is then a step for the new sum of each row instead of the old one: at
-every row that was fitted the prediction stays what it was, within `TOLERANCE`, but for a few of rounded inputs whose
-sums become the same. Between the rows both are the noise of their neighbours, and as good as each other.
+The transformations of the inputs become piecewise linear and stay close to the value of each row. The inverse of theta,
+which jumps from row to row by more than the tolerance, becomes a step function of the new sum of each row instead of
+the old one: for every fitted row the prediction is unchanged within `TOLERANCE`, except for a few rows with rounded
+inputs whose sums coincide. Between the rows, old and new tables both follow the noise of the neighbours and are equally
+accurate.
 """
 
 from collections.abc import Sequence
@@ -13,20 +14,20 @@ import numpy as np
 from thermocomp.core.additive import Curve
 from thermocomp.models.base import FloatArray
 
-#: how far a prediction for a fitted row may move [unit of the target], or by which share of what they span
+#: permissible change of the prediction for a fitted row [unit of the target], and the same as a share of the span
 TOLERANCE, SHARE = 0.01, 1e-3
-#: tables of no more steps in all are left as they are
+#: tables are left unchanged if they have no more steps than this in total
 SMALL = 5000
-#: points of all transformations of inputs together, at most
+#: maximum number of points of all input transformations together
 POINTS = 4000
-#: a transformation may move by this, their sum having norm 1; by which factor more until `POINTS` are enough
+#: permissible change of a transformation (their sum has norm 1), and the factor that widens it to reach `POINTS`
 _NEAR, _FACTOR = 0.002, 1.4
-#: digits of points: shares of their span
+#: significant digits of the points, relative to their span
 _DIGITS = 6
 
 
 def thin(curves: Sequence[Curve], response: Curve, columns: Sequence[FloatArray]) -> tuple[tuple[Curve, ...], Curve]:
-    """Return smaller tables that predict the same for the rows that they were fitted to.
+    """Return smaller tables with the same predictions for the rows to which they were fitted.
 
     Parameters
     ----------
@@ -35,13 +36,13 @@ def thin(curves: Sequence[Curve], response: Curve, columns: Sequence[FloatArray]
     response : Curve
         Curve applied to their sum.
     columns : sequence of ndarray of shape (n_rows,)
-        The fitted rows of each input.
+        Fitted rows of each input.
 
     Returns
     -------
     curves : tuple of Curve
     response : Curve
-        Both as given if they are small.
+        Curves and response are returned unchanged if they are small.
     """
     if sum(len(c.x) for c in (*curves, response)) <= SMALL:
         return tuple(curves), response
@@ -57,7 +58,7 @@ def thin(curves: Sequence[Curve], response: Curve, columns: Sequence[FloatArray]
 
 
 def _sum(curves: Sequence[Curve], columns: Sequence[FloatArray]) -> FloatArray:
-    """Add up as the frozen model does, to the last bit."""
+    """Add up exactly as the frozen model does, to the last bit."""
     total = np.zeros(len(columns[0]))
     for curve, x in zip(curves, columns, strict=True):
         total = total + curve(x)
@@ -65,7 +66,7 @@ def _sum(curves: Sequence[Curve], columns: Sequence[FloatArray]) -> FloatArray:
 
 
 def _joined(curve: Curve, x: FloatArray, near: float) -> Curve:
-    """Return straight lines from point to point of a curve, each as long as no point is further off than `near`."""
+    """Return a piecewise linear curve with long segments in which no point deviates by more than `near`."""
     y = curve(x)
     kept, at = [0], 0
     xs, ys = x.tolist(), y.tolist()
@@ -85,11 +86,11 @@ def _joined(curve: Curve, x: FloatArray, near: float) -> Curve:
 
 
 def _steps(x: FloatArray, y: FloatArray, allowed: float) -> Curve:
-    """Return steps that are no further than `allowed` from each y at its x; neighbours share one where they can."""
+    """Return a step curve within `allowed` of each y at its x; neighbours share a step where possible."""
     order = np.argsort(x, kind="stable")
     xs, ys = x[order].tolist(), y[order].tolist()
     digits = max(0, 1 - int(np.floor(np.log10(allowed)))) if allowed > 0 else 15
-    room = 2 * allowed - 10.0**-digits  # rounding takes its part
+    room = 2 * allowed - 10.0**-digits  # rounding uses part of the tolerance
     breaks, levels = list[float](), list[float]()
     low = high = ys[0]
     for k in range(1, len(xs)):
@@ -102,7 +103,7 @@ def _steps(x: FloatArray, y: FloatArray, allowed: float) -> Curve:
 
 
 def _between(a: float, b: float) -> float:
-    """Return a number of few digits that is above a and not above b."""
+    """Return a number with few digits that is greater than a and at most b."""
     for digits in range(2, 16):
         if a < (found := round((a + b) / 2, digits)) <= b:
             return found

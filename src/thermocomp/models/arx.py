@@ -1,4 +1,4 @@
-"""`arx` and `arx-free-run`: the deviation from its own past and the spindle speed (P-01, P-02)."""
+"""`arx` and `arx-free-run`: the deviation predicted from its own past and the spindle speed (P-01, P-02)."""
 
 import math
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ from thermocomp.models.timed import Time
 
 @dataclass(frozen=True, eq=False)
 class _Setting:
-    """Candidates to try: data on one clock, orders to choose from, with an intercept or without."""
+    """Candidates to try: data on one clock, orders to choose from, with or without intercept."""
 
     data: Clocked
     ks: tuple[int, ...]
@@ -34,40 +34,40 @@ class _Setting:
 class ARX(ClockedRegressor):
     """Autoregressive model with inputs: dz(t) = sum_{i=1..k} a_i dz(t - ih) + sum_{i=0..m} b_i n(t - ih) (P-01).
 
-    The recording is put on a clock of `interval`: each tick is driven by the mean of the inputs over the interval that
-    ends there, and the displacement is interpolated at the tick (see `thermocomp.core.autoregressive`).
+    The recording is resampled to a clock of `interval`: the input at each tick is the mean of the inputs over the
+    interval that ends there, and the displacement is interpolated at the tick (see `thermocomp.core.autoregressive`).
 
     With ``criterion`` ``"fpe"``, ``"aic"`` or ``"bic"`` the coefficients come from least squares on one-step errors,
-    and the orders from that criterion (P-02); k = 0 takes part, so there is always an order whose free run decays.
+    and the orders from that criterion (P-02); k = 0 is a candidate, so there is always an order whose free run decays.
     Orders whose free run does not decay within the length of the longest test are not admissible. One-step errors
-    are trivially small, and the noise of the probe biases the coefficients (E-P3); with ``"free-run"`` they are those
-    with the smallest error in free run (see `thermocomp.models.numerics.freerun.output_error`), and the orders those
-    that leave the smallest free-run error on thermal cycles left out. Several intervals are always judged by that.
+    are trivially small, and the noise of the probe biases the coefficients (E-P3). With ``"free-run"`` the coefficients
+    minimise the free-run error (see `thermocomp.models.numerics.freerun.output_error`), and the orders minimise the
+    free-run error on left-out thermal cycles. The choice among several intervals always uses that error.
 
-    Rows with cycle -1 are not learned from, but their inputs drive the model. Inputs that depend on others, or never
-    leave zero, get no coefficient of their own. A `FitError` if there is no input, too few rows, or the free run of the
-    orders asked for does not decay.
+    Rows with cycle -1 are not used for training, but their inputs drive the model. Inputs that depend linearly on
+    others, or are always zero, get no coefficient. Raises `FitError` if there is no input, if there are too few rows,
+    or if the free run with the requested orders does not decay.
 
-    With ``time="none"`` every row is a machine at rest: k = m = 0 is all that can be learned, and `predict` gives the
+    With ``time="none"`` every row is a machine at rest: only k = m = 0 can be learned, and `predict` returns the
     deviation at which the model settles.
 
     Parameters
     ----------
     inputs : sequence of str or int, optional
-        Names (or indices) of the columns it predicts from: the spindle speed in the paper. All columns without it; an
-        empty sequence is a `FitError`, since it means that there is no spindle speed.
+        Names (or indices) of the input columns: the spindle speed in the paper. Default: all columns. An empty sequence
+        raises `FitError`, since it means that there is no spindle speed.
     interval : float or sequence of float, optional
-        h [s], or several to choose from. None: the usual time step of the recording. The paper computes every 10 min.
+        h [s], or several values to choose from. None: the usual time step of the recording. The paper uses 10 min.
     k, m : int, optional
-        Orders; chosen without them.
+        Orders; chosen automatically if None.
     k_max, m_max : int
-        Greatest orders that are tried.
+        Maximum orders that are tried.
     criterion : {'fpe', 'aic', 'bic', 'free-run'}
     fit_intercept : bool or None
-        False: no deviation without inputs, as in the paper. True: one that builds up from the start of each test, as
-        what runs beside the spindle gives. None: judged in free run on cycles left out.
+        False: no deviation without inputs, as in the paper. True: a deviation that builds up from the start of each
+        test, such as from auxiliary units that run with the spindle. None: chosen by free run on left-out cycles.
     time : {'column', 'routed', 'none'} or None
-        Source of the time, see `thermocomp.models.timed.TimedRegressor`; without it, the estimator raises an error.
+        Source of the time, see `thermocomp.models.timed.TimedRegressor`; if None, `fit` raises an error.
 
     Attributes
     ----------
@@ -76,18 +76,18 @@ class ARX(ClockedRegressor):
         [s]
     a_ : ndarray of shape (k,)
     b_ : ndarray of shape (m + 1, n_inputs_used)
-        Lag by lag, for the inputs in the order of `inputs`.
+        One row per lag, for the inputs in the order of `inputs`.
     intercept_ : float
     orders_ : tuple of Order
         Table of FPE, AIC and BIC at `interval_`; empty with ``"free-run"``.
     trials_ : tuple of TriedSetting
-        Settings judged in free run on left-out cycles; empty if none were.
+        Settings assessed in free run on left-out cycles; empty if there was no choice.
     cv_rms_ : float
-        RMS of the chosen setting; nan if none was judged.
+        RMS of the chosen setting; nan if none was assessed.
     chosen_by_ : str
-        Left-out units.
+        Kind of units that were left out.
     one_step_rms_, free_run_rms_ : float
-        In the training data: the first is trivially small, the second is the model's [unit of y].
+        Errors on the training data [unit of y]; the first is trivially small, the second is that of the model in use.
     caution_ : str
         Limitation of the model (E-P6).
 
@@ -146,9 +146,9 @@ class ARX(ClockedRegressor):
             for h in self._intervals(self.interval, step)
         ]
         constants = (False, True) if self.fit_intercept is None else (self.fit_intercept,)
-        if self.time == "none":  # nothing to choose: no row has a past
+        if self.time == "none":  # no choice: no row has a past
             ks, ms, data, constants = ks[:1], ms[:1], data[:1], constants[:1]
-        # one-step criteria choose among all orders by themselves
+        # one-step criteria choose among all orders in a single fit
         groups = [((k,), (m,)) for k in ks for m in ms] if self.criterion == "free-run" else [(ks, ms)]
         tried = [_Setting(d, k, m, c) for d in data for k, m in groups for c in constants]
         best = self._chosen([self._judge(t) for t in tried] if len(tried) > 1 else [])
@@ -164,7 +164,7 @@ class ARX(ClockedRegressor):
         return self._coefficients
 
     def one_step(self, X: ArrayLike, y: ArrayLike, *, dt: ArrayLike | None = None) -> FloatArray:
-        """Predict each tick from the measured displacements before it: a diagnostic, not a prediction (E-P3).
+        """Predict each tick from the measured displacements before it; for diagnosis only (E-P3).
 
         Parameters
         ----------
@@ -177,7 +177,7 @@ class ARX(ClockedRegressor):
         Returns
         -------
         ndarray of shape (n_predicted, 2)
-            Measured and predicted deviation at all ticks that have enough past.
+            Measured and predicted deviation at all ticks with a sufficient past.
         """
         rows, step = self._given(X, dt)
         inputs = self._used(rows)
@@ -204,7 +204,7 @@ class ARX(ClockedRegressor):
     def _solve(
         self, setting: _Setting, targets: Sequence[FloatArray]
     ) -> tuple[Coefficients, tuple[orders.Order, ...], float]:
-        """Return the coefficients of the best of the orders of a setting, the table, and the RMS of one-step errors."""
+        """Return the coefficients of the best orders of a setting, the table of orders, and the one-step RMS error."""
         data, ks, ms, constant = setting.data, setting.ks, setting.ms, setting.intercept
         J = len(self._columns)
         if self.criterion == "free-run" and any(len(r.drive) > 1 for r in data.runs):
@@ -213,7 +213,7 @@ class ARX(ClockedRegressor):
                 raise FitError(too_few(sum(int(np.isfinite(t[1:]).sum()) for t in targets), ks[0], ms[0], data))
             work = data.lagged(targets, ks[0], ms[0])
             return least, (), rms(work[:, -1] - least.one_step(work[:, :-1]))
-        while True:  # the greatest orders that the rows suffice for
+        while True:  # largest orders for which there are enough rows
             K, M = ks[-1], ms[-1]
             work = data.lagged(targets, K, M)
             if len(work) > K + (M + 1) * J + int(constant):
@@ -236,7 +236,7 @@ class ARX(ClockedRegressor):
         return found_at, found, math.sqrt(chosen.sse / chosen.n_rows)
 
     def _judge(self, setting: _Setting) -> TriedSetting:
-        """Judge a setting by its free run over the folds, each left out in turn."""
+        """Assess a setting by its free run on the folds, each left out in turn."""
         data, errors = setting.data, []
         for fold in range(int(data.folds.max()) + 1):
             try:

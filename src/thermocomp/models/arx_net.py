@@ -1,4 +1,4 @@
-"""`arx-net`: a net for the next deviation from the last ones and the spindle speed (P-03)."""
+"""`arx-net`: a neural net that predicts the next deviation from the last ones and the spindle speed (P-03)."""
 
 import math
 from collections.abc import Sequence
@@ -21,12 +21,12 @@ from thermocomp.models.numerics.backprop import learning_rates, scaling_in, scal
 from thermocomp.models.numerics.ticks import TickedRun
 from thermocomp.models.timed import Time
 
-#: ticks after which a row without time is taken to have settled
+#: ticks after which a row without time is regarded as settled
 SETTLED = 2000
 
 
 class _Net:
-    """A trained net with its scaling: one tick, and the free run."""
+    """A trained net with its scaling: single tick and free run."""
 
     def __init__(self, net: Perceptron, scale_in: Affine, scale_out: Affine, k: int, m: int) -> None:
         self.net, self.scale_in, self.scale_out, self.k, self.m = net, scale_in, scale_out, k, m
@@ -37,7 +37,7 @@ class _Net:
     def ticked(self, run: TickedRun) -> FloatArray:
         """Run freely from a cold start; return the deviation at each tick."""
         k, n = self.k, len(run.drive)
-        own = np.zeros(n + k)  # k ticks of rest in front
+        own = np.zeros(n + k)  # preceded by k ticks at rest
         driven = ticks.regressors(np.empty(0), run.drive, np.arange(n), 0, self.m, run.drive)
         row = np.empty(k + driven.shape[1])
         for t in range(1, n):
@@ -54,7 +54,7 @@ class _Net:
         )
 
     def settled(self, inputs: FloatArray) -> FloatArray:
-        """Return the state of the free run after many ticks with the same inputs."""
+        """Return the state of the free run after many ticks with constant inputs."""
         own = np.zeros((len(inputs), max(self.k, 1)))
         driven = np.tile(inputs, self.m + 1)
         for _ in range(SETTLED if self.k else 1):
@@ -70,19 +70,19 @@ class NetARX(ClockedRegressor):
     """Back-propagation net for dz(t) from dz(t-h) .. dz(t-kh) and n(t) .. n(t-mh) (P-03, E-P2).
 
     The net is trained on measured displacements one step ahead, as in the paper, on the same clock as `ARX`; the number
-    of hidden nodes is the one that leaves the smallest error in free run on thermal cycles left out, in place of the
-    paper's trial and error. Its sigmoid output keeps the free run within the trained displacements and an eighth more
-    on either side: it cannot run away. A `FitError` if there is no input, or too few rows.
+    of hidden nodes minimises the free-run error on left-out thermal cycles, which replaces the paper's trial and error.
+    Its sigmoid output keeps the free run within the trained displacements, extended by an eighth at either end: it
+    cannot diverge. Raises `FitError` if there is no input or too few rows.
 
-    With ``time="none"`` every row is a machine at rest in that state: the net is trained with k = m = 0.
+    With ``time="none"`` every row is a machine at rest in that state, and the net is trained with k = m = 0.
 
     Parameters
     ----------
     inputs : sequence of str or int, optional
         As for `ARX`: the spindle speed in the paper.
     interval : float or None
-        h [s]; None: the usual time step of the recording. In steps much shorter than the time constants of the machine,
-        dz(t) is dz(t-h) but for less than a net can learn.
+        h [s]; None: the usual time step of the recording. If steps are much shorter than the time constants of the
+        machine, dz(t) and dz(t-h) differ by less than a net can learn.
     k, m : int or None
         Orders; None: those of the linear model with the smallest final prediction error (P-02, E-P2).
     hidden : int or sequence of int
@@ -91,13 +91,13 @@ class NetARX(ClockedRegressor):
     rate, final_rate : float
         Learning rate in the first and in the last epoch.
     momentum : float
-        Part of the previous change that is added to the next one.
+        Share of the previous change that is added to the next one.
     random_state : int
         Seed of the initial weights and of the order of the patterns.
     jobs : int
-        Threads that train nets.
+        Number of threads for training.
     time : {'column', 'routed', 'none'} or None
-        Source of the time, see `thermocomp.models.timed.TimedRegressor`; without it, the estimator raises an error.
+        Source of the time, see `thermocomp.models.timed.TimedRegressor`; if None, `fit` raises an error.
 
     Attributes
     ----------
@@ -106,11 +106,11 @@ class NetARX(ClockedRegressor):
         [s]
     net_ : Perceptron
     trials_ : tuple of TriedSetting
-        Numbers of hidden nodes that were judged; empty if there was nothing to choose.
+        Numbers of hidden nodes that were assessed; empty if there was no choice.
     cv_rms_ : float
     chosen_by_ : str
     free_run_rms_ : float
-        In the training data [unit of y].
+        Error on the training data [unit of y].
     caution_ : str
         Limitation of the model (E-P6).
 
@@ -211,7 +211,7 @@ class NetARX(ClockedRegressor):
         self._orders(self.m, 0, "m")
         if self.k is not None and self.m is not None:
             return self.k, self.m
-        with config_context(enable_metadata_routing=False):  # the steps were checked
+        with config_context(enable_metadata_routing=False):  # the steps were already checked
             linear = ARX(interval=self.interval, k=self.k, m=self.m, time="routed").fit(inputs, y, dt=step, cycle=cycle)
         return linear.k_, linear.m_
 
@@ -234,7 +234,7 @@ class NetARX(ClockedRegressor):
         return _Net(trained.net, scale_in, scaling_out(low, high), self.k_, self.m_)
 
     def _judge(self, data: Clocked, size: int, fold: int) -> float:
-        """Return the RMS in free run on one fold, left out; inf if what is left is too little."""
+        """Return the free-run RMS on one left-out fold; inf if the remaining rows are too few."""
         try:
             net = self._train(data, size, fold)
         except FitError:

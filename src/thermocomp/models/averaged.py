@@ -1,4 +1,4 @@
-"""`averaged`: many ridge regressions on lagged temperatures and states of the spindle speed, merged into one model."""
+"""`averaged`: many ridge regressions on lagged temperatures and speed states, merged into one model."""
 
 from collections.abc import Sequence
 from typing import Any, ClassVar
@@ -17,52 +17,52 @@ from thermocomp.models.timed import Time, TimedRegressor
 
 MINUTE = 60.0
 
-#: of the lags of the temperatures [s]
+#: time constants of the temperature lags [s]
 LAGS = (10 * MINUTE, 30 * MINUTE, 90 * MINUTE)
-#: what heat grows with: friction of a constant torque; of oil, whose torque grows with n^(2/3) (Palmgren); of air
+#: exponents of heat against speed: friction of constant torque; oil friction, torque ~ n^(2/3) (Palmgren); air
 POWERS = (1.0, 5 / 3, 3.0)
 #: time constants of the speed states at rest and at top speed [s]
 STOPPED = (10 * MINUTE, 30 * MINUTE, 90 * MINUTE, 270 * MINUTE)
 RUNNING = (5 * MINUTE, 15 * MINUTE, 45 * MINUTE, 135 * MINUTE)
 
-#: read-outs that a frozen model knows the structures' spread by
+#: number of linear combinations that describe the spread of the structures in a frozen model
 DIRECTIONS = 12
 
 
 class AveragedDynamic(TimedRegressor):
     """Average of many ridge regressions on lagged temperatures and on states of the spindle speed.
 
-    A few thermal cycles cannot tell which time constants a machine has: the set that errs least on a cycle left out is
-    the luckiest, and errs more on the next. So none is chosen. Each of many structures takes some lags, the same for
-    all temperatures, some states of the speed (`PacedDynamic`) and a strength of its ridge at random; the weights of
-    all are averaged, those that err less where half a cycle, its run or its stop, was left out with the greater share.
-    Since every structure is linear in the same states, their average is one model of that form.
+    A few thermal cycles cannot determine the time constants of a machine: the set with the smallest error on a left-out
+    cycle is best by chance and does worse on the next. Therefore none is chosen. Each of many structures draws at
+    random some lags, the same for all temperatures, some speed states (`PacedDynamic`) and a ridge penalty. The weights
+    of all structures are averaged; structures with smaller errors on left-out half cycles (run or stop) have a greater
+    share. Since every structure is linear in the same states, their average is a single model of that form.
 
-    To each ridge the covariance is added that noise of the sensors in use gives the features, the zero's included: what
-    a regression on inputs with that noise would come to. Nothing leans on a difference that is lost in noise.
+    Each ridge regression adds the covariance that noise of the sensors in use, including noise in the zero, causes in
+    the features: the limit of a regression on inputs with that noise. The model does not rely on differences that are
+    lost in noise.
 
     Parameters
     ----------
     speed : sequence of str or int
         Names (or indices into X) of the columns that are spindle speeds; the others are temperatures.
     noise : float
-        Standard deviation of the temperatures in use, beyond what they have in X, independent from reading to reading
-        and in each reading of the zero [degC].
+        Standard deviation of the temperature noise in use beyond the noise in X, independent between readings and in
+        each reading of the zero [degC].
     lags : sequence of float
-        Time constants of the temperatures' lags [s]. One below
-        `thermocomp.models.pacedfeatures.SHORTEST_LAG` times the time between two rows is left
-        out.
+        Time constants of the temperature lags [s]. Those below `thermocomp.models.pacedfeatures.SHORTEST_LAG` times
+        the time between two rows are omitted.
     powers : sequence of float
-        Exponents of the fraction of the top speed.
+        Exponents of the speed as a fraction of the top speed.
     stopped, running : sequence of float
-        Time constants of the speed states at rest and at top speed [s]; all pairs are taken that do not slow down as
-        the spindle turns.
+        Time constants of the speed states at rest and at top speed [s]; all pairs are used whose running time constant
+        is not the longer one.
     structures : int
         Number of averaged structures.
     random_state : int
-        Seed of the draw.
+        Seed of the random draw.
     time : {'column', 'routed', 'none'} or None
-        Source of the time, see `thermocomp.models.timed.TimedRegressor`; without it, the estimator raises an error.
+        Source of the time, see `thermocomp.models.timed.TimedRegressor`; if None, `fit` raises an error.
 
     Attributes
     ----------
@@ -72,17 +72,17 @@ class AveragedDynamic(TimedRegressor):
     lags_ : tuple of float
         Lags of the temperatures [s].
     top_speed_ : float
-        Greatest speed of the rows learned from [1/min].
+        Greatest speed in the training rows [1/min].
     cv_rms_ : float
-        Mean over what was left out of the root mean square error there [unit of y].
+        Mean over the left-out parts of the root mean square error on each [unit of y].
     chosen_by_ : str
-        Left-out units.
+        Kind of units that were left out.
     left_out_ : ndarray of shape (n_rows, 2)
-        Of each row that was learned from: prediction by structures that were fitted without its cycle, and their spread
-        [unit of y]; nan elsewhere.
+        Prediction for each training row by structures fitted without its cycle, and their spread [unit of y]; nan
+        elsewhere.
     gain_ : ndarray of shape (n_inputs,)
-        How much y follows each temperature within one step between rows, in absolute value [unit of y per degC]; 0 for
-        a speed.
+        Sensitivity of y to each temperature within one step between rows, in absolute value [unit of y per degC]; 0
+        for a speed.
 
     References
     ----------
@@ -162,16 +162,16 @@ class AveragedDynamic(TimedRegressor):
     def lay_out(
         self, rows: FloatArray, step: FloatArray, folds: IntArray, speeds: Sequence[int]
     ) -> tuple[PacedFeatures, IntArray, str]:
-        """Return the features that the rows can determine, and the parts of the rows that are left out together.
+        """Return the features identifiable from the rows, and the parts of the rows to leave out together.
 
         Parameters
         ----------
         rows : ndarray of shape (n_rows, n_inputs)
             Inputs minus their reference.
         step : ndarray of shape (n_rows,)
-            Time since the row before [s], inf where a test starts.
+            Time since the previous row [s], inf at the start of a test.
         folds : ndarray of int of shape (n_rows,)
-            As `thermocomp.models.numerics.folds.number_folds` gives them.
+            Fold of each row, as returned by `thermocomp.models.numerics.folds.number_folds`.
         speeds : sequence of int
             Columns that are spindle speeds; the others are temperatures.
 
@@ -201,7 +201,7 @@ class AveragedDynamic(TimedRegressor):
     def _leave_out(
         self, rows: FloatArray, step: FloatArray, folds: IntArray, weights: FloatArray, shares: FloatArray
     ) -> FloatArray:
-        """Return mean and spread of the structures, (n_rows, 2), by the weights (n_folds, ...) of each row's fold."""
+        """Return mean and spread of the structures, (n_rows, 2), with the weights (n_folds, ...) of each row's fold."""
         found, start = np.full((len(rows), 2), np.nan), 0
         for table in self._features.tables(rows, step):
             for k, own in enumerate(weights):
@@ -214,13 +214,13 @@ class AveragedDynamic(TimedRegressor):
         return found
 
     def _copies(self) -> FloatArray:
-        """Return the weights of the temperatures and of their lags, (n_copies, n_temperatures)."""
+        """Return the weights of the temperatures and of their lags, shape (n_copies, n_temperatures)."""
         of = self._features
         return self.coef_[: of.copies * len(of.temperatures)].reshape(of.copies, len(of.temperatures))
 
     @property
     def feature_labels_(self) -> tuple[str, ...]:
-        """Names of the features behind `coef_`."""
+        """Names of the features that belong to `coef_`."""
         names, of = [str(n) for n in self._names()], self._features
         labels = [names[i] for i in of.temperatures]
         labels += [f"{names[i]} lagged {tau / MINUTE:g} min" for tau in of.lags for i in of.temperatures]
@@ -249,14 +249,14 @@ class AveragedDynamic(TimedRegressor):
 
 
 def _main_directions(deviations: FloatArray, moments: Moments) -> FloatArray:
-    """Return the few read-outs, (n_spread, n_features), whose squares sum to those of the structures.
+    """Return a few linear combinations, (n_spread, n_features), that approximate the spread of the structures.
 
-    They are the largest directions of the spread, widened by what is left out.
+    They are the principal directions of the spread, enlarged to make up for the omitted ones.
 
     Parameters
     ----------
     deviations : ndarray of shape (n_structures, n_features)
-        Weights less their mean, times the root of the structure's share.
+        Weights minus their mean, times the square root of the structure's share.
     moments : Moments
     """
     scale = np.sqrt(np.diag(moments.gram.sum(axis=0)) / moments.rows.sum())

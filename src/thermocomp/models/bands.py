@@ -1,4 +1,4 @@
-"""Bands from the errors on thermal cycles that were left out of the training, one after the other."""
+"""Uncertainty bands from the errors on thermal cycles that were left out of the training in turn."""
 
 from collections.abc import Sequence
 from typing import Literal
@@ -13,11 +13,11 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
 
-#: share of the rows of unseen cycles that a band is to hold
+#: share of the rows of unseen cycles that a band should cover
 LEVEL = 0.9
-#: least spread that is counted with, in units of its root mean square on the cycles left out
+#: minimum spread used, relative to its root mean square on the left-out cycles
 FLOOR = 0.5
-_LEAST = 1e-6  # [unit], and of a size in units of that: nothing is divided by less
+_LEAST = 1e-6  # lower limit of divisors [unit], and of a size relative to that
 
 
 def find_band(
@@ -28,31 +28,31 @@ def find_band(
     speeds: Sequence[int] = (),
     level: float = LEVEL,
 ) -> Band | None:
-    """Return the band of a model by the errors on its training's cycles, each left out.
+    """Return the uncertainty band of a model from the errors on its left-out training cycles.
 
-    The error is taken in units of ``sqrt(floor^2 + spread^2)``; its size in these units differs between run and stop. A
-    cycle errs as a whole, so n cycles say of that size what n independent numbers do, and the size is that of cycles
-    left out of n, not of one more: the interval for one more number of a sample, Student's t with n - 1 degrees of
-    freedom times sqrt(1 + 1/n). From `CONFORMAL` cycles on nothing is assumed but that the cycles could have
-    come in any order: the quantile of the errors, each cycle counting the same and one more, unknown, beside them.
+    The error is expressed in units of ``sqrt(floor^2 + spread^2)``; its size in these units differs between run and
+    stop. Errors within a cycle are dependent, so n cycles count as n independent values. The size for one further
+    cycle is that of the prediction interval of a sample: Student's t with n - 1 degrees of freedom times
+    sqrt(1 + 1/n). From `CONFORMAL` cycles onwards, the only assumption is that the cycles are exchangeable: the
+    quantile of the errors, with equal weight for each cycle and for one additional unknown cycle.
 
     Parameters
     ----------
     residual : ndarray of shape (n_rows,)
-        Error on rows whose cycle the model had not seen [unit].
+        Error on rows whose cycle was left out of the training [unit].
     spread : ndarray of shape (n_rows,)
-        Spread of its structures there [unit].
+        Spread of the structures for these rows [unit].
     cycle : ndarray of int of shape (n_rows,)
     turning : ndarray of bool of shape (n_rows,)
-        The spindle turns.
+        Whether the spindle turns.
     speeds : sequence of int
-        Inputs that will state whether it turns.
+        Inputs that will indicate whether the spindle turns.
     level : float
 
     Returns
     -------
     Band or None
-        None with fewer than two cycles: nothing is known of an unseen one.
+        None with fewer than two cycles: the error on an unseen cycle is then unknown.
 
     References
     ----------
@@ -80,9 +80,9 @@ def find_band(
 
 
 def _size(errors: FloatArray, rows: Sequence[BoolArray], phase: BoolArray) -> float:
-    """Return the root mean square of errors in a phase, every cycle counting the same.
+    """Return the root mean square of errors in a phase, with equal weight for each cycle.
 
-    It is drawn towards that of all phases, which weighs as much as one cycle more.
+    It is shrunk towards the value over all phases, which has the weight of one additional cycle.
     """
     squares = [np.mean(errors[mine & phase] ** 2) for mine in rows if (mine & phase).any()]
     squares.append(np.mean([np.mean(errors[mine] ** 2) for mine in rows]))

@@ -1,4 +1,4 @@
-"""Common base of all estimators: the contract of scikit-learn and `freeze`."""
+"""Common base of all estimators: the scikit-learn interface and `freeze`."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -22,11 +22,11 @@ IntArray = NDArray[np.intp]
 class ThermalRegressor(RegressorMixin, BaseEstimator, ABC):
     """A regressor that freezes into plain numbers.
 
-    The columns of X are the inputs minus their reference ("change"). `fit` leaves the trained range behind, as
-    ``data_min_`` and ``data_max_`` of shape (n_features,).
+    The columns of X are the inputs minus their reference ("change"). `fit` sets the trained range as ``data_min_`` and
+    ``data_max_`` of shape (n_features,).
     """
 
-    freezable: ClassVar[bool] = True  #: False: can be compared, not deployed; see `thermocomp.models.unfrozen`
+    freezable: ClassVar[bool] = True  #: False: comparison only, no deployment; see `thermocomp.models.unfrozen`
 
     def freeze(
         self,
@@ -37,21 +37,21 @@ class ThermalRegressor(RegressorMixin, BaseEstimator, ABC):
         support: Support = Support(),
         provenance: Provenance | None = None,
     ) -> ErrorModel:
-        """Return the fitted model as plain numbers, without the inputs it has no use for.
+        """Return the fitted model as plain numbers, without unused inputs.
 
-        A sensor that was not selected may die without a consequence.
+        Failure of a sensor that was not selected has no effect.
 
         Parameters
         ----------
         target : str
-            Displacement channel (or error component) it predicts.
+            Displacement channel (or error component) that the model predicts.
         unit : str
-            Unit of the deviation it gives.
+            Unit of the predicted deviation.
         inputs : sequence of Input, optional
-            One per feature. Without it they are made from the training data: named like the features, without unit,
-            with reference 0 and the range seen in `fit`.
+            One per feature. Default: created from the training data, with the names of the features, no unit, reference
+            0 and the trained range.
         support : Support
-            Behaviour of the model outside its training range.
+            Behaviour of the model outside its trained range.
         provenance : Provenance, optional
             Origin of the model.
 
@@ -62,7 +62,7 @@ class ThermalRegressor(RegressorMixin, BaseEstimator, ABC):
         Raises
         ------
         InputError
-            `inputs` are not as many as the features.
+            The number of `inputs` differs from the number of features.
         FitError
             The method cannot be frozen; see `freezable`.
         """
@@ -72,14 +72,14 @@ class ThermalRegressor(RegressorMixin, BaseEstimator, ABC):
 
     @abstractmethod
     def _frozen(self, inputs: Sequence[Input], header: dict[str, Any]) -> ErrorModel:
-        """Build the model of the method's family; `header` holds what is the same for all families."""
+        """Build the model of the method's family; `header` contains the fields common to all families."""
 
     def _names(self) -> tuple[str, ...]:
         """Return the names of the features: those of the table given to `fit`, else x0, x1, ..."""
         return tuple(getattr(self, "feature_names_in_", [f"x{i}" for i in range(self.n_features_in_)]))
 
     def _inputs(self, inputs: Sequence[Input] | None) -> tuple[Input, ...]:
-        """Return the inputs of the frozen model: those given, else made from the training data."""
+        """Return the inputs of the frozen model: as given, or created from the training data."""
         check_is_fitted(self)
         names = self._names()
         if inputs is None:
@@ -96,14 +96,14 @@ class ThermalRegressor(RegressorMixin, BaseEstimator, ABC):
     # -- for the methods -----------------------------------------------------------------------------------------------
 
     def _read(self, X: ArrayLike, y: ArrayLike, *, multi_output: bool = False) -> tuple[FloatArray, FloatArray]:
-        """Check the training data; return X by column in memory, and y."""
+        """Check the training data; return X (column-major) and y."""
         change, deviation = validate_data(
             self, X, y, y_numeric=True, multi_output=multi_output, dtype=np.float64, order="F", ensure_min_samples=2
         )
         return change, np.asarray(deviation, dtype=np.float64)
 
     def _note_range(self, change: FloatArray) -> None:
-        """Note the trained range; ten times as fast by column in memory as by row."""
+        """Store the trained range; column-major data is ten times as fast as row-major."""
         self.data_min_, self.data_max_ = change.min(axis=0), change.max(axis=0)
 
 
@@ -121,16 +121,16 @@ class MemorylessRegressor(ThermalRegressor):
         Returns
         -------
         ndarray of shape (n_rows,)
-            A net that was fitted to several columns of y gives as many: (n_rows, n_outputs).
+            A net that was fitted to several columns of y returns several: (n_rows, n_outputs).
         """
         return self._predict(self._checked(X))
 
     @abstractmethod
     def _predict(self, change: FloatArray) -> FloatArray:
-        """Predict for rows that were checked, (n_rows, n_features)."""
+        """Predict for checked rows, (n_rows, n_features)."""
 
     def _checked(self, X: ArrayLike) -> FloatArray:
-        """Check rows against what was fitted."""
+        """Check rows against the fitted features."""
         check_is_fitted(self)
         change: FloatArray = validate_data(self, X, dtype=np.float64, reset=False)
         return change
@@ -138,9 +138,9 @@ class MemorylessRegressor(ThermalRegressor):
     def _learned(
         self, X: ArrayLike, y: ArrayLike, cycle: ArrayLike | None
     ) -> tuple[FloatArray, FloatArray, IntArray, str]:
-        """Check the training data, note the range of the rows that may be learned from, and return these alone.
+        """Check the training data, store the range of the training rows, and return only these rows.
 
-        Beside X and y come the fold of each row and, in words, what is left out in turn.
+        Also return the fold of each row and a text that describes the units left out in turn.
         """
         change, deviation = self._read(X, y)
         folds, description = number_folds(cycle, len(change))
@@ -148,7 +148,7 @@ class MemorylessRegressor(ThermalRegressor):
             learned = folds >= 0
             if learned.sum() < 2:
                 raise FitError("a single row to learn from: at least 2 are needed")
-            # by column again: rows left out must not change a single digit
+            # column-major again: rows that are left out must not change a single digit
             change, deviation, folds = np.asfortranarray(change[learned]), deviation[learned], folds[learned]
         self._note_range(change)
         return change, deviation, folds, description
@@ -158,14 +158,14 @@ class StaticRegressor(MemorylessRegressor):
     """A memoryless regressor whose fit needs only X and y."""
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
-        """Fit; the class documents the additional data that a method refuses.
+        """Fit the model; see the class for cases in which a method rejects the data.
 
         Parameters
         ----------
         X : array-like of shape (n_rows, n_features)
-            Inputs minus their reference, in the order of time.
+            Inputs minus their reference, in chronological order.
         y : array-like of shape (n_rows,)
-            Deviation; a net takes several columns, (n_rows, n_outputs).
+            Deviation; a net accepts several columns, (n_rows, n_outputs).
 
         Returns
         -------
@@ -183,7 +183,7 @@ class StaticRegressor(MemorylessRegressor):
 
     @abstractmethod
     def _fit(self, change: FloatArray, deviation: FloatArray) -> None:
-        """Fit to data that were checked, (n_rows, n_features) and (n_rows,)."""
+        """Fit to checked data, (n_rows, n_features) and (n_rows,)."""
 
 
 class CycledRegressor(MemorylessRegressor):
@@ -192,21 +192,21 @@ class CycledRegressor(MemorylessRegressor):
     Attributes
     ----------
     chosen_by_ : str
-        Units left out for the choice.
+        Kind of units left out for the choice.
     """
 
     def fit(self, X: ArrayLike, y: ArrayLike, *, cycle: ArrayLike | None = None) -> Self:
-        """Fit; the class documents the additional data that a method refuses.
+        """Fit the model; see the class for cases in which a method rejects the data.
 
         Parameters
         ----------
         X : array-like of shape (n_rows, n_features)
-            Inputs minus their reference, in the order of time.
+            Inputs minus their reference, in chronological order.
         y : array-like of shape (n_rows,)
             Deviation.
         cycle : array-like of int of shape (n_rows,), optional
-            Thermal cycle of each row; rows with -1 are not learned from. Without it, five stretches of equal length
-            take the place of the cycles.
+            Thermal cycle of each row; rows with -1 are not used for training. Default: five blocks of equal length
+            replace the cycles.
 
         Returns
         -------
@@ -215,7 +215,7 @@ class CycledRegressor(MemorylessRegressor):
         Raises
         ------
         FitError
-            Fewer than two rows to learn from.
+            Fewer than two training rows.
         InputError
             A setting is out of its range.
         """
@@ -225,4 +225,4 @@ class CycledRegressor(MemorylessRegressor):
 
     @abstractmethod
     def _fit(self, change: FloatArray, deviation: FloatArray, folds: IntArray) -> None:
-        """Fit to data that were checked; `folds` of shape (n_rows,), 0, 1, ..., are left out in turn."""
+        """Fit to checked data; `folds` of shape (n_rows,), numbered 0, 1, ..., are left out in turn."""

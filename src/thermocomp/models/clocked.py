@@ -1,4 +1,4 @@
-"""Common part of the autoregressive estimators: their data on a clock, their inputs, and the candidates tried."""
+"""Common part of the autoregressive estimators: data on a clock, inputs, and the candidates tried."""
 
 import math
 from abc import abstractmethod
@@ -17,8 +17,8 @@ from thermocomp.models.timed import TimedRegressor
 
 BoolArray = NDArray[np.bool_]
 
-#: a memory much longer than the recording cannot be known from it: the free run must decay by e within this many times
-#: the longest test
+#: a recording cannot determine a memory much longer than itself: the free run must decay by a factor e within this many
+#: lengths of the longest test
 MEMORY = 1.0
 
 NO_SPEED = (
@@ -29,7 +29,7 @@ NO_SPEED = (
 
 @dataclass(frozen=True)
 class TriedSetting:
-    """One setting that was tried, judged in free run on thermal cycles left out.
+    """One setting that was tried, assessed in free run on left-out thermal cycles.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class TriedSetting:
     hidden : int
         Hidden nodes; 0 for a linear model.
     cv_rms : float
-        Mean over the cycles left out of their RMS [unit of y]; inf if the setting cannot be fitted.
+        Mean of the RMS values of the left-out cycles [unit of y]; inf if the setting cannot be fitted.
     """
 
     interval: float
@@ -53,7 +53,7 @@ class TriedSetting:
 
 @dataclass(frozen=True, eq=False)
 class Clocked:
-    """Training data on the clock of one interval.
+    """Training data resampled to the clock of one interval.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class Clocked:
     runs : list of TickedRun
     y, dt : ndarray of shape (n_rows,)
     folds : ndarray of int of shape (n_rows,)
-        -1 for rows that are not learned from.
+        -1 for rows that are not used for training.
     """
 
     interval: float
@@ -72,12 +72,12 @@ class Clocked:
     folds: IntArray
 
     def targets(self, without: int | None = None) -> list[FloatArray]:
-        """Return the known displacement at each tick of each run, nan elsewhere and in the fold left out."""
+        """Return the known displacement at each tick of each run, nan elsewhere and in the left-out fold."""
         known = (self.folds >= 0) & (self.folds != without) if without is not None else self.folds >= 0
         return ticks.displacements(self.runs, self.y, self.dt, known, self.interval)
 
     def lagged(self, targets: Sequence[FloatArray], k: int, m: int) -> FloatArray:
-        """Return the regressors and dz at all ticks whose whole past is known: measured, not predicted.
+        """Return the regressors and dz at all ticks whose entire past is measured, not predicted.
 
         Returns
         -------
@@ -100,13 +100,13 @@ class Clocked:
         return blocks[0] if len(blocks) == 1 else np.asfortranarray(np.vstack(blocks))
 
     def free_run_rms(self, model: "Recursion", rows: BoolArray) -> float:
-        """Return the RMS of a model's free run in some of the rows [unit of y]; nan if there are none."""
+        """Return the RMS error of a model's free run on selected rows [unit of y]; nan if there are none."""
         free = np.concatenate([model.at_rows(r) for r in self.runs])
         return rms(self.y[rows] - free[rows])
 
     @property
     def largest_root(self) -> float:
-        """Bound on the roots of the polynomial."""
+        """Upper bound on the roots of the polynomial."""
         longest = max(len(r.drive) - 1 for r in self.runs)
         return math.exp(-1.0 / (MEMORY * max(longest, 1)))
 
@@ -115,14 +115,14 @@ class Recursion(Protocol):
     """Fitted recursion of an autoregressive estimator."""
 
     def settled(self, inputs: FloatArray) -> FloatArray:
-        """Return the deviation at which it would come to rest with each row's inputs."""
+        """Return the deviation at which the model settles with the inputs of each row."""
 
     def at_rows(self, run: TickedRun) -> FloatArray:
-        """Return its free run through a test, at the rows."""
+        """Return the free run through a test, at the rows."""
 
 
 class ClockedRegressor(TimedRegressor):
-    """Base of the autoregressive estimators: choice of inputs and clock, by cycles."""
+    """Base of the autoregressive estimators: selection of inputs and clock by cycles."""
 
     inputs: Sequence[str | int] | None
     interval_: float
@@ -156,7 +156,7 @@ class ClockedRegressor(TimedRegressor):
         return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
     def _resolve(self) -> IntArray:
-        """Return the columns it predicts from."""
+        """Return the columns used as inputs."""
         if self.inputs is None:
             return np.arange(len(self._names()))
         if not len(self.inputs):
@@ -167,18 +167,18 @@ class ClockedRegressor(TimedRegressor):
         return np.array(found, dtype=np.intp)
 
     def _used(self, rows: FloatArray) -> FloatArray:
-        """Return the columns of the inputs; no copy if that is all: it takes as long as the rest."""
+        """Return the columns of the inputs; without a copy if all are used, since copying would double the run time."""
         return rows[:, self._columns] if self._some else rows
 
     def _chosen(self, trials: Sequence[TriedSetting]) -> int:
-        """Note what was judged; return the place of the best, the first if nothing was."""
+        """Store the assessed settings; return the index of the best, or 0 if none was assessed."""
         self.trials_ = tuple(trials)
         best = int(np.argmin([t.cv_rms for t in trials])) if trials else 0
         self.cv_rms_ = trials[best].cv_rms if trials else math.nan
         return best
 
     def _note_free_run(self, data: Clocked) -> None:
-        """Note how the free run fits the training data; with ``time="none"`` there is none."""
+        """Store the free-run error on the training data; nan with ``time="none"``."""
         self.free_run_rms_ = math.nan if self.time == "none" else data.free_run_rms(self._recursion, data.folds >= 0)
 
     @staticmethod
@@ -200,17 +200,17 @@ class ClockedRegressor(TimedRegressor):
 
 
 def rms(error: FloatArray) -> float:
-    """Return the root of the mean square; nan of nothing."""
+    """Return the root mean square; nan for an empty array."""
     return float(np.sqrt(np.mean(error**2))) if error.size else math.nan
 
 
 def too_few(n: int, k: int, m: int, data: Clocked) -> str:
-    """Return the message that there are too few rows for some orders.
+    """Return the message that there are too few rows for the given orders.
 
     Parameters
     ----------
     n : int
-        Ticks that could be learned from.
+        Ticks available for training.
     k, m : int
     data : Clocked
 

@@ -1,8 +1,8 @@
-"""Joint support of a training set: a few representative states, and a limit calibrated on cycles left out.
+"""Joint support of a training set: a few representative states, and a limit calibrated on left-out cycles.
 
 States: farthest-point cover (Gonzalez 1985, Clustering to minimize the maximum intercluster distance): each new point
-is the training state that is farthest from those there are. Limit: the distance that `SHARE` of the rows of left-out
-cycles have at most to a cover of the others, and never less than that of any training row to the cover.
+is the training state farthest from the existing points. Limit: the distance within which `SHARE` of the rows of
+left-out cycles lie from a cover of the other cycles, but at least the largest distance of a training row to the cover.
 """
 
 from collections.abc import Sequence
@@ -17,16 +17,16 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
 
-#: rows of left-out cycles that are inside
+#: share of the rows of left-out cycles that must lie inside
 SHARE = 0.95
-#: a speed is known so near to a trained one, by the span of the trained speeds and standstill
+#: a speed this close to a trained one counts as known, relative to the span of the trained speeds and standstill
 NEAR = 0.1
-#: numbers in all points together: the model file stays below 8 KB more
+#: maximum count of numbers in all points together: adds less than 8 KB to the model file
 NUMBERS = 360
-#: most inputs that are compared, those that change most first
+#: maximum number of inputs compared, those with the largest changes first
 COLUMNS = 40
-_ROWS = 600  # of the training that points are taken from
-_BLOCKS = 8  # left out at most
+_ROWS = 600  # maximum number of training rows from which points are selected
+_BLOCKS = 8  # maximum number of blocks left out
 
 
 def find_joint_support(change: FloatArray, channels: Sequence[Channel], cycle: IntArray) -> JointSupport | None:
@@ -37,9 +37,9 @@ def find_joint_support(change: FloatArray, channels: Sequence[Channel], cycle: I
     change : ndarray of shape (n_rows, n_inputs)
         Inputs minus their reference, finite [their units].
     channels : sequence of Channel
-        Channels of the values.
+        Channels of the inputs.
     cycle : ndarray of int of shape (n_rows,)
-        Thermal cycle of each row; with a single one its quarters are left out in turn.
+        Thermal cycle of each row; with a single cycle, its quarters are left out in turn.
 
     Returns
     -------
@@ -77,7 +77,7 @@ def find_joint_support(change: FloatArray, channels: Sequence[Channel], cycle: I
 
 
 def _calibrated(states: FloatArray, cycle: IntArray, n_points: int) -> float:
-    """Return the distance that most rows of left-out cycles have at most to a cover of the others."""
+    """Return the distance within which `SHARE` of the rows of left-out cycles lie from a cover of the others."""
     names, block = np.unique(cycle, return_inverse=True)
     if len(names) == 1:
         block = np.arange(len(states)) * 4 // len(states)
@@ -92,7 +92,7 @@ def _calibrated(states: FloatArray, cycle: IntArray, n_points: int) -> float:
 
 
 def _points(states: FloatArray, n_points: int) -> FloatArray:
-    """Return states that cover all: the one nearest to the mean, then always the one farthest from those before."""
+    """Return states that cover all: the one nearest to the mean, then always the one farthest from those chosen."""
     pool = _thinned(states)
     taken = [int(np.argmin(((pool - pool.mean(axis=0)) ** 2).sum(axis=1)))]
     far = _nearest(pool, pool[taken])
@@ -103,7 +103,7 @@ def _points(states: FloatArray, n_points: int) -> FloatArray:
 
 
 def _nearest(states: FloatArray, points: FloatArray) -> FloatArray:
-    """Return the distance of states to the nearest point, (n_states,): root of the mean square over the inputs."""
+    """Return the distance of each state to its nearest point, (n_states,): root mean square over the inputs."""
     square = np.full(len(states), np.inf)
     for p in points:
         away = states - p
@@ -116,7 +116,7 @@ def _thinned(states: FloatArray) -> FloatArray:
 
 
 def _levels(values: FloatArray, radius: float) -> tuple[float, ...]:
-    """Return values such that every one of `values` is within `radius` of one of them."""
+    """Return values such that every element of `values` is within `radius` of one of them."""
     found: list[float] = []
     for v in np.unique(values).tolist():
         if not found or v - found[-1] > radius:

@@ -1,4 +1,4 @@
-"""Parameter uncertainty of `averaged`: the covariance of its weights, and its reduction by a further test."""
+"""Parameter uncertainty of `averaged`: covariance of its weights, and its reduction by a further test."""
 
 from dataclasses import dataclass
 
@@ -19,23 +19,23 @@ FloatArray = NDArray[np.float64]
 class Doubt:
     """Uncertainty of an average of ridge regressions, and the response of temperatures to the speed.
 
-    The covariance of the weights is that of the structures: they fit the rows alike and differ where these say nothing.
-    A part that is left out in turn (half a thermal cycle) counts as one observation, whose error is the one left out:
-    neighbouring rows say the same.
+    The covariance of the weights is that of the structures: they fit the rows equally well and differ where the rows
+    contain no information. Each part that is left out in turn (half a thermal cycle) counts as one observation with the
+    error found on it, because neighbouring rows are not independent.
 
     Parameters
     ----------
     features : PacedFeatures
     columns : int
-        Inputs of the recordings.
+        Number of inputs of the recordings.
     covariance : ndarray of shape (n_targets, n_features, n_features)
         Covariance of the weights.
     error : ndarray of shape (n_targets,)
-        Root mean square error on what was left out [unit of the target].
+        Root mean square error on the left-out parts [unit of the target].
     part : float
-        Mean duration of what is left out together [s].
+        Mean duration of a part that is left out [s].
     heating : tuple of PacedFeatures and ndarray of shape (n_states, n_temperatures)
-        States of the speed alone, and the temperatures' weights of them.
+        Features from the speed alone, and the weights with which they predict the temperatures.
     """
 
     features: PacedFeatures
@@ -51,16 +51,16 @@ class Doubt:
         return self.features.states[0][0]
 
     def table(self, speed: FloatArray, dt: float, room: FloatArray | None = None) -> FloatArray:
-        """Return the features in a test that was not run, (n_rows, n_features).
+        """Return the features of a planned test, (n_rows, n_features).
 
         Parameters
         ----------
         speed : ndarray of shape (n_rows,)
             [1/min]
         dt : float
-            Between two rows [s].
+            Time between two rows [s].
         room : ndarray of shape (n_rows, n_temperatures), optional
-            Effect of the room on each temperature [degC]. The rest is predicted from the speed.
+            Effect of the room on each temperature [degC]. The effect of the speed is predicted.
         """
         step = np.full(len(speed), dt)
         step[0] = np.inf
@@ -72,7 +72,7 @@ class Doubt:
         return np.vstack(list(self.features.tables(rows, step)))
 
     def spread(self, table: FloatArray) -> FloatArray:
-        """Return the expected error in some rows, root mean square, (n_targets,) [unit of the target]."""
+        """Return the expected RMS error over the given rows, (n_targets,) [unit of the target]."""
         squares = (self.covariance * (table.T @ table / len(table))).sum(axis=(1, 2))
         return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
 
@@ -82,7 +82,7 @@ class Doubt:
         Parameters
         ----------
         table : ndarray of shape (n_rows, n_features)
-            Its features; a few dozen rows are enough.
+            Features of the test; a few dozen rows are enough.
         duration : float
             [s]
         """
@@ -102,12 +102,12 @@ class Doubt:
 
 
 def find_doubt(samples: Samples, settings: AveragedDynamic | None = None) -> Doubt:
-    """Return the uncertainty of `averaged` after some recordings.
+    """Return the uncertainty of `averaged` after the given recordings.
 
     Parameters
     ----------
     samples : Samples
-        With a spindle speed and at least one temperature.
+        Samples with a spindle speed and at least one temperature.
     settings : AveragedDynamic, optional
         Settings of the method. Default: its default settings.
 
@@ -118,9 +118,9 @@ def find_doubt(samples: Samples, settings: AveragedDynamic | None = None) -> Dou
     Raises
     ------
     InputError
-        There is no spindle speed, more than one, or no temperature.
+        There is no spindle speed, more than one spindle speed, or no temperature.
     FitError
-        Too few rows are complete.
+        There are too few complete rows.
     """
     of = settings if settings is not None else AveragedDynamic()
     complete = samples.take(samples.valid)

@@ -19,7 +19,7 @@ from thermocomp.recordings.samples import usual_step
 
 MINUTE = 60.0
 
-#: sets of time constants that are tried for the copies of the temperatures [s]: none, one of minutes to hours, several
+#: candidate sets of time constants for the temperature copies [s]: none, a single one of minutes to hours, or several
 TEMPERATURE_LAGS: tuple[tuple[float, ...], ...] = (
     (),
     (10 * MINUTE,),
@@ -29,7 +29,7 @@ TEMPERATURE_LAGS: tuple[tuple[float, ...], ...] = (
     (5 * MINUTE, 20 * MINUTE, 80 * MINUTE),
     (10 * MINUTE, 40 * MINUTE, 160 * MINUTE),
 )
-#: the same for the spindle speed [s]
+#: candidate sets of time constants for the spindle speed [s]
 SPEED_LAGS: tuple[tuple[float, ...], ...] = (
     (10 * MINUTE,),
     (30 * MINUTE,),
@@ -38,10 +38,10 @@ SPEED_LAGS: tuple[tuple[float, ...], ...] = (
     (10 * MINUTE, 40 * MINUTE, 160 * MINUTE),
     (3 * MINUTE, 10 * MINUTE, 30 * MINUTE, 100 * MINUTE, 300 * MINUTE),
 )
-#: ridge strengths that are tried, per row and in units of each feature's mean square
+#: candidate ridge strengths, per row and relative to each feature's mean square
 STRENGTHS: tuple[float, ...] = tuple(float(10.0 ** (k / 2)) for k in range(-12, 5))
 
-_CHUNK = 20_000  # rows of features held at once: bounds the memory of a fit, whatever the length of the recording
+_CHUNK = 20_000  # feature rows held in memory at once: bounds the memory of a fit for any length of recording
 
 
 @dataclass(frozen=True)
@@ -56,13 +56,13 @@ class _Candidate:
 class DynamicRidge(TimedRegressor):
     """Ridge regression on temperatures, their lagged or high-passed copies, and the lagged spindle speed.
 
-    Temperature sensors and structure do not have the same time constants, and the heat at a bearing grows faster than
-    the speed; both are linear again in first-order lags of the temperatures, of the speed and of its square. Strength
-    of the ridge and the set of time constants are chosen by leaving out whole thermal cycles, one after the other,
-    inside the data given to `fit`: the set with the smallest mean RMS, and within it the greatest strength whose mean
-    RMS is within one standard error of the smallest (the one-standard-error rule of Breiman et al. 1984). A set with a
-    lag of the temperatures below `SHORTEST_LAG` times the time between two rows (their median) is not tried; if none is
-    left, the temperatures are not lagged.
+    Temperature sensors and structure have different time constants, and the heat at a bearing increases more than
+    proportionally with the speed; both effects become linear in first-order lags of the temperatures, of the speed and
+    of its square. The ridge strength and the set of time constants are chosen by leaving out whole thermal cycles in
+    turn, within the data given to `fit`: the set with the smallest mean RMS, and within it the greatest strength whose
+    mean RMS is within one standard error of the smallest (one-standard-error rule of Breiman et al. 1984). Sets with a
+    temperature lag below `SHORTEST_LAG` times the time between two rows (median) are not tried; if no set remains, the
+    temperatures are not lagged.
 
     Parameters
     ----------
@@ -77,11 +77,11 @@ class DynamicRidge(TimedRegressor):
     strengths : sequence of float
         Ridge strengths to choose from.
     rule : {'one-standard-error', 'minimum'}
-        Rule by which the strength is chosen.
+        Rule for the choice of the strength.
     fit_intercept : bool
-        False: the model gives zero in the reference state.
+        False: the model returns zero in the reference state.
     time : {'column', 'routed', 'none'} or None
-        Source of the time, see `thermocomp.models.timed.TimedRegressor`; without it, the estimator raises an error.
+        Source of the time, see `thermocomp.models.timed.TimedRegressor`; if None, `fit` raises an error.
 
     Attributes
     ----------
@@ -94,9 +94,9 @@ class DynamicRidge(TimedRegressor):
     strength_ : float
         Chosen strength.
     cv_rms_ : float
-        Mean over the cycles left out of their RMS, at the choice [unit of y].
+        Mean of the RMS values of the left-out cycles with the chosen settings [unit of y].
     chosen_by_ : str
-        Units left out for the choice.
+        Kind of units left out for the choice.
 
     References
     ----------
@@ -166,7 +166,7 @@ class DynamicRidge(TimedRegressor):
 
     @property
     def feature_labels_(self) -> tuple[str, ...]:
-        """Names of the features behind `coef_`."""
+        """Names of the features that belong to `coef_`."""
         names = [str(n) for n in self._names()]
         labels = [names[i] for i in self._temperatures]
         kind = "high-passed" if self.copies == "high-passed" else "lagged"
@@ -236,7 +236,7 @@ class DynamicRidge(TimedRegressor):
         return found
 
     def _features(self, X: FloatArray, dt: FloatArray) -> Iterator[FloatArray]:
-        """Yield the table of all features, a chunk of rows at a time."""
+        """Yield the table of all features in chunks of rows."""
         memory = None
         for start in range(0, len(X), _CHUNK):
             rows = X[start : start + _CHUNK]
@@ -253,7 +253,7 @@ class DynamicRidge(TimedRegressor):
             yield np.hstack([temperatures, lags])
 
     def _moments(self, X: FloatArray, y: FloatArray, dt: FloatArray, folds: IntArray) -> FloatArray:
-        """Return the sums of products of [features, 1, y] per fold: all that ridge and its errors need."""
+        """Return the sums of products of [features, 1, y] per fold; ridge and its errors need nothing else."""
         moments: Any = 0.0
         n_folds = int(folds.max()) + 1
         start = 0

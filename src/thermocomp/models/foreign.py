@@ -1,4 +1,4 @@
-"""External regressors: any of scikit-learn, or a small custom class, judged with the methods."""
+"""External regressors: any scikit-learn regressor, or a small custom class, assessed with the methods."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -17,19 +17,19 @@ from thermocomp.models.unfrozen import UnfrozenRegressor
 
 
 class ForeignRegressor(UnfrozenRegressor):
-    """A regressor without `freeze`: replayed and judged like the others, never deployed.
+    """A regressor without `freeze`: replayed and judged like the others, but never deployed.
 
-    A `FitError` where its prediction raises, or is not a finite number per row.
+    Raises `FitError` if its prediction raises an error or does not return one finite number per row.
 
     Parameters
     ----------
     estimator : estimator
-        With `fit` and `predict`; is not changed itself. It gets a table with the inputs' names.
+        Estimator with `fit` and `predict`; it is cloned, not changed. It receives a table with the names of the inputs.
 
     Attributes
     ----------
     estimator_ : estimator
-        Fitted.
+        Fitted clone.
     data_min_, data_max_ : ndarray of shape (n_features,)
         Trained range.
     """
@@ -59,9 +59,9 @@ class ForeignRegressor(UnfrozenRegressor):
 
 @contextmanager
 def catch_failures(what: str) -> Iterator[None]:
-    """Make a `FitError` of whatever an estimator raises, so that it costs no other one its result.
+    """Convert any exception of an estimator into a `FitError`, so that the results of other estimators are kept.
 
-    Errors of thermocomp are passed on unchanged: they state the remedy.
+    Errors of thermocomp are passed on unchanged: their messages state the remedy.
 
     Parameters
     ----------
@@ -71,11 +71,11 @@ def catch_failures(what: str) -> Iterator[None]:
     Raises
     ------
     FitError
-        Something else was raised.
+        Any other exception was raised.
     """
     try:
         yield
-    except ValueError as e:  # what scikit-learn raises for data it cannot use: the text says it all
+    except ValueError as e:  # scikit-learn's error for unusable data: its text is sufficient
         raise FitError(f"{what}: {e}") from e
     except ThermocompError:
         raise
@@ -100,7 +100,7 @@ def check_numbers(predicted: Any, n_rows: int, name: str) -> FloatArray:
     Raises
     ------
     FitError
-        It is not that.
+        The predictions are not one finite number per row.
     """
     with catch_failures(f"{name} predicts no numbers"):
         found = np.asarray(predicted, dtype=np.float64)
@@ -113,7 +113,7 @@ def check_numbers(predicted: Any, n_rows: int, name: str) -> FloatArray:
 
 
 def adopt_estimator(estimator: Any) -> Any:
-    """Return an estimator that was handed in as one that can be trained and judged.
+    """Return a user-supplied estimator in a form that can be trained and judged.
 
     Parameters
     ----------
@@ -123,13 +123,13 @@ def adopt_estimator(estimator: Any) -> Any:
     Returns
     -------
     estimator
-        Itself if it freezes; a Pipeline of parts that freeze as a `PipelineRegressor`; all others as a
+        The estimator itself if it freezes; a `PipelineRegressor` for a Pipeline of parts that freeze; otherwise a
         `ForeignRegressor`.
 
     Raises
     ------
     InputError
-        It is not a regressor, or a part of it has a memory and cannot be given the time.
+        The object is not a regressor, or contains a part with a memory that cannot receive the time.
     """
     if isinstance(estimator, type):
         raise InputError(f"{estimator.__name__} is a class: give an instance, {estimator.__name__}()")
@@ -154,7 +154,7 @@ def adopt_estimator(estimator: Any) -> Any:
 
 
 def title(estimator: Any) -> str:
-    """Return the title of an estimator: its class, or the classes of the steps of a Pipeline."""
+    """Return the title of an estimator: its class name, or the class names of the steps of a Pipeline."""
     if isinstance(estimator, ForeignRegressor):
         return title(estimator.estimator)
     if isinstance(estimator, PipelineRegressor):

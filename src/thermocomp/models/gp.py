@@ -19,24 +19,24 @@ _CHUNK = 2_000  # rows predicted at once: bounds the memory
 class GaussianProcess(UnfrozenRegressor):
     """Gaussian process regression (Rasmussen and Williams 2006) on standardised inputs.
 
-    scikit-learn's `GaussianProcessRegressor`: a plane, a smooth deviation from it (squared-exponential kernel, one
-    length for all inputs) and white noise, weighed by their likelihood from one start, so that the same data give the
-    same model. The likelihood takes rows as independent, which those of a drift test are not. It needs its training
-    rows to predict, so it cannot be frozen.
+    Uses scikit-learn's `GaussianProcessRegressor`: a plane, a smooth deviation from it (squared-exponential kernel, one
+    length scale for all inputs) and white noise. Their hyperparameters maximise the likelihood from a single start, so
+    that the same data give the same model. The likelihood treats rows as independent, which the rows of a drift test
+    are not. Prediction requires the training rows, so the model cannot be frozen.
 
     Parameters
     ----------
     max_rows : int
-        Rows that are learned from, at least 2, thinned evenly: the fit grows with their cube.
+        Maximum number of training rows, at least 2, thinned evenly: fitting time grows with the cube of this number.
 
     Attributes
     ----------
     kernel_ : sklearn.gaussian_process.kernels.Kernel
-        With what was found; the inputs and the deviation standardised.
+        Kernel with the fitted hyperparameters, for standardised inputs and deviation.
     n_rows_ : int
-        Rows that were learned from.
+        Number of training rows used.
     data_min_, data_max_ : ndarray of shape (n_features,)
-        Trained range: of all rows given to `fit`.
+        Trained range of all rows given to `fit`.
 
     References
     ----------
@@ -71,13 +71,13 @@ class GaussianProcess(UnfrozenRegressor):
         (mean,), (spread,) = scaling(deviation[rows, None])
         spread = spread if np.isfinite(spread) else 1.0
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ConvergenceWarning)  # a part that is not needed ends at its bound
+            warnings.simplefilter("ignore", ConvergenceWarning)  # an unnecessary kernel part ends at its bound
             process.fit((change[rows] - self._centre) / self._scale, (deviation[rows] - mean) / spread)
         self.kernel_ = process.kernel_
         self._prepare(process, mean, spread)
 
     def _prepare(self, process: GaussianProcessRegressor, mean: float, spread: float) -> None:
-        """Collect what a prediction needs: the plane as coefficients, the rest as a sum over the training rows."""
+        """Store the data for predictions: the plane as coefficients, the rest as a sum over the training rows."""
         smooth, plane = process.kernel_.k1.k1, process.kernel_.k1.k2
         rows: FloatArray = process.X_train_
         alpha: FloatArray = spread * process.alpha_
@@ -94,7 +94,7 @@ class GaussianProcess(UnfrozenRegressor):
         half = 0.5 * np.einsum("ij,ij->i", self._rows, self._rows)
         for start in range(0, len(Z), _CHUNK):
             part = Z[start : start + _CHUNK] / self._length
-            exponent = part @ self._rows.T  # minus half the squared distance, term by term
+            exponent = part @ self._rows.T  # minus half the squared distance, computed term by term
             exponent -= half
             exponent -= 0.5 * np.einsum("ij,ij->i", part, part)[:, None]
             deviation[start : start + _CHUNK] += np.exp(exponent, out=exponent) @ self._weights

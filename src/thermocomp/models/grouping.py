@@ -1,4 +1,4 @@
-"""`grouping`: sensors by correlation grouping and successive regression (Hwang, Lee, Yang)."""
+"""`grouping`: sensor selection by correlation grouping and successive regression (Hwang, Lee, Yang)."""
 
 import numpy as np
 
@@ -13,33 +13,33 @@ from thermocomp.models.selection.grouping import choose, group, interval_of, int
 
 
 class CorrelationGrouping(StaticRegressor, TermRegressor):
-    """Linear model of the temperatures that correlation grouping and successive regression choose (H-01).
+    """Linear model of the temperatures chosen by correlation grouping and successive regression (H-01).
 
-    Temperatures are grouped by their correlation; successive regression makes one of each group its representative; the
-    subset of representatives with the smallest residual mean square tells which groups take part; of all combinations
-    of members of these groups the one with the smallest residual mean square is the model. The rules for what the paper
-    leaves open are told by `thermocomp.models.selection.grouping.group`. The mean square takes the rows as
-    independent, which those of a time series are not: see `n_effective_`.
+    Temperatures are grouped by their correlation. Successive regression selects one representative of each group. The
+    subset of representatives with the smallest residual mean square determines the participating groups. The model is
+    the combination of members of these groups with the smallest residual mean square. See
+    `thermocomp.models.selection.grouping.group` for rules that the paper leaves open. The mean square treats the rows
+    as independent, which the rows of a time series are not: see `n_effective_`.
 
-    Grouping lessens collinearity and does not end it (E-H10): look at `spectrum_` and `condition_`.
+    Grouping reduces collinearity but does not remove it (E-H10): inspect `spectrum_` and `condition_`.
 
-    With a `reference`, the temperatures themselves are grouped, without it, and regressed on are their differences from
-    it (section 3.2.1; H-08). A temperature that is constant, or constant but for the reference, is left out.
+    With a `reference`, the other temperatures are grouped, and their differences from the reference are the regressors
+    (section 3.2.1; H-08). A temperature that is constant, or differs from the reference by a constant, is left out.
 
-    A threshold beyond -1 to 1 is an `InputError`, and so is a reference that does not exist; a `FitError` if no
-    temperature varies, there are fewer than three rows (two without intercept), or there is too much to search.
+    A threshold outside -1 to 1 and a non-existent reference raise `InputError`. `FitError` is raised if no temperature
+    varies, if there are fewer than three rows (two without intercept), or if the search would be too large.
 
     Parameters
     ----------
     threshold : float
-        Of the correlation, above which a temperature joins a group; from -1 to 1. The paper's is not known (E-H1);
-        `thermocomp.models.selection.grouping.sweep` shows what others give.
+        Correlation above which a temperature joins a group, from -1 to 1. The paper's value is not known (E-H1);
+        `thermocomp.models.selection.grouping.sweep` shows the results of other values.
     absolute : bool
         Group by the magnitude of the correlation (E-H2).
     reference : str or int, optional
-        Name (or index) of the temperature that is subtracted from the others, such as the bed's.
+        Name (or index) of the temperature that is subtracted from the others, such as that of the bed.
     fit_intercept : bool
-        False: the model gives zero in the reference state.
+        False: the model returns zero in the reference state.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class CorrelationGrouping(StaticRegressor, TermRegressor):
     candidates_ : tuple of int
         Features that were grouped.
     left_out_ : tuple of int
-        Features that were not, because they are constant.
+        Features that were not grouped because they are constant.
     groups_ : tuple of tuple of int
         Features of each group, in the order in which the groups were found.
     representatives_ : tuple of int
@@ -56,20 +56,20 @@ class CorrelationGrouping(StaticRegressor, TermRegressor):
     curve_ : tuple of Subset
         Best subset of 1, 2, ... representatives and its MSE_p (Fig. 4).
     participating_ : tuple of int
-        Groups that take part, as indices of `groups_`.
+        Participating groups, as indices of `groups_`.
     selected_ : tuple of int
-        Features in the model, in rising order, without the reference.
+        Features in the model, in ascending order, without the reference.
     mse_ : float
         MSE_p of the model.
     searched_ : tuple of (int, int)
-        Number of subsets and of combinations that were looked at (H-07).
+        Number of subsets and of combinations that were examined (H-07).
     terms_ : tuple of str
         Names of the selected variables.
     coef_ : ndarray of shape (n_selected,)
-        One for each of `terms_`.
+        One coefficient for each of `terms_`.
     intercept_ : float
     contributions_ : ndarray of shape (n_selected,)
-        Correlation of each with the error (Eq. 9; H-17).
+        Correlation of each selected variable with the error (Eq. 9; H-17).
     spectrum_ : Spectrum
         Eigenvalues of X'X of the selected variables, as in Table 3 (H-16).
     r_squared_, adjusted_r_squared_, standard_error_, n_effective_, condition_ : float
@@ -142,12 +142,12 @@ class CorrelationGrouping(StaticRegressor, TermRegressor):
         self._keep(found, variables, [(k,) for k in range(len(variables))], tri.total)
 
     def log_text(self, target: str = "Y") -> str:
-        """Return as text the groups, the curve of MSE_p, the model and how far its variables repeat each other.
+        """Return a text with the groups, the curve of MSE_p, the model and the collinearity of its variables.
 
         Parameters
         ----------
         target : str
-            Name of what is predicted.
+            Name of the predicted quantity.
 
         Returns
         -------

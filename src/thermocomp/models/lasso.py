@@ -1,4 +1,4 @@
-"""`lasso` and `elastic-net`: regressions that drop inputs by themselves."""
+"""`lasso` and `elastic-net`: regressions with built-in input selection."""
 
 import warnings
 from abc import abstractmethod
@@ -12,27 +12,27 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.models.base import FloatArray
 from thermocomp.models.shrinkage import PenalisedRegressor, Rule, sorted_strengths
 
-#: shares of the strength at which the last input drops out
+#: strengths to choose from, relative to the strength at which the last input is dropped
 SHARES: tuple[float, ...] = tuple(float(10.0 ** (-k / 10)) for k in range(41))
-_TOL, _SWEEPS = 1e-5, 5_000  # dual gap as a share of the sum of squares of y; a change of either moves no figure
+_TOL, _SWEEPS = 1e-5, 5_000  # dual gap as a share of the sum of squares of y; changing either has no visible effect
 
 
 class _Sparse(PenalisedRegressor):
-    """Linear regression with a penalty on the coefficients' absolute values."""
+    """Linear regression with a penalty on the absolute values of the coefficients."""
 
     @abstractmethod
     def _ratios(self) -> tuple[float, ...]:
-        """Return the shares of the absolute values in the penalty."""
+        """Return the shares of the absolute-value (L1) term in the penalty."""
 
     def _paths(self, Z: FloatArray, y: FloatArray) -> FloatArray:
         shares, ratios = sorted_strengths(self.strengths), self._ratios()
         steepest = float(np.abs(y @ Z).max()) / len(y)
         paths = np.zeros((len(ratios), shares.size, Z.shape[1]))
-        if steepest == 0:  # nothing to follow
+        if steepest == 0:  # y is uncorrelated with all inputs
             return paths
         for path, ratio in zip(paths, ratios, strict=True):
             with warnings.catch_warnings():
-                # a strength so small that it does not converge is judged on the cycles left out like any other
+                # a strength too small for convergence is assessed on the left-out cycles like any other
                 warnings.simplefilter("ignore", ConvergenceWarning)
                 path[:] = enet_path(
                     Z, y, l1_ratio=ratio, alphas=shares * (steepest / ratio), tol=_TOL, max_iter=_SWEEPS
@@ -50,18 +50,18 @@ class _Sparse(PenalisedRegressor):
 
 
 class Lasso(_Sparse):
-    """The lasso (Tibshirani 1996) on standardised inputs: a selector and a regression in one.
+    """Lasso (Tibshirani 1996) on standardised inputs: selector and regression in one.
 
-    scikit-learn's coordinate descent along the whole path; the strength is chosen by leaving thermal cycles out.
+    Uses scikit-learn's coordinate descent along the whole path; the strength is chosen by leaving out thermal cycles.
 
     Parameters
     ----------
     strengths : sequence of float
-        To choose from, as shares of the strength at which the last input drops out.
+        Strengths to choose from, relative to the strength at which the last input is dropped.
     rule : {'one-standard-error', 'minimum'}
-        Rule by which the strength is chosen.
+        Rule for the choice of the strength.
     fit_intercept : bool
-        False: the model gives zero in the reference state.
+        False: the model returns zero in the reference state.
 
     Attributes
     ----------
@@ -107,25 +107,26 @@ class Lasso(_Sparse):
 
 
 class ElasticNet(_Sparse):
-    """The elastic net (Zou and Hastie 2005): a lasso that keeps or drops collinear inputs together.
+    """Elastic net (Zou and Hastie 2005): a lasso that keeps or drops collinear inputs together.
 
-    scikit-learn's coordinate descent along the whole path; strength and share are chosen by leaving thermal cycles out.
+    Uses scikit-learn's coordinate descent along the whole path; strength and L1 share are chosen by leaving out thermal
+    cycles.
 
     Parameters
     ----------
     l1_ratios : sequence of float
-        Shares of the absolute values in the penalty to choose from; the rest are squares. 1 is the lasso.
+        L1 shares of the penalty to choose from; the rest of the penalty is quadratic. 1 gives the lasso.
     strengths : sequence of float
-        To choose from, as shares of the strength at which the last input drops out.
+        Strengths to choose from, relative to the strength at which the last input is dropped.
     rule : {'one-standard-error', 'minimum'}
-        Rule by which the strength is chosen, within the best share.
+        Rule for the choice of the strength, within the best share.
     fit_intercept : bool
-        False: the model gives zero in the reference state.
+        False: the model returns zero in the reference state.
 
     Attributes
     ----------
     l1_ratio_ : float
-        Chosen share.
+        Chosen L1 share.
     strength_ : float
         Chosen strength.
     selected_ : tuple of str

@@ -1,4 +1,4 @@
-"""Common part of the regressions on terms: the fit of chosen terms, its accuracy, and `freeze`."""
+"""Common part of the regressions on terms: fit of chosen terms, its accuracy, and `freeze`."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -25,22 +25,22 @@ class TermRegressor(MemorylessRegressor):
     Attributes
     ----------
     coef_ : ndarray of shape (n_terms,)
-        One for each of `terms_`.
+        One coefficient for each of `terms_`.
     intercept_ : float
-        Deviation at the reference state.
+        Deviation in the reference state.
     terms_ : tuple of str
         Names of the terms.
     dependent_ : tuple of str
-        Terms that depend on the others (or on the constant) and got the coefficient 0.
+        Terms that depend linearly on others (or on the constant); their coefficient is 0.
     condition_ : float
         Condition number of the terms, centred (if there is an intercept) and scaled.
     n_rows_ : int
     r_squared_, adjusted_r_squared_ : float
-        In the training data; nan where not defined.
+        On the training data; nan where undefined.
     r_squared_kind_ : {'centred', 'uncentred'}
-        Whether the sum of squares they compare with is about the mean or, without intercept, about zero (E-C10).
+        Whether the total sum of squares is about the mean or, without intercept, about zero (E-C10).
     standard_error_ : float
-        Standard error of estimate, as if the rows were independent [unit of y].
+        Standard error of estimate, with the rows treated as independent [unit of y].
     n_effective_ : float
         Number of independent rows equivalent to the training rows, by the autocorrelation of the residual (E-C12).
     data_min_, data_max_ : ndarray of shape (n_features,)
@@ -74,7 +74,7 @@ class TermRegressor(MemorylessRegressor):
     def _regress(
         self, change: FloatArray, deviation: FloatArray, columns: Sequence[int], tri: Triangle | None = None
     ) -> None:
-        """Note the least squares on some of the inputs; `tri` is that of all, if it is there already."""
+        """Store the least-squares fit on some of the inputs; `tri`, if available, is the triangular factor of all."""
         tri = tri or triangle(join_columns(change, deviation), intercept=self.fit_intercept)
         found = solve(change, deviation, tri, columns=columns)
         self._keep(found, self._inputs_alone(), [(i,) for i in columns], tri.total)
@@ -84,7 +84,7 @@ class TermRegressor(MemorylessRegressor):
         return [Variable.single(name, i) for i, name in enumerate(self._names())]
 
     def _keep(self, found: Solution, variables: Sequence[Variable], terms: Sequence[Term], total: float) -> None:
-        """Note the coefficients of `terms`, and how well they fit; `total` is the sum of squares of y."""
+        """Store the coefficients of `terms` and their goodness of fit; `total` is the sum of squares of y."""
         one = int(self.fit_intercept)
         self._table = TermTable(self.n_features_in_, tuple(variables), tuple(terms))
         n_rows = len(found.residual)
@@ -102,7 +102,7 @@ class TermRegressor(MemorylessRegressor):
         self.n_effective_ = effective_sample_size(found.residual)
 
     def _coefficient_lines(self, title: str = "", beside: Sequence[str] = ()) -> list[str]:
-        """Return a table of the coefficients as text, the constant first; `beside` is an additional column."""
+        """Return a text table of the coefficients, constant first; `beside` is an additional column."""
         wide = max(len(name) for name in ("VARIABLE", *self.terms_))
         lines = [f"{'VARIABLE':<{wide}}  {'COEFFICIENT':>14}{title}"]
         if self.fit_intercept:

@@ -1,4 +1,4 @@
-"""A method: its name, what it is, and how its estimator is made."""
+"""A method: name, summary, and construction of its estimator."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -15,17 +15,17 @@ class Method:
     Parameters
     ----------
     name : str
-        On the command line.
+        Name on the command line.
     summary : str
-        One line.
+        Summary in one line.
     estimator : str
-        Module and class, such as ``package.module:Class``; imported when it is built, for some bring a compiler along.
+        Module and class, such as ``package.module:Class``; imported on use, since some load a compiler.
     speed : str
-        Its parameter that takes the names of the spindle speeds; empty for a method that has no use for them.
+        Parameter of the estimator for the names of the spindle speeds; empty if there is none.
     takes : tuple of {'dt', 'cycle'}
-        Arguments of `fit` other than X and y. With ``dt`` it has a memory, and also gets rows not used for training.
+        Arguments of `fit` other than X and y. With ``dt`` the method has a memory and also receives non-training rows.
     settings : dict of str to object
-        Other parameters than the estimator's own defaults.
+        Parameters that differ from the estimator's defaults.
     """
 
     name: str
@@ -43,6 +43,6 @@ class Method:
         return found
 
     def build(self, speeds: Sequence[str]) -> ThermalRegressor:
-        """Make the estimator, given the names of the spindle speeds among its inputs."""
+        """Create the estimator for the given names of spindle speeds among its inputs."""
         columns = {self.speed: tuple(speeds)} if self.speed else {}
         return self.kind(**self.settings, **columns, **({"time": "routed"} if "dt" in self.takes else {}))

@@ -1,4 +1,4 @@
-"""The methods by name: those that come with the package, and those that others bring."""
+"""Methods by name: those of this package and those of plug-ins."""
 
 import warnings
 from collections.abc import Sequence
@@ -11,12 +11,12 @@ from thermocomp.core.plugins import describe_plugin, find_plugins, load_plugin
 from thermocomp.models.foreign import adopt_estimator, title
 from thermocomp.models.method import Method
 
-#: asks for every method where names of methods are given
+#: selects every method where method names are expected
 ALL_METHODS = "all"
 
 
 class NamedEstimator(str):
-    """The name of an estimator that was passed in, with the estimator attached: it can replace names of methods.
+    """Name of an estimator that was passed in, with the estimator attached; usable wherever a method name is.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ class NamedEstimator(str):
     estimator: Any
 
     def __new__(cls, name: str, estimator: Any) -> "NamedEstimator":
-        """Make the string."""
+        """Create the string."""
         made = super().__new__(cls, name)
         made.estimator = estimator
         return made
@@ -38,7 +38,7 @@ class NamedEstimator(str):
 
 
 def _registered() -> dict[str, Method]:
-    """Return the methods of all packages by name; what cannot be loaded is skipped with a warning."""
+    """Return the methods of all packages by name; those that cannot be loaded are skipped with a warning."""
     found: dict[str, Method] = {}
     for entry in find_plugins("methods", warnings.warn).values():
         try:
@@ -52,7 +52,7 @@ def _registered() -> dict[str, Method]:
     return found
 
 
-#: by name: an entry point of ``thermocomp.methods`` names a sequence of `Method`
+#: methods by name: an entry point of ``thermocomp.methods`` refers to a sequence of `Method`
 METHODS = _registered()
 
 
@@ -62,7 +62,7 @@ def find_method(name: str) -> Method:
     Raises
     ------
     InputError
-        There is none of that name.
+        There is no method of that name.
     """
     found = METHODS.get(name)
     if found is None:
@@ -73,7 +73,7 @@ def find_method(name: str) -> Method:
 
 
 def make_method(estimator: Any) -> Method:
-    """Return the method for an estimator with custom settings: it uses all inputs."""
+    """Return the method for an estimator with custom settings; it uses all inputs."""
     kind = type(estimator)
     known: tuple[Literal["dt", "cycle"], ...] = ("dt", "cycle")
     takes = tuple(p for p in known if p in signature(estimator.fit).parameters)
@@ -86,7 +86,7 @@ def expand(names: Sequence[Any]) -> list[str]:
     Parameters
     ----------
     names : sequence of str or estimator
-        An estimator becomes a `NamedEstimator`, named after its class; further ones of the same class are numbered.
+        Each estimator becomes a `NamedEstimator` with the name of its class; duplicates are numbered.
 
     Returns
     -------
@@ -95,7 +95,7 @@ def expand(names: Sequence[Any]) -> list[str]:
     Raises
     ------
     InputError
-        None is given, there is no method of one of the names, or something else is no regressor.
+        No names are given, a name is unknown, or an object is not a regressor.
     """
     if not names:
         raise InputError("no model given: name at least one method, such as dynamic, or all of them by all")
@@ -113,7 +113,7 @@ def expand(names: Sequence[Any]) -> list[str]:
 
 
 def deployable(name: str) -> bool:
-    """Return whether models of this name can run at a machine: False for methods that cannot be frozen."""
+    """Return whether models of this method can run at a machine: False for methods that cannot be frozen."""
     if isinstance(name, NamedEstimator):
         return bool(getattr(name.estimator, "freezable", True))
     return name not in METHODS or METHODS[name].kind.freezable

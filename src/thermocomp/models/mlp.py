@@ -1,4 +1,4 @@
-"""`mlp`: Chen's net, sigmoids in both layers, trained by backpropagation (Chen, Yuan, Ni 1996, section 4)."""
+"""`mlp`: Chen's net with sigmoids in both layers, trained by backpropagation (Chen, Yuan, Ni 1996, section 4)."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from thermocomp.models.base import FloatArray, IntArray
 from thermocomp.models.nets import NetRegressor, thin_rows
 from thermocomp.models.numerics.backprop import TrainedNet, constant, learning_rates, scaling_in, scaling_out, train_net
 
-#: hidden counts in a row that bring no gain and end a sweep
+#: consecutive hidden-node counts without improvement that end a sweep
 PATIENCE = 2
 
 
@@ -34,7 +34,7 @@ class HiddenCount:
 
     @property
     def mean(self) -> float:
-        """Mean over the cycles."""
+        """Mean RMS over the cycles."""
         return float(np.mean(self.rms))
 
     @property
@@ -46,56 +46,56 @@ class HiddenCount:
 class SigmoidNet(NetRegressor):
     """Chen's artificial neural network: i-h-o with sigmoids in hidden nodes and outputs, trained by backpropagation.
 
-    Inputs and targets are scaled to 0.1 .. 0.9 (C-28), a channel that does not change to 0.5. As a sigmoid stays
-    between 0 and 1, a prediction cannot leave the range of y by more than an eighth of it at either end: the net
-    saturates where others extrapolate.
+    Inputs and targets are scaled to 0.1 .. 0.9 (C-28), a constant channel to 0.5. Since a sigmoid stays between 0 and
+    1, a prediction cannot leave the range of y by more than an eighth of that range at either end: the net saturates
+    where other models extrapolate.
 
     Initial weights are uniform in -0.3 .. 0.3 (C-29). Chen starts with a learning rate of 0.5 and decreases it
-    continuously, he does not state how: here it falls to `final_learning_rate` by `schedule`. Nor does he say in which
-    order the patterns come, or how many epochs he ran.
+    continuously but does not state how: here it decreases to `final_learning_rate` by `schedule`. Chen also does not
+    state the order of the patterns or the number of epochs.
 
     Parameters
     ----------
     hidden : int or sequence of int
-        Number of hidden nodes; 20 is Chen's for the spindle drifts, 8 for the slope (C-26, C-27). Of several numbers
-        the best is chosen by leaving out whole thermal cycles of the data given to `fit`: they are tried in rising
-        order until two in a row bring no gain, and the smallest is taken whose mean RMS is within one standard error
-        of the best.
+        Number of hidden nodes; Chen uses 20 for the spindle drifts and 8 for the slope (C-26, C-27). If several numbers
+        are given, the best is chosen by leaving out whole thermal cycles of the data given to `fit`: the numbers are
+        tried in ascending order until two in a row bring no improvement, and the smallest number is chosen whose mean
+        RMS is within one standard error of the best.
     n_epochs : int
         Number of passes through the patterns.
     learning_rate, final_learning_rate : float
-        In the first and in the last epoch.
+        Learning rate in the first and in the last epoch.
     schedule : {'geometric', 'harmonic'}
         See `thermocomp.models.numerics.backprop.learning_rates`.
     update : {'pattern', 'batch'}
-        Change the weights after every pattern, Chen's choice; or once an epoch, by the mean over all patterns (C-30).
+        Change the weights after every pattern, as Chen does, or once per epoch by the mean over all patterns (C-30).
     order : {'shuffled', 'fixed'}
         Order of the patterns, see `thermocomp.models.numerics.backprop.train_net`.
     momentum : float
-        Part of the previous change of the weights that is added to the next; Chen has none.
+        Share of the previous weight change that is added to the next; Chen uses none.
     scaling : {'channel', 'common'}
-        Scale each input by its own range, which Chen found to be better; or all by the range they have together.
-        Targets are always scaled each by its own.
+        Scale each input by its own range, which Chen found to be better, or all inputs by their common range. Each
+        target is always scaled by its own range.
     max_patterns : int
-        Of more rows than these only so many are learned, spread evenly in time: neighbours in a drift test are nearly
-        the same, and time goes with their number.
+        Maximum number of training rows; longer data are thinned evenly in time, since neighbouring rows of a drift test
+        are nearly equal and training time is proportional to their number.
     goal : float
-        Stop after the first epoch whose loss is not above this; see `loss_history_`.
+        Stop after the first epoch whose loss does not exceed this; see `loss_history_`.
     seed : int
-        Seed of the initial weights and the order.
+        Seed of the initial weights and of the order of the patterns.
     jobs : int
-        Threads of a sweep; -1 for all cores.
+        Number of threads for a sweep; -1 for all cores.
 
     Attributes
     ----------
     n_hidden_ : int
         Number of hidden nodes.
     loss_history_ : ndarray of shape (n_epochs run,)
-        Mean of the squared errors in each epoch [scaled units], taken while the weights change.
+        Mean squared error in each epoch [scaled units], accumulated while the weights change.
     sweep_ : tuple of HiddenCount
-        Numbers of hidden nodes tried; empty if `hidden` is one number.
+        Numbers of hidden nodes that were tried; empty if `hidden` is a single number.
     chosen_by_ : str
-        Units left out for the choice.
+        Kind of units left out for the choice.
     net_, input_scaling_, output_scaling_, n_parameters_, n_patterns_, n_effective_, caution_, data_min_, data_max_
         See `thermocomp.models.nets.NetRegressor`.
 
@@ -157,7 +157,7 @@ class SigmoidNet(NetRegressor):
         cycle: ArrayLike | None = None,
         progress: Callable[[str], None] | None = None,
     ) -> "SigmoidNet":
-        """Fit.
+        """Fit the net.
 
         Parameters
         ----------
@@ -166,11 +166,11 @@ class SigmoidNet(NetRegressor):
         y : array-like of shape (n_rows,) or (n_rows, n_outputs)
             Deviation.
         cycle : array-like of int of shape (n_rows,), optional
-            Thermal cycle of each row, by which the number of hidden nodes is chosen; rows of cycle -1 are not learned.
-            Without it five stretches of equal length take the place of the cycles.
+            Thermal cycle of each row, for the choice of the number of hidden nodes; rows with cycle -1 are not used for
+            training. Default: five blocks of equal length replace the cycles.
         progress : callable, optional
-            Is told what a sweep has found so far. A sweep that is interrupted (KeyboardInterrupt) after its first
-            count continues with what it has, and says so in `chosen_by_`.
+            Receives the intermediate results of a sweep. After an interrupt (KeyboardInterrupt) the fit continues with
+            the counts tried so far, as noted in `chosen_by_`.
 
         Returns
         -------
@@ -179,7 +179,7 @@ class SigmoidNet(NetRegressor):
         Raises
         ------
         FitError
-            Fewer than two rows to learn from.
+            Fewer than two training rows.
         InputError
             A setting is out of its range.
         """
@@ -197,7 +197,7 @@ class SigmoidNet(NetRegressor):
     def _trained(
         self, X: FloatArray, y: FloatArray, n_hidden: int, rng: np.random.Generator
     ) -> tuple[TrainedNet, Affine, Affine]:
-        """Train a net; return it, the scaling of its inputs and that of its outputs."""
+        """Train a net; return the net, the input scaling and the output scaling."""
         into, out_of = self._input_scaling(X), scaling_out(y.min(axis=0), y.max(axis=0))
         rows = thin_rows(len(X), self.max_patterns)
         trained = train_net(

@@ -1,4 +1,4 @@
-"""`mlp-sklearn`: the net of scikit-learn, to compare with."""
+"""`mlp-sklearn`: scikit-learn's net, for comparison."""
 
 import warnings
 from typing import Literal
@@ -17,8 +17,8 @@ _NAMES: dict[str, Activation] = {"logistic": "sigmoid", "tanh": "tanh"}
 class SklearnNet(StaticRegressor, NetRegressor):
     """`sklearn.neural_network.MLPRegressor` with one hidden layer, inputs and targets standardised.
 
-    Its output is linear: beyond the trained range it continues where Chen's net saturates. A channel that does not
-    change is cut off.
+    Its output is linear: it extrapolates beyond the trained range, where Chen's net saturates. Constant channels are
+    ignored.
 
     Parameters
     ----------
@@ -30,18 +30,18 @@ class SklearnNet(StaticRegressor, NetRegressor):
     alpha : float
         Strength of the penalty on squared weights.
     max_iter : int
-        Most iterations of the solver.
+        Maximum number of iterations of the solver.
     max_patterns : int
-        Maximum number of training rows; of more, this number is used, spread evenly in time.
+        Maximum number of training rows; longer data are thinned evenly in time.
     seed : int
-        Seed of the initial weights and the order.
+        Seed of the initial weights and of the order of the patterns.
 
     Attributes
     ----------
     converged_ : bool
         False: the solver did not converge, as noted in `caution_`.
     n_iter_ : int
-        Iterations of the solver.
+        Number of iterations of the solver.
     net_, input_scaling_, output_scaling_, n_parameters_, n_patterns_, n_effective_, caution_, data_min_, data_max_
         See `thermocomp.models.nets.NetRegressor`.
 
@@ -81,7 +81,7 @@ class SklearnNet(StaticRegressor, NetRegressor):
         self.seed = seed
 
     def _fit(self, change: FloatArray, deviation: FloatArray) -> None:
-        from sklearn.neural_network import MLPRegressor  # not needed by the other methods, and slow to import
+        from sklearn.neural_network import MLPRegressor  # slow to import, and unused by other methods
 
         (gain, offset, _), (out_gain, out_offset, unit) = _standard(change), _standard(deviation)
         into = Affine(tuple(gain.tolist()), tuple(offset.tolist()))
@@ -115,7 +115,7 @@ class SklearnNet(StaticRegressor, NetRegressor):
 
 
 def _standard(values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return gain and offset to mean 0 and standard deviation 1, and that deviation; all 0 for what is constant."""
+    """Return gain and offset to mean 0 and standard deviation 1, and that deviation; all 0 for constant channels."""
     still = constant(values.min(axis=0), values.max(axis=0))
     deviation = np.where(still, 0.0, values.std(axis=0))
     gain = 1.0 / np.where(still, np.inf, deviation)

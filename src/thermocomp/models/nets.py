@@ -1,4 +1,4 @@
-"""Common part of the neural nets: reading, scaling, the caution about too many weights, and `freeze`."""
+"""Common part of the neural nets: data checks, scaling, warning of too many weights, and `freeze`."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -15,23 +15,23 @@ from thermocomp.models.numerics.leastsquares import effective_sample_size
 
 
 class NetRegressor(MemorylessRegressor):
-    """A net with one hidden layer; one for several outputs at once, if y has several columns.
+    """Net with one hidden layer; a single net for several outputs if y has several columns.
 
     Attributes
     ----------
     net_ : Perceptron
-        From scaled inputs to scaled outputs.
+        Net from scaled inputs to scaled outputs.
     input_scaling_, output_scaling_ : Affine
-        To what the net takes, and from what it gives.
+        Scaling to the inputs of the net, and from its outputs.
     n_parameters_ : int
         Number of weights and thresholds.
     n_patterns_ : int
-        Number of rows that were learned.
+        Number of training rows.
     n_effective_ : float
-        How many independent rows they stand for, by the autocorrelation of the residual (E-C12); of several outputs,
-        the smallest.
+        Number of equivalent independent rows, from the autocorrelation of the residual (E-C12); the minimum over
+        several outputs.
     caution_ : str
-        Reason not to trust the net, above all more parameters than independent rows (C-27); else empty.
+        Reason not to trust the net, mainly more parameters than independent rows (C-27); otherwise empty.
     data_min_, data_max_ : ndarray of shape (n_features,)
         Trained range.
     """
@@ -41,14 +41,14 @@ class NetRegressor(MemorylessRegressor):
         return deviation[:, 0] if self._one_dimensional else deviation
 
     def freeze(self, *, inputs: Sequence[Input] | None = None, output: int | None = None, **header: Any) -> Network:
-        """Return one output of the fitted net as plain numbers, without the inputs that never changed in training.
+        """Return one output of the fitted net as plain numbers, without inputs that were constant in training.
 
         Parameters
         ----------
         inputs : sequence of Input, optional
             One per feature; see `thermocomp.models.base.ThermalRegressor.freeze`.
         output : int, optional
-            Column of y; must be given if y has several. Each column makes a separate model.
+            Column of y; required if y has several. Each column becomes a separate model.
         **header
             As in `thermocomp.models.base.ThermalRegressor.freeze`.
 
@@ -59,7 +59,7 @@ class NetRegressor(MemorylessRegressor):
         Raises
         ------
         InputError
-            `inputs` are not as many as the features, or there is no such output.
+            The number of `inputs` differs from the number of features, or the output does not exist.
         """
         return self._frozen(self._inputs(inputs), {"unit": "um", **header}, output)
 
@@ -72,7 +72,7 @@ class NetRegressor(MemorylessRegressor):
             raise InputError(
                 f"output {output}: the net has {n_outputs}; freeze each separately, with output=0 .. {n_outputs - 1}"
             )
-        # an input of gain 0 is as good as a part of the thresholds
+        # inputs with gain 0 are merged into the thresholds
         kept = [i for i, gain in enumerate(into.gain) if gain != 0 and out_of.gain[output] != 0]
         weights = np.array(net.hidden_weights)
         fixed = np.where(np.isin(np.arange(weights.shape[1]), kept), 0.0, into.offset)
@@ -96,7 +96,7 @@ class NetRegressor(MemorylessRegressor):
         tags.target_tags.multi_output = True
         return tags
 
-    # -- for those who train -----------------------------------------------------------------------------------------
+    # -- for subclasses ----------------------------------------------------------------------------------------------
 
     def _read(self, X: ArrayLike, y: ArrayLike, *, multi_output: bool = True) -> tuple[FloatArray, FloatArray]:
         """Check the training data; return X, and y as a table of shape (n_rows, n_outputs)."""
@@ -105,7 +105,7 @@ class NetRegressor(MemorylessRegressor):
         return change, deviation.reshape(len(deviation), -1)
 
     def _keep(self, net: Perceptron, into: Affine, out_of: Affine, X: FloatArray, y: FloatArray, n_rows: int) -> None:
-        """Store the net, and its relation to the `n_rows` patterns taken from X and y."""
+        """Store the net, with a comparison of its size and the `n_rows` training patterns from X and y."""
         self.net_, self.input_scaling_, self.output_scaling_ = net, into, out_of
         self.n_parameters_, self.n_patterns_ = net.n_parameters, n_rows
         residual = y - out_of(net.evaluate(into(X)))
@@ -119,7 +119,7 @@ class NetRegressor(MemorylessRegressor):
 
 
 def thin_rows(n_rows: int, n_most: int) -> IntArray:
-    """Return the indices of at most `n_most` of `n_rows` rows, spread evenly, the first and the last among them."""
+    """Return the indices of at most `n_most` of `n_rows` rows, evenly spread, including the first and the last."""
     if n_most < 2:
         raise InputError(f"at most {n_most} patterns: expected at least 2")
     return np.linspace(0, n_rows - 1, min(n_rows, n_most)).round().astype(np.intp)

@@ -5,15 +5,15 @@ from thermocomp.models.linear import TermRegressor
 
 
 class LeastSquares(StaticRegressor, TermRegressor):
-    """Linear least squares on all inputs: the method others are compared with (T-08).
+    """Linear least squares on all inputs: the reference for other methods (T-08).
 
-    Inputs that depend on others get the coefficient 0 and are told in ``dependent_``; how this is decided says
-    `thermocomp.models.numerics.leastsquares.lstsq`.
+    Inputs that depend linearly on others get the coefficient 0 and are listed in ``dependent_``; see
+    `thermocomp.models.numerics.leastsquares.lstsq` for the criterion.
 
     Parameters
     ----------
     fit_intercept : bool
-        False: the model gives zero in the reference state.
+        False: the model returns zero in the reference state.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""The methods that come with the package."""
+"""Methods of this package."""
 
 from thermocomp.models.method import Method
 

@@ -1,4 +1,4 @@
-"""Features of `averaged`: temperatures, their lags, and states of the spindle speed whose pace the speed sets."""
+"""Features of `averaged`: temperatures, their lags, and states of the spindle speed with speed-dependent lags."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -14,28 +14,28 @@ from thermocomp.recordings.samples import usual_step
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
 
-#: A lag of the temperatures that is shorter than this many times between two rows is left out: these rows say nothing
-#: of it, and a model that runs at another rate would do what nobody has seen.
+#: Temperature lags shorter than this many row intervals are omitted: the rows contain no information about them, and a
+#: model that runs at another rate would behave in an untested way.
 SHORTEST_LAG = 2.0
 
-# what a structure is drawn from
-_FEWEST_COPIES, _MOST_COPIES = 2, 4  # of each temperature: itself and its lags
+# ranges from which a structure is drawn
+_FEWEST_COPIES, _MOST_COPIES = 2, 4  # copies of each temperature: itself and its lags
 _FEWEST_STATES, _MOST_STATES = 2, 12
-_WEAKEST, _STRONGEST = -6.0, -1.0  # strength of the ridge per feature, power of ten
+_WEAKEST, _STRONGEST = -6.0, -1.0  # ridge penalty per feature, as a power of ten
 
-_CHUNK = 20_000  # rows of features held at once: bounds the memory of a fit, whatever the length of the recording
+_CHUNK = 20_000  # feature rows held in memory at once: bounds the memory of a fit for any length of recording
 
 
 @dataclass(frozen=True)
 class PacedFeatures:
-    """Features and their order: the temperatures, their lags, lag by lag, and the speed states.
+    """Features in this order: temperatures, their lags (lag by lag), speed states.
 
     Parameters
     ----------
     temperatures : tuple of int
-        Columns of the rows.
+        Columns of the temperatures.
     lags : tuple of float
-        Time constants of the temperatures' lags [s].
+        Time constants of the temperature lags [s].
     states : tuple of (int, float, float, float)
         Column of the speed, power, and time constants at rest and at top speed [s].
     top_speed : float
@@ -60,23 +60,23 @@ class PacedFeatures:
         stopped: Sequence[float],
         running: Sequence[float],
     ) -> "PacedFeatures":
-        """Return the features that the rows can determine.
+        """Return the features identifiable from the rows.
 
         Parameters
         ----------
         rows : ndarray of shape (n_rows, n_inputs)
             Inputs minus their reference.
         step : ndarray of shape (n_rows,)
-            Time since the row before [s], inf where a test starts.
+            Time since the previous row [s], inf at the start of a test.
         learned : ndarray of bool of shape (n_rows,)
-            Rows that may be learned from.
+            Training rows.
         speeds : sequence of int
             Columns that are spindle speeds; the others are temperatures.
         lags, powers, stopped, running : sequence of float
             As for `thermocomp.models.averaged.AveragedDynamic`.
         """
         usual = usual_step(step)
-        # where the spindle was stopped in the rows learned from, it may have turned before
+        # if the spindle was stopped in all training rows, use the other rows
         turned = np.abs(rows[:, list(speeds)]).max(axis=1, initial=0.0)
         return cls(
             tuple(i for i in range(rows.shape[1]) if i not in speeds),
@@ -87,21 +87,21 @@ class PacedFeatures:
                 for p in powers
                 for slow in stopped
                 for fast in running
-                if fast <= slow  # a turning spindle is not the slower one
+                if fast <= slow  # lags at speed are not longer than at rest
             ),
             max(float(turned[learned].max(initial=0.0)) or float(turned.max(initial=0.0)), LEAST),
         )
 
     @property
     def copies(self) -> int:
-        """Features of each temperature: itself and its lags."""
+        """Number of features per temperature: itself and its lags."""
         return 1 + len(self.lags)
 
     def __len__(self) -> int:
         return self.copies * len(self.temperatures) + len(self.states)
 
     def tables(self, rows: FloatArray, step: FloatArray) -> Iterator[FloatArray]:
-        """Yield the table of all features, (n_rows, n_features), a chunk of rows at a time."""
+        """Yield the table of all features, (n_rows, n_features), in chunks of rows."""
         where = [state[0] for state in self.states]
         powers, slow, fast = np.array([state[1:] for state in self.states], dtype=np.float64).reshape(-1, 3).T
         taus = np.repeat(self.lags, len(self.temperatures))
@@ -119,7 +119,7 @@ class PacedFeatures:
     def moments(
         self, rows: FloatArray, targets: FloatArray, step: FloatArray, parts: IntArray, noise: float
     ) -> Moments:
-        """Return all that ridge regressions need to know of the rows.
+        """Return the moments of the rows for ridge regressions.
 
         Parameters
         ----------
@@ -129,9 +129,9 @@ class PacedFeatures:
         step : ndarray of shape (n_rows,)
             [s]
         parts : ndarray of int of shape (n_rows,)
-            Part of each row; a part is left out together; -1 is not used for training.
+            Part of each row; each part is left out as a whole; rows with -1 are not used for training.
         noise : float
-            Standard deviation of the temperatures in use [degC].
+            Standard deviation of the temperature noise in use [degC].
         """
         n_parts, n_features, start = int(parts.max()) + 1, len(self), 0
         products = np.zeros((n_parts, n_features + targets.shape[1], n_features + targets.shape[1]))
@@ -151,7 +151,7 @@ class PacedFeatures:
         )
 
     def _covariance(self, rows: FloatArray, step: FloatArray) -> FloatArray:
-        """Return the covariance of the features by noise of 1 degC in the readings, and in those of the zero."""
+        """Return the covariance of the features for noise of 1 degC in the readings, including those of the zero."""
         share = self.shares(step)
         kept = np.outer(1 - share, 1 - share)
         own = np.outer(share, share) / (1 - kept) + _zero_noise(rows[:, self.temperatures], step)
@@ -165,14 +165,14 @@ class PacedFeatures:
         return np.append(1.0, lagbank.step_response(usual_step(step), np.array(self.lags, dtype=np.float64)))
 
     def draw(self, count: int, random_state: int, keep: Sequence[int] | None = None) -> list[LagStructure]:
-        """Draw structures: some copies, the same for all temperatures, some speed states, and strengths of a ridge.
+        """Draw structures at random: copies (the same for all temperatures), speed states, and ridge penalties.
 
         Parameters
         ----------
         count : int
         random_state : int
         keep : sequence of int, optional
-            Places in `temperatures` that are used; all by default. The draw is the same.
+            Indices in `temperatures` to use; default: all. The random draw does not depend on this.
 
         Returns
         -------
@@ -193,14 +193,14 @@ class PacedFeatures:
 
 
 def _pick(rng: np.random.Generator, count: int, fewest: int, most: int) -> IntArray:
-    """Return some of `count` numbers at random, as many as there are at most, in their order."""
+    """Return a random, sorted subset of ``range(count)`` with `fewest` to `most` elements."""
     return np.sort(rng.choice(count, min(count, int(rng.integers(fewest, most + 1))), replace=False))
 
 
 def _zero_noise(temperatures: FloatArray, step: FloatArray) -> float:
-    """Return the mean variance of the tests' zeros, in units of that of a reading.
+    """Return the mean variance of the tests' zeros, relative to the variance of a reading.
 
-    The readings that a zero is the mean of all say that mean, so they are the rows at the start that do not change.
+    The readings averaged for a zero are replaced by their mean, so they are the constant rows at the start of a test.
     """
     starts = np.append(np.flatnonzero(np.isinf(step)), len(step))
     shares = []

@@ -9,34 +9,34 @@ from thermocomp.models.steplog import StepwiseRegressor
 class PartialF(StepwiseRegressor):
     """Linear model of the temperatures that partial F selects (stepwise2017, section 3; T-02 to T-06).
 
-    The temperature with the greatest partial F enters if that is at least `f_enter`; then those inside are tested
-    again and the worst is deleted while its F is below `f_delete`; until nothing enters and nothing leaves. If not
-    even one temperature enters, the model is the mean (zero without intercept) and `selected_` is empty. A temperature
-    of which those inside leave less than 1e-8 of its norm does not enter. An `InputError` unless
-    ``f_enter >= f_delete >= 0``.
+    The temperature with the greatest partial F enters if its F is at least `f_enter`; then the temperatures in the
+    model are tested again, and the worst is deleted while its F is below `f_delete`; this is repeated until none enters
+    or leaves. If no temperature enters, the model is the mean (zero without intercept) and `selected_` is empty. A
+    temperature whose remainder outside the span of the model is below 1e-8 of its norm does not enter. Raises
+    `InputError` unless ``f_enter >= f_delete >= 0``.
 
     Parameters
     ----------
     f_enter : float
         F_E (T-03).
     f_delete : float
-        F_D, not above `f_enter` (E-T4).
+        F_D, at most `f_enter` (E-T4).
     fit_intercept : bool
-        False: the model gives zero in the reference state, and R2 is uncentred.
+        False: the model returns zero in the reference state, and R2 is uncentred.
 
     Attributes
     ----------
     selected_ : tuple of int
-        Features in the model, in rising order.
+        Features in the model, in ascending order.
     terms_ : tuple of str
-        Their names.
+        Names of the features in the model.
     coef_ : ndarray of shape (n_selected,)
-        One for each of `terms_`.
+        One coefficient for each of `terms_`.
     intercept_ : float
     log_ : tuple of Step
-        Each entering and leaving, with the significance and the gain in R2 it corresponds to (E-T3).
+        Each entry and deletion, with the corresponding significance and change of R2 (E-T3).
     cycled_ : bool
-        True if the selection was stopped because it went round in a circle.
+        True if the selection stopped because a model occurred for the second time.
     r_squared_, adjusted_r_squared_, standard_error_, n_effective_, condition_ : float
         See `thermocomp.models.linear.TermRegressor`.
 
@@ -69,7 +69,7 @@ class PartialF(StepwiseRegressor):
         return FThresholds(self.f_enter, self.f_delete)
 
     def _rule_text(self) -> str:
-        """Return the thresholds in words, and their equivalents at this number of rows (E-T3)."""
+        """Return the thresholds as text, with their equivalents for this number of rows (E-T3)."""
         df = self.n_rows_ - int(self.fit_intercept) - 1
         alphas = " AND ".join(f"{alpha_of_f(f, df):.2g}" for f in (self.f_enter, self.f_delete))
         least = r_squared_of_f(self.f_enter, df)

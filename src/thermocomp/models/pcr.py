@@ -8,26 +8,26 @@ from thermocomp.models.shrinkage import ComponentRegressor
 
 
 class PrincipalComponents(ComponentRegressor):
-    """Principal component regression, which Miao et al. use against collinear temperatures (T-10).
+    """Principal component regression, used by Miao et al. against collinear temperatures (T-10).
 
-    Least squares on the first principal components of the standardised inputs, in the order of their variance; how
-    many, is chosen by leaving thermal cycles out. One decomposition serves all numbers of components.
+    Least squares on the first principal components of the standardised inputs, in order of variance; their number is
+    chosen by leaving out thermal cycles. A single decomposition serves all numbers of components.
 
     Parameters
     ----------
     components : int, optional
         Fixed number of components, or the largest possible number if smaller. Default: chosen by `rule`.
     max_components : int, optional
-        Most to choose from; as many as inputs if not given.
+        Largest number to choose from; default: the number of inputs.
     rule : {'one-standard-error', 'minimum'}
-        Rule by which the number of components is chosen.
+        Rule for the choice of the number of components.
     fit_intercept : bool
-        False: the model gives zero in the reference state, and the components are those about zero.
+        False: the model returns zero in the reference state, and the components are computed about zero.
 
     Attributes
     ----------
     n_components_ : int
-        Chosen number; components without variance (dependent inputs) add nothing.
+        Chosen number; components without variance (dependent inputs) contribute nothing.
     cv_rms_, chosen_by_ : float, str
         See `thermocomp.models.shrinkage.ShrunkRegressor`.
 
@@ -52,7 +52,7 @@ class PrincipalComponents(ComponentRegressor):
     """
 
     def _path(self, Z: FloatArray, y: FloatArray, most: int) -> FloatArray:
-        left, values, right = linalg.svd(Z, full_matrices=False, lapack_driver="gesvd")  # whatever the input, it ends
+        left, values, right = linalg.svd(Z, full_matrices=False, lapack_driver="gesvd")  # gesvd always converges
         steps = np.zeros((most, Z.shape[1]))
         for k in np.flatnonzero(values[:most] > 1e-10 * values.max(initial=0.0)):
             steps[k] = right[k] * ((left[:, k] @ y) / values[k])

@@ -1,4 +1,4 @@
-"""Pipelines of selectors and one method, as one model of plain numbers."""
+"""Pipelines of selectors and one method, frozen into a single model of plain numbers."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -23,7 +23,7 @@ from thermocomp.models.timed import TimedRegressor
 
 
 def freezes(pipeline: Pipeline) -> bool:
-    """Return whether a Pipeline can be frozen: selectors or a `StandardScaler`, then a method that can be frozen."""
+    """Return whether a Pipeline can be frozen: selectors or a `StandardScaler`, followed by a freezable method."""
     *before, last = _steps(pipeline)
     return (
         isinstance(last, ThermalRegressor)
@@ -43,14 +43,14 @@ def freeze(
 ) -> ErrorModel:
     """Return a fitted method, or a fitted Pipeline of selectors and a method, as plain numbers.
 
-    A selector is any `SelectorMixin`; a `StandardScaler` may stand before a method without products of inputs.
+    A selector is any `SelectorMixin`; a `StandardScaler` may precede a method without products of inputs.
 
     Parameters
     ----------
     estimator : estimator
-        Fitted.
+        Fitted estimator.
     target, unit, inputs, support, provenance
-        As in `thermocomp.models.base.ThermalRegressor.freeze`; the inputs are those of the Pipeline, without the time.
+        As in `thermocomp.models.base.ThermalRegressor.freeze`; `inputs` are the Pipeline's inputs without the time.
 
     Returns
     -------
@@ -59,7 +59,7 @@ def freeze(
     Raises
     ------
     FitError
-        It cannot be frozen.
+        The estimator cannot be frozen.
 
     Examples
     --------
@@ -89,7 +89,7 @@ def freeze(
     check_is_fitted(estimator)
     last = _steps(estimator)[-1]
     columns, mean, scale = _passed(estimator)
-    hidden = last.n_features_in_ - len(last.data_min_)  # the time
+    hidden = last.n_features_in_ - len(last.data_min_)  # number of leading time columns
     if (columns[:hidden] != np.arange(hidden)).any():
         raise FitError(
             "a step before the last has not kept the time, the first column: give its selector time='column'"
@@ -112,17 +112,17 @@ def freeze(
 
 
 class PipelineRegressor(ThermalRegressor):
-    """A Pipeline that can be frozen, trained as one method: its selectors see the rows that are learned from alone.
+    """A freezable Pipeline, trained as one method: its selectors are fitted to the training rows only.
 
     Parameters
     ----------
     pipeline : Pipeline
-        Is not changed itself.
+        Pipeline to be cloned; it is not changed.
 
     Attributes
     ----------
     pipeline_ : Pipeline
-        Fitted.
+        Fitted clone.
     """
 
     def __init__(self, pipeline: Pipeline) -> None:
@@ -131,16 +131,16 @@ class PipelineRegressor(ThermalRegressor):
     def fit(
         self, X: ArrayLike, y: ArrayLike, *, dt: ArrayLike | None = None, cycle: ArrayLike | None = None
     ) -> "PipelineRegressor":
-        """Fit each step to what the step before has passed on.
+        """Fit each step to the output of the previous step.
 
         Parameters
         ----------
         X : DataFrame of shape (n_rows, n_features)
-            Inputs minus their reference, in the order of time.
+            Inputs minus their reference, in chronological order.
         y : array-like of shape (n_rows,)
             Deviation.
         dt, cycle : array-like of shape (n_rows,), optional
-            As in `thermocomp.models.dynamic.DynamicRidge.fit`; rows with cycle -1 are not learned from.
+            As in `thermocomp.models.dynamic.DynamicRidge.fit`; rows with cycle -1 are not used for training.
 
         Returns
         -------
@@ -154,7 +154,7 @@ class PipelineRegressor(ThermalRegressor):
         table: Any = X
         for step in before:
             if "time" in step.get_params():
-                step.set_params(time=None)  # here the time is no column
+                step.set_params(time=None)  # the time is not a column here
             step.set_output(transform="pandas").fit(table[learned], deviation[learned])
             table = step.transform(table)
         if isinstance(last, TimedRegressor):
@@ -208,7 +208,7 @@ def _passed(pipeline: Pipeline) -> tuple[IntArray, FloatArray, FloatArray]:
 
 
 def _unscaled(model: ErrorModel, scaling: dict[str, tuple[float, float]]) -> Polynomial:
-    """Return a model of scaled inputs as one of the inputs themselves."""
+    """Return the model of scaled inputs as a model of the unscaled inputs."""
     if not isinstance(model, Polynomial) or any(len(term) > 1 for term in model.terms):
         raise FitError(
             f"a StandardScaler before a model of the family {model.family} cannot be frozen: its inputs are multiplied "

@@ -10,26 +10,26 @@ from thermocomp.models.shrinkage import ComponentRegressor
 
 
 class PartialLeastSquares(ComponentRegressor):
-    """Partial least squares (Wold): components that follow the deviation, not only the inputs' own variance.
+    """Partial least squares (Wold): components chosen by covariance with the deviation, not by input variance alone.
 
-    scikit-learn's `PLSRegression` on standardised inputs. Its components come one after the other, so one fit serves
-    all numbers of components; the number is chosen by leaving thermal cycles out.
+    Uses scikit-learn's `PLSRegression` on standardised inputs. Its components are computed sequentially, so one fit
+    serves all numbers of components; the number is chosen by leaving out thermal cycles.
 
     Parameters
     ----------
     components : int, optional
         Fixed number of components, or the largest possible number if smaller. Default: chosen by `rule`.
     max_components : int, optional
-        Most to choose from; as many as inputs if not given.
+        Largest number to choose from; default: the number of inputs.
     rule : {'one-standard-error', 'minimum'}
-        Rule by which the number of components is chosen.
+        Rule for the choice of the number of components.
     fit_intercept : bool
-        False: the model gives zero in the reference state, and the components are those about zero.
+        False: the model returns zero in the reference state, and the components are computed about zero.
 
     Attributes
     ----------
     n_components_ : int
-        Chosen number; beyond the rank of the inputs further ones add nothing.
+        Chosen number; components beyond the rank of the inputs contribute nothing.
     cv_rms_, chosen_by_ : float, str
         See `thermocomp.models.shrinkage.ShrunkRegressor`.
 
@@ -53,13 +53,13 @@ class PartialLeastSquares(ComponentRegressor):
 
     def _path(self, Z: FloatArray, y: FloatArray, most: int) -> FloatArray:
         paths = np.zeros((most, Z.shape[1]))
-        # beyond the rank, components would be made of rounding errors
+        # components beyond the rank would consist of rounding errors
         used = min(most, int(np.linalg.matrix_rank(Z, rtol=1e-8)))
         if used and y.any():
             model = PLSRegression(n_components=used, scale=False)
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # the deviation is explained before the last component: no harm
-                # it takes the means out: with each row's mirror image these are zero, as `fit_intercept` wants them
+                warnings.simplefilter("ignore")  # harmless: y is explained before the last component
+                # PLSRegression subtracts means; mirrored rows make them zero, since `fit_intercept` handles centring
                 model.fit(np.vstack([Z, -Z]), np.concatenate([y, -y]))
             paths[:used] = np.cumsum(model.x_rotations_ * model.y_loadings_[0], axis=1).T
             paths[used:] = paths[used - 1]

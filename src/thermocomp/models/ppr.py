@@ -15,50 +15,50 @@ from thermocomp.core.terms import Variable
 from thermocomp.models.base import CycledRegressor, FloatArray, IntArray
 from thermocomp.models.shrinkage import Rule, choose, scaling
 
-_KNOTS = 25  # of a curve, evenly over its projection; the penalty, not their number, makes it smooth
-_DAMPING = 1e-4  # of a Gauss-Newton step, in units of the mean curvature: collinear inputs leave some at nearly none
-_HALVINGS = 4  # of a step that makes things worse
-_STEPS = 20  # of Gauss-Newton for a new term; one per term in a sweep of backfitting
-_SWEEPS = 20  # of backfitting after each new term
-_GAIN = 1e-3  # less of the residual sum of squares per step or sweep is not worth another one
+_KNOTS = 25  # knots of a curve, equally spaced along its projection; smoothness comes from the penalty
+_DAMPING = 1e-4  # of a Gauss-Newton step, relative to the mean curvature; needed for collinear inputs
+_HALVINGS = 4  # step halvings if a step increases the error
+_STEPS = 20  # Gauss-Newton steps for a new term; one per term in a backfitting sweep
+_SWEEPS = 20  # backfitting sweeps after each new term
+_GAIN = 1e-3  # stop if a step or sweep reduces the residual sum of squares by a smaller share
 
 
 class ProjectionPursuit(CycledRegressor):
-    """Projection pursuit regression (Friedman and Stuetzle 1981), the comparison of stepwise2017 (T-08).
+    """Projection pursuit regression (Friedman and Stuetzle 1981), the comparison method of stepwise2017 (T-08).
 
-    Deviation = intercept + f1(a1 . x) + f2(a2 . x) + ... One term after the other is added to what the others leave:
-    its direction by Gauss-Newton steps, its curve by a smoother; after each new term all are fitted again in turn
-    (backfitting), as in Friedman's SMART (1984) and R's ``ppr``. Different from these: the curves are penalised linear
-    splines, so that the frozen model holds them exactly and tied temperatures need no rule; terms are only added, never
-    dropped again; and how many there are and how much they may bend is chosen by leaving thermal cycles out.
+    Deviation = intercept + f1(a1 . x) + f2(a2 . x) + ... Terms are added one at a time, each fitted to the residual of
+    the others: the direction by Gauss-Newton steps, the curve by a smoother. After each new term all terms are refitted
+    in turn (backfitting), as in Friedman's SMART (1984) and R's ``ppr``. Differences: the curves are penalised linear
+    splines, so that the frozen model represents them exactly and tied temperatures need no rule; terms are only added,
+    never dropped; and the number of terms and the smoothness are chosen by leaving out thermal cycles.
 
-    Beyond what its projection reached in training, a curve is constant.
+    A curve is constant outside the range of its projection in training.
 
     Parameters
     ----------
     max_terms : int
     degrees : sequence of float
-        Degrees of freedom of each curve to choose from, above 2 (a straight line).
+        Degrees of freedom to choose from, the same for all curves, above 2 (a straight line).
     rule : {'one-standard-error', 'minimum'}
-        Rule by which the number of terms is chosen, within the best degrees of freedom.
+        Rule for the choice of the number of terms, with the best degrees of freedom.
 
     Attributes
     ----------
     n_terms_ : int
-        Chosen number of terms; fewer if nothing is left to explain.
+        Chosen number of terms; smaller if no residual remains to be explained.
     degrees_ : float
         Chosen degrees of freedom of each curve.
     intercept_ : float
     directions_ : ndarray of shape (n_terms, n_features)
-        On raw inputs.
+        Directions in terms of the unscaled inputs.
     curves_ : tuple of Curve
-        One per direction.
+        One curve per direction.
     r_squared_ : float
-        In the training data; nan if the deviation does not change.
+        On the training data; nan if the deviation is constant.
     cv_rms_ : float
-        Mean over the cycles left out of their RMS, at the choice [unit of y].
+        Mean of the RMS values of the left-out cycles with the chosen settings [unit of y].
     chosen_by_ : str
-        Units left out for the choice.
+        Kind of units left out for the choice.
     data_min_, data_max_ : ndarray of shape (n_features,)
         Trained range.
 
@@ -137,7 +137,7 @@ class ProjectionPursuit(CycledRegressor):
 
 @dataclass(frozen=True)
 class _Model:
-    """Fitted model, on raw inputs."""
+    """Fitted model in terms of the unscaled inputs."""
 
     intercept: float
     directions: FloatArray
@@ -152,7 +152,7 @@ class _Model:
 
 @dataclass(frozen=True)
 class _Smooth:
-    """A curve fitted to a scatter: where its knots lie, its values there, and at the rows value and slope."""
+    """A curve fitted to scattered data: range, values at its knots, and values and slopes at the rows."""
 
     low: float
     high: float
@@ -163,7 +163,7 @@ class _Smooth:
 
 @dataclass(frozen=True)
 class _Term:
-    """A direction on standardised inputs, its curve, and the penalty this was fitted with."""
+    """Direction in standardised inputs, the curve along it, and the penalty used for its fit."""
 
     direction: FloatArray
     smooth: _Smooth
@@ -178,7 +178,7 @@ _PENALTIES = np.logspace(-10, 6, 65)
 
 
 def _normal(u: FloatArray) -> tuple[FloatArray, NDArray[np.intp], FloatArray]:
-    """Return the normal matrix of a linear spline by its upper bands, and where each row lies between two knots."""
+    """Return the upper bands of the normal matrix of a linear spline, and each row's position between its knots."""
     low, high = u.min(), u.max()
     place = (u - low) * ((_KNOTS - 1) / (high - low))
     piece = np.minimum(place.astype(np.intp), _KNOTS - 2)
@@ -189,12 +189,12 @@ def _normal(u: FloatArray) -> tuple[FloatArray, NDArray[np.intp], FloatArray]:
     bands[2, 1:] += np.bincount(piece, share * share, _KNOTS)[:-1]
     bands[1, 1:] = np.bincount(piece, share * rest, _KNOTS)[:-1]
     bands /= len(u)
-    bands[2] += 1e-9 / _KNOTS  # two different values alone do not make a curve
+    bands[2] += 1e-9 / _KNOTS  # keeps the matrix regular if the values lie in a few intervals only
     return bands, piece, share
 
 
 def _penalty(u: FloatArray, degrees: float) -> float:
-    """Return the penalty on bending that leaves a curve a given number of degrees of freedom."""
+    """Return the curvature penalty for which a curve has a given number of degrees of freedom."""
     bands = _normal(u)[0]
     gram = np.diag(bands[2]) + np.diag(bands[1, 1:], 1) + np.diag(bands[1, 1:], -1)
     bending = linalg.eigh(_BENDING, gram, eigvals_only=True)
@@ -203,7 +203,7 @@ def _penalty(u: FloatArray, degrees: float) -> float:
 
 
 def _smooth(u: FloatArray, r: FloatArray, penalty: float) -> _Smooth:
-    """Smooth a scatter by a penalised linear spline, about zero."""
+    """Smooth scattered data by a penalised linear spline with zero mean."""
     bands, piece, share = _normal(u)
     right = np.bincount(piece, (1 - share) * r, _KNOTS)
     right[1:] += np.bincount(piece, share * r, _KNOTS)[:-1]
@@ -222,13 +222,13 @@ def _smooth(u: FloatArray, r: FloatArray, penalty: float) -> _Smooth:
 
 
 def _bends(u: FloatArray) -> bool:
-    """Return whether a projection has room for a curve."""
+    """Return whether a projection varies enough for a curve."""
     low, high = u.min(), u.max()
     return bool(high - low > 1e-12 * max(abs(low), abs(high)))
 
 
 def _pursue(Z: FloatArray, r: FloatArray, term: _Term, steps: int) -> _Term:
-    """Turn the direction of a term by Gauss-Newton steps, its curve following."""
+    """Improve the direction of a term by Gauss-Newton steps, refitting its curve after each."""
     residual = r - term.smooth.values
     rss = float(residual @ residual)
     for _ in range(steps):
@@ -261,7 +261,7 @@ def _pursue(Z: FloatArray, r: FloatArray, term: _Term, steps: int) -> _Term:
 
 
 def _starts(Z: FloatArray, r: FloatArray) -> list[FloatArray]:
-    """Return directions to start from: of the steepest rise, and of the strongest bend (Li 1992) of what is left."""
+    """Return starting directions: steepest slope of the residual, and its strongest curvature (Li 1992)."""
     gram = Z.T @ Z / len(Z)
     values, vectors = linalg.eigh(gram)
     kept = values > 1e-6 * values[-1]
@@ -274,7 +274,7 @@ def _starts(Z: FloatArray, r: FloatArray) -> list[FloatArray]:
 
 
 def _new_term(Z: FloatArray, r: FloatArray, degrees: float) -> _Term | None:
-    """Return the term that explains most of what is left; None if nothing bends."""
+    """Return the term that explains most of the residual; None if no projection varies."""
     found = []
     for direction in _starts(Z, r):
         u = Z @ direction
@@ -285,7 +285,7 @@ def _new_term(Z: FloatArray, r: FloatArray, degrees: float) -> _Term | None:
 
 
 def _path(X: FloatArray, y: FloatArray, max_terms: int, degrees: float) -> list[_Model]:
-    """Return models with 1, 2, ... terms; the last one again where nothing is left to explain."""
+    """Return models with 1, 2, ... terms; the last model is repeated if no residual remains to be explained."""
     centre, scale = scaling(X)
     Z = (X - centre) / scale
     mean = float(y.mean())
@@ -304,7 +304,7 @@ def _path(X: FloatArray, y: FloatArray, max_terms: int, degrees: float) -> list[
 
 
 def _backfit(Z: FloatArray, left: FloatArray, terms: list[_Term]) -> FloatArray:
-    """Fit all terms again in turn, each to what the others leave; return what all leave."""
+    """Refit all terms in turn, each to the residual of the others; return the final residual."""
     for _ in range(_SWEEPS if len(terms) > 1 else 0):
         before = float(left @ left)
         for k, term in enumerate(terms):
@@ -318,7 +318,7 @@ def _backfit(Z: FloatArray, left: FloatArray, terms: list[_Term]) -> FloatArray:
 
 
 def _raw(terms: Sequence[_Term], mean: float, centre: FloatArray, scale: FloatArray) -> _Model:
-    """Return terms on raw inputs."""
+    """Return the model in terms of the unscaled inputs."""
     directions = np.array([t.direction / scale for t in terms]).reshape(len(terms), len(scale))
     curves = []
     for direction, t in zip(directions, terms, strict=True):

@@ -11,18 +11,18 @@ from thermocomp.models.shrinkage import PenalisedRegressor, Rule, sorted_strengt
 
 
 class Ridge(PenalisedRegressor):
-    """Ridge regression (Hoerl and Kennard 1970) on standardised inputs: what `dynamic` is without its memory.
+    """Ridge regression (Hoerl and Kennard 1970) on standardised inputs: `dynamic` without memory.
 
-    scikit-learn's `ridge_regression` by singular values; the strength is chosen by leaving thermal cycles out.
+    Uses scikit-learn's `ridge_regression` by singular values; the strength is chosen by leaving out thermal cycles.
 
     Parameters
     ----------
     strengths : sequence of float
-        To choose from, per row and in units of each input's variance.
+        Strengths to choose from, per row and relative to each input's variance.
     rule : {'one-standard-error', 'minimum'}
-        Rule by which the strength is chosen.
+        Rule for the choice of the strength.
     fit_intercept : bool
-        False: the model gives zero in the reference state.
+        False: the model returns zero in the reference state.
 
     Attributes
     ----------

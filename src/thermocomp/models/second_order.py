@@ -1,4 +1,4 @@
-"""`mra`: second-order regression with stepwise choice of the terms (Chen, Yuan, Ni 1996)."""
+"""`mra`: second-order regression with stepwise selection of terms (Chen, Yuan, Ni 1996)."""
 
 from collections.abc import Sequence
 
@@ -13,32 +13,32 @@ from thermocomp.models.steplog import StepwiseRegressor
 
 
 class SecondOrderRegression(StepwiseRegressor):
-    """Chen's multiple regression analysis: linear terms, squares and products, chosen by significance.
+    """Chen's multiple regression analysis: linear terms, squares and products, selected by significance.
 
-    The form is ``A1' dT + dT' A2 dT`` without constant (Chen 1996, Eq. 4; C-09), over variables which are inputs or
-    differences of inputs (C-12). SYSTAT's stepwise rule chooses among its n + n(n+1)/2 terms (C-10): one action a
-    step, removal before entering, by default with alpha-to-enter .001 and alpha-to-remove .015 (C-15). The
-    significances take the rows as independent, which those of a time series are not: see `n_effective_` (E-C12). A term
-    of which those inside leave less than 1e-8 of its norm does not enter. Bad significance levels are an `InputError`,
-    and so is a variable that does not exist.
+    The form is ``A1' dT + dT' A2 dT`` without constant (Chen 1996, Eq. 4; C-09), with variables that are inputs or
+    differences of inputs (C-12). SYSTAT's stepwise rule selects among its n + n(n+1)/2 terms (C-10): one action per
+    step, removal before entry, by default with alpha-to-enter .001 and alpha-to-remove .015 (C-15). The significances
+    treat the rows as independent, which the rows of a time series are not: see `n_effective_` (E-C12). A term whose
+    remainder outside the span of the model is below 1e-8 of its norm does not enter. Invalid significance levels and
+    unknown variables raise `InputError`.
 
     Parameters
     ----------
     alpha_enter, alpha_remove : float
         Significance levels, ``0 < alpha_enter <= alpha_remove <= 1``.
     fit_intercept : bool
-        True adds a constant, and R2 becomes a centred one (E-C10).
+        True: a constant is added, and R2 is centred (E-C10).
     differences : sequence of (str, str)
-        Pairs of feature names; ``("T6", "T7")`` makes the variable ``T6-T7``. Features of a nameless table are called
-        ``x0``, ``x1``, ...
+        Pairs of feature names; ``("T6", "T7")`` defines the variable ``T6-T7``. Features of a table without names are
+        called ``x0``, ``x1``, ...
     subset : sequence of str, optional
-        Variables to use, features and differences, such as ``("T1", "T2", "T3", "T6-T7", "T8-T9")`` (C-13). Without
-        it all features and all differences are used.
+        Variables to use, features and differences, such as ``("T1", "T2", "T3", "T6-T7", "T8-T9")`` (C-13). Default:
+        all features and all differences.
     second_order : bool
         False: linear terms only, as for Chen's slope (C-23).
     hierarchy : bool
-        True: a square or product enters only when its factors are in, and these stay while it is. Chen's models are
-        free of that (C-21).
+        True: a square or product enters only if its factors are in the model, and these stay as long as it does. Chen's
+        models do not have this restriction (C-21).
 
     Attributes
     ----------
@@ -47,16 +47,16 @@ class SecondOrderRegression(StepwiseRegressor):
     candidates_ : tuple of str
         Names of all terms.
     selected_ : tuple of int
-        Terms in the model, as indices of `candidates_`, in rising order.
+        Terms in the model, as indices of `candidates_`, in ascending order.
     terms_ : tuple of str
-        Their names.
+        Names of the terms in the model.
     coef_ : ndarray of shape (n_selected,)
-        One for each of `terms_`.
+        One coefficient for each of `terms_`.
     intercept_ : float
     log_ : tuple of Step
-        Each entering and leaving.
+        Each entry and deletion.
     cycled_ : bool
-        True if the selection was stopped because it went round in a circle.
+        True if the selection stopped because a model occurred for the second time.
     r_squared_, adjusted_r_squared_, standard_error_, n_effective_, condition_ : float
         See `thermocomp.models.linear.TermRegressor`.
 
@@ -131,7 +131,7 @@ def _values(X: FloatArray, variables: Sequence[Variable]) -> FloatArray:
 
 
 def _columns(values: FloatArray, terms: Sequence[Term], y: FloatArray) -> FloatArray:
-    """Return the table [terms y] in Fortran order: column by column, seven times as fast as `TermTable` row by row."""
+    """Return the table [terms y] in Fortran order; column by column is seven times as fast as `TermTable` by rows."""
     out = np.empty((len(values), len(terms) + 1), order="F")
     for k, (first, *others) in enumerate(terms):
         out[:, k] = values[:, first]
@@ -142,5 +142,5 @@ def _columns(values: FloatArray, terms: Sequence[Term], y: FloatArray) -> FloatA
 
 
 def _factors(terms: Sequence[Term]) -> list[frozenset[int]]:
-    """Return, per term, the linear terms of its factors if it is a square or a product."""
+    """Return, for each square or product, the linear terms of its factors; an empty set for other terms."""
     return [frozenset(terms.index((i,)) for i in t) if len(t) > 1 else frozenset() for t in terms]

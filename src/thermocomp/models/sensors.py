@@ -1,4 +1,4 @@
-"""`SensorSelector`: any way to choose sensors as a step of a scikit-learn Pipeline."""
+"""`SensorSelector`: sensor selection methods as a step of a scikit-learn Pipeline."""
 
 from collections.abc import Sequence
 from inspect import signature
@@ -19,7 +19,7 @@ from thermocomp.models.partial_f import PartialF
 from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.models.subsets import BestSubset
 
-#: the methods that choose, as on the command line
+#: selection methods, as on the command line
 SELECTORS: dict[str, type[ThermalRegressor]] = {
     "grouping": CorrelationGrouping,
     "partial-f": PartialF,
@@ -30,22 +30,22 @@ SELECTORS: dict[str, type[ThermalRegressor]] = {
 
 
 class SensorSelector(SelectorMixin, BaseEstimator):
-    """Keeps the sensors that a method chooses.
+    """Transformer that keeps the sensors chosen by a method.
 
     Parameters
     ----------
     method : str or estimator
-        ``grouping``, ``partial-f``, ``stepwise``, ``subsets``, ``lasso``; or such an estimator with settings of its
-        own, such as ``CorrelationGrouping(threshold=0.95)``. Whatever its frozen model has a use for is kept.
+        ``grouping``, ``partial-f``, ``stepwise``, ``subsets``, ``lasso``; or such an estimator with custom settings,
+        such as ``CorrelationGrouping(threshold=0.95)``. All inputs used by its frozen model are kept.
     keep : sequence of str or int
-        Names (or indices) of columns that are kept without being asked about, such as the spindle speed.
+        Names (or indices) of columns that are always kept, such as the spindle speed.
     time : {'column'} or None
-        ``"column"``: the first column is the time, for a model with a memory further on; it is kept.
+        ``"column"``: the first column is the time, for a later step with a memory; it is kept.
 
     Attributes
     ----------
     estimator_ : ThermalRegressor
-        The method, fitted to the candidates.
+        The method, fitted to the candidate columns.
     n_features_in_ : int
 
     References
@@ -79,7 +79,7 @@ class SensorSelector(SelectorMixin, BaseEstimator):
         self.time = time
 
     def fit(self, X: ArrayLike, y: ArrayLike, *, cycle: ArrayLike | None = None) -> "SensorSelector":
-        """Choose.
+        """Choose the sensors.
 
         Parameters
         ----------
@@ -88,7 +88,7 @@ class SensorSelector(SelectorMixin, BaseEstimator):
         y : array-like of shape (n_rows,)
             Deviation.
         cycle : array-like of int of shape (n_rows,), optional
-            Thermal cycle of each row, for a method that chooses by cycles left out.
+            Thermal cycle of each row, for a method that chooses by left-out cycles.
 
         Returns
         -------
@@ -97,7 +97,7 @@ class SensorSelector(SelectorMixin, BaseEstimator):
         Raises
         ------
         InputError
-            The method or a column is unknown, or there is nothing to choose from.
+            The method or a column is unknown, or there are no columns to choose from.
         """
         values, deviation = validate_data(self, X, y, y_numeric=True, dtype=np.float64, ensure_min_samples=2)
         names = [str(n) for n in getattr(self, "feature_names_in_", [f"x{i}" for i in range(self.n_features_in_)])]

@@ -23,13 +23,13 @@ def scaling(X: FloatArray, *, centred: bool = True) -> tuple[FloatArray, FloatAr
     ----------
     X : ndarray of shape (n_rows, n_features)
     centred : bool
-        False: the columns keep their zero.
+        False: the columns are not centred.
 
     Returns
     -------
     centre : ndarray of shape (n_features,)
     scale : ndarray of shape (n_features,)
-        inf for a constant column: divided by it, it has no effect.
+        inf for a constant column, so that it has no effect after the division.
     """
     centre = X.mean(axis=0) if centred else np.zeros(X.shape[1])
     scale = np.sqrt(np.mean((X - centre) ** 2, axis=0))
@@ -38,15 +38,15 @@ def scaling(X: FloatArray, *, centred: bool = True) -> tuple[FloatArray, FloatAr
 
 
 def choose(rms: FloatArray, rule: Rule) -> tuple[int, int]:
-    """Choose a setting by the errors on what was left out.
+    """Choose a setting by the errors on the left-out folds.
 
     Parameters
     ----------
     rms : ndarray of shape (n_sets, n_settings, n_folds)
-        In each set from the simplest to the richest setting.
+        In each set ordered from the simplest to the most complex setting.
     rule : {'one-standard-error', 'minimum'}
-        The smallest mean, or in its set the simplest setting whose mean is within one standard error of it (Breiman
-        et al. 1984).
+        The smallest mean, or the simplest setting of the same set whose mean is within one standard error of it
+        (Breiman et al. 1984).
 
     Returns
     -------
@@ -63,21 +63,21 @@ def choose(rms: FloatArray, rule: Rule) -> tuple[int, int]:
 
 
 class ShrunkRegressor(CycledRegressor, TermRegressor):
-    """Linear regression on standardised inputs; how rich it is, is chosen by leaving thermal cycles out.
+    """Linear regression on standardised inputs whose complexity is chosen by leaving out thermal cycles.
 
-    Each thermal cycle among the training rows is left out in turn, the whole path of models is fitted to the others and
-    predicts it. Inputs that do not change get the coefficient 0.
+    Each thermal cycle among the training rows is left out in turn; the whole path of models is fitted to the others and
+    predicts the left-out cycle. Constant inputs get the coefficient 0.
 
     Attributes
     ----------
     cv_rms_ : float
-        Mean over the cycles left out of their RMS, at the choice [unit of y].
+        Mean of the RMS values of the left-out cycles with the chosen settings [unit of y].
     chosen_by_ : str
-        Units left out for the choice.
+        Kind of units left out for the choice.
     r_squared_, adjusted_r_squared_, standard_error_, n_effective_, condition_ : float
-        See `thermocomp.models.linear.TermRegressor`; each coefficient that is not 0 counts as a parameter.
+        See `thermocomp.models.linear.TermRegressor`; each non-zero coefficient counts as a parameter.
     dependent_ : tuple of str
-        Names of the inputs that do not change.
+        Names of the constant inputs.
     """
 
     rule: Rule
@@ -99,17 +99,17 @@ class ShrunkRegressor(CycledRegressor, TermRegressor):
 
     @abstractmethod
     def _paths(self, Z: FloatArray, y: FloatArray) -> FloatArray:
-        """Return the weights on standardised inputs, (n_sets, n_settings, n_features): see `choose`.
+        """Return the weights for standardised inputs, (n_sets, n_settings, n_features): see `choose`.
 
         The numbers of sets and settings must not depend on the rows.
         """
 
     @abstractmethod
     def _note(self, which: int, setting: int) -> None:
-        """Note the chosen settings as attributes."""
+        """Store the chosen settings as attributes."""
 
     def _fitted(self, X: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return weights (n_sets, n_settings, n_features) and intercepts (n_sets, n_settings) on raw inputs."""
+        """Return weights (n_sets, n_settings, n_features) and intercepts (n_sets, n_settings) for unscaled inputs."""
         centre, scale = scaling(X, centred=self.fit_intercept)
         mean = float(y.mean()) if self.fit_intercept else 0.0
         weights = self._paths((X - centre) / scale, y - mean) / scale
@@ -135,7 +135,7 @@ class ShrunkRegressor(CycledRegressor, TermRegressor):
 
 
 class PenalisedRegressor(ShrunkRegressor):
-    """Linear regression with a penalty on the coefficients, whose strength is chosen.
+    """Linear regression with a penalty on the coefficients, whose strength is chosen by leaving out thermal cycles.
 
     Attributes
     ----------
@@ -145,23 +145,23 @@ class PenalisedRegressor(ShrunkRegressor):
 
     strengths: Sequence[float]
 
-    def _note(self, which: int, setting: int) -> None:  # noqa: ARG002 - one set has the same strengths as another
+    def _note(self, which: int, setting: int) -> None:  # noqa: ARG002 - all sets have the same strengths
         self.strength_ = float(sorted_strengths(self.strengths)[setting])
 
 
 class ComponentRegressor(ShrunkRegressor):
-    """Linear regression on the first of some components of the inputs, whose number is chosen.
+    """Linear regression on the first components of the inputs, whose number is chosen by leaving out thermal cycles.
 
     Parameters
     ----------
     components : int, optional
         Fixed number of components, or the largest possible number if smaller. Default: chosen by `rule`.
     max_components : int, optional
-        Most to choose from; as many as inputs if not given.
+        Largest number to choose from; default: the number of inputs.
     rule : {'one-standard-error', 'minimum'}
-        Rule by which the number of components is chosen.
+        Rule for the choice of the number of components.
     fit_intercept : bool
-        False: the model gives zero in the reference state, and the components are those about zero.
+        False: the model returns zero in the reference state, and the components are computed about zero.
 
     Attributes
     ----------
@@ -184,25 +184,25 @@ class ComponentRegressor(ShrunkRegressor):
 
     @abstractmethod
     def _path(self, Z: FloatArray, y: FloatArray, most: int) -> FloatArray:
-        """Return the weights on standardised inputs with 1, 2, ... components, (most, n_features)."""
+        """Return the weights for standardised inputs with 1, 2, ... components, (most, n_features)."""
 
     def _paths(self, Z: FloatArray, y: FloatArray) -> FloatArray:
         path = self._path(Z, y, most_components(self.components or self.max_components, Z.shape[1]))
         return path[None] if self.components is None else path[None, -1:]
 
-    def _note(self, which: int, setting: int) -> None:  # noqa: ARG002 - there is one set
+    def _note(self, which: int, setting: int) -> None:  # noqa: ARG002 - there is only one set
         self.n_components_ = (
             setting + 1 if self.components is None else most_components(self.components, self.n_features_in_)
         )
 
 
 def sorted_strengths(strengths: ArrayLike) -> FloatArray:
-    """Return strengths from the greatest (the simplest model) to the smallest.
+    """Return strengths in descending order, that is, from the simplest model to the most complex.
 
     Raises
     ------
     InputError
-        None, or one that is not a positive number.
+        There are no strengths, or one is not a positive number.
     """
     values = np.atleast_1d(np.asarray(strengths, dtype=np.float64))
     if values.size == 0 or not (values > 0).all() or not np.isfinite(values).all():
@@ -211,7 +211,7 @@ def sorted_strengths(strengths: ArrayLike) -> FloatArray:
 
 
 def most_components(max_components: int | None, n_features: int) -> int:
-    """Return the number of components of the richest model.
+    """Return the number of components of the most complex model.
 
     Raises
     ------

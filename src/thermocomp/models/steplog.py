@@ -1,4 +1,4 @@
-"""Common part of the stepwise regressions: selection, and its log in the style of SYSTAT 5.0 (Chen 1996, Fig. 2)."""
+"""Common part of the stepwise regressions: selection, and log in the style of SYSTAT 5.0 (Chen 1996, Fig. 2)."""
 
 import math
 from abc import abstractmethod
@@ -12,16 +12,16 @@ from thermocomp.models.numerics.stepwise import Rule, StepwiseStep, stepwise
 
 
 class StepwiseRegressor(StaticRegressor, TermRegressor):
-    """Linear regression whose terms are selected step by step.
+    """Linear regression with stepwise selection of terms.
 
     Attributes
     ----------
     selected_ : tuple of int
-        Terms in the model, in rising order.
+        Terms in the model, in ascending order.
     log_ : tuple of StepwiseStep
-        Each entering and leaving.
+        Each entry and deletion.
     cycled_ : bool
-        True if the selection was stopped because it went round in a circle.
+        True if the selection stopped because a model occurred for the second time.
     """
 
     selected_: tuple[int, ...]
@@ -30,13 +30,13 @@ class StepwiseRegressor(StaticRegressor, TermRegressor):
     def log_text(self, target: str = "Y") -> str:
         """Return the rule, the steps, the fit and the coefficients as text (C-16).
 
-        To SYSTAT's columns are added the partial F, the significance it corresponds to, the change of R2 (E-T3), the
-        kind of R2 (E-C10) and the effective sample size (E-C12).
+        In addition to SYSTAT's columns, the text contains the partial F, the corresponding significance, the change of
+        R2 (E-T3), the kind of R2 (E-C10) and the effective sample size (E-C12).
 
         Parameters
         ----------
         target : str
-            Name of what is predicted.
+            Name of the predicted quantity.
 
         Returns
         -------
@@ -71,18 +71,18 @@ class StepwiseRegressor(StaticRegressor, TermRegressor):
         """Return the thresholds."""
 
     def _rule_text(self) -> str:
-        """Return the thresholds in words."""
+        """Return the thresholds as text."""
         return str(self._rule())
 
     def _select(
         self, tri: Triangle, names: Sequence[str], needs: Sequence[frozenset[int]] | None = None
     ) -> tuple[int, ...]:
-        """Note the selection and its steps; return the selected columns of `tri`."""
+        """Store the selection and its steps; return the selected columns of `tri`."""
         chosen = stepwise(tri, self._rule(), names, needs=needs)
         self.selected_, self.log_, self.cycled_ = chosen.selected, chosen.steps, chosen.cycled
         return self.selected_
 
 
 def _three(value: float) -> str:
-    """Write a number like SYSTAT: three decimals, no zero before the point."""
+    """Format a number like SYSTAT: three decimals, no zero before the decimal point."""
     return f"{value:.3f}".replace("0.", ".", 1) if abs(value) < 1 else f"{value:.3f}"

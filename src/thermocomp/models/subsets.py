@@ -1,4 +1,4 @@
-"""`subsets`: the exact best set of temperatures, its size chosen by cycles left out or by a criterion."""
+"""`subsets`: exact best set of temperatures, with its size chosen by left-out cycles or by a criterion."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -19,19 +19,19 @@ Criterion = Literal["mse", "adjr2", "cp", "bic", "cycles"]
 def scores(found: Subsets) -> dict[str, FloatArray]:
     """Return the criteria of the best sets, one number for each of ``found.best``.
 
-    With n rows, s columns, the residual sum of squares SSE and R2 (uncentred if there is no intercept):
+    With n rows, s columns, residual sum of squares SSE and R2 (uncentred if there is no intercept):
 
     - ``mse``: SSE / (n - s - 1), without intercept SSE / (n - s) (H-05);
-    - ``adjr2``: adjusted R2, the greater the better; it ranks the sizes as ``mse`` does;
+    - ``adjr2``: adjusted R2, the greater the better; it ranks the sizes like ``mse``;
     - ``cp``: Mallows' SSE / s2 + 2 (s + 1) - n with s2 from the model of all columns;
     - ``bic``: n log(1 - R2) + (s + 1) log n.
 
-    All are as in the R package leaps, and all take the rows for independent.
+    All are defined as in the R package leaps, and all treat the rows as independent.
 
     Returns
     -------
     dict of str to ndarray of shape (n_best,)
-        nan where there is no degree of freedom left.
+        nan where no degree of freedom remains.
     """
     n, one = found.n_rows, int(found.intercept)
     rss = np.array([s.rss for s in found.best])
@@ -40,7 +40,7 @@ def scores(found: Subsets) -> dict[str, FloatArray]:
     left[left <= 0] = np.nan
     full = found.dof - found.rank
     share = rss / found.total if found.total > 0 else np.full(len(rss), np.nan)
-    with np.errstate(divide="ignore", invalid="ignore"):  # a perfect fit
+    with np.errstate(divide="ignore", invalid="ignore"):  # in case of a perfect fit
         return {
             "mse": rss / left,
             "adjr2": 1 - share * found.dof / left,
@@ -50,32 +50,32 @@ def scores(found: Subsets) -> dict[str, FloatArray]:
 
 
 class BestSubset(TermRegressor):
-    """Linear least squares on the best set of temperatures of all there are (H-05, H-07).
+    """Linear least squares on the best of all possible sets of temperatures (H-05, H-07).
 
     For every size the set with the smallest residual sum of squares is found exactly, or the certificate says "not
-    proven" (`thermocomp.models.selection.subsets.best_subsets`). Among the sizes the criterion chooses. ``cycles``:
-    the search is made again without each thermal cycle in turn, so that the cycle is unseen by the selection too, and
-    the size with the smallest RMS over all the cycles left out is taken.
+    proven" (`thermocomp.models.selection.subsets.best_subsets`). The size is chosen by the criterion. ``cycles``: the
+    search is repeated without each thermal cycle in turn, so that the cycle is unseen by the selection as well, and the
+    size with the smallest RMS over all left-out cycles is chosen.
 
-    ``mse``, ``adjr2``, ``cp`` and ``bic`` take the rows for independent. Those of a time series are not (E-C12), and
-    all four, BIC too, then select far too many temperatures; prefer ``cycles``.
+    ``mse``, ``adjr2``, ``cp`` and ``bic`` treat the rows as independent. The rows of a time series are not (E-C12), and
+    all four, including BIC, then select far too many temperatures; prefer ``cycles``.
 
     Parameters
     ----------
     criterion : {'cycles', 'bic', 'cp', 'adjr2', 'mse'}, optional
-        Without it ``cycles`` if `fit` is given cycles, else ``bic``. If ``cycles`` is asked for and none are given,
-        five stretches of equal length take their place.
+        Default: ``cycles`` if `fit` receives cycles, else ``bic``. If ``cycles`` is requested without cycles, five
+        blocks of equal length replace them.
     size : int, optional
-        Fixed number of temperatures, or the largest possible number if smaller. Default: chosen.
+        Fixed number of temperatures, or the largest possible number if smaller. Default: chosen by `criterion`.
     max_size : int, optional
-        Search up to this size only; needed beyond about 50 temperatures, and where they are as many as the rows.
+        Largest size to search; required for more than about 50 temperatures, or for at least as many as there are rows.
     rule : {'minimum', 'one-standard-error'}
-        For ``cycles``: the best size, or the smallest whose mean square error over the cycles is within one standard
-        error of the best.
+        For ``cycles``: the best size, or the smallest size whose mean square error over the cycles is within one
+        standard error of the best.
     fit_intercept : bool
-        False: the model gives zero in the reference state.
+        False: the model returns zero in the reference state.
     jobs : int
-        Threads.
+        Number of threads.
     nodes : int, optional
         Stop each search after about this number of sets.
     seconds : float, optional
@@ -86,18 +86,18 @@ class BestSubset(TermRegressor):
     Attributes
     ----------
     subsets_ : Subsets
-        The best set of every size, with its certificate.
+        Best set of every size, with its certificate.
     scores_ : dict of str to ndarray
-        Criteria of ``subsets_.best``, see `scores`; with ``cycles`` the RMS over the cycles left out [unit of y].
+        Criteria of ``subsets_.best``, see `scores`; for ``cycles`` the RMS over the left-out cycles [unit of y].
     selected_ : tuple of int
-        Features in the model, in rising order.
+        Features in the model, in ascending order.
     proven_ : bool
-        Whether no other set of that size fits as well.
+        Whether it is proven that no other set of that size fits as well.
     criterion_ : str
-        What the size was chosen by; ``size`` if it was given. After a KeyboardInterrupt the search stops with what it
-        has found, and ``bic`` takes the place of ``cycles``.
+        Criterion that determined the size; ``size`` if the size was given. After a KeyboardInterrupt the search stops
+        with its present result, and ``bic`` replaces ``cycles``.
     chosen_by_ : str
-        Units left out for the choice; empty if none were.
+        Kind of units left out for the choice; empty if none.
     terms_, coef_, intercept_, r_squared_, adjusted_r_squared_, standard_error_, n_effective_, condition_
         See `thermocomp.models.linear.TermRegressor`.
 
@@ -148,7 +148,7 @@ class BestSubset(TermRegressor):
         self.progress = progress
 
     def fit(self, X: ArrayLike, y: ArrayLike, *, cycle: ArrayLike | None = None) -> "BestSubset":
-        """Search, choose and fit.
+        """Search, choose the size, and fit.
 
         Parameters
         ----------
@@ -157,7 +157,7 @@ class BestSubset(TermRegressor):
         y : array-like of shape (n_rows,)
             Deviation.
         cycle : array-like of int of shape (n_rows,), optional
-            Thermal cycle of each row; rows with -1 are not learned from.
+            Thermal cycle of each row; rows with -1 are not used for training.
 
         Returns
         -------
@@ -166,11 +166,12 @@ class BestSubset(TermRegressor):
         Raises
         ------
         FitError
-            Fewer than two rows to learn from.
+            Fewer than two training rows.
         InputError
-            A setting makes no sense, or there are too many columns that depend on each other (see `max_size`).
+            A setting is out of range, or there are too many dependent columns (see `max_size`).
         KeyboardInterrupt
-            While the cycles are left out. Interrupted before, it continues with what was found so far.
+            Interrupted while cycles are left out. After an earlier interrupt, the fit continues with the present
+            result.
         """
         criterion = self.criterion or ("bic" if cycle is None else "cycles")
         if criterion not in {"mse", "adjr2", "cp", "bic", "cycles"} or (self.size is not None and self.size < 1):
@@ -183,7 +184,7 @@ class BestSubset(TermRegressor):
         self.selected_: tuple[int, ...] = ()
         self.proven_, self.criterion_, self.chosen_by_ = True, "none", ""
         self.scores_: dict[str, FloatArray] = {}
-        with suppress(FitError):  # only constant columns: the model is the mean
+        with suppress(FitError):  # if all columns are constant, the model is the mean
             self.subsets_ = self._search(change, deviation, sizes)
             if not self.subsets_.best:
                 raise InputError("best subsets: stopped before a set was found; give it more sets or seconds")
@@ -193,7 +194,7 @@ class BestSubset(TermRegressor):
             if self.criterion_ == "cycles":
                 try:
                     place, self.chosen_by_ = self._by_cycles(change, deviation, folds), left_out
-                except KeyboardInterrupt:  # what was found is not thrown away
+                except KeyboardInterrupt:  # keep the present result
                     self.criterion_ = "bic"
             if self.criterion_ in ("mse", "adjr2", "cp", "bic"):
                 score = self.scores_[self.criterion_] * (-1 if self.criterion_ == "adjr2" else 1)
@@ -216,7 +217,7 @@ class BestSubset(TermRegressor):
         )
 
     def _by_cycles(self, X: FloatArray, y: FloatArray, folds: IntArray) -> int:
-        """Return the place in ``subsets_.best`` that predicts cycles best that neither search nor fit have seen."""
+        """Return the index in ``subsets_.best`` of the set that best predicts cycles unseen by both search and fit."""
         if self.subsets_.stopped == "interrupted":
             raise KeyboardInterrupt
         sizes = [len(s.columns) for s in self.subsets_.best]
@@ -237,7 +238,7 @@ class BestSubset(TermRegressor):
         return best
 
     def _unseen(self, X: FloatArray, y: FloatArray, out: NDArray[np.bool_], sizes: list[int]) -> FloatArray:
-        """Return the sum of squared errors on the rows left out, for each size; nan where there is no such set."""
+        """Return the sum of squared errors on the left-out rows, for each size; nan if there is no set of that size."""
         errors = np.full(len(sizes), np.nan)
         train, known = X[~out], y[~out]
         try:

@@ -1,8 +1,8 @@
-"""Time in scikit-learn: how an estimator with a memory gets the time, and when it refuses to work.
+"""Time in scikit-learn: how an estimator with a memory receives the time, and when it raises an error.
 
-scikit-learn takes rows as exchangeable and hands any part of them on. A model with a memory that is given a part
-without its past predicts something else and no warning comes; so it demands a declaration, and rows it can follow from
-the start of each test.
+scikit-learn treats rows as exchangeable and passes on any part of them. A model with a memory that receives a part
+without its past predicts different values without a warning; it therefore requires a declaration of the time, and rows
+that are complete from the start of each test.
 """
 
 import math
@@ -23,9 +23,9 @@ from thermocomp.models.numerics.ticks import check_steps as checked_steps
 
 Time = Literal["column", "routed", "none"]
 
-#: a step this many times the usual one is no pause of the logger: rows are missing
+#: a step longer than this many usual steps means missing rows, not a pause of the logger
 GAP = 10.0
-#: a column that ends before this is no time [s] of a thermal test: it was scaled, or counts hours
+#: a time column that ends before this cannot be the time [s] of a thermal test: it was scaled, or is in hours
 LEAST = 60.0
 
 REMEDY = (
@@ -37,31 +37,31 @@ _OURS = "thermocomp.compare(..., leave_one='cycle') judges a thermal cycle from 
 
 
 class TimedRegressor(ThermalRegressor):
-    """A regressor with a memory; ``time`` specifies the source of the time.
+    """A regressor with a memory; ``time`` defines the source of the time.
 
     ``"column"``
-        The first column of X is the time since the start of the row's test [s]. A row that is not later than the one
-        before starts a new test, at 0.
+        The first column of X is the time since the start of the row's test [s]. A row that is not later than the
+        previous row starts a new test, at 0.
     ``"routed"``
-        `fit`, `predict` and `score` get ``dt``, the time since the row before [s], ``inf`` where a test starts; from
-        scikit-learn by ``set_fit_request(dt=True)`` and the like. With metadata routing enabled it must be a pandas
-        Series: its index shows rows that were left out.
+        `fit`, `predict` and `score` receive ``dt``, the time since the previous row [s], ``inf`` at the start of a
+        test; from scikit-learn through ``set_fit_request(dt=True)`` etc. With metadata routing enabled it must be a
+        pandas Series: its index reveals missing rows.
     ``"none"``
-        Every row is a machine at rest in that state. For scikit-learn's own checks: it cannot be frozen or compared.
+        Every row is a machine at rest in that state. For scikit-learn's own checks; cannot be frozen or compared.
     ``None``
-        Nothing was declared: `fit`, `predict` and `score` refuse.
+        Not declared: `fit`, `predict` and `score` raise an error.
     """
 
-    columns: ClassVar[str] = "inputs"  #: its parameter that names columns of X
+    columns: ClassVar[str] = "inputs"  #: name of the parameter that selects columns of X
     time: Time | None
 
     def routed(self) -> Self:
-        """Return an unfitted copy with ``time="routed"``, for those who pass dt themselves.
+        """Return an unfitted copy with ``time="routed"``, for callers that pass dt themselves.
 
         Raises
         ------
         InputError
-            It was given ``time="none"``, so it was not meant for a machine.
+            The estimator has ``time="none"``, which is not intended for use on a machine.
         """
         if self.time == "none":
             raise InputError(
@@ -74,20 +74,20 @@ class TimedRegressor(ThermalRegressor):
         return copy
 
     def fit(self, X: ArrayLike, y: ArrayLike, *, dt: ArrayLike | None = None, cycle: ArrayLike | None = None) -> Self:
-        """Fit; the class documents the additional data that a method refuses.
+        """Fit the model; see the class for cases in which a method rejects the data.
 
         Parameters
         ----------
         X : array-like of shape (n_rows, n_features)
-            Inputs minus their reference, in the order of time; with ``time="column"`` behind the time.
+            Inputs minus their reference, in chronological order; with ``time="column"`` preceded by the time.
         y : array-like of shape (n_rows,)
-            Deviation; without meaning where `cycle` is -1.
+            Deviation; ignored where `cycle` is -1.
         dt : array-like of shape (n_rows,), optional
-            With ``time="routed"``: time since the row before [s], ``inf`` in the first row of each test.
+            With ``time="routed"``: time since the previous row [s], ``inf`` in the first row of each test.
         cycle : array-like of int of shape (n_rows,), optional
-            Thermal cycle of each row, by which settings are chosen. Rows with -1 drive the memory but are not learned
-            from. Without it each test of several is one (``time="column"``), or five stretches of equal length take the
-            place of the cycles.
+            Thermal cycle of each row, for the choice of settings. Rows with -1 drive the memory but are not used for
+            training. Default: each of several tests is a cycle (``time="column"``), otherwise five blocks of equal
+            length replace the cycles.
 
         Returns
         -------
@@ -96,9 +96,9 @@ class TimedRegressor(ThermalRegressor):
         Raises
         ------
         FitError
-            No row to learn from.
+            There are no training rows.
         InputError
-            The time was not declared, the rows are not those of whole tests, or a setting is out of its range.
+            The time was not declared, the rows do not form complete tests, or a setting is out of range.
         """
         self._time = self.time
         self._declared()
@@ -111,17 +111,18 @@ class TimedRegressor(ThermalRegressor):
 
     @abstractmethod
     def _fit(self, rows: FloatArray, deviation: FloatArray, step: FloatArray, folds: IntArray) -> None:
-        """Fit to data that were checked: inputs without the time, y, time steps [s], and folds (-1: not learned)."""
+        """Fit to checked data: inputs without the time, y, time steps [s], and folds (-1: not used for training)."""
 
     def predict(self, X: ArrayLike, *, dt: ArrayLike | None = None) -> FloatArray:
-        """Predict the deviation from a cold start of each test; never from measured ones (P-05).
+        """Predict the deviation from a cold start of each test; never from measured deviations (P-05).
 
         Parameters
         ----------
         X : array-like of shape (n_rows, n_features)
             As in `fit`.
         dt : array-like of shape (n_rows,), optional
-            As in `fit`. With ``time="none"``, what is predicted is where the machine would settle in each row.
+            As in `fit`. With ``time="none"``, the deviation at which the machine would settle is predicted for each
+            row.
 
         Returns
         -------
@@ -160,7 +161,7 @@ class TimedRegressor(ThermalRegressor):
         Parameters
         ----------
         **header
-            As there. The time is no input.
+            As in that method. The time is not an input.
 
         Returns
         -------
@@ -169,7 +170,7 @@ class TimedRegressor(ThermalRegressor):
         Raises
         ------
         FitError
-            It was fitted with ``time="none"``: it has learned nothing of time.
+            The model was fitted with ``time="none"`` and has learned nothing about time.
         """
         if self.time == "none":
             raise FitError(
@@ -180,7 +181,7 @@ class TimedRegressor(ThermalRegressor):
     # -- for the methods -----------------------------------------------------------------------------------------------
 
     def _declared(self) -> None:
-        """Refuse to work without a declaration of time, or with another than in `fit`."""
+        """Raise an error if the time was not declared or differs from the declaration in `fit`."""
         name = type(self).__name__
         if self.time is None:
             raise InputError(f"{name} has a memory and was not given the time: give it {REMEDY}")
@@ -191,7 +192,7 @@ class TimedRegressor(ThermalRegressor):
             raise InputError(f"{name} was fitted with time={fitted!r} and has time={self.time!r} now: fit it again")
 
     def _given(self, X: ArrayLike, dt: ArrayLike | None) -> tuple[FloatArray, FloatArray]:
-        """Check X and time against what was fitted; return the inputs without the time, and the time steps."""
+        """Check X and time against the fitted model; return the inputs without the time, and the time steps."""
         self._declared()
         check_is_fitted(self)
         if _is_plain(X, self.n_features_in_) and not hasattr(self, "feature_names_in_"):
@@ -203,7 +204,7 @@ class TimedRegressor(ThermalRegressor):
     def _clock(
         self, X: ArrayLike, rows: FloatArray, dt: ArrayLike | None, *, fitting: bool = False
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the inputs without the time, and the time since the row before [s], inf where a test starts."""
+        """Return the inputs without the time, and the time since the previous row [s], inf at the start of a test."""
         if self.time == "routed":
             return rows, _routed(dt, len(rows), type(self).__name__)
         if dt is not None:
@@ -217,7 +218,7 @@ class TimedRegressor(ThermalRegressor):
         return rows[:, 1:], derive_steps(rows[:, 0], getattr(X, "index", None), fitting=fitting)
 
     def _cycles(self, cycle: ArrayLike | None, step: FloatArray) -> ArrayLike | None:
-        """Return the thermal cycles to choose settings by: those given, else the tests if there are several."""
+        """Return the thermal cycles for the choice of settings: as given, or the tests if there are several."""
         if cycle is not None or self.time != "column":
             return cycle
         tests = np.cumsum(np.isinf(step)) - 1
@@ -227,12 +228,12 @@ class TimedRegressor(ThermalRegressor):
         return super()._names()[self._hidden :]
 
     def _place(self, column: str | int, what: str) -> int:
-        """Return the input denoted by a name or by an index into the columns of X.
+        """Return the input specified by a name or by an index into the columns of X.
 
         Raises
         ------
         InputError
-            There is none of that name, or it is the time.
+            There is no input of that name, or the column is the time.
         """
         names = [str(n) for n in self._names()]
         if isinstance(column, str):
@@ -247,12 +248,12 @@ class TimedRegressor(ThermalRegressor):
 
     @property
     def _hidden(self) -> int:
-        """Columns of X in front of the inputs."""
+        """Number of columns of X before the inputs."""
         return int(self.time == "column")
 
 
 def _is_plain(X: ArrayLike, n_columns: int) -> TypeGuard[FloatArray]:
-    """Return True for an array that scikit-learn would accept unchanged; its own check takes as long as a free run."""
+    """Return True for an array that scikit-learn would accept unchanged; its own check is as slow as a free run."""
     if not (type(X) is np.ndarray and X.dtype == np.float64 and X.ndim == 2 and len(X) and X.shape[1] == n_columns):
         return False
     with np.errstate(over="ignore", invalid="ignore"):
@@ -260,16 +261,16 @@ def _is_plain(X: ArrayLike, n_columns: int) -> TypeGuard[FloatArray]:
 
 
 def derive_steps(time: FloatArray, index: object = None, *, fitting: bool = False) -> FloatArray:
-    """Return the time since the row before from a column that counts from the start of each test.
+    """Return the time since the previous row from a column with the time since the start of each test.
 
     Parameters
     ----------
     time : ndarray of shape (n_rows,)
-        [s]; a row that is not later than the one before starts a new test.
+        [s]; a row that is not later than the previous row starts a new test.
     index : pandas.Index, optional
-        Index of the rows; whole numbers show rows that were left out.
+        Index of the rows; integers reveal missing rows.
     fitting : bool
-        Also refuse what is too short to be learned from.
+        Also reject data that are too short for training.
 
     Returns
     -------
@@ -279,7 +280,7 @@ def derive_steps(time: FloatArray, index: object = None, *, fitting: bool = Fals
     Raises
     ------
     InputError
-        It is not a time, or a test does not begin at 0, or rows are missing.
+        The column is not a time, a test does not begin at 0, or rows are missing.
     """
     step = np.diff(time, prepend=np.inf)
     step[step <= 0] = np.inf
@@ -330,7 +331,7 @@ def _routed(dt: ArrayLike | None, n_rows: int, name: str) -> FloatArray:
 
 
 def _refuse_holes(index: Any, starts: NDArray[np.bool_]) -> None:
-    """Refuse rows that are no longer adjacent; labels that are not integers are not checked."""
+    """Reject rows that are not adjacent; labels that are not integers are not checked."""
     labels = None if index is None or callable(index) else np.asarray(index)
     if labels is None or labels.ndim != 1 or not np.issubdtype(labels.dtype, np.integer):
         return

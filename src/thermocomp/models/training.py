@@ -1,4 +1,4 @@
-"""Training of a method on the training rows."""
+"""Training of a method on selected rows."""
 
 import time
 from collections.abc import Sequence
@@ -44,11 +44,11 @@ class Trained:
     method : str
     estimator : ThermalRegressor
     model : ErrorModel
-        Frozen, unless the method cannot be: see `thermocomp.models.unfrozen`.
+        Frozen model, unless the method cannot be frozen: see `thermocomp.models.unfrozen`.
     seconds : float
-        The fit took [s].
+        Duration of the fit [s].
     r_squared : float
-        In-sample, about the mean.
+        R2 on the training data, about the mean.
     predicted : ndarray of shape (n_rows,)
         Predictions of the estimator for every row; nan where an input is missing.
     """
@@ -63,23 +63,23 @@ class Trained:
 
 @dataclass(frozen=True)
 class FittedMethod:
-    """A method that knows its rows, before it is frozen.
+    """A fitted method with its training rows, before it is frozen.
 
     Parameters
     ----------
     how : Method
     estimator : ThermalRegressor
     columns : tuple of int
-        The inputs it was given.
+        Inputs that were used.
     seen : ndarray of bool of shape (n_rows,)
-        Rows that it has learned from.
+        Training rows.
     seconds : float
-        The fit took [s].
+        Duration of the fit [s].
     predicted : ndarray of shape (n_rows,)
         Predictions for every row; nan where an input is missing.
     left_out : ndarray of shape (n_rows, 2) or None
-        What it would have said of a row without that row's cycle, and the spread of its structures; nan where it has
-        not learned. None: it does not tell.
+        Prediction for each row by a model without that row's cycle, and the spread of its structures; nan for rows not
+        used for training. None: not provided by the method.
     """
 
     how: Method
@@ -92,19 +92,19 @@ class FittedMethod:
 
 
 def fit_method(name: str | BaseEstimator, samples: Samples, target: int, learn: BoolArray) -> FittedMethod:
-    """Fit a method to some of the rows.
+    """Fit a method to selected rows.
 
     Parameters
     ----------
     name : str or estimator
-        Of the method; or an estimator with settings of its own, which gets all inputs and is not changed itself, see
+        Name of the method; or an estimator with custom settings, which receives all inputs and is cloned, see
         `thermocomp.models.foreign.adopt_estimator`.
     samples : Samples
     target : int
         Index into ``samples.targets``.
     learn : ndarray of bool of shape (n_rows,)
-        Rows whose deviation may be seen. A dynamic method also gets the inputs (never the deviations) of the other
-        rows: they are what the machine has gone through in between.
+        Rows whose deviation may be used. A dynamic method also receives the inputs (never the deviations) of the other
+        rows, since they describe the thermal history of the machine.
 
     Returns
     -------
@@ -113,7 +113,8 @@ def fit_method(name: str | BaseEstimator, samples: Samples, target: int, learn: 
     Raises
     ------
     FitError
-        Too few rows, or the method cannot be fitted to them, or does not give a finite number per row.
+        There are too few rows, the method cannot be fitted to them, or its predictions are not one finite number per
+        row.
     """
     own = (
         name.estimator if isinstance(name, NamedEstimator) else None if isinstance(name, str) else adopt_estimator(name)
@@ -137,10 +138,10 @@ def fit_method(name: str | BaseEstimator, samples: Samples, target: int, learn: 
     with catch_failures(f"{how.name} cannot be fitted to {channel.name}"):
         estimator = how.build(speeds) if own is None else clone(own)
     if isinstance(estimator, TimedRegressor) and estimator.columns == "speed" and not getattr(estimator, "speed", None):
-        estimator.set_params(speed=speeds)  # the recording knows which inputs are
+        estimator.set_params(speed=speeds)  # the recording identifies the speed inputs
     frame = samples.frame().iloc[:, list(columns)]
     begin = time.perf_counter()
-    # a method with a memory also gets what the machine went through between the rows it learns from
+    # a method with a memory also receives the history of the machine between the training rows
     rows = valid & np.isin(samples.test, samples.test[seen]) if "dt" in how.takes else seen
     learned = seen[rows]
     y = np.where(learned, samples.deviations[rows, target], 0.0)
@@ -156,7 +157,7 @@ def fit_method(name: str | BaseEstimator, samples: Samples, target: int, learn: 
         found = estimator.predict(frame.iloc[valid], **everywhere)
     predicted[valid] = check_numbers(found, int(valid.sum()), how.name)
     left_out = None
-    if isinstance(estimator, TimedRegressor) and hasattr(estimator, "left_out_"):  # of grouping they are columns
+    if isinstance(estimator, TimedRegressor) and hasattr(estimator, "left_out_"):  # for grouping, they are columns
         left_out = np.full((len(samples), 2), np.nan)
         left_out[rows] = estimator.left_out_
     return FittedMethod(
@@ -180,18 +181,18 @@ def train(
     prints: bool = False,
     joint: bool = True,
 ) -> Trained:
-    """Fit a method to some of the rows and freeze it.
+    """Fit a method to selected rows and freeze it.
 
     Parameters
     ----------
     name, samples, target, learn
         As for `fit_method`.
     support : Support
-        For the frozen model.
+        Behaviour of the frozen model outside its trained range.
     prints : bool
-        The model is kept: fingerprints of the rows go into its provenance.
+        True if the model will be kept: fingerprints of the rows are stored in its provenance.
     joint : bool
-        Whether it gets its joint support; a model that only clips gives the same output without.
+        Whether the model gets a joint support; a model that only clips has the same output without one.
 
     Returns
     -------
@@ -217,7 +218,7 @@ def train(
         provenance=_provenance(how, estimator, samples, target, seen),
     )
     if prints and model.provenance is not None:
-        # of what the model needs: no file can be judged that has not got it
+        # fingerprints of the model's inputs only, since a file can be judged only if it has them
         inputs = samples.only([i.name for i in model.inputs])
         model = replace(model, provenance=replace(model.provenance, prints=fingerprint(inputs, target, learn)))
     model = replace(model, joint=_joint(model, samples, seen) if joint else None, zeroing=samples.zeroing)
@@ -229,7 +230,7 @@ def train(
 
 
 def _refuse_unknown_counts(samples: Samples, seen: BoolArray) -> None:
-    """Refuse to learn from displacements whose zero lies somewhere on the way of a warm machine."""
+    """Reject training displacements whose zero was set at an unknown drift of a warm machine."""
     for test in np.unique(samples.test[seen]).tolist() if samples.starts else []:
         start = samples.starts[test]
         if start.word == "rezeroed" and start.earlier:
@@ -240,7 +241,7 @@ def _refuse_unknown_counts(samples: Samples, seen: BoolArray) -> None:
 
 
 def _joint(model: ErrorModel, samples: Samples, seen: BoolArray) -> JointSupport | None:
-    """Return the joint support of the model's inputs in the rows that were learned from."""
+    """Return the joint support of the model's inputs in the training rows."""
     columns = [[c.name for c in samples.inputs].index(i.name) for i in model.inputs]
     return find_joint_support(
         samples.change()[seen][:, columns], [samples.inputs[j] for j in columns], samples.cycle[seen]
@@ -248,7 +249,7 @@ def _joint(model: ErrorModel, samples: Samples, seen: BoolArray) -> JointSupport
 
 
 def _band(model: ErrorModel, samples: Samples, target: int, left_out: FloatArray) -> Band | None:
-    """Return the band of a model by its errors on cycles left out."""
+    """Return the uncertainty band of a model from its errors on left-out cycles."""
     speeds = [k for k, i in enumerate(model.inputs) if i.quantity == "spindle_speed"]
     columns = [j for j, c in enumerate(samples.inputs) if c.quantity == "spindle_speed"]
     known = np.isfinite(left_out).all(axis=1)

@@ -1,4 +1,4 @@
-"""Methods that cannot be reduced to a few numbers: compared with the others, never deployed."""
+"""Methods that cannot be frozen: for comparison with other methods, never deployed."""
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
@@ -18,14 +18,14 @@ from thermocomp.models.base import FloatArray, StaticRegressor
 
 
 class UnfrozenRegressor(StaticRegressor):
-    """A regressor that cannot be frozen; `unfrozen` gives what the replay of a comparison needs instead."""
+    """A regressor that cannot be frozen; `unfrozen` returns a substitute for replay in a comparison."""
 
     freezable: ClassVar[bool] = False
-    name: ClassVar[str]  #: of the method
+    name: ClassVar[str]  #: name of the method
 
     @abstractmethod
     def _bulk(self) -> str:
-        """Return the reason why it cannot be frozen, in words."""
+        """Return the reason why it cannot be frozen, as text."""
 
     def unfrozen(
         self, *, inputs: Sequence[Input] | None = None, rows: FloatArray | None = None, **header: Any
@@ -37,20 +37,21 @@ class UnfrozenRegressor(StaticRegressor):
         inputs : sequence of Input, optional
             One per feature; see `thermocomp.models.base.ThermalRegressor.freeze`.
         rows : ndarray of shape (n_rows, n_features), optional
-            Inputs minus their reference that it will be asked for: predicted at once, which is much faster.
+            Inputs minus their reference for which predictions will be required; computing these in advance is much
+            faster.
         **header
             As in `thermocomp.models.base.ThermalRegressor.freeze`.
 
         Returns
         -------
         EstimatorModel
-            With all of the inputs.
+            Model that uses all inputs.
         """
         given = self._inputs(inputs)
         made = None if rows is None else self._predict(rows)
         try:
             fingerprint = str(joblib.hash(self))
-        except PicklingError:  # a class from inside a function: its predictions stand for it
+        except PicklingError:  # class defined inside a function: use its predictions instead
             fingerprint = str(joblib.hash((self.name, self.data_min_, self.data_max_, made)))
         return EstimatorModel(
             **{"unit": "um", **header},
@@ -60,7 +61,7 @@ class UnfrozenRegressor(StaticRegressor):
             known={} if made is None or rows is None else {r.tobytes(): v for r, v in zip(rows, made, strict=True)},
         )
 
-    def _frozen(self, inputs: Sequence[Input], header: dict[str, Any]) -> NoReturn:  # noqa: ARG002 - none is made
+    def _frozen(self, inputs: Sequence[Input], header: dict[str, Any]) -> NoReturn:  # noqa: ARG002 - always raises
         raise FitError(
             f"{self.name} cannot be frozen to plain numbers: {self._bulk()}; use it only in compare, and deploy "
             "another method"
@@ -69,18 +70,18 @@ class UnfrozenRegressor(StaticRegressor):
 
 @dataclass(frozen=True, kw_only=True)
 class EstimatorModel(ErrorModel):
-    """A fitted estimator that is replayed like any frozen model; no file holds it.
+    """A fitted estimator that is replayed like a frozen model; it cannot be saved to a file.
 
     Parameters
     ----------
     family : str
-        No file has a word for it.
+        Name of the family, not used in any file.
     estimator : UnfrozenRegressor
-        Fitted.
+        Fitted estimator.
     fingerprint : str
-        Hash of its numbers; in its place when two models are compared.
+        Hash of its numbers, which represents it when two models are compared.
     known : dict of bytes to float
-        Predictions that were made before, by the bytes of the inputs minus their reference.
+        Predictions made in advance, with the bytes of the inputs minus their reference as keys.
     """
 
     family: str = "estimator"
@@ -104,16 +105,16 @@ class EstimatorModel(ErrorModel):
 
     @property
     def sensors(self) -> tuple[str, ...]:
-        """Names of the inputs: it uses all of them."""
+        """Names of all inputs, since the estimator uses all of them."""
         return tuple(i.name for i in self.inputs)
 
     def coefficients_by_name(self) -> dict[str, float]:
-        """Return nothing: there are no coefficients."""
+        """Return an empty dict, since there are no coefficients."""
         return {}
 
-    def _expression(self, change: Sequence[Node]) -> NoReturn:  # noqa: ARG002 - none is made
+    def _expression(self, change: Sequence[Node]) -> NoReturn:  # noqa: ARG002 - always raises
         raise InputError(f"{self.estimator.name} is not an expression: it cannot be exported")
 
     def formula(self) -> str:
-        """Return the description of the model, as one line of text."""
+        """Return a description of the model in one line of text."""
         return f"{self.estimator.name} of {', '.join(self.sensors)}: no formula"

@@ -1,4 +1,4 @@
-"""Training of a watch over the temperatures: each predicted by the others, as `averaged` predicts a displacement."""
+"""Training of a temperature watch: each sensor is predicted by the others, as `averaged` predicts a displacement."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -20,19 +20,19 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
 
-#: noise of the temperatures that predict, as `averaged` reckons with it [degC]
+#: noise assumed for the predicting temperatures, as in `averaged` [degC]
 NOISE = 0.2
-#: structures that a prediction is the average of
+#: number of structures averaged for a prediction
 STRUCTURES = 100
-#: limits are so many times the largest that was seen where all was well, and with few cycles more
+#: limits are this many times the largest value observed in sound data, and larger with few cycles
 SAFETY = 1.5
-#: the same of jumps: an untried speed warms up faster
+#: the same factor for jumps: an untried speed warms up faster
 FASTEST = 2.0
-#: least limits: off, within a minute, moved while stuck, beside the resolution [degC]
+#: lower bounds of the limits: deviation, change within a minute, movement while stuck, in addition to resolution [degC]
 OFF, JUMP, MOVED = 1.0, 0.8, 0.5
-#: a reading that stays the same for so long is stuck, if in the recording none did for a part of that [s; -]
+#: a reading constant for this time is stuck, unless one in the recording was constant for this fraction of it [s; -]
 STILL, STILL_PART = 1200.0, 1 / 3
-#: time over which a jump is one, at least [s]
+#: minimum time over which a jump is measured [s]
 PACE = 60.0
 
 
@@ -42,14 +42,14 @@ def find_watch(samples: Samples, learn: BoolArray) -> Watch | None:
     Parameters
     ----------
     samples : Samples
-        With the inputs that will be there on the machine.
+        Samples with the inputs that will be available on the machine.
     learn : ndarray of bool of shape (n_rows,)
-        Rows that may be learned from.
+        Training rows.
 
     Returns
     -------
     Watch or None
-        None with fewer than two thermal cycles or two temperatures: nothing is known of an unseen one.
+        None with fewer than two thermal cycles or two temperatures: the error in an unseen cycle is then unknown.
     """
     rows = samples.valid & np.isin(samples.test, samples.test[learn & samples.valid])
     samples = samples.take(rows)
@@ -100,7 +100,7 @@ def find_watch(samples: Samples, learn: BoolArray) -> Watch | None:
 def _weights(
     of: PacedFeatures, change: FloatArray, step: FloatArray, heat: Sequence[int], parts: IntArray, folds: IntArray
 ) -> FloatArray:
-    """Return the predictor of each temperature, by all cycles and without each, (1 + n_cycles, n_features, n_heat)."""
+    """Return each temperature's predictor, with all cycles and without each, (1 + n_cycles, n_features, n_heat)."""
     moments = of.moments(change, change[:, list(heat)], step, parts, NOISE)
     every = np.unique(parts[parts >= 0])
     learned = (every, *(np.setdiff1d(every, parts[folds == k]) for k in range(int(folds.max()) + 1)))
@@ -130,14 +130,14 @@ def _limits(
         "off": max(OFF, wider * float(np.nanmax(np.abs(off), initial=0.0))),
         "jump": max(JUMP, FASTEST * _jump(change, samples.time, folds, pace)),
         "moved": max(MOVED + _resolution(values), SAFETY * moved),
-        # one that is coarse for its noise reads the same for days on a machine at rest: time says nothing of it
+        # a sensor with coarse resolution may be constant for days on a machine at rest: the duration is no criterion
         "still": STILL if still <= STILL_PART * STILL else GAP,
         "unseen": float(np.sqrt(np.nanmean(off**2))) if np.isfinite(off).any() else 0.0,
     }
 
 
 def _covered(speed: FloatArray, folds: IntArray, test: IntArray) -> BoolArray:
-    """Return the rows of whose speed the other cycles know: until a test turns faster than all of them."""
+    """Return a mask of the rows up to which a test does not exceed the speeds of the other cycles."""
     found = np.ones(len(speed), dtype=np.bool_)
     for k in range(int(folds.max()) + 1):
         others = (folds >= 0) & (folds != k)
@@ -150,7 +150,7 @@ def _covered(speed: FloatArray, folds: IntArray, test: IntArray) -> BoolArray:
 
 
 def _jump(values: FloatArray, time: FloatArray, folds: IntArray, pace: float) -> float:
-    """Return the largest change within `pace` that lasts, in rows that were learned from."""
+    """Return the largest lasting change within `pace`, over the training rows."""
     usual = max(float(np.median(np.diff(time)[np.diff(time) > 0])), 1e-9)
     lasting = median_filter(values, size=1 + 2 * round(LASTING / 2 / usual), mode="nearest")
     largest = 0.0
@@ -162,13 +162,13 @@ def _jump(values: FloatArray, time: FloatArray, folds: IntArray, pace: float) ->
 
 
 def _resolution(values: FloatArray) -> float:
-    """Return the usual smallest step of a sensor: of one that is noisier than its last digit, its noise."""
+    """Return the typical smallest step of a sensor: its resolution, or its noise if this is larger."""
     steps = np.abs(np.diff(values))
     return float(np.quantile(steps[steps > 0], 0.1)) if steps.any() else 0.0
 
 
 def _same(values: FloatArray, predicted: FloatArray, time: FloatArray, folds: IntArray) -> tuple[float, float]:
-    """Return the longest time of constant readings of a sensor, and the change of its prediction meanwhile."""
+    """Return the longest time of constant readings of a sensor, and the change of its prediction during that time."""
     new = np.append(True, (np.diff(values) != 0) | (np.diff(folds) != 0) | (np.diff(time) <= 0))
     run = np.cumsum(new) - 1
     first = np.flatnonzero(new)

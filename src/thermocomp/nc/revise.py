@@ -1,4 +1,4 @@
-"""`thermocomp.revise`: the command as a function."""
+"""Python function for the command `thermocomp revise`."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -16,7 +16,7 @@ from thermocomp.nc.revision.prepare import prepare_job
 
 #: groups of options of the command; their fields are the keywords of `revise`
 GROUPS = (Drifting, Starting, Way, Controller, Timing)
-#: words of the command that name files
+#: option names whose values are file paths
 _PATHS = ("model", "forecast", "carried", "machine", "subroutines")
 
 

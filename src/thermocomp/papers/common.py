@@ -1,4 +1,4 @@
-"""Common part of the studies: recordings in a paper's names, replay of models over whole tests, error tables."""
+"""Common part of the studies: recordings with a paper's names, replay of models over whole tests, error tables."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -26,21 +26,21 @@ from thermocomp.recordings.starts import COLD
 
 _Item = TypeVar("_Item")
 
-#: no paper's model stops at the edge of its trained range: so far beyond it that no reading gets there
+#: the papers' models are not limited to their training range: a margin that no reading exceeds
 PAPERS_SUPPORT = Support(margin=1e3)
 
 
-# -- recordings ----------------------------------------------------------------------------------------------------
+# -- recordings --------------------------------------------------------------------------------------------------------
 
 
 def rename_channels(recording: Recording, names: Mapping[str, str]) -> Recording:
-    """Return some of the channels of a recording under the names of a paper, in the order given.
+    """Return selected channels of a recording under the names of a paper, in the given order.
 
     Parameters
     ----------
     recording : Recording
     names : mapping of str to str
-        From the channel to its new name, such as ``{"t_air_C": "T1"}``; what is not named is left out.
+        New names by channel, such as ``{"t_air_C": "T1"}``; other channels are dropped.
 
     Returns
     -------
@@ -49,7 +49,7 @@ def rename_channels(recording: Recording, names: Mapping[str, str]) -> Recording
     Raises
     ------
     InputError
-        There is no such channel.
+        Channel missing.
     """
     channels = tuple(replace(recording.channel(old), name=new) for old, new in names.items())
     columns = recording.values([recording.channel(old) for old in names])
@@ -57,15 +57,15 @@ def rename_channels(recording: Recording, names: Mapping[str, str]) -> Recording
 
 
 def add_derived_channel(recording: Recording, channel: Channel, weights: Mapping[str, float]) -> Recording:
-    """Return a recording with one more channel: a weighted sum of others, such as a mean or a difference.
+    """Return a recording with an additional channel: a weighted sum of others, such as a mean or a difference.
 
     Parameters
     ----------
     recording : Recording
     channel : Channel
-        The new one.
+        The new channel.
     weights : mapping of str to float
-        Factor of each channel it is made of.
+        Weight of each source channel.
 
     Returns
     -------
@@ -79,7 +79,7 @@ def add_derived_channel(recording: Recording, channel: Channel, weights: Mapping
 def stacked(
     recordings: Sequence[Recording], targets: Sequence[str], inputs: Sequence[str] | None = None, *, rezero: bool = True
 ) -> Samples:
-    """Stack tests as in the papers: they begin with a cold machine, and their first reading is the zero.
+    """Stack tests as in the papers: they start with a cold machine, and their first reading is the zero.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def stacked(
     targets, inputs : sequence of str
         See `thermocomp.recordings.stacking.stack`.
     rezero : bool
-        True: temperatures are counted from the start of each test; False: as read.
+        Whether temperatures are relative to the start of each test; False: as read.
 
     Returns
     -------
@@ -97,18 +97,18 @@ def stacked(
 
 
 def every(samples: Samples) -> BoolArray:
-    """Return the choice of all rows, shape (n_rows,)."""
+    """Return a mask that selects all rows, shape (n_rows,)."""
     return np.ones(len(samples), dtype=np.bool_)
 
 
 def with_noise(samples: Samples, size: float, law: Literal["uniform", "normal"], seed: int) -> Samples:
-    """Return the same rows with random error on every temperature, also in the rows that count as zero.
+    """Return the same rows with random errors of all temperatures, including the rows used as zero.
 
     Parameters
     ----------
     samples : Samples
     size : float
-        Uniform: within +-size; normal: standard deviation [degC].
+        Half-width of the uniform distribution, or standard deviation of the normal one [degC].
     law : {'uniform', 'normal'}
     seed : int
 
@@ -124,7 +124,7 @@ def with_noise(samples: Samples, size: float, law: Literal["uniform", "normal"],
 
 
 def cut_off(samples: Samples, name: str) -> Samples:
-    """Return the same rows with one input's change reading zero from the start on, as of a sensor that is cut off.
+    """Return the same rows with the change of one input zero from the start, as for a cut-off sensor.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def cut_off(samples: Samples, name: str) -> Samples:
     Raises
     ------
     InputError
-        There is no such input.
+        Input missing.
     """
     names = [c.name for c in samples.inputs]
     if name not in names:
@@ -149,7 +149,7 @@ def cut_off(samples: Samples, name: str) -> Samples:
     return replace(samples, values=values)
 
 
-# -- models --------------------------------------------------------------------------------------------------------
+# -- models ------------------------------------------------------------------------------------------------------------
 
 
 def fit_and_freeze(
@@ -162,30 +162,30 @@ def fit_and_freeze(
 ) -> dict[str, ErrorModel]:
     """Fit an estimator to all rows of the samples, which must be complete, and freeze it.
 
-    For a method of `thermocomp.models.methods` with its own settings there is `thermocomp.models.training.train`.
+    For a method of `thermocomp.models.methods` with default settings use `thermocomp.models.training.train`.
 
     Parameters
     ----------
     estimator : ThermalRegressor
-        Is fitted in place.
+        Estimator; fitted in place.
     samples : Samples
-        Its inputs are the features, see `Samples.only`.
+        Training data; its inputs are the features, see `Samples.only`.
     targets : sequence of str
-        Targets; of several, one estimator learns them all at once: a net with as many outputs.
+        Targets; several are learned by one estimator, as by a net with several outputs.
     support : Support
         Behaviour of the frozen models outside the training range.
     **fit
-        For the estimator's ``fit``, such as ``cycle=samples.cycle`` and ``dt=samples.dt()``.
+        Keyword arguments of the estimator's ``fit``, such as ``cycle=samples.cycle`` and ``dt=samples.dt()``.
 
     Returns
     -------
     dict of str to ErrorModel
-        One per target.
+        Model of each target.
 
     Raises
     ------
     FitError
-        It cannot be fitted.
+        The fit fails.
     """
     columns = [[c.name for c in samples.targets].index(t) for t in targets]
     y = samples.deviations[:, columns]
@@ -210,7 +210,7 @@ def trained(method: str, samples: Samples, target: int = 0, support: Support = S
         Key of `thermocomp.models.methods.METHODS`.
     samples : Samples
     target : int
-        Place of the target.
+        Index of the target.
     support : Support
         Behaviour of the model outside the training range.
 
@@ -229,14 +229,14 @@ def frozen(
     Parameters
     ----------
     samples : Samples
-        It was fitted to.
+        Samples of the fit.
     columns : sequence of int
         Indices of the inputs.
     coefficients : sequence of float
     intercept : float
         [unit of the target]
     **shape
-        Its ``variables`` and ``terms``; each input by itself if not given.
+        ``variables`` and ``terms`` of the polynomial. Default: each input linearly.
 
     Returns
     -------
@@ -258,13 +258,13 @@ def frozen(
 
 
 def predict_deviation(model: ErrorModel, samples: Samples) -> FloatArray:
-    """Replay a frozen model reading by reading from the start of every test; return its deviation at all rows.
+    """Replay a frozen model reading by reading from the start of each test; return its deviation in all rows.
 
     Parameters
     ----------
     model : ErrorModel
     samples : Samples
-        With the model's inputs.
+        Samples with the inputs of the model.
 
     Returns
     -------
@@ -284,7 +284,7 @@ def residual(model: ErrorModel, samples: Samples) -> FloatArray:
     return take_measured(samples, model.target) - predict_deviation(model, samples)
 
 
-# -- errors ---------------------------------------------------------------------------------------------------------
+# -- errors ------------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -304,23 +304,23 @@ class Errors:
 
     @classmethod
     def of(cls, residual: FloatArray) -> "Errors":
-        """Return the figures of a residual of any shape, nan left out; that of no compensation is the deviation."""
+        """Return the error figures of a residual of any shape, ignoring nan; for no compensation pass the deviation."""
         e = residual[np.isfinite(residual)]
         return cls(*(m(e, 0.0 * e) for m in (metrics.rms, metrics.mae, metrics.max_abs, metrics.peak_to_peak)))
 
 
 def rms(residual: FloatArray) -> float:
-    """Return the root of the mean square of a residual of any shape."""
+    """Return the root mean square of a residual of any shape."""
     return Errors.of(residual).rms
 
 
 def described(residual: FloatArray, deviation: FloatArray) -> float:
-    """Return the share of a deviation's variance that a model describes which leaves this residual: R2."""
+    """Return the share of the variance of a deviation that is explained by a model with this residual: R2."""
     return float(1 - np.sum(residual**2) / np.sum((deviation - deviation.mean()) ** 2))
 
 
 def table(caption: str, items: Iterable[_Item], columns: Mapping[str, Callable[[_Item], str]]) -> StudyTable:
-    """Lay items out, a row each.
+    """Return a table with a row per item.
 
     Parameters
     ----------
@@ -337,13 +337,13 @@ def table(caption: str, items: Iterable[_Item], columns: Mapping[str, Callable[[
 
 
 def errors_table(caption: str, residuals: Mapping[tuple[str, str], FloatArray], unit: str = "um") -> StudyTable:
-    """Lay errors out: a row per residual.
+    """Return a table with the error figures of each residual in a row.
 
     Parameters
     ----------
     caption : str
     residuals : mapping of (str, str) to ndarray
-        Residual by what is judged and by method, such as ``("z, 1250 1/min", "no compensation")``.
+        Residual by subject and method, such as ``("z, 1250 1/min", "no compensation")``.
     unit : str
         Unit of the residuals.
 

@@ -1,4 +1,4 @@
-"""One table across the papers: every method on every experiment, judged on a test it has not seen (X-02, X-03)."""
+"""One table across the papers: every method on every experiment, judged on an unseen test (X-02, X-03)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,26 +18,26 @@ from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
 from thermocomp.virtual.datasets import record
 
-#: the papers' methods, least squares beside them, and ours; all are fast. `thermocomp.models.methods.METHODS` has more
+#: methods of the papers, least squares for comparison, and ours; all are fast, `thermocomp.models.methods` has more
 FAST = ("ols", "mra", "mlp", "ace", "grouping", "partial-f", "arx", "ace-monotone", "dynamic")
-#: what the table calls a machine that is not compensated
+#: label of no compensation in the table
 NONE = "none"
 
 
 @dataclass(frozen=True)
 class CrossExperiment:
-    """A paper's experiment as a task: some tests are learned, the last ones are unseen.
+    """A paper's experiment as a task: the first tests are for training, the last ones are unseen.
 
     Parameters
     ----------
     name : str
         Name of the experiment of the virtual machine.
     target : str or int
-        Displacement, by name or by its place.
+        Displacement, by name or index.
     unseen : int
         Number of tests at the end that are unseen.
     then : str
-        Another experiment whose tests follow; the same name: the experiment is repeated on another day.
+        Another experiment whose tests follow; if the same, the experiment is repeated on another day.
     """
 
     name: str
@@ -46,7 +46,7 @@ class CrossExperiment:
     then: str = ""
 
     def recordings(self, seed: int) -> list[Recording]:
-        """Run it; what follows is run with the next seed: another weather, other draws."""
+        """Run the experiment; `then` is run with the next seed, so with other weather and random draws."""
         return record(self.name, seed=seed) + (record(self.then, seed=seed + 1) if self.then else [])
 
 
@@ -63,13 +63,13 @@ EXPERIMENTS = (
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """Rows to learn from and rows to judge on.
+    """Training and validation rows.
 
     Parameters
     ----------
     name : str
     samples : Samples
-        With one target.
+        Samples with one target.
     judging : Judging
     """
 
@@ -80,27 +80,27 @@ class Task:
 
 @dataclass(frozen=True)
 class Row:
-    """Result of one method on one task; nan where it could not be fitted.
+    """Result of one method on one task; nan if it could not be fitted.
 
     Parameters
     ----------
     task, method : str
     fit_rms : float
-        RMS in the rows it learned from, replayed; of several trainings pooled [um].
+        RMS of the replay in the training rows, pooled over several trainings [um].
     rms, max_abs, peak_to_peak : float
-        In the unseen rows [um].
+        Errors in the unseen rows [um].
     noise_rms : float
-        RMS with noise of +-0.4 degC, uniform, on every temperature [um] (C-33).
+        RMS with uniform noise of +-0.4 degC on every temperature [um] (C-33).
     lost_rms : float
-        RMS with the one input cut off that hurts most [um] (C-34).
+        RMS with the most harmful input cut off [um] (C-34).
     lost : str
-        That input.
+        Name of that input.
     sensors : int
-        Inputs with an influence; of several trainings the most.
+        Number of inputs with an influence; the largest of several trainings.
     fit_s : float
-        The fits took [s].
+        Duration of the fits [s].
     failure : str
-        Reason why it could not be fitted; empty if it could.
+        Reason why the fit failed; empty if it succeeded.
     """
 
     task: str
@@ -118,7 +118,7 @@ class Row:
 
 
 def simulate_task(experiment: CrossExperiment, seed: int) -> Task:
-    """Run an experiment on the virtual machine: its last tests are unseen.
+    """Run an experiment on the virtual machine; its last tests are unseen.
 
     Parameters
     ----------
@@ -139,14 +139,14 @@ def simulate_task(experiment: CrossExperiment, seed: int) -> Task:
 
 
 def take_task(recordings: Sequence[Recording], target: str) -> Task:
-    """Return a task from the recordings of a machine: every thermal cycle is unseen once (X-02).
+    """Return a task from recordings of a real machine: each thermal cycle is unseen once (X-02).
 
     Parameters
     ----------
     recordings : sequence of Recording
         One or several tests.
     target : str
-        Displacement.
+        Displacement channel.
 
     Returns
     -------
@@ -155,7 +155,7 @@ def take_task(recordings: Sequence[Recording], target: str) -> Task:
     Raises
     ------
     InputError
-        There is no such channel, or fewer than two thermal cycles.
+        Channel missing, or fewer than two thermal cycles.
     """
     samples = stacked(recordings, [target])
     name = f"{samples.test_names[0]}{' ...' if len(recordings) > 1 else ''}, {target}"
@@ -163,17 +163,17 @@ def take_task(recordings: Sequence[Recording], target: str) -> Task:
 
 
 def judge(task: Task, methods: Sequence[str], progress: Progress = tell_nobody, *, jobs: int = 1) -> list[Row]:
-    """Judge methods on a task, none first.
+    """Judge methods on a task, starting with no compensation.
 
     Parameters
     ----------
     task : Task
     methods : sequence of str
-        ``all`` stands for all of them.
+        Methods; ``all`` denotes all of them.
     progress : callable
-        Told the share done after each piece of work.
+        Called with the completed fraction after each step.
     jobs : int
-        Processes to share the work among; -1 takes all cores.
+        Number of parallel processes; -1: one per core.
 
     Returns
     -------
@@ -209,16 +209,16 @@ def run(
     ----------
     seed : int
     progress : callable
-        Told the share done and what comes next.
+        Called with the completed fraction and the next step.
     recordings : sequence of Recording
         Tests of one measured machine.
     methods : sequence of str
-        ``all`` stands for all of `thermocomp.models.methods.METHODS`.
+        Methods; ``all`` denotes all of `thermocomp.models.methods.METHODS`.
     experiments : sequence of CrossExperiment
     targets : sequence of str, optional
-        Displacements of the measured machine; all of them if not given.
+        Displacements of the measured machine. Default: all.
     jobs : int
-        Processes to share the work among; -1 takes all cores.
+        Number of parallel processes; -1: one per core.
 
     Returns
     -------
@@ -227,12 +227,12 @@ def run(
     Raises
     ------
     InputError
-        A method or channel is unknown, or the recordings hold fewer than two thermal cycles.
+        A method or channel is unknown, or the recordings have fewer than two thermal cycles.
     """
     names = expand(methods)
     if targets is None:
         targets = [c.name for c in recordings[0].displacements] if recordings else []
-    real = [take_task(recordings, target) for target in targets]  # first of all: what cannot be used is told at once
+    real = [take_task(recordings, target) for target in targets]  # first, so that unusable input is reported at once
     n = len(experiments) + len(real)
     rows: list[list[Row]] = []
 
@@ -258,7 +258,7 @@ def run(
 def _row(task: Task, overall: Assessment, blocks: Sequence[Assessment]) -> Row:
     stressed = overall.robustness
     lost, lost_rms = stressed.worst_lost if stressed else ("", float("nan"))
-    if stressed and not overall.sensors:  # a constant: there is nothing to lose
+    if stressed and not overall.sensors:  # a constant: there is no sensor to lose
         lost_rms = overall.metric("rms")
     return Row(
         task=task.name,
@@ -295,7 +295,7 @@ def _none(task: Task, first: Assessment) -> Row:
 
 
 def _fit_rms(task: Task, blocks: Sequence[Assessment]) -> float:
-    """Replay the models on what they learned from; in the order of the splits."""
+    """Return the RMS of the models replayed on their training rows, in the order of the splits."""
     splits = {s.block: s for s in task.judging.splits}
     residuals = []
     for block in blocks:
@@ -306,7 +306,7 @@ def _fit_rms(task: Task, blocks: Sequence[Assessment]) -> float:
 
 
 def _claims(rows: Sequence[Row], *, real: bool) -> tuple[Claim, ...]:
-    """Judge what every paper takes for granted: that its method helps in a test it has not seen."""
+    """Return the claims implied by every paper: its method is useful in an unseen test."""
     none, *judged = rows
     fitted = [r for r in judged if not r.failure]
     if not fitted:
@@ -338,7 +338,7 @@ def _claims(rows: Sequence[Row], *, real: bool) -> tuple[Claim, ...]:
 
 
 def _overview(rows: Sequence[Sequence[Row]]) -> StudyTable:
-    """Return the one table of X-03."""
+    """Return the overview table of X-03."""
     cells = [
         [first.method, *("-" if mine[k].failure else f"{mine[k].rms:.2f}" for mine in rows)]
         for k, first in enumerate(rows[0])

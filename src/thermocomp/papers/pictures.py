@@ -1,4 +1,4 @@
-"""Common figures of the studies: curves over the same axis, figures of one panel, tests one after the other."""
+"""Common figures of the studies: curves over the same axis, figures with one panel, tests in sequence."""
 
 from collections.abc import Mapping, Sequence
 
@@ -22,11 +22,11 @@ def curves(
     ----------
     x : ndarray of shape (n,)
     values : mapping of str to ndarray of shape (n,)
-        By their label.
+        Values by label.
     style : {'line', 'dashed', 'points'}
-        Style of the curves that are not listed below.
+        Style of all other curves.
     dashed, points : sequence of str
-        Labels of curves drawn so.
+        Labels of curves with these styles.
 
     Returns
     -------
@@ -52,7 +52,7 @@ def single(
     title : str
         Title of the panel.
     columns : int
-        Number of columns out of 2 that it fills.
+        Number of columns filled, out of 2.
 
     Returns
     -------
@@ -62,7 +62,7 @@ def single(
 
 
 def end_to_end(samples: Samples, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Put the tests of samples one after the other on one axis of time, with a break in the line between them.
+    """Place tests one after another on a time axis, with a break in the line between them.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def end_to_end(samples: Samples, values: FloatArray) -> tuple[FloatArray, FloatA
     Returns
     -------
     hours, values : ndarray of shape (n_rows + n_tests - 1,)
-        A nan between two tests.
+        With nan between two tests.
     """
     x: list[FloatArray] = []
     y: list[FloatArray] = []

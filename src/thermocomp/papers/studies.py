@@ -1,4 +1,4 @@
-"""The studies by name; each is imported when it is asked for."""
+"""Studies by name; each is imported on demand."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -10,16 +10,16 @@ from thermocomp.judging.pieces import elsewhere, work_through
 from thermocomp.papers.study import Claim, Progress, Study, tell_nobody
 from thermocomp.virtual.protocol import Physics
 
-#: each is a package beside this module, with ``redo.run(seed, progress) -> Study``
+#: packages next to this module, each with ``redo.run(seed, progress) -> Study``
 STUDIES = ("chen1996", "wessel2004", "hwang", "precompensation", "stepwise2017")
-#: those that also run on the nonlinear machines
+#: studies that can also run on the nonlinear machines
 PHYSICS = ("wessel2004",)
-#: between the seeds of a study's repeated runs
+#: difference between the seeds of repeated runs of a study
 APART = 100
 
 
 def run(name: str, *, seed: int = 0, progress: Progress = tell_nobody, physics: Physics | None = None) -> Study:
-    """Redo a paper's study on the virtual machine.
+    """Reproduce the study of a paper on the virtual machine.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ def run(name: str, *, seed: int = 0, progress: Progress = tell_nobody, physics: 
     seed : int
         Random seed of weather, noise and random draws.
     progress : callable
-        Told the share done and what comes next.
+        Called with the completed fraction and the next step.
     physics : {'linear', 'nonlinear'}, optional
         Physics of the virtual machine, in `PHYSICS`. Default: as defined by the experiments.
 
@@ -57,21 +57,21 @@ def repeat(
     name : str
         One of `STUDIES`.
     seed : int
-        Random seed of the first run; those of the others are `APART` further on: a study steps its own seeds by one.
+        Random seed of the first run; the following runs are `APART` apart, as a study increments its own seeds by one.
     repeats : int
         Number of runs.
     progress : callable
-        Told the share done and what comes next.
+        Called with the completed fraction and the next step.
     physics : {'linear', 'nonlinear'}, optional
         See `run`.
     jobs : int
-        Processes to share the runs among; -1 takes all cores. With several, or on a cluster, progress is told after
-        each run.
+        Number of parallel processes; -1: one per core. With several, or on a cluster, progress is reported after each
+        run.
 
     Returns
     -------
     Study
-        That of the first run; its claims know whether they hold in the others.
+        Study of the first run; its claims include whether they hold in the other runs.
     """
     if jobs != 1 or elsewhere.get() is not None:
         return _joined(_together(name, [seed + APART * k for k in range(repeats)], progress, physics, jobs), seed)
@@ -90,7 +90,7 @@ def repeat(
 
 
 def _together(name: str, seeds: Sequence[int], progress: Progress, physics: Physics | None, jobs: int) -> list[Study]:
-    """Return the runs of a study, done side by side."""
+    """Return the runs of a study, executed in parallel."""
     found: list[Study] = []
     for study in work_through(partial(_run, name, physics), seeds, _why, jobs=jobs):
         if isinstance(study, str):
@@ -109,7 +109,7 @@ def _why(_: int, why: str) -> Study | str:
 
 
 def _joined(found: Sequence[Study], seed: int) -> Study:
-    """Return the first run, with claims that know whether they hold in the others."""
+    """Return the first run, with claims that include whether they hold in the other runs."""
     return replace(found[0], claims=tuple(_known(c, [s.claims for s in found[1:]], seed) for c in found[0].claims))
 
 
@@ -130,7 +130,7 @@ def not_redone(name: str, why: str) -> Study:
 
 
 def _known(claim: Claim, others: Sequence[Sequence[Claim]], seed: int) -> Claim:
-    """Return a claim that knows its other runs, and what was found where it does not hold."""
+    """Return a claim with the outcome of its other runs, and the finding where it does not hold."""
     same = [c for claims in others for c in claims if (c.ids, c.text) == (claim.ids, claim.text)]
     failed = [(k, c) for k, c in enumerate(same, start=1) if c.holds is False]
     otherwise = f"Seed {seed + APART * failed[0][0]}: {failed[0][1].finding}" if claim.holds and failed else ""

@@ -1,4 +1,4 @@
-"""Reproduction of a paper's study: its claims, its numbers next to ours, and its figures as plain numbers."""
+"""Reproduction of a paper's study: claims, its numbers next to ours, and figures as plain numbers."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
-#: how a curve is drawn
+#: drawing style of a curve
 Style = Literal["line", "dashed", "points"]
 
-#: told after each part of a study: how much of it is done (0..1), and what comes next
+#: called after each part of a study with the completed fraction (0..1) and the next step
 Progress = Callable[[float, str], None]
 
 
@@ -22,24 +22,24 @@ def tell_nobody(_: float, __: str) -> None:
 
 @dataclass(frozen=True)
 class Claim:
-    """One statement or number of a paper, and what came out here.
+    """One statement or number of a paper, and the result here.
 
     Parameters
     ----------
     ids : tuple of str
-        Identifiers of the requirements it covers, such as ``C-34``.
+        Identifiers of the requirements covered, such as ``C-34``.
     text : str
         Statement of the paper, as a sentence that can be true or false.
     paper : str
-        The paper's number, with its unit; "" where it prints none.
+        Number printed in the paper, with its unit; "" if there is none.
     ours : str
-        Ours.
+        Result here.
     holds : bool or None
-        Whether the statement is true here; None: a number to look at, nothing that could be false.
+        Whether the statement is true here; None: a number for information, which cannot be false.
     finding : str
-        Reason why it does not hold, or its limitation. Every claim that does not hold needs one.
+        Reason why it does not hold, or its limitation. Required for every claim that does not hold.
     again : tuple of bool
-        Whether it holds in further runs with other seeds, where the study was repeated.
+        Whether it holds in further runs with other seeds, if the study was repeated.
     """
 
     ids: tuple[str, ...]
@@ -52,7 +52,7 @@ class Claim:
 
     @property
     def verdict(self) -> str:
-        """``yes`` or ``no``; ``2 of 3`` where runs do not agree; ``-`` for a number that is only to be looked at."""
+        """``yes`` or ``no``; ``2 of 3`` if runs disagree; ``-`` for a number for information."""
         if self.holds is None:
             return "-"
         held = (self.holds, *self.again)
@@ -63,23 +63,23 @@ class Claim:
             raise ValueError(f"{', '.join(self.ids)}: a claim that does not hold needs a finding")
 
 
-#: what a study found, and its claims are judged by
+#: type of the results by which the claims of a study are judged
 _Found = TypeVar("_Found")
 
 
 class Ours(NamedTuple):
-    """Our side of a claim.
+    """Result here for a claim.
 
     Parameters
     ----------
     text : str
-        Our number.
+        Our number, as text.
     holds : bool or None
         See `Claim`.
     otherwise : str
-        Reason why it does not hold: shown only if it does not.
+        Reason why it does not hold; shown only in this case.
     note : str
-        Limitation: shown in any case, before that.
+        Limitation; always shown, before the reason.
     """
 
     text: str
@@ -89,7 +89,7 @@ class Ours(NamedTuple):
 
 
 class Claims(Generic[_Found]):
-    """The claims of a study, in their order of presentation: each with the function that computes our side of it."""
+    """Claims of a study in order of presentation, each with the function that computes our result."""
 
     def __init__(self) -> None:
         self._judges: list[Callable[[_Found], Sequence[Claim]]] = []
@@ -97,17 +97,18 @@ class Claims(Generic[_Found]):
     def add(
         self, ids: str, text: str, paper: str = ""
     ) -> Callable[[Callable[[_Found], Ours | str]], Callable[[_Found], Claim]]:
-        """Add a claim, judged by the function that is decorated.
+        """Return a decorator that adds a claim, judged by the decorated function.
 
         Parameters
         ----------
         ids, text, paper : str
-            See `Claim`; several ids with blanks between them.
+            See `Claim`; several ids separated by spaces.
 
         Returns
         -------
         callable
-            Takes a function of what was found; it returns our side, or its text alone where nothing could be false.
+            Decorator of a function of the results, which returns an `Ours`, or only its text for a number for
+            information.
         """
 
         def register(ours: Callable[[_Found], Ours | str]) -> Callable[[_Found], Claim]:
@@ -131,11 +132,11 @@ class Claims(Generic[_Found]):
         return register
 
     def include(self, others: "Claims[Any]", part: Callable[[_Found], Any]) -> None:
-        """Continue with all claims about a part of what was found."""
+        """Append all claims about a part of the results."""
         self._judges.append(lambda found: others(part(found)))
 
     def __call__(self, found: _Found) -> tuple[Claim, ...]:
-        """Return all claims, judged by what was found."""
+        """Return all claims, judged by the results."""
         return tuple(claim for judge in self._judges for claim in judge(found))
 
 
@@ -146,9 +147,9 @@ class PlotCurve:
     Parameters
     ----------
     label : str
-        "" for none.
+        Label; "" for none.
     x, y : ndarray of shape (n,)
-        NaN breaks the line.
+        Values; nan breaks the line.
     style : {'line', 'dashed', 'points'}
     """
 
@@ -165,7 +166,7 @@ class Panel:
     Parameters
     ----------
     title, xlabel, ylabel : str
-        With the unit in brackets.
+        Texts, with the unit in brackets.
     curves : sequence of PlotCurve
     """
 
@@ -177,17 +178,17 @@ class Panel:
 
 @dataclass(frozen=True, eq=False)
 class Figure:
-    """One figure like the paper's.
+    """A figure corresponding to one of the paper.
 
     Parameters
     ----------
     key : str
-        For a file name, such as ``chen1996-fig14``.
+        Stem of a file name, such as ``chen1996-fig14``.
     caption : str
-        Description of the figure: a sentence or two; begins with the paper's figure number.
+        Description of the figure in one or two sentences; begins with the figure number of the paper.
     panels : sequence of Panel
     columns : int
-        Panels side by side.
+        Number of panels next to each other.
     """
 
     key: str
@@ -230,7 +231,7 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """A paper's study, run.
+    """The executed study of a paper.
 
     Parameters
     ----------
@@ -242,9 +243,9 @@ class Study:
     tables : tuple of StudyTable
     figures : tuple of Figure
     numbers : mapping of str to float
-        Figures that the gallery page asserts, by a name that says the unit (``mae_ann_x_um``).
+        Numbers asserted by the gallery page, by a name that includes the unit (``mae_ann_x_um``).
     ran : bool
-        False: it failed, and its one claim says why.
+        False: the study failed; its only claim gives the reason.
     """
 
     name: str
@@ -257,7 +258,7 @@ class Study:
 
     @classmethod
     def of(cls, name: str, title: str, *parts: Part) -> "Study":
-        """Return the study that these parts make, one after the other."""
+        """Return the study composed of the given parts, in order."""
         return cls(
             name,
             title,

@@ -1,6 +1,6 @@
-"""Cleaning: stretches that are cut, clocks that are shifted, probes that are zeroed again, rows that are resampled.
+"""Cleaning: removal of sections, shift of clocks, re-zeroing of probes, exchange of channels, resampling.
 
-Values are changed only by steps that a user has written down, and each step reports its changes.
+Values are changed only by steps specified by the user, and each step reports its changes.
 """
 
 from collections.abc import Sequence
@@ -13,11 +13,11 @@ from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
 from thermocomp.core.exceptions import InputError
 from thermocomp.recordings.rows import Instant, Rows
 
-#: places that are listed
+#: maximum number of locations listed
 MOST_LISTED = 40
-#: rows on each side that tell the height of a step
+#: number of rows on each side used to determine the height of a step
 _BESIDE = 3
-#: two times closer than that are one [s]
+#: times closer than this are equal [s]
 _SAME = 1e-6
 
 
@@ -28,11 +28,11 @@ class Step:
     Parameters
     ----------
     channels : tuple of str
-        Channels concerned, by name.
+        Names of the channels concerned.
     do : str
         Operation.
     reason : str
-        Reason, in words; it is reported with the step.
+        Reason as text; it is reported with the step.
     """
 
     channels: tuple[str, ...] = ()
@@ -43,10 +43,10 @@ class Step:
         self.check()
 
     def check(self) -> None:
-        """Raise `InputError` if the step is empty, or contradicts itself."""
+        """Raise `InputError` if the step is empty or contradictory."""
 
     def apply(self, rows: Rows) -> Rows:
-        """Return the cleaned rows, with a note of what was done."""
+        """Return the cleaned rows, with a note on the changes."""
         raise NotImplementedError
 
     @property
@@ -68,19 +68,19 @@ class Cut(Step):
     Parameters
     ----------
     times : tuple of float, str or pair of them
-        Instants, and stretches from one to another, both included; an instant is the time of a row.
+        Times of rows, and intervals that include both ends.
     """
 
     times: tuple[Instant | tuple[Instant, Instant], ...] = ()
     do: Literal["cut"] = "cut"
 
     def check(self) -> None:
-        """Refuse a cut of nothing."""
+        """Reject a cut without times."""
         if not self.times:
             raise self._refuse('name what is cut, such as times = [50.0, [600.0, 660.0]] or ["2024-05-06T08:00:00"]')
 
     def apply(self, rows: Rows) -> Rows:
-        """Set the values missing, or take the rows out."""
+        """Set the values to missing, or remove the rows."""
         hit = np.zeros(len(rows.time), dtype=np.bool_)
         for t in self.times:
             hit |= self._rows(t, rows)
@@ -110,7 +110,7 @@ class Cut(Step):
 
 @dataclass(frozen=True)
 class Shift(Step):
-    """Move channels in time, as those of a logger whose clock is wrong.
+    """Shift channels in time, such as those of a logger with a wrong clock.
 
     Parameters
     ----------
@@ -122,12 +122,12 @@ class Shift(Step):
     do: Literal["shift"] = "shift"
 
     def check(self) -> None:
-        """Refuse a shift of nothing, or by nothing."""
+        """Reject a shift without channels or offset."""
         if not self.channels or self.by_s == 0:
             raise self._refuse('name whose clock is wrong, and by how much: channels = ["t1_C"] and by_s = -1200.0')
 
     def apply(self, rows: Rows) -> Rows:
-        """Interpolate the channels at their new times; a spindle speed, which steps, keeps its last value."""
+        """Interpolate the channels at their new times; a spindle speed, which is stepwise, keeps its last value."""
         rows.refuse_twins(self.name)
         table = rows.table.copy()
         wanted = rows.time - self.by_s
@@ -151,16 +151,16 @@ class Shift(Step):
 
 @dataclass(frozen=True)
 class Rezero(Step):
-    """Move a probe's values from an instant on, as after it was knocked or zeroed in the middle of a test.
+    """Offset a probe's values from a time on, for a probe that was displaced or zeroed during a test.
 
     Parameters
     ----------
     at : float or str
-        Time of the first row that is moved.
+        Time of the first row that is offset.
     to : float, optional
-        New value there, in the internal unit. Default: the channel continues as it went before.
+        New value at this row, in the house unit. Default: the channel continues its previous course.
     until : float or str, optional
-        Time of the first row that is not moved any more; without it the rest of the test is moved.
+        Time of the first row that is no longer offset. Default: the rest of the test is offset.
     """
 
     at: Instant = 0.0
@@ -169,12 +169,12 @@ class Rezero(Step):
     do: Literal["rezero"] = "rezero"
 
     def check(self) -> None:
-        """Refuse to move nothing."""
+        """Reject a step without channels."""
         if not self.channels:
             raise self._refuse('name which probe, and when: channels = ["z_um"] and at = 3600.0')
 
     def apply(self, rows: Rows) -> Rows:
-        """Move the values."""
+        """Offset the values."""
         begin = rows.seconds(self.at, self.name)
         end = np.inf if self.until is None else rows.seconds(self.until, self.name)
         moved = (rows.time >= begin - _SAME) & (rows.time < end - _SAME)
@@ -197,19 +197,19 @@ class Rezero(Step):
 
 @dataclass(frozen=True)
 class Swap(Step):
-    """Exchange two channels, as after two plugs were.
+    """Exchange two channels, for sensors whose plugs were exchanged.
 
     Parameters
     ----------
     at : float or str
-        Time of the first row that is exchanged; from there on all are.
+        Time of the first row that is exchanged; all later rows are exchanged as well.
     """
 
     at: Instant = 0.0
     do: Literal["swap"] = "swap"
 
     def check(self) -> None:
-        """Refuse anything but two channels."""
+        """Reject any number of channels other than two."""
         if len(set(self.channels)) != 2:
             raise self._refuse('name the two that change places, and when: channels = ["t1_C", "t2_C"] and at = 3600.0')
 
@@ -232,7 +232,7 @@ class Swap(Step):
 
 @dataclass(frozen=True)
 class Resample(Step):
-    """Average the rows over equal intervals; each ends at its time, so that no value comes from later.
+    """Average the rows over equal intervals; each time is the end of its interval, so that no later value is used.
 
     Parameters
     ----------
@@ -244,12 +244,12 @@ class Resample(Step):
     do: Literal["resample"] = "resample"
 
     def check(self) -> None:
-        """Refuse intervals without length, and single channels: a recording has one clock."""
+        """Reject intervals without length, and a selection of channels: a recording has one clock."""
         if self.channels or not self.every_s > 0:
             raise self._refuse("give the interval of all rows, such as every_s = 60.0, and no channels")
 
     def apply(self, rows: Rows) -> Rows:
-        """Average; an interval without a row stays out, a value without a number in it is missing."""
+        """Average the rows; an interval without rows is omitted, and a channel without values in it is missing."""
         rows.refuse_twins(self.name)
         number = np.ceil((rows.time - rows.time[0]) / self.every_s - 1e-9).astype(np.int64)
         last = np.flatnonzero(np.diff(number, append=number[-1] + 1))
@@ -261,23 +261,23 @@ class Resample(Step):
 
 
 def clean(rows: Rows, steps: Sequence[Step]) -> Rows:
-    """Apply the steps of a cleaning, one after the other.
+    """Apply the steps of a cleaning in order.
 
     Parameters
     ----------
     rows : Rows
     steps : sequence of Step
-        Their times count from the first row of the file, whatever was cut before.
+        Steps whose times count from the first row of the file, even if it was removed.
 
     Returns
     -------
     Rows
-        With a note for each step.
+        Cleaned rows, with a note on each step.
 
     Raises
     ------
     InputError
-        A channel or a row is not there, or nothing would be left.
+        A channel or a row does not exist, or no rows would be left.
     """
     for step in steps:
         rows = step.apply(rows)
@@ -285,7 +285,7 @@ def clean(rows: Rows, steps: Sequence[Step]) -> Rows:
 
 
 def _step(x: FloatArray, first: int, name: str, owner: str) -> float:
-    """Return the jump of a channel at a row, beyond its neighbouring changes."""
+    """Return the jump of a channel at a row relative to its neighbouring changes."""
     before = np.flatnonzero(np.isfinite(x[:first]))[-_BESIDE:]
     after = first + np.flatnonzero(np.isfinite(x[first:]))[:_BESIDE]
     if not before.size or not after.size:
@@ -298,7 +298,7 @@ def _step(x: FloatArray, first: int, name: str, owner: str) -> float:
 
 
 def _listed(places: Sequence[str], at: IntArray) -> str:
-    """Return places in words, neighbours as one stretch."""
+    """Return locations as text, with consecutive ones combined to a range."""
     if not places:
         return ""
     breaks = np.flatnonzero(np.diff(at) > 1) + 1

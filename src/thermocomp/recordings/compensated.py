@@ -1,7 +1,7 @@
-"""Recordings that were made while a correction was in force: what a model may learn from of them.
+"""Recordings made while a correction was in force, and the part usable for training.
 
-A model learns the uncompensated deviation. Beside it, ``z_um``, such a recording may hold what was measured,
-``z_residual_um``, and what was in force meanwhile, ``z_correction_um``; `uncompensated` parts them.
+A model learns the uncompensated deviation. In addition to this deviation, ``z_um``, such a recording may contain the
+measured residual, ``z_residual_um``, and the correction in force, ``z_correction_um``; `uncompensated` separates them.
 """
 
 from collections.abc import Sequence
@@ -12,9 +12,9 @@ from thermocomp.core.correction import uncompensated
 from thermocomp.core.exceptions import RecordingError
 from thermocomp.recordings.recording import Recording
 
-#: the deviation may be off by so much from what makes it, rounded as it may be [um]
+#: tolerance of the deviation against residual minus correction, including rounding [um]
 ROUNDED = 0.5
-#: what is said of a recording, or of a column
+#: error message for a recording or a column whose state of compensation is unknown
 UNKNOWN = (
     "compensation: unknown: nobody knows which correction was in force while it was measured, so it does not tell what "
     "the machine does by itself; record with a controller that confirms its corrections and with its own temperature "
@@ -29,19 +29,19 @@ def beside(target: str) -> tuple[str, str]:
 
 
 def refuse_compensated(recordings: Sequence[Recording], targets: Sequence[str]) -> None:
-    """Refuse recordings whose displacements are not those of an uncompensated machine.
+    """Reject recordings whose displacements are not those of an uncompensated machine.
 
     Parameters
     ----------
     recordings : sequence of Recording
     targets : sequence of str
-        Displacement channels that are to be learned, or judged.
+        Displacement channels for training or judging.
 
     Raises
     ------
     RecordingError
-        It is not known what was in force; a residual has no uncompensated deviation beside it, or is asked for itself;
-        or the three do not fit together.
+        The correction in force is unknown; a residual has no uncompensated deviation, or is itself the target; or the
+        three columns are inconsistent.
     """
     for recording in recordings:
         where = recording.source or recording.name
@@ -86,7 +86,7 @@ def _refuse(recording: Recording, target: str, where: str) -> None:
     known = np.flatnonzero(np.isfinite(off))
     if not known.size or recording.changed:
         return
-    off -= np.median(off[known])  # they may count from another zero
+    off -= np.median(off[known])  # they may have different zeros
     worst = int(known[np.argmax(np.abs(off[known]))])
     if abs(off[worst]) > ROUNDED:
         raise RecordingError(

@@ -20,7 +20,7 @@ class Cycle:
     Parameters
     ----------
     name : str
-        Such as ``2 (2500 1/min)``.
+        Name, such as ``2 (2500 1/min)``.
     start, stop : int
         First row, and the row after the last.
     """
@@ -38,7 +38,7 @@ def find_cycles(
 ) -> tuple[Cycle, ...]:
     """Split a test into thermal cycles by its spindle speed.
 
-    A cycle begins where the spindle starts after a stop; it ends where the next one begins. Rows before the first run
+    A cycle starts with a start of the spindle after a stop, and ends with the next one. Rows before the first run
     belong to the first cycle.
 
     Parameters
@@ -46,14 +46,14 @@ def find_cycles(
     time : ndarray of shape (n_rows,)
         [s]
     speed : ndarray of shape (n_rows,)
-        [1/min]; nan counts as the last known speed.
+        [1/min]; NaN counts as the last known speed.
     min_run, min_stop : float
-        Shorter runs and stops (a tool change, a dropped reading) do not split [s].
+        Shorter runs and stops (a tool change, a lost reading) do not split the test [s].
 
     Returns
     -------
     tuple of Cycle
-        One cycle that covers everything if the spindle does not start again.
+        A single cycle over the whole test if the spindle does not restart.
     """
     known = np.isfinite(speed)
     if not known.any():
@@ -75,7 +75,7 @@ def find_cycles(
     for number, (a, b) in enumerate(zip(starts, stops, strict=True), start=1):
         running = filled[a:b][turning[a:b]]
         speeds = np.unique(np.round(running)) if running.size else np.array([0.0])
-        # a measured speed jitters: more than a handful of values is told as a range
+        # a measured speed fluctuates: more than a few values are reported as a range
         steady = running.size and np.ptp(running) <= 0.05 * top
         text = f"{np.median(running):.0f}" if steady else f"{speeds.min():.0f}-{speeds.max():.0f}"
         cycles.append(Cycle(f"{number} ({text} 1/min)", a, b))
@@ -83,17 +83,17 @@ def find_cycles(
 
 
 def make_single_cycle(n_rows: int) -> tuple[Cycle, ...]:
-    """Return one cycle that covers everything."""
+    """Return a single cycle over the whole test."""
     return (Cycle("whole test", 0, n_rows),)
 
 
 def split_by_labels(labels: Sequence[object]) -> tuple[Cycle, ...]:
-    """Split by a column of labels: each stretch of equal labels is a cycle.
+    """Split by a column of labels: each run of equal labels is a cycle.
 
     Raises
     ------
     RecordingError
-        A label comes back after another one.
+        A label recurs after another one.
     """
     text = [f"{v:g}" if isinstance(v, float) else str(v) for v in labels]
     starts = [0, *(k for k in range(1, len(text)) if text[k] != text[k - 1])]
@@ -107,7 +107,7 @@ def split_by_labels(labels: Sequence[object]) -> tuple[Cycle, ...]:
 
 
 def _drop_short(time: FloatArray, turning: BoolArray, *, state: bool, shorter_than: float) -> BoolArray:
-    """Return `turning` with the stretches of `state` that are too short turned over; the first and last one stay."""
+    """Return `turning` with short runs of `state` inverted; the first and the last run are kept."""
     edges = np.flatnonzero(np.diff(turning)) + 1
     bounds = [0, *edges.tolist(), len(turning)]
     out = turning.copy()

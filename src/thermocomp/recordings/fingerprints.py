@@ -1,8 +1,8 @@
-"""Fingerprints of rows: identification of the training rows of a model in a recording, in whatever file they are.
+"""Fingerprints of rows: identification of the training rows of a model in any recording or file.
 
-A run is `LENGTH` differences between rows of one channel, rounded to a step: a copy with another zero has the same.
-It is hashed. Rows are known again where a run of the target and a run of an input are, at the same rows, in several
-places of the same order. The decision `0019-overlap` tells what is found and what is not.
+A run is `LENGTH` differences between rows of one channel, rounded to a step, so that a copy with another zero has the
+same run. Each run is hashed. Rows are recognised where a run of the target and a run of an input match at the same
+rows, at several locations in the same order. The decision `0019-overlap` describes what is detected and what is not.
 """
 
 from itertools import pairwise
@@ -17,54 +17,54 @@ from thermocomp.recordings.samples import Samples
 
 Marks = NDArray[np.uint32]
 
-#: differences in a run
+#: number of differences in a run
 LENGTH = 20
-#: rows between the rows of the long runs: the first with which a run is at most a third of the recording
+#: strides of the long runs [rows]; the first at which a run spans at most a third of the recording is used
 LONG = (60, 12, 6, 4, 2)
-#: inputs whose runs are kept
+#: number of inputs whose runs are stored
 INPUTS = 4
-#: of fingerprints in a model file [byte]; as text they are a third more
+#: maximum size of the fingerprints in a model file [byte]; base64 text is a third larger
 BYTES = 14_000
-#: a run whose half continues in more ways than these says too little
+#: a run with a half that has more distinct continuations than this carries too little information
 WAYS = 4
-#: a run that comes again within so many of its lengths is something periodic
+#: a run that recurs within this number of its lengths is periodic
 PERIOD = 5
-#: least mean of the third differences where rounding hides the noise [resolution]; of a smooth curve it is 1.03 at most
+#: smallest mean third difference where rounding hides the noise [resolution]; at most 1.03 for a smooth curve
 ROUGH = 1.2
 
 _BASE, _MIX = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xBF58476D1CE4E5B9)
 
 
 class _Scale(NamedTuple):
-    """Of a channel [its unit]."""
+    """Rounding step and noise of a channel [its unit]."""
 
-    step: float  #: what differences are rounded to
-    noise: float  #: standard deviation of a difference that is noise
+    step: float  #: rounding step of differences
+    noise: float  #: standard deviation of the noise of a difference
     resolution: float  #: smallest step in the file
 
 
 class _Windows(NamedTuple):
-    """All runs of one channel at one stride, by their first row."""
+    """All runs of one channel at one stride, by first row."""
 
     mark: Marks  #: hash; 0 where a value is missing
-    telling: BoolArray  #: it has enough information to be known again
-    moving: BoolArray  #: the channel moves beyond its noise around it
-    margin: FloatArray  #: how far the nearest difference is from being rounded otherwise [step]
+    telling: BoolArray  #: the run has enough information to be recognised
+    moving: BoolArray  #: the channel changes by more than its noise around the run
+    margin: FloatArray  #: smallest distance of a difference from a rounding boundary [step]
 
 
 class TargetRows(NamedTuple):
-    """Rows in which the target has a number, of all tests."""
+    """Rows of all tests in which the target has a number."""
 
-    at: IntArray  #: where they stand in the samples
-    test: IntArray  #: index of the first row of their test, in `at`
+    at: IntArray  #: row numbers in the samples
+    test: IntArray  #: index of the first row of the same test, in `at`
 
     def starts(self, reach: int) -> BoolArray:
-        """Return the rows that have the row `reach` rows later in the same test, without the last `reach` rows."""
+        """Return the rows with a row of the same test `reach` rows later; the last `reach` rows are omitted."""
         return np.asarray(self.test[: len(self.test) - reach] == self.test[reach:])
 
 
 def fingerprint(samples: Samples, target: int, learn: BoolArray, *, thin: bool = True) -> Prints | None:
-    """Return the fingerprints of rows that are learned from.
+    """Return the fingerprints of training rows.
 
     Parameters
     ----------
@@ -73,8 +73,8 @@ def fingerprint(samples: Samples, target: int, learn: BoolArray, *, thin: bool =
         Index into ``samples.targets``.
     learn : ndarray of bool of shape (n_rows,)
     thin : bool
-        Keep as many as a model file shall hold, evenly spread over the rows; of neighbours the one that another
-        rounding of the file changes least. Without it all are kept.
+        Keep only as many runs as a model file may contain, evenly spread over the rows; of neighbouring runs the one
+        least sensitive to another rounding of the file. False: all are kept.
 
     Returns
     -------
@@ -90,7 +90,7 @@ def fingerprint(samples: Samples, target: int, learn: BoolArray, *, thin: bool =
     scales = {name: _scale(x) for name, x in channels.items()}
     short = {name: _windows(x, scales[name], 1, rows) for name, x in channels.items() if np.isfinite(x).any()}
     names = [first.name, *_best(short, first.name)]
-    # temperatures that say nothing keep the target from being known again; a spindle speed never says anything
+    # temperatures without information prevent recognition of the target; a spindle speed never carries information
     if first.name not in short or (len(names) == 1 and any(c.quantity == "temperature" for c in others)):
         return None
     found = {1: short}
@@ -114,16 +114,16 @@ def fingerprint(samples: Samples, target: int, learn: BoolArray, *, thin: bool =
 
 
 def find_rows(samples: Samples, target: int) -> TargetRows:
-    """Return the rows in which the target of an index into ``samples.targets`` has a number."""
+    """Return the rows in which the target with an index into ``samples.targets`` has a number."""
     at = np.flatnonzero(np.isfinite(samples.deviations[:, target]))
     return TargetRows(at, np.searchsorted(samples.test[at], samples.test[at]))
 
 
 def _scale(x: FloatArray) -> _Scale:
-    """Return the step that differences of a channel are rounded to.
+    """Return the rounding step for the differences of a channel.
 
-    It is twice their noise, so that a run has some 24 bits and withstands another rounding of the file; an odd multiple
-    of the file's own resolution if that is not much finer: then no difference is near a boundary.
+    The step is twice their noise, so that a run has about 24 bits and withstands another rounding of the file. If the
+    resolution of the file is not much finer, the step is an odd multiple of it: no difference is near a boundary then.
     """
     steps = np.abs(np.concatenate([np.diff(x), np.diff(x, 2)]))
     steps = steps[steps > 1e-9 * np.nanmax(np.abs(x), initial=0.0)]
@@ -132,7 +132,7 @@ def _scale(x: FloatArray) -> _Scale:
     if third.size == 0 or steps.size == 0:
         return _Scale(1.0, 0.0, 1.0)
     resolution = float(steps.min())
-    # of white noise the third differences have ten times the variance of the first; drift is gone from them
+    # for white noise, third differences have ten times the variance of first differences, and contain no drift
     noise = 1.4826 * float(np.median(third)) / np.sqrt(10.0)
     ratio = 2.0 * noise / resolution
     if ratio > 100.0:
@@ -145,17 +145,17 @@ def _rounded(x: FloatArray, step: float, stride: int) -> FloatArray:
 
 
 def hash_runs(x: FloatArray, step: float, stride: int, length: int = LENGTH) -> Marks:
-    """Return the hash of the run that begins at each row; 0 where a value is missing.
+    """Return the hash of the run that starts at each row; 0 where a value is missing.
 
     Parameters
     ----------
     x : ndarray of shape (n_rows,)
     step : float
-        Step to which differences are rounded [unit of x].
+        Rounding step of differences [unit of x].
     stride : int
-        Rows between the rows of a run.
+        Distance between the rows of a run.
     length : int
-        Differences in a run.
+        Number of differences in a run.
     """
     ratio = _rounded(x, step, stride)
     finite = np.isfinite(ratio)
@@ -171,7 +171,7 @@ def hash_runs(x: FloatArray, step: float, stride: int, length: int = LENGTH) -> 
 
 
 def _windows(x: FloatArray, scale: _Scale, stride: int, rows: TargetRows) -> _Windows:
-    """Return the runs of a channel, and which of them can be known again."""
+    """Return the runs of a channel, with their information, movement and rounding margin."""
     ratio = np.nan_to_num(_rounded(x, scale.step, stride))
     moves = np.rint(ratio)
     n = len(moves) - (LENGTH - 1) * stride
@@ -192,15 +192,15 @@ def _windows(x: FloatArray, scale: _Scale, stride: int, rows: TargetRows) -> _Wi
 
 
 def _seldom(mark: Marks, halves: Marks, stride: int) -> BoolArray:
-    """Return the runs of which neither half continues in many ways, and which do not come again soon.
+    """Return the runs whose halves have few distinct continuations and do not recur soon.
 
-    However often all of a run comes, it counts: so do the copies of a recording.
+    Repetitions of a complete run do not exclude it: copies of a recording repeat it as well.
     """
     n, later = len(mark), LENGTH // 2 * stride
     number = np.unique(halves, return_inverse=True)[1]
     whole = np.flatnonzero(mark > 0)
     ways = np.zeros(number.max(initial=-1) + 1, dtype=np.intp)
-    for at in (0, later):  # as the beginning of a run, and as its end
+    for at in (0, later):  # as the first half of a run, and as the second half
         pairs = np.unique((number[whole + at].astype(np.uint64) << np.uint64(32)) | mark[whole])
         halves_of = (pairs >> np.uint64(32)).astype(np.intp)
         ways = np.maximum(ways, np.bincount(halves_of, minlength=len(ways)))
@@ -213,7 +213,7 @@ def _seldom(mark: Marks, halves: Marks, stride: int) -> BoolArray:
 
 
 def _moving(x: FloatArray, scale: _Scale, rows: TargetRows) -> BoolArray:
-    """Return the rows around which a channel moves: its mean before and after differs by more than its noise."""
+    """Return the rows around which a channel changes: its means before and after differ by more than its noise."""
     finite = np.isfinite(x)
     filled = np.interp(np.arange(len(x)), np.flatnonzero(finite), x[finite])
     total = np.concatenate([[0.0], np.cumsum(filled - filled.mean())])
@@ -228,11 +228,11 @@ def _moving(x: FloatArray, scale: _Scale, rows: TargetRows) -> BoolArray:
     return np.asarray(enough & (np.abs(change) * np.sqrt(np.minimum(here - before, after - here)) > 6.0 * noise))
 
 
-# -- what is kept --------------------------------------------------------------------------------------------------
+# -- selection of runs -------------------------------------------------------------------------------------------------
 
 
 def _best(windows: dict[str, _Windows], target: str) -> list[str]:
-    """Return the most informative inputs where the target is informative, and moves."""
+    """Return the most informative inputs at runs where the target is informative and changes."""
     mine = windows[target]
     said = {}
     for name, w in windows.items():
@@ -245,7 +245,7 @@ def _best(windows: dict[str, _Windows], target: str) -> list[str]:
 def _kept(
     windows: dict[str, _Windows], names: list[str], whole: BoolArray, stride: int, at: IntArray, most: int
 ) -> Runs:
-    """Return at most `most` runs, one of each of as many stretches of rows."""
+    """Return at most `most` runs, each from a separate section of rows."""
     target, *inputs = (windows[name] for name in names)
     usable, moving, margin = target.telling & whole, target.moving, target.margin
     if inputs:

@@ -19,7 +19,7 @@ from thermocomp.recordings.headings import Meaning, understand
 def parts_of(
     table: pd.DataFrame, *, time: Any, units: Mapping[str, str], cycles: str | Sequence[object] | None, name: str
 ) -> dict[str, Any]:
-    """Return the arguments of the `Recording` of a table.
+    """Return the `Recording` arguments for a table.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def parts_of(
 
 
 def _time(table: pd.DataFrame, given: Any, units: Mapping[str, str], name: str) -> tuple[FloatArray, str, str | None]:
-    """Return the time since the first row [s], the first row's time stamp, and the column it was taken from."""
+    """Return the time since the first row [s], the time stamp of the first row, and the column of the time."""
     used = None
     symbol = "s"
     if given is None:
@@ -113,7 +113,7 @@ def _time(table: pd.DataFrame, given: Any, units: Mapping[str, str], name: str) 
 
 
 def _meaning(column: str, units: Mapping[str, str]) -> Meaning | None:
-    """Return the meaning of a column, by `units` or by its heading."""
+    """Return the meaning of a column, from `units` or its heading."""
     if column not in units:
         return understand(column)
     meant = find_unit(units[column])

@@ -1,4 +1,4 @@
-"""Meaning of headings: ``t1_C``, ``drift_mm``, ``T1 [degC]`` carry the unit of their column."""
+"""Interpretation of headings: ``t1_C``, ``drift_mm``, ``T1 [degC]`` contain the unit of their column."""
 
 import re
 from contextlib import suppress
@@ -10,7 +10,7 @@ from thermocomp.core.exceptions import UnitError
 from thermocomp.core.units import SPELLINGS, Unit, find_unit, is_unit
 from thermocomp.recordings.words import split_words
 
-# What may stand behind the last underscore. Not m, in, Hz, 1: coolant_in, mains_Hz, t_1 mean other things.
+# Units allowed after the last underscore. Not m, in, Hz, 1: coolant_in, mains_Hz, t_1 have other meanings.
 SUFFIXES = {
     **{s: s for s in ("C", "degC", "°C", "K", "F", "degF", "°F", "nm", "um", "µm", "μm", "mm", "urad", "µrad", "mrad")},
     **{s: s for s in ("arcsec", "rpm", "s", "ms", "min", "h")},
@@ -18,30 +18,30 @@ SUFFIXES = {
     "mm_min": "mm/min",
     "m_min": "m/min",
 }
-#: what may stand behind a name without brackets, as in "T1 °C", "T1 in °C", "T1 / °C" and "T1, °C": no letter alone
+#: units allowed after a name without brackets, as in "T1 °C", "T1 in °C", "T1 / °C" and "T1, °C": no single letter
 _BEHIND = re.compile(
     r"(?P<base>.*?[^\s/,;:])(?:\s*[/,;:]\s*|\s+in\s+|\s+)(?P<unit>(?:°|º|˚|[dD]eg\.? ?|DEG ?|Grad "
     r")[CF]|℃|(?:[cC]elsius|CELSIUS)"
     r"|(?:\d[\d.,/]* ?)?(?:[µμu]m|mm|UM|MM)|[µμ]rad|rpm|RPM|(?:U|1|r|tr|rev)/(?:min|MIN)|(?:min|MIN)(?:-1|\^-1|⁻¹))"
     r"|(?P<base2>.*\S)\s+(?:/|in)\s+(?P<unit2>K|s|ms|min|h)"
 )
-#: units of what is no use here; they are no slips of the pen
+#: units of quantities that are not used; they are not typing errors
 _OTHERS = split_words(
     "%, °, deg, grad, rad, rev, v, mv, vdc, vac, a, ma, adc, aac, w, kw, va, wh, kwh, n, kn, nm, ncm, bar",
     "mbar, pa, kpa, mpa, hpa, psi, l/min, l/h, m3/h, ml/min, gpm, kg, g, mg, ohm, ω, kohm, kω, mm/s, m/s",
     "mm/rev, g/m3, db, dba, khz, mhz, %rh, %rf, % rh, % rf, bit, inc, counts, digits, w/m2, j, kj, var",
     "cos phi, ppm, 1/k, um/s, rad/s",
 )
-# In brackets anything but what would turn any frequency into a spindle speed, or a number into a channel.
+# In brackets all units except those that would make a frequency a spindle speed, or a plain number a channel.
 _NOT_IN_BRACKETS = ("", "1")
 _FREQUENCIES = ("Hz", "1/s")
 HOUSE_SUFFIX = {"degC": "C", "um": "um", "urad": "urad", "1/min": "rpm", "mm": "mm", "mm/min": "mm_min", "s": "s"}
 BRACKETS = re.compile(r"(?P<base>.*\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))")
-#: a unit before the name, as in "[°C] T1"; or a remark behind it, as in "T1 [°C] (front)"
+#: a unit before the name, as in "[°C] T1"; or a remark after it, as in "T1 [°C] (front)"
 _EARLIER = re.compile(r"(?P<before>.*?)\[(?P<unit>[^\[\]]*)\]\s*(?P<after>.+)")
 _AXIS = re.compile(r"[xyzuvw]\d?")
 _TURNING = ("spindle", "speed", "spindel", "drehzahl", "broche", "mandrin", "husillo", "mandrino")
-#: names that say what is measured, whatever the unit
+#: names that define the quantity, whatever the unit
 _NAMES = {
     "spindle_speed": re.compile(rf".*(?:{'|'.join(_TURNING)}).*"),
     "temperature": re.compile(r"t\d+|tc ?\d+|.*\btemp(?:\b|[ _.\d]|er).*|.*temperatur.*"),
@@ -49,7 +49,7 @@ _NAMES = {
         r".*(?:drift|displacement|verlagerung|verschiebung|abweichung|deviation|déplacement).*|weg ?\w?"
     ),
 }
-#: what counts from another temperature, and is no temperature
+#: quantities that are not absolute temperatures although their unit suggests it
 _ELECTRIC = re.compile(r"(?i)capaci|kapaz|charge|ladung")  # F and C are farads and coulombs there
 _DIFFERENCE = re.compile(
     r"Δ.*|.*\b(?:delta|diff\w*|rise|dT\d*|d[Tt]emp\w*)\b.*|.*(?:erwärmung|übertemp|temperaturdiff|-änderung).*", re.I
@@ -76,9 +76,9 @@ class Meaning:
     Parameters
     ----------
     name : str
-        Channel name: the heading with the suffix of the internal unit.
+        Channel name: the heading with the suffix of the house unit.
     base : str
-        The heading without its unit.
+        Heading without its unit.
     unit : Unit
     """
 
@@ -93,13 +93,13 @@ def understand(heading: str) -> Meaning | None:
     Returns
     -------
     Meaning or None
-        None if there is no unit in it. A length is a position where the heading says so (``x_mm``, ``pos_x_mm``), or a
+        None if there is no unit. A length is a position if the heading names it as such (``x_mm``, ``pos_x_mm``), or a
         residual or correction of a machine under compensation (``z_residual_um``, ``z_correction_um``).
 
     Raises
     ------
     UnitError
-        The brackets hold what looks like a mistyped unit.
+        The brackets contain what looks like a mistyped unit.
     """
     heading = strip_heading(heading)
     said = _in_brackets(heading) if "[" in heading or "(" in heading else _behind(heading)
@@ -107,21 +107,21 @@ def understand(heading: str) -> Meaning | None:
         return None
     base, meant = said
     inner = _behind(base) if heading.endswith((")", "]")) else None
-    if inner is not None and inner[1] == meant:  # x_um [um]: said twice
+    if inner is not None and inner[1] == meant:  # x_um [um]: duplicate unit
         twice = understand(base)
         if twice is not None and (twice.unit.scale, twice.unit.shift) == (1, 0):
             return Meaning(base, twice.base, twice.unit)
     other = (meant.symbol == "K" and _DIFFERENCE.fullmatch(base)) or _ELECTRIC.search(base)
     if other or (meant.quantity == "time" and find_named_quantity(base)):
-        return None  # T1_min is the least of T1
+        return None  # T1_min is the minimum of T1
     if meant.quantity == "displacement":
         meant = find_unit(meant.symbol, _kind_of_length(base, meant.symbol))
-    # one word, so that the name can go into a formula or a controller
+    # one word, so that the name can be used in a formula or a controller
     return Meaning(f"{'_'.join(base.split())}_{HOUSE_SUFFIX[meant.house]}", base, meant)
 
 
 def _kind_of_length(base: str, symbol: str) -> str:
-    """Return the quantity of a length by its name."""
+    """Return the quantity of a length according to its name."""
     words = re.split(r"[\s_.-]+", base.casefold())
     if any(w in ("pos", "position") for w in words) or (symbol == "mm" and all(_AXIS.fullmatch(w) for w in words)):
         return "position"
@@ -144,14 +144,14 @@ def _in_brackets(heading: str) -> tuple[str, Unit] | None:
     if symbol == "m" and is_time_name(base):
         raise UnitError("'m' denotes metres; write min for minutes")
     if is_unit(symbol):
-        with suppress(UnitError):  # a share of degC
+        with suppress(UnitError):  # a fraction of degC
             return base, find_unit(symbol)
-    return (base, find_unit(symbol)) if _is_mistyped(symbol) else None  # it says what is meant
+    return (base, find_unit(symbol)) if _is_mistyped(symbol) else None  # the error suggests the intended unit
 
 
 @lru_cache(maxsize=1024)
 def _is_mistyped(symbol: str) -> bool:
-    """Return whether a unit is a slip, such as [degX]; [kW], [%] or (front) are columns of no use here."""
+    """Return whether a unit is a typing error, such as [degX]; [kW], [%] or (front) mark columns that are not used."""
     return not (is_foreign_unit(symbol) or _FORMAT.fullmatch(symbol)) and bool(
         get_close_matches(symbol.casefold(), SPELLINGS, n=1, cutoff=0.85)
         or get_close_matches(symbol, SUFFIXES, n=1, cutoff=0.6)
@@ -167,28 +167,28 @@ def _behind(heading: str) -> tuple[str, Unit] | None:
     behind = _BEHIND.fullmatch(heading)
     if behind:
         return behind["base"] or behind["base2"], find_unit(behind["unit"] or behind["unit2"])
-    if is_unit(heading) and find_unit(heading).symbol == "1/min":  # a column that is called RPM
+    if is_unit(heading) and find_unit(heading).symbol == "1/min":  # a column named RPM
         return "spindle", find_unit(heading)
     return None
 
 
 def strip_heading(heading: str) -> str:
-    """Return a heading without blanks and colons around it."""
+    """Return a heading without leading and trailing blanks and colons."""
     return heading.strip().rstrip(":").strip()
 
 
 def is_foreign_unit(symbol: str) -> bool:
-    """Return whether a text is a unit of what is no use here, such as ``%`` or ``kW``."""
+    """Return whether a text is a unit of a quantity that is not used, such as ``%`` or ``kW``."""
     return symbol.casefold() in _OTHERS
 
 
 def is_time_name(heading: str) -> bool:
-    """Return whether a heading, whose unit is taken off, is that of a time."""
+    """Return whether a heading without its unit names a time."""
     return plain_name(heading) in _TIMES
 
 
 def plain_name(heading: str) -> str:
-    """Return a heading in small letters, without the letters of a format: ``Datum (TT.MM.JJJJ)`` is ``datum``."""
+    """Return a heading in lower case without a date format: ``Datum (TT.MM.JJJJ)`` becomes ``datum``."""
     name = strip_heading(heading)
     found = BRACKETS.fullmatch(name)
     if found and _FORMAT.fullmatch((found["square"] or found["round"] or "").strip()):
@@ -197,7 +197,7 @@ def plain_name(heading: str) -> str:
 
 
 def find_date_order(heading: str) -> str:
-    """Return the order of day, month and year that a heading states, such as ``dmy``; empty if it states none."""
+    """Return the order of day, month and year in a heading, such as ``dmy``; empty if it specifies none."""
     found = BRACKETS.fullmatch(strip_heading(heading))
     letters = re.findall(r"[a-z]+", ((found["square"] or found["round"]) if found else heading).casefold())
     if not all(re.fullmatch(r"([dtgmyjahsf])\1*|[ap]m?", word) for word in letters):
@@ -209,7 +209,7 @@ def find_date_order(heading: str) -> str:
 
 
 def find_named_quantity(base: str) -> str:
-    """Return the quantity that a name without unit speaks of, such as temperature for ``T1``; empty if of none."""
+    """Return the quantity implied by a name without unit, such as temperature for ``T1``; empty if none."""
     name = " ".join(base.casefold().replace("_", " ").split())
     return next((quantity for quantity, words in _NAMES.items() if words.fullmatch(name)), "")
 

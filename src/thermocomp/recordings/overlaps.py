@@ -1,4 +1,4 @@
-"""Recognition of the training rows of a model, in whatever file they are; see the decision `0019-overlap`."""
+"""Recognition of the training rows of a model in any file; see the decision `0019-overlap`."""
 
 from collections.abc import Iterator
 
@@ -9,14 +9,14 @@ from thermocomp.core.fingerprints import Prints, Runs, unpack_marks
 from thermocomp.recordings.fingerprints import LENGTH, Marks, TargetRows, find_rows, fingerprint, hash_runs
 from thermocomp.recordings.samples import Samples
 
-#: runs long that a match has to be where no input says anything, such as a spindle speed
+#: minimum length of a match in runs where no input carries information, such as a spindle speed
 ALONE = 5
-#: tests whose intervals differ by less are read at one rate
+#: relative difference of intervals below which two tests have the same sampling rate
 SAME_RATE = 0.05
 
 
 def overlap(prints: Prints, samples: Samples, target: int) -> IntArray:
-    """Find rows that were learned from.
+    """Find training rows of a model.
 
     Parameters
     ----------
@@ -24,19 +24,19 @@ def overlap(prints: Prints, samples: Samples, target: int) -> IntArray:
         Fingerprints of the training rows.
     samples : Samples
     target : int
-        Index into ``samples.targets``; it is looked up under the target's prints whatever its name.
+        Index into ``samples.targets``; it is compared with the target of the fingerprints whatever its name.
 
     Returns
     -------
     ndarray of int of shape (n_rows,)
-        Row that was learned from, about, counted through all tests; -1 where a row is new.
+        Approximate training row, counted through all tests; -1 where a row is new.
     """
     everything = np.ones(len(samples), dtype=np.bool_)
     return _overlap(prints, samples, target, samples.interval(everything), own=False)
 
 
 def repeats(samples: Samples, target: int) -> IntArray:
-    """Find rows that repeat earlier ones, of the same test or of another.
+    """Find rows that repeat earlier rows of the same or another test.
 
     Parameters
     ----------
@@ -47,9 +47,9 @@ def repeats(samples: Samples, target: int) -> IntArray:
     Returns
     -------
     ndarray of int of shape (n_rows,)
-        Row of the samples that is repeated, about; -1 where there is none.
+        Approximate row of the samples that is repeated; -1 where there is none.
     """
-    # tests that were read at other intervals may be copies with fewer rows
+    # tests with other sampling intervals may be copies with fewer rows
     intervals = [samples.interval(samples.test == k) for k in range(len(samples.test_names))]
     rates: list[float] = []
     for interval in intervals:
@@ -84,7 +84,7 @@ def _overlap(prints: Prints, samples: Samples, target: int, interval: float, *, 
         marks = {n: np.where(inside, hash_runs(x, prints.steps[n], stride), 0) for n, x in columns.items()}
         found, of = _matches(run, marks)
         there = unpack_marks(run.rows).astype(np.intp)[of]
-        # long runs are for files that have other rows than those that were learned from: fewer, or more
+        # long runs are for files with a different selection of rows than the training files: fewer, or more
         new = ~np.isin(samples.test[rows.at[found]], np.unique(samples.test[source >= 0]))
         if own:
             new &= there + LENGTH * stride <= rows.at[found]
@@ -93,7 +93,7 @@ def _overlap(prints: Prints, samples: Samples, target: int, interval: float, *, 
 
 
 def _tries(prints: Prints, interval: float) -> Iterator[tuple[Runs, int]]:
-    """Yield runs, and the rows between rows by which they may be found: as they are, and for as much time."""
+    """Yield runs and the strides at which they may match: the same number of rows, and the same time."""
     rate = prints.interval / interval
     for run in prints.runs:
         yield run, run.stride
@@ -103,7 +103,7 @@ def _tries(prints: Prints, interval: float) -> Iterator[tuple[Runs, int]]:
 
 
 def _matches(run: Runs, marks: dict[str, Marks]) -> tuple[IntArray, IntArray]:
-    """Return the rows where a run of the target and one of an input match a stored run, and which."""
+    """Return the rows where a run of the target and a run of an input match a stored run, and the index of that run."""
     first, *others = run.marks
     stored = {name: unpack_marks(text) for name, text in run.marks.items()}
     known, which = np.unique(stored[first], return_index=True)
@@ -130,14 +130,14 @@ def _fill(
     *,
     own: bool,
 ) -> None:
-    """Write into `source` the rows between consecutive matches, and those next to them that may be known."""
+    """Write into `source` the rows between consecutive matches, and adjacent rows that may also be training rows."""
     learned, moving = unpack_marks(run.rows).astype(np.intp), unpack_marks(run.moving) > 0
     scale = stride / run.stride
     usual = float(np.median(np.diff(learned))) if learned.size > 1 else 0.0
     for mine in _chains(rows.at[found], learned[of], rows.test[found], scale, max(3.0 * usual, 2.0 * LENGTH)):
         here, there = rows.at[found[mine]], learned[of[mine]]
         end = int(rows.at[found[mine[-1]] + LENGTH * stride])
-        # one place may be chance: two that move, more than a run long, are not; without an input it takes more
+        # one match may be chance; two in changing sections over more than a run are not; more without an input
         least = (1.5 if len(run.marks) > 1 else ALONE) * LENGTH * stride
         if np.count_nonzero(moving[of[mine]]) < 2 or end - here[0] < least:
             continue
@@ -152,7 +152,7 @@ def _fill(
 
 
 def _chains(here: IntArray, there: IntArray, test: IntArray, scale: float, bridge: float) -> Iterator[IntArray]:
-    """Yield matches that follow each other as the learned rows did; a few rows may be gone or altered between them."""
+    """Yield matches in the order of the training rows; a few rows may be missing or altered between them."""
     if not len(here):
         return
     went, should = np.diff(here), scale * np.diff(there)
@@ -162,10 +162,10 @@ def _chains(here: IntArray, there: IntArray, test: IntArray, scale: float, bridg
 
 
 def _reach(prints: Prints, learned: IntArray, there: IntArray) -> tuple[int, int]:
-    """Return the number of training rows before the first match and after the last one that may be known too.
+    """Return the number of training rows before the first match and after the last one that may match as well.
 
-    Up to the next run that is kept, or three times as far as matches are apart, as not every run is found again; never
-    beyond what was learned from.
+    The limit is the next stored run, or three times the distance of matches, because not every run is recognised; and
+    always the end of the training section.
     """
     usual = 3 * max(LENGTH, int(there[-1] - there[0]) // max(len(there) - 1, 1))
     begin, last = int(there[0]), int(there[-1])

@@ -1,4 +1,4 @@
-"""`Profiles`: the error of one component along its axis, measured in one thermal state after the other."""
+"""`Profiles`: the error of one component along its axis, measured in several thermal states."""
 
 import hashlib
 from collections.abc import Sequence
@@ -13,9 +13,9 @@ from thermocomp.core.components import BY_CODE
 from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.recordings.recording import Recording
 
-#: what is measured, by the unit of the error
+#: measured quantity, by the unit of the error
 QUANTITY = {"um": "displacement", "urad": "angle"}
-#: fewer positions than this are no profile
+#: minimum number of positions of a profile
 MIN_POSITIONS = 3
 
 
@@ -26,17 +26,17 @@ class Slopes:
     Parameters
     ----------
     powers : tuple of int
-        Power of q that each factor belongs to.
+        Power of q of each factor.
     factors : ndarray of shape (n_states, n_powers)
-        k_i [unit/m^i]; nan where a state has too few points.
+        k_i [unit/m^i]; NaN where a state has too few points.
     errors : ndarray of shape (n_states, n_powers)
-        Their standard errors, by what the fit leaves of its own profile [unit/m^i].
+        Standard errors of the factors, from the fit residual of the same profile [unit/m^i].
     residual : ndarray of shape (n_states, n_points)
         Residual of the fit [unit].
     remainder : float
-        The same of all states but the reference, RMS per degree of freedom [unit]; nan if there is none.
+        Residual of all states except the reference, RMS per degree of freedom [unit]; NaN if there is none.
     shared : float
-        Share of the errors' variance that is the same in all states: the noise of the reference.
+        Fraction of the error variance that is common to all states: noise of the reference.
     """
 
     powers: tuple[int, ...]
@@ -57,23 +57,23 @@ class Profiles:
         Code of the component, such as ``EYY``, or any other name.
     unit : {'um', 'urad'}
     axis : {'X', 'Y', 'Z'}
-        Along which it was measured.
+        Axis along which the component was measured.
     points : ndarray of shape (n_points, 3)
-        x, y, z of the axes [mm]. Where the other two coordinates vary (C-06), the points come in lines: along each, the
-        axis' own position rises.
+        x, y, z of the axes [mm]. Where the other two coordinates vary (C-06), the points form lines, along which the
+        position of the axis itself increases.
     values : ndarray of shape (n_states, n_points)
-        Actual minus commanded [unit]; nan where a point was missed.
+        Actual minus commanded [unit]; NaN where a point is missing.
     states : Recording
-        The thermal states, one row each: time, temperatures, spindle speed; cycles.
+        Thermal states, one per row: time, temperatures, spindle speed; cycles.
     zero : ndarray of shape (n_points,), optional
-        Profile that counts as cold, in place of that of the profiles' reference states [unit].
+        Profile of the cold state that replaces the profile of the reference states [unit].
 
     Raises
     ------
     RecordingError
-        Shapes differ, a number is infinite, there are fewer than 3 positions, they do not rise, or one comes twice.
+        Shapes differ, a number is infinite, there are fewer than 3 positions, or they are not increasing or not unique.
     InputError
-        Unit or axis are none, or not those of the component.
+        The unit or axis is invalid, or differs from that of the component.
     """
 
     target: str
@@ -160,7 +160,7 @@ class Profiles:
 
     @property
     def varying(self) -> str:
-        """Axes whose position is not the same at all points, such as ``YX``, the own one first."""
+        """Axes whose position varies between the points, such as ``YX``, the measured axis first."""
         return self.axis + "".join(a for k, a in enumerate("XYZ") if a != self.axis and np.ptp(self.points[:, k]) > 0)
 
     @cached_property
@@ -172,17 +172,17 @@ class Profiles:
         return digest.hexdigest()
 
     def reference_rows(self, reference: int | Sequence[int] = 0) -> IntArray:
-        """Return the states that count as cold.
+        """Return the states that are regarded as cold.
 
         Parameters
         ----------
         reference : int or sequence of int
-            Indices of the states, from 0; negative ones count from the last.
+            Indices of the states, from 0; negative ones count from the end.
 
         Raises
         ------
         InputError
-            There is no such state.
+            The state does not exist.
         """
         rows = np.atleast_1d(np.asarray(reference, dtype=np.intp))
         n = len(self)
@@ -197,12 +197,12 @@ class Profiles:
         Parameters
         ----------
         reference : int or sequence of int
-            See `reference_rows`; of several states it is the mean.
+            See `reference_rows`; for several states the mean is used.
 
         Returns
         -------
         ndarray of shape (n_points,)
-            [unit]; nan where no reference state has a value.
+            [unit]; NaN where no reference state has a value.
         """
         if self.zero is not None:
             return self.zero
@@ -211,7 +211,7 @@ class Profiles:
         return np.where(count > 0, np.nansum(rows, axis=0) / np.maximum(count, 1), np.nan)
 
     def thermal(self, reference: int | Sequence[int] = 0) -> FloatArray:
-        """Return the profiles minus the one of the cold machine, shape (n_states, n_points) [unit] (C-07).
+        """Return the profiles minus the cold profile, shape (n_states, n_points) [unit] (C-07).
 
         Parameters
         ----------
@@ -233,9 +233,9 @@ class Profiles:
         Parameters
         ----------
         order : int
-            Highest power m; Chen finds 1 enough (C-05).
+            Highest power m; Chen finds 1 sufficient (C-05).
         offset : bool
-            Fit a k_0 too; without it the lines go through the reference position, as Chen's.
+            Fit k_0 as well; otherwise the lines pass through the reference position, as in Chen.
         reference : int or sequence of int
             See `reference_rows`.
         reference_position : float
@@ -248,7 +248,7 @@ class Profiles:
         Raises
         ------
         InputError
-            Nothing would be fitted, or there are not more positions than factors.
+            There is nothing to fit, or the number of positions does not exceed the number of factors.
         """
         powers = tuple(range(0 if offset else 1, order + 1))
         n_positions = len(np.unique(self.position[self.position != reference_position])) + offset
@@ -259,7 +259,7 @@ class Profiles:
             )
         q = 1e-3 * (self.position - reference_position)
         reach = float(np.abs(q).max())
-        # the columns are scaled, for powers of metres differ by much
+        # the columns are scaled, because powers of metres differ by orders of magnitude
         columns = np.stack([(q / reach) ** k for k in powers], axis=1)
         scale = np.array([reach**-k for k in powers])
         thermal = self.thermal(reference)

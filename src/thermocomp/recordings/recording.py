@@ -27,31 +27,31 @@ class Recording:
     Parameters
     ----------
     name : str
-        Name of the test; mostly the file's name without its extension.
+        Name of the test; usually the file name without its extension.
     time : ndarray of shape (n_rows,)
-        Seconds since the first row [s], strictly rising.
+        Seconds since the first row [s], strictly increasing.
     table : DataFrame of shape (n_rows, n_channels)
-        One float column per channel, in house units; nan where a value is missing.
+        One float column per channel, in house units; NaN where a value is missing.
     channels : tuple of Channel
-        One per column of `table`, in its order.
+        One per column of `table`, in the same order.
     cycles : tuple of Cycle
-        Thermal cycles; together they cover all rows. Several cycles or one.
+        Thermal cycles, one or more; together they cover all rows.
     source : str
-        File it was read from; empty if it never was in a file.
+        File from which it was read; empty if there is none.
     sha256 : str
-        Hash of that file.
+        Hash of the file.
     start : str
         ISO timestamp of the first row; empty if the file has only relative times.
     origin : float
-        Time between the first row of the file and that of the recording, where the first rows were cut [s].
+        Time between the first row of the file and of the recording, if the first rows were removed [s].
     aliases : mapping of str to str
-        Other names a channel answers to: the file's own heading, the name without its unit.
+        Alternative names of channels: the heading in the file, the name without its unit.
     notes : tuple of str
         Notes of the reader for the user.
     changed : tuple of str
-        Those of the notes that list changes of the values by a mapping.
+        Notes on changes of the values by a mapping.
     compensation : {'', 'off', 'known', 'unknown'}
-        Whether a correction was in force at the machine, and known; empty: not said. See
+        Whether a correction was in force at the machine, and known; empty: not specified. See
         `thermocomp.recordings.compensated`.
 
     Examples
@@ -102,38 +102,38 @@ class Recording:
         cycles: str | Sequence[object] | None = None,
         name: str = "table",
     ) -> "Recording":
-        """Make a recording of a table.
+        """Return a recording made from a table.
 
         Parameters
         ----------
         table : DataFrame of shape (n_rows, n_columns)
-            A column is a channel if its heading has a unit (``t1_C``, ``drift_um``, ``spindle_rpm``) or `units` tells
-            it; what is left out is told in `notes`.
+            A column is a channel if its heading has a unit (``t1_C``, ``drift_um``, ``spindle_rpm``) or `units` defines
+            it; omitted columns are listed in `notes`.
         time : str or array-like of shape (n_rows,), optional
             Name of a column, or the time of each row: numbers (seconds without a unit), datetimes with or
-            without a time zone (the first is kept as `start`), or timedeltas. Without it the one column of times, such
-            as ``time_s``, or an index of times.
+            without a time zone (the first is kept as `start`), or timedeltas. Default: the only time column, such as
+            ``time_s``, or an index of times.
         units : mapping of str to str, optional
             Column to unit, such as ``{"T1": "degC", "Z": "um"}``.
         cycles : str or sequence of object of shape (n_rows,), optional
-            Name of a column, or the label of each row's thermal cycle. Without it a column ``cycle``, or the spindle
-            speed tells.
+            Name of a column, or the label of each row's thermal cycle. Default: the column ``cycle``, or the spindle
+            speed.
         name : str
             Name of the test.
 
         Returns
         -------
         Recording
-            In house units.
+            Recording in house units.
 
         Raises
         ------
         RecordingError
-            There is no time, or it does not rise; no column is a channel; a cell is not a number.
+            There is no time, or it does not increase; no column is a channel; a cell is not a number.
         UnitError
             A unit is unknown.
         InputError
-            A column that was named is not there, or an array has another length.
+            A named column does not exist, or an array has another length.
         """
         return cls(**parts_of(table, time=time, units=units or {}, cycles=cycles, name=name))
 
@@ -154,7 +154,7 @@ class Recording:
         )
 
     def of_quantity(self, quantity: str) -> tuple[Channel, ...]:
-        """Return the channels that measure `quantity`, in the order of the table."""
+        """Return the channels of a quantity, in the order of the table."""
         return tuple(c for c in self.channels if c.quantity == quantity)
 
     @property
@@ -169,7 +169,7 @@ class Recording:
 
     @property
     def ambient(self) -> Channel | None:
-        """The first temperature whose name contains air, ambient, room, workshop or environment; None if none does."""
+        """The first temperature named after air, ambient, room, workshop or environment; None if there is none."""
         return next((c for c in self.temperatures if AMBIENT.search(c.name)), None)
 
     @property
@@ -179,12 +179,12 @@ class Recording:
         return found[0] if found else None
 
     def channel(self, name: str) -> Channel:
-        """Find a channel by its name, the file's own heading, or its name without the unit.
+        """Return a channel by its name, its heading in the file, or its name without the unit.
 
         Raises
         ------
         InputError
-            There is none; the message names the nearest.
+            The channel does not exist; the message names the most similar one.
         """
         wanted = self.aliases.get(name, name)
         for c in self.channels:
@@ -194,7 +194,7 @@ class Recording:
         raise InputError(f"{PurePath(self.source).name or self.name}: no channel is named {name!r}; {hint}")
 
     def has(self, name: str) -> bool:
-        """Return whether `channel` finds a channel."""
+        """Return whether `channel` finds a channel of this name."""
         try:
             self.channel(name)
         except InputError:
@@ -202,16 +202,16 @@ class Recording:
         return True
 
     def values(self, channels: Sequence[Channel]) -> FloatArray:
-        """Return the columns of `channels` as an array of shape (n_rows, n_channels), in internal units."""
+        """Return the columns of `channels` as an array of shape (n_rows, n_channels), in house units."""
         return self.table[[c.name for c in channels]].to_numpy(dtype=np.float64)
 
     def with_cycles(self, cycles: Sequence[Cycle]) -> "Recording":
-        """Return the same recording, split into other cycles."""
+        """Return the same recording with other thermal cycles."""
         return replace(self, cycles=tuple(cycles))
 
     @cached_property
     def fingerprint(self) -> str:
-        """SHA-256 of times and values: the same for the same test, however its file was written."""
+        """SHA-256 of times and values: the same for the same test in any file format."""
         digest = hashlib.sha256(np.ascontiguousarray(self.time).tobytes())
         for name in sorted(str(c) for c in self.table.columns):
             digest.update(name.encode())
@@ -220,5 +220,5 @@ class Recording:
 
     @property
     def sampling_interval(self) -> float:
-        """Median time between two rows [s]; nan for a single row."""
+        """Median time between two rows [s]; NaN for a single row."""
         return float(np.median(np.diff(self.time))) if len(self) > 1 else float("nan")

@@ -1,4 +1,4 @@
-"""`Rows`: what a file holds, row by row, before it is a recording."""
+"""`Rows`: content of a file, row by row, before it becomes a recording."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -18,14 +18,14 @@ Instant = float | datetime | str
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Content of a file, row by row, in internal units.
+    """Content of a file, row by row, in house units.
 
     Parameters
     ----------
     source : str
-        The file.
+        Path of the file.
     sha256 : str
-        Hash of it.
+        Hash of the file.
     time : ndarray of shape (n_rows,)
         Seconds since the first row of the file [s].
     start : str
@@ -36,15 +36,15 @@ class Rows:
     labels : list of object or None
         Thermal cycle of each row, if the file contains it.
     place : callable
-        Returns the location of a row in the file, such as ``line 7``.
+        Function that returns the location of a row in the file, such as ``line 7``.
     extra : dict of str to list of object
-        Cells of further columns that were asked for and are there.
+        Cells of further requested columns that exist.
     min_run, min_stop : float
         Shorter runs and stops of the spindle do not split the test into thermal cycles [s].
     most_cycles : int
-        Thermal cycles it may have.
+        Maximum number of thermal cycles.
     aliases : mapping of str to str
-        Headings and names without unit to channel names.
+        Channel names by heading and by name without unit.
     notes : tuple of str
         Notes of the reader.
     changed : tuple of str
@@ -83,11 +83,11 @@ class Rows:
         )
 
     def noted(self, *changes: str) -> "Rows":
-        """Return the same with more of what was changed."""
+        """Return the rows with additional notes on changes."""
         return replace(self, changed=(*self.changed, *changes))
 
     def seconds(self, at: Instant, owner: str) -> float:
-        """Return an instant as seconds since the first row of the file [s].
+        """Return a time as seconds since the first row of the file [s].
 
         Parameters
         ----------
@@ -98,7 +98,7 @@ class Rows:
         Raises
         ------
         InputError
-            It is no timestamp, or the file has none.
+            The text is not a timestamp, or the file has no timestamps.
         """
         if isinstance(at, int | float):
             return float(at)
@@ -117,12 +117,12 @@ class Rows:
             ) from e
 
     def columns(self, names: Sequence[str], owner: str) -> list[str]:
-        """Return the names of channels, all of which are there.
+        """Return the names of existing channels.
 
         Raises
         ------
         InputError
-            One is not; the message names the nearest.
+            A channel does not exist; the message names the most similar one.
         """
         known = [str(c) for c in self.table.columns]
         for name in names:
@@ -132,6 +132,6 @@ class Rows:
         return list(names)
 
     def refuse_twins(self, owner: str) -> None:
-        """Raise `InputError` unless each row is later than the one before."""
+        """Raise `InputError` unless each row is later than the previous one."""
         if not (np.diff(self.time) > 0).all():
             raise InputError(f"{self.source}: {owner}: needs a row per instant, and several rows have the same time")

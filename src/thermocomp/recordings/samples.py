@@ -1,4 +1,4 @@
-"""`Samples`: several tests stacked into the arrays that models are fitted to and replayed on."""
+"""`Samples`: several tests stacked into arrays for fitting and replaying models."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -33,28 +33,28 @@ class Samples:
     deviations : ndarray of shape (n_rows, n_targets)
         Targets, in house units.
     time : ndarray of shape (n_rows,)
-        Seconds since the start of the row's test [s].
+        Seconds since the start of the test to which the row belongs [s].
     test, cycle, row : ndarray of int of shape (n_rows,)
-        Index into `test_names`, index into `cycle_names`, row in the file's table. The last two are -1 in rows of an
-        earlier file, which a test continues from: they are gone through, and neither learned from nor judged.
+        Index into `test_names`, index into `cycle_names`, row in the table of the file. The last two are -1 in rows of
+        an earlier file that a test continues: these are replayed, but neither used for training nor for judging.
     test_names, cycle_names : tuple of str
     hashes : tuple of str
         Fingerprint of each test: SHA-256 of its times and values.
     rezero : bool
-        Temperatures are counted from the start of each test, or from `zero`.
+        Temperatures are relative to the start of each test, or to `zero`.
     zero : ndarray of shape (n_tests, n_inputs), optional
-        What they are counted from, if it is not the start of each test; nan for a test whose start it is. Without
-        `rezero` it is the same for all tests, and holds live too.
+        Reference values, if they are not taken from the start of each test; NaN for a test that uses its start. Without
+        `rezero` they are the same for all tests, and also apply live.
     zeroing : Zeroing
-        Over how long the start is averaged.
+        Averaging time at the start.
     resting : ndarray of bool of shape (n_rows,), optional
-        The spindle is known to be stopped; None: it is known nowhere.
+        The spindle is known to be stopped; None: unknown in all rows.
     starts : tuple of Start
         Initial state of each test; empty: cold.
     stamps : tuple of str
-        ISO timestamp of each test's first row, that of an earlier file it continues from; empty: not known.
+        ISO timestamp of the first row of each test, or of an earlier file it continues; empty: unknown.
     trouble : tuple of (str, str)
-        Channel (empty: all) and what is wrong with it as a whole; see `thermocomp.recordings.checks.sound`.
+        Channel (empty: all) and its fault as a whole; see `thermocomp.recordings.checks.sound`.
     """
 
     inputs: tuple[Channel, ...]
@@ -86,7 +86,7 @@ class Samples:
 
     @property
     def rezeroed(self) -> BoolArray:
-        """Inputs that are counted from the start of their test."""
+        """Inputs relative to the start of their test."""
         return np.array([self.rezero and c.quantity == "temperature" for c in self.inputs], dtype=np.bool_)
 
     def reference(self) -> FloatArray:
@@ -113,31 +113,31 @@ class Samples:
         return np.zeros(len(self), dtype=np.bool_) if self.resting is None else self.resting
 
     def anew(self, test: int) -> int | None:
-        """Return the row from which a test is re-zeroed, what went before being known or not; None: it does not."""
+        """Return the row from which a test is re-zeroed, whether or not earlier rows are known; None if it is not."""
         if not self.starts or self.starts[test].word != "rezeroed":
             return None
         return int(np.flatnonzero((self.test == test) & (self.cycle >= 0))[0])
 
     def change(self) -> FloatArray:
-        """Return inputs minus their reference, (n_rows, n_inputs); the rows of a zero give its mean."""
+        """Return inputs minus their reference, (n_rows, n_inputs); rows used for the zero have its mean."""
         return self._change.copy()
 
     @cached_property
     def _change(self) -> FloatArray:
-        values, reference = self.values.copy(), self.reference()  # raises where a test has no row to count from
+        values, reference = self.values.copy(), self.reference()  # raises an error for a test without usable rows
         for window in self._windows() if self.rezeroed.any() else []:
             values[window] = robust_mean(values[window])
         return values - reference[self.test]
 
     def _windows(self) -> Iterator[IntArray]:
-        """Yield the rows that the zero of each test is averaged of, where it is not stated."""
+        """Yield the rows averaged for the zero of each test, unless it is specified."""
         for k in range(len(self.test_names)):
             if self.zero is None or np.isnan(self.zero[k]).any():
                 rows = np.flatnonzero((self.test == k) & self.valid)
                 yield rows[: first_rows(self.zeroing, self.time[rows], self.stands[rows])[0]]
 
     def days(self) -> "NDArray[np.datetime64]":
-        """Return the day of each row, (n_rows,); not a time where the recording has no time stamps."""
+        """Return the day of each row, (n_rows,); NaT where the recording has no time stamps."""
         found = np.full(len(self), "NaT", "datetime64[D]")
         for k, stamp in enumerate(self.stamps):
             mine = self.test == k
@@ -147,13 +147,13 @@ class Samples:
         return found
 
     def dt(self) -> FloatArray:
-        """Return the time since the previous row of the same test [s]; inf in each test's first row."""
+        """Return the time since the previous row of the same test [s]; inf in the first row of each test."""
         steps = np.diff(self.time, prepend=np.inf)
         steps[np.flatnonzero(np.diff(self.test, prepend=-1))] = np.inf
         return steps
 
     def interval(self, rows: BoolArray) -> float:
-        """Return the usual time between rows of a test [s]; 1 where there is none."""
+        """Return the usual time between rows of a test [s]; 1 if there is none."""
         steps = self.dt()[rows]
         return float(np.median(steps[np.isfinite(steps)])) if np.isfinite(steps).any() else 1.0
 
@@ -165,10 +165,10 @@ class Samples:
         target : int
             Index into `targets`.
         rows : ndarray of bool of shape (n_rows,)
-            Learned from; those without a number are passed over.
+            Training rows; those without a number are ignored.
         before : int, optional
-            The last value is that of the last row before this one in its test, or in the files it continues from, 0
-            without any; without it, that of the last row of all.
+            The last value is taken from the last row before this one in its test, or in the files it continues, 0 if
+            there is none. Default: the last row of all.
         """
         y = self.deviations[:, target]
         known = rows & np.isfinite(y)
@@ -179,7 +179,7 @@ class Samples:
         if before is not None:
             test = int(self.test[before])
             mine = candidates[(candidates < before) & (self.test[candidates] == test)]
-            for r in reversed(self.starts[test].earlier if self.starts else ()):  # what it continues from
+            for r in reversed(self.starts[test].earlier if self.starts else ()):  # recordings that it continues
                 if not mine.size:
                     others = [k for k, own in enumerate(self.hashes) if own == r.fingerprint]
                     mine = candidates[np.isin(self.test[candidates], others)]
@@ -188,7 +188,7 @@ class Samples:
         return Learned(float(y[known].mean()), last, float(np.median(noise)), float(np.abs(y[known]).max()))
 
     def take(self, rows: BoolArray | IntArray) -> "Samples":
-        """Return some of the rows, in their order."""
+        """Return a selection of rows, in their order."""
         return replace(
             self,
             values=self.values[rows],
@@ -201,13 +201,13 @@ class Samples:
         )
 
     def only(self, names: Sequence[str]) -> "Samples":
-        """Return the same rows with some of the inputs, in the order they had."""
+        """Return the same rows with a selection of inputs, in their present order."""
         kept = [j for j, c in enumerate(self.inputs) if c.name in names]
         zero = None if self.zero is None else self.zero[:, kept]
         return replace(self, inputs=tuple(self.inputs[j] for j in kept), values=self.values[:, kept], zero=zero)
 
     def model_inputs(self, columns: Sequence[int], rows: BoolArray | IntArray) -> tuple[Input, ...]:
-        """Describe inputs for a model fitted to `rows`: reference and trained range of each."""
+        """Return the inputs of a model fitted to `rows`, with the reference and trained range of each."""
         change = self.change()[rows]
         zero = self.reference()[int(self.test[rows][0])]
         return tuple(
@@ -224,7 +224,7 @@ class Samples:
         )
 
     def frame(self) -> pd.DataFrame:
-        """Return inputs minus reference as a table with the inputs' names."""
+        """Return inputs minus reference as a table with the names of the inputs."""
         return pd.DataFrame(self.change(), columns=[c.name for c in self.inputs])
 
 

@@ -1,4 +1,4 @@
-"""Recordings become samples: one under the other, with what counts as zero in each."""
+"""Stacking of recordings into samples, with the zero of each recording."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.starts import Start, bridge_files, find_resting_rows, find_starts, level
 
-#: quantities nothing is predicted from, and why
+#: quantities that cannot be inputs, and the reason
 NO_INPUTS = {
     "displacement": "a machine in production has no displacement probe",
     "angle": "a machine in production has no probe for angles",
@@ -22,7 +22,7 @@ NO_INPUTS = {
     "residual": "a machine in production has no displacement probe",
     "correction": "it is what a model makes, not what it is made of",
 }
-#: no temperature, speed or displacement of a machine reaches this, whatever its unit
+#: upper bound of any temperature, speed or displacement of a machine, in any unit
 ABSURD = 1e9
 
 
@@ -40,23 +40,23 @@ def stack(
     Parameters
     ----------
     recordings : sequence of Recording
-        The tests; each keeps its own zero.
+        The tests; each has a separate zero.
     targets : sequence of str
         Displacement channels to predict.
     inputs : sequence of str, optional
-        Channels models may use; all temperatures and the first spindle speed if not given.
+        Channels that models may use. Default: all temperatures and the first spindle speed.
     rezero : bool
-        True: temperatures are counted from the start of each test (ISO 230-3); False: they are absolute.
+        True: temperatures are relative to the start of each test (ISO 230-3); False: they are absolute.
     zeroing : Zeroing, optional
-        Over how long the start is averaged; as `Zeroing` says if not given, by the first recording's spindle speed.
+        Averaging time at the start. Default: that of `Zeroing`, with the spindle speed of the first recording.
     starts : Start or sequence of Start, optional
         Initial state of each recording, or of all of them. Default: determined from the recordings.
 
     Raises
     ------
     InputError
-        A channel is missing in one of the recordings, a displacement is asked for as an input, it cannot be told how a
-        recording begins, or it was made under compensation and does not tell what the machine does by itself.
+        A channel is missing in one of the recordings, a displacement is requested as an input, the initial state of a
+        recording cannot be determined, or the uncompensated deviation of a recording under compensation is unknown.
     """
     if not recordings:
         raise InputError("no recording given")
@@ -104,7 +104,7 @@ def stack(
 def _chosen_channels(
     recordings: Sequence[Recording], targets: Sequence[str], inputs: Sequence[str] | None
 ) -> tuple[tuple[Channel, ...], tuple[Channel, ...]]:
-    """Return targets and inputs, or raise `InputError` if they are none that a model can have."""
+    """Return targets and inputs, or raise `InputError` if a model cannot use them."""
     first = recordings[0]
     target_channels = tuple(first.channel(name) for name in dict.fromkeys(targets))
     if not target_channels:
@@ -132,7 +132,7 @@ def _chosen_channels(
 
 
 class _Part(NamedTuple):
-    """The rows of one test, after those of the files that it continues from."""
+    """The rows of one test, after those of the files that it continues."""
 
     start: Start
     values: FloatArray
@@ -169,7 +169,7 @@ def _part(
 
 
 def _known(starts: Sequence[Start], inputs: Sequence[Channel], rezero: bool) -> FloatArray | None:
-    """Return the zeros that are stated, (n_tests, n_inputs); nan for tests that have their own."""
+    """Return the specified zeros, (n_tests, n_inputs); NaN for tests with a separate zero."""
     if not rezero or not any(s.word == "known" for s in starts):
         return None
     zero = np.full((len(starts), len(inputs)), np.nan)
@@ -183,7 +183,7 @@ def _known(starts: Sequence[Start], inputs: Sequence[Channel], rezero: bool) -> 
 
 
 def _refuse_twins(recordings: Sequence[Recording]) -> None:
-    """Refuse a test that is given twice: it would be learned from and judged on at once."""
+    """Reject a duplicate test, which would be used for training and judging at the same time."""
     seen: dict[str, Recording] = {}
     for r in recordings:
         twin = seen.setdefault(r.fingerprint, r)
@@ -192,7 +192,7 @@ def _refuse_twins(recordings: Sequence[Recording]) -> None:
 
 
 def _refuse_different_inputs(recordings: Sequence[Recording], inputs: Sequence[Channel]) -> None:
-    """Refuse sensors that only some tests have: the user leaves them out, not the order of the files."""
+    """Reject sensors that only some tests have: the user must exclude them explicitly."""
     first = {c.name for c in inputs}
     for r in recordings[1:]:
         speed = r.speed
@@ -206,7 +206,7 @@ def _refuse_different_inputs(recordings: Sequence[Recording], inputs: Sequence[C
 
 
 def _refuse_the_absurd(recording: Recording, channels: Sequence[Channel]) -> None:
-    """Refuse numbers that no sensor means and that sums of squares cannot hold."""
+    """Reject implausible numbers that would overflow in sums of squares."""
     values = recording.values([recording.channel(c.name) for c in channels])
     for row, k in np.argwhere(np.abs(values) > ABSURD)[:1]:
         raise RecordingError(

@@ -15,20 +15,20 @@ from thermocomp.core.zero import Zeroing, first_rows, robust_mean
 from thermocomp.recordings.recording import Recording
 
 Word = Literal["cold", "continued", "rezeroed", "known"]
-#: what the words mean, for tables and errors
+#: description of each initial state, for tables and errors
 WORDS: dict[Word, str] = {
     "cold": "zeroed at rest at its start",
     "continued": "continues from an earlier file, and counts from the zero of that",
     "rezeroed": "displacements and temperatures count from its start, on a machine that may be warm",
     "known": "counts from a zero that is known",
 }
-#: a displacement that begins nearer to zero than this was zeroed there [um or urad]
+#: a displacement whose initial value is smaller than this was zeroed there [um or urad]
 NEAR = 3.0
-#: or nearer than this share of its range
+#: or smaller than this fraction of its range
 SHARE = 0.1
-#: or nearer than so many times its noise
+#: or smaller than this multiple of its noise
 LOUD = 6.0
-#: a file follows another if it begins at most this long after its end [s], or ten of its intervals
+#: a file follows another if it starts at most this long after its end [s], or ten of its intervals
 SOON = 600.0
 
 
@@ -41,19 +41,19 @@ class Start:
     word : {'cold', 'continued', 'rezeroed', 'known'}
         See `WORDS`.
     why : str
-        Origin of that state: stated, or determined from the recording.
+        Origin of the state: specified, or determined from the recording.
     earlier : tuple of Recording
         Earlier recordings of the machine, in chronological order.
     gap : float or None
-        From the last row of each of them to the first row of what follows [s]; None: from their time stamps, or else
-        one sampling interval.
+        Time from the last row of each earlier recording to the first row of the next one [s]; None: from their time
+        stamps, or else one sampling interval.
     zero : mapping of str to float
-        Temperatures that count as zero, by channel [degC]; for ``known``, and none where they are taken as they are.
+        Temperatures that count as zero, by channel [degC]; for ``known``; empty if the temperatures are absolute.
 
     Raises
     ------
     InputError
-        The word does not go with the rest.
+        The word is inconsistent with the other parameters.
 
     Examples
     --------
@@ -84,7 +84,7 @@ class Start:
             raise InputError(f"a gap of {self.gap:g} s between two files: must be more than 0 s")
 
     def content(self, name: str) -> dict[str, object]:
-        """Return it for a program to read."""
+        """Return the initial state as data for programs."""
         return {
             "recording": name,
             "start": self.word,
@@ -94,37 +94,37 @@ class Start:
         }
 
     def told(self, name: str) -> str:
-        """Return it in words, such as ``b: continued from a (continues from an earlier file ...); stated``."""
+        """Return it as text, such as ``b: continued from a (continues from an earlier file ...); stated``."""
         names = ", ".join(r.name for r in self.earlier)
         before = f" from {names}" if self.word == "continued" else ""
         after = f"; what went before: {names}" if self.earlier and not before else ""
         return f"{name}: {self.word}{before} ({WORDS[self.word]}{after}); {self.why}"
 
 
-#: zeroed at rest at its start, whatever the displacement says there
+#: zeroed at rest at its start, whatever the initial displacement
 COLD = Start()
 
 
 def bridge_files(start: Start, recording: Recording) -> tuple[Start, FloatArray]:
-    """Bridge the time between the files of a test.
+    """Determine the time between the files of a test.
 
     Parameters
     ----------
     start : Start
     recording : Recording
-        That continues from the earlier files of `start`.
+        Recording that continues the earlier files of `start`.
 
     Returns
     -------
     start : Start
         Start with known gaps.
     begins : ndarray of shape (n_earlier + 1,)
-        Start of each earlier file and of the recording itself, since the first of them [s].
+        Start time of each earlier file and of the recording itself, relative to the first file [s].
 
     Raises
     ------
     InputError
-        By its time stamps a file begins before the one it follows has ended.
+        According to its time stamps, a file starts before the end of the file it follows.
     """
     begins, words, every = [0.0], [], (*start.earlier, recording)
     for before, after in pairwise(every):
@@ -154,31 +154,31 @@ def find_starts(
 ) -> tuple[Start, ...]:
     """Determine the initial states of tests.
 
-    A displacement that begins near zero was zeroed there. One that does not, and continues where the file before it
-    (by time stamps) ended, continues that. All else cannot be told.
+    A displacement that starts near zero was zeroed there. If it does not, and continues from the end of the previous
+    file (by time stamps), the test continues that file. Other cases are undetermined.
 
     Parameters
     ----------
     recordings : sequence of Recording
-        Given together.
+        Recordings that are given together.
     targets : sequence of Channel
-        Displacements that are judged or learned from.
+        Displacements used for training or judging.
     zeroing : Zeroing
         Definition of the zero at the start.
     absolute : bool
-        Temperatures are taken as they are: their zero is known.
+        Temperatures are used as absolute values: their zero is known.
 
     Raises
     ------
     InputError
-        It cannot be determined, and a model started at zero would be wrong by it.
+        The state cannot be determined, and a model started at zero would be wrong by the initial displacement.
     """
     if absolute:
         return tuple(Start("known", "temperatures are taken as they are") for _ in recordings)
     found = {id(r): _found(r, [o for o in recordings if o is not r], targets, zeroing) for r in recordings}
 
     def whole(start: Start) -> Start:
-        """Return a start with all that went before: what it continues may be a continuation itself."""
+        """Return a start with the complete history: the recording it continues may itself be a continuation."""
         before = found[id(start.earlier[0])] if start.earlier else start
         return replace(start, earlier=(*whole(before).earlier, *start.earlier)) if before.earlier else start
 
@@ -213,14 +213,14 @@ def level(recording: Recording, name: str, zeroing: Zeroing, *, end: bool = Fals
     name : str
         Name of the channel.
     zeroing : Zeroing
-        Over how long the start is averaged.
+        Averaging time at the start.
     end : bool
-        The last value instead.
+        Return the last value instead.
 
     Returns
     -------
     float
-        In the channel's unit; nan if it has no value.
+        Level in the unit of the channel; NaN if it has no value.
     """
     values = recording.table[recording.channel(name).name].to_numpy(dtype=np.float64)
     there = np.flatnonzero(np.isfinite(values))
@@ -259,13 +259,13 @@ def _tolerance(recording: Recording, name: str) -> float:
     values = values[np.isfinite(values)]
     if len(values) < 2:
         return NEAR
-    # of a normal law: the difference has sqrt(2) of its noise
+    # for normal noise: the standard deviation of a difference is sqrt(2) times that of the noise
     noise = float(np.median(np.abs(np.diff(values)))) / 0.954
     return max(NEAR, SHARE * float(np.ptp(values)), LOUD * noise)
 
 
 def _between(before: Recording, after: Recording) -> float | None:
-    """Return the time from the end of one recording to the begin of another [s]; None without time stamps."""
+    """Return the time from the end of one recording to the start of another [s]; None without time stamps."""
     if not (before.start and after.start):
         return None
     stamps = [datetime.fromisoformat(r.start) for r in (before, after)]

@@ -1,4 +1,4 @@
-"""Sets of words, as they are easiest to read: many in a line."""
+"""Sets of words in a compact, readable notation."""
 
 
 def split_words(*lines: str) -> frozenset[str]:

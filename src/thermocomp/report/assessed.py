@@ -1,6 +1,6 @@
 """Results of a model file on recordings, as a single offline page.
 
-A section of it is a function that makes one of what was judged, and a line in `SECTIONS`.
+Each section of the page is made by a function listed in `SECTIONS`.
 """
 
 import math
@@ -27,7 +27,7 @@ def render(judged: Judged, recordings: Sequence[Recording]) -> str:
     ----------
     judged : Judged
     recordings : sequence of Recording
-        On which the models were judged, in their order.
+        Recordings on which the models were judged, in order.
 
     Returns
     -------
@@ -59,7 +59,7 @@ def _verdict(a: Assessment) -> str:
 
 
 def _fitted_badly(judged: Judged) -> Iterator[str]:
-    """Yield what was found when models were fitted, if that was not good."""
+    """Yield shortcomings found when the models were fitted."""
     for m in judged.models:
         if m.honest_error is None:
             yield f"{m.target}: never judged on cycles it had not seen when it was fitted; it does not run."
@@ -76,7 +76,7 @@ def _covered(judged: Judged, _: Sequence[Recording]) -> Section | None:
     return Section(table.title, [laid_out(replace(table, title=""))])
 
 
-#: of the page, in their order: each makes one of what was judged, or none where it has nothing to say
+#: sections of the page in order; each function returns None if its section is empty
 SECTIONS: tuple[Callable[[Judged, Sequence[Recording]], Section | None], ...] = (
     faults.section,
     probings.section,

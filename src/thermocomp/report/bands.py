@@ -1,4 +1,4 @@
-"""Uncertainty bands of models in words, and their coverage where the models were judged."""
+"""Uncertainty bands of models as text, and their coverage on the judged data."""
 
 import math
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ def describe_bands(models: Sequence[ErrorModel], assessments: Sequence[Assessmen
     ----------
     models : sequence of ErrorModel
     assessments : sequence of Assessment
-        The last words on them, one per model, in their order.
+        Overall assessments, one per model, in order.
 
     Returns
     -------

@@ -16,10 +16,10 @@ from thermocomp.report.figures import COLOURS, POINTS, SHADE, FloatArray, thin_p
 from thermocomp.report.html import page
 from thermocomp.report.layout import Column, Layout
 
-#: what is drawn below each other, in this order
+#: panels by quantity from top to bottom, with their relative heights
 _PANELS = {"spindle_speed": 1.0, "temperature": 2.4, "displacement": 2.4, "angle": 2.0, "position": 1.2, "feed": 1.0}
 _MARK = {"trouble": "#b00020", "warning": "#E69F00", "info": "#5b636e"}
-#: names beside a panel
+#: maximum number of names next to a panel
 _NAMED = 14
 
 
@@ -53,7 +53,7 @@ def draw(recording: Recording, findings: Sequence[Finding]) -> str:
 
 
 def figure(recording: Recording, findings: Sequence[Finding]) -> Figure:
-    """Show what each channel did, and where what was found lies; a finding's number is its place in the list.
+    """Plot each channel with its findings marked; the number of a finding is its position in the list.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def _panel(
             ax.axvspan(float(hours[cycle.start]), float(hours[cycle.stop - 1]), color=SHADE, lw=0, zorder=0)
     low, high = _limits(recording, channels, numbers)
     ax.set_ylim(low, high)
-    # those with a finding are named first
+    # channels with a finding are named first
     ordered = sorted(channels, key=lambda c: c.name not in numbers)
     names: list[str | None] = [c.name for c in ordered]
     if len(names) > _NAMED:
@@ -125,7 +125,7 @@ def _panel(
 def _limits(
     recording: Recording, channels: Sequence[Channel], numbers: Mapping[str, Sequence[tuple[int, Finding]]]
 ) -> tuple[float, float]:
-    """Return the range of plausible values, with a margin: a spike of millimetres would hide all other values."""
+    """Return the range of plausible values with a margin: one large spike would hide all other values."""
     low, high = np.inf, -np.inf
     for c in channels:
         values = np.clip(recording.table[c.name].to_numpy(dtype=np.float64), -1e30, 1e30)
@@ -145,7 +145,7 @@ def _first(f: Finding) -> int | None:
 
 
 def _mark(ax: Axes, hours: FloatArray, values: FloatArray, f: Finding, style: str) -> None:
-    """Mark the rows of a finding on its channel, or the row where it begins."""
+    """Mark the rows of a finding on its channel, or the row where it starts."""
     if f.rows is not None and f.rows.size:
         drawn = f.rows[:: max(1, len(f.rows) // POINTS)]
         ax.plot(hours[drawn], values[drawn], "x", color=_MARK[f.severity], ms=5, mew=1.4, zorder=5, clip_on=False)
@@ -154,7 +154,7 @@ def _mark(ax: Axes, hours: FloatArray, values: FloatArray, f: Finding, style: st
 
 
 def _label(ax: Axes, hour: float, found: Sequence[tuple[int, Finding]]) -> None:
-    """Write the numbers of the findings that begin at the same time, the most serious one giving the colour."""
+    """Write the numbers of findings that start at the same time, in the colour of the most serious one."""
     first = min(found, key=lambda one: one[0])[1]
     ax.annotate(
         ", ".join(str(number) for number, _ in found[:4]) + (" ..." if len(found) > 4 else ""),

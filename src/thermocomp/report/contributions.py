@@ -13,7 +13,7 @@ from thermocomp.report.drawing import Drawn, add_legend, drawing, svg
 from thermocomp.report.figures import COLOURS, LONGEST, MEASURED, NONE, FloatArray, thin_points
 from thermocomp.report.layout import Column, Layout
 
-#: inputs that are drawn; the others are drawn as one
+#: maximum number of inputs drawn separately; the others are summed
 MOST = 6
 
 
@@ -22,7 +22,7 @@ class Answer(NamedTuple):
 
     figure: Drawn
     table: Layout
-    lags: str  #: time constants, in words
+    lags: str  #: time constants, as text
 
 
 def explain(model: PacedDynamic, samples: Samples) -> Answer:
@@ -32,7 +32,7 @@ def explain(model: PacedDynamic, samples: Samples) -> Answer:
     ----------
     model : PacedDynamic
     samples : Samples
-        With all of its inputs.
+        Samples with all inputs of the model.
 
     Returns
     -------
@@ -42,7 +42,7 @@ def explain(model: PacedDynamic, samples: Samples) -> Answer:
 
 
 def _draw(model: PacedDynamic, samples: Samples) -> Drawn:
-    """Show what each input adds over time; recordings follow each other."""
+    """Plot the contribution of each input over time; recordings are drawn one after another."""
     names = [c.name for c in samples.inputs]
     columns = [names.index(i.name) for i in model.inputs]
     each: list[dict[str, FloatArray]] = []

@@ -1,8 +1,8 @@
-"""Shared by all figures: the style, escaping of text, and output as SVG or PNG.
+"""Shared basis of all figures: style, escaping of text, and output as SVG or PNG.
 
-Words that people typed (names of channels, cycles, files, methods, places) are never read as formulas; what cannot be
-printed is replaced, and what is too long is cut, whatever draws it. So legends and names at ticks are made here, and
-nothing but `svg` and `png` saves a figure.
+External text (names of channels, cycles, files, methods, places) is never interpreted as a formula; unprintable
+characters are replaced, and long texts are cut. Legends and tick labels are therefore made here, and figures are saved
+by `svg` and `png` only.
 """
 
 import io
@@ -22,10 +22,10 @@ from matplotlib.ticker import LogLocator
 
 from thermocomp.core.shown import shorten
 
-#: characters of a name beside what it names, and of a line by itself; lines of a text
+#: maximum length of a name next to an item, and of a separate line [characters]; maximum number of lines
 _NAME, _LINE, _LINES = 48, 130, 3
 
-#: no text is a formula
+#: text is never interpreted as a formula
 _PLAIN: dict[Any, Any] = {"text.parse_math": False, "text.usetex": False}
 _STYLE = {
     **_PLAIN,
@@ -47,19 +47,19 @@ _STYLE = {
 
 
 class Drawn(str):
-    """A figure as SVG text, which carries the figure along."""
+    """A figure as SVG text, with the figure itself as an attribute."""
 
     figure: Figure
 
 
 @contextmanager
 def drawing(salt: str) -> Iterator[None]:
-    """Draw in the style of the reports, and no text as a formula.
+    """Apply the style of the reports while drawing; text is never interpreted as a formula.
 
     Parameters
     ----------
     salt : str
-        Keeps the ids of several figures on one page apart, and the page the same from run to run.
+        Seed of the SVG ids: distinct for each figure of a page, and the same in each run.
     """
     rc: Any = {**_STYLE, "svg.hashsalt": ascii(salt)}
     with mpl.rc_context(rc):
@@ -72,7 +72,7 @@ def add_legend(where: Axes | Figure, **how: Any) -> None:
     Parameters
     ----------
     where : Axes or Figure
-        A figure's legend has each label of its axes once.
+        The legend of a figure contains each label of its axes once.
     **how
         Keyword arguments of matplotlib's ``legend``.
     """
@@ -85,13 +85,13 @@ def add_legend(where: Axes | Figure, **how: Any) -> None:
                 first.setdefault(label, handle)
         named = [(handle, label) for label, handle in first.items()]
     labels = [shorten(label, _NAME) for _, label in named]
-    # before 3.10 matplotlib takes it with a blank before it
+    # matplotlib before 3.10 accepts such a label with a leading space
     labels = [f" {label}" if label.startswith("_") else label for label in labels]
     where.legend([handle for handle, _ in named], labels, **how)
 
 
 def _labelled(ax: Axes) -> Iterator[tuple[Artist, str]]:
-    """Yield what was given a label, with it; matplotlib labels the rest by their place."""
+    """Yield each item with an explicit label, and the label; matplotlib assigns default labels to the other items."""
     for k, artist in enumerate(ax.get_children()):
         label: Any = artist.get_label()
         if isinstance(label, str) and label not in ("", f"_child{k}", "_nolegend_"):
@@ -99,14 +99,14 @@ def _labelled(ax: Axes) -> Iterator[tuple[Artist, str]]:
 
 
 def name_ticks(axis: Axis, names: Sequence[str], longest: int = _NAME, **how: Any) -> None:
-    """Write names at 0, 1, 2 ... of an axis.
+    """Set names as tick labels at 0, 1, 2 ... of an axis.
 
     Parameters
     ----------
     axis : matplotlib.axis.Axis
     names : sequence of str
     longest : int
-        Characters that find room.
+        Maximum length of a name [characters].
     **how
         Properties of the labels, such as ``fontsize``.
     """
@@ -114,16 +114,16 @@ def name_ticks(axis: Axis, names: Sequence[str], longest: int = _NAME, **how: An
 
 
 def log_ticks(ax: Axes, which: Literal["x", "y"], dense: float = 0.7) -> None:
-    """Make an axis logarithmic, with plain numbers at its ticks that do not run into each other.
+    """Make an axis logarithmic, with plain numbers at ticks that do not overlap.
 
-    Call it when all is drawn.
+    Call this function after all drawing.
 
     Parameters
     ----------
     ax : Axes
     which : {'x', 'y'}
     dense : float
-        Decades across up to which each digit finds room; up to three times as many 1, 2 and 5 do.
+        Range in decades up to which each digit is labelled; up to three times this range 1, 2 and 5 are.
     """
     ax.set(**{f"{which}scale": "log"})
     axis = ax.xaxis if which == "x" else ax.yaxis
@@ -157,6 +157,6 @@ def _save(figure: Figure, buffer: io.StringIO | io.BytesIO, **how: Any) -> None:
         longest = _NAME if id(text) in beside else _LINE
         text.set_text("\n".join(shorten(line, longest) for line in text.get_text().split("\n", _LINES - 1)))
     with warnings.catch_warnings(), mpl.rc_context(_PLAIN):
-        # a name may hold letters that the font to measure it lacks; the browser has them
+        # a name may contain characters missing from the font used for measuring; the browser has them
         warnings.filterwarnings("ignore", message="Glyph .* missing")
         figure.savefig(buffer, **how)

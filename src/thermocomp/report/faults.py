@@ -18,13 +18,13 @@ from thermocomp.report.figures import LETTERS, LONGEST, MEASURED, POINTS, PREDIC
 from thermocomp.report.layout import Column, Layout
 from thermocomp.report.sections import Section, Shown
 
-#: how a failure is drawn
+#: colours by kind of failure
 TINTS = {"missing": "#56B4E9", "stepped": "#D55E00", "stuck": "#CC79A7", "off": "#E69F00", "swapped": "#009E73"}
-#: sensors of a recording whose stand-in is drawn, and failures in a table
+#: maximum number of sensors of a recording whose substitutes are drawn, and of failures in a table
 MOST, ROWS = 6, 40
-#: failures of a recording in the terminal
+#: maximum number of failures of a recording shown on the terminal
 TOLD = 8
-#: beyond what stands in, a reading that is further off is not drawn [degC]
+#: distance from the substitute beyond which readings are not drawn [degC]
 AROUND = 5.0
 
 TITLE = "Sensors"
@@ -75,7 +75,7 @@ def section(judged: Judged, recordings: Sequence[Recording]) -> Section:
 
 
 def describe_faults(logs: Sequence[FaultLog], recordings: Sequence[Recording]) -> Iterator[str]:
-    """Yield a line per failure that a watch found, the first ones of each recording.
+    """Yield a line per failure found by a watch, for the first failures of each recording.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def describe_faults(logs: Sequence[FaultLog], recordings: Sequence[Recording]) -
 
 
 def describe_held(judged: Judged, logs: Sequence[FaultLog]) -> Iterator[str]:
-    """Yield what was left where a correction was held because of what had failed, a line per model and failure.
+    """Yield the residual while a correction was held because of failures, one line per model and failure.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def _held_words(target: str, unit: str, cost: Cost) -> str:
 
 
 def draw_timeline(log: FaultLog, recording: Recording) -> Drawn:
-    """Show which sensor was not believed when, and why; above it the spindle speed.
+    """Plot when and why each sensor was rejected, with the spindle speed above.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def draw_timeline(log: FaultLog, recording: Recording) -> Drawn:
             needed = room * (len(words) + 1)
             late = begin + needed > hours[-1]
             start = begin - needed if late else begin
-            if start >= free.get(f.sensor, -math.inf):  # what would run into the words before it is left out
+            if start >= free.get(f.sensor, -math.inf):  # omit text that would overlap the preceding text
                 ax.annotate(
                     words, (begin, k), (-3 if late else 3, 0), textcoords="offset points", fontsize=7, zorder=3,
                     ha="right" if late else "left", va="center",
@@ -173,7 +173,7 @@ def draw_timeline(log: FaultLog, recording: Recording) -> Drawn:
 
 
 def draw_stand_ins(log: FaultLog) -> Drawn:
-    """Show the readings of failed sensors, and the substitute temperature.
+    """Plot the readings of failed sensors, and the substitute temperatures.
 
     Parameters
     ----------
@@ -214,7 +214,7 @@ def _around(read: FloatArray, stood_in: FloatArray) -> tuple[float, float]:
     sure = np.where(np.isfinite(stood_in), stood_in, read)
     low, high = float(np.nanmin(sure)), float(np.nanmax(sure))
     far = AROUND + (high - low)
-    near = read[(read >= low - far) & (read <= high + far)]  # nan is not
+    near = read[(read >= low - far) & (read <= high + far)]  # excludes nan
     low, high = min(low, float(near.min(initial=low))), max(high, float(near.max(initial=high)))
     room = 0.05 * max(high - low, 0.5)
     return low - room, high + room
@@ -265,7 +265,7 @@ def _cost_table(title: str, unit: str, costs: Sequence[Cost]) -> Layout:
 
 
 def _when(seconds: float, recording: Recording) -> str:
-    """Return an instant, with the clock of the wall where that is known."""
+    """Return a time, with date and clock time if known."""
     if not recording.start:
         return f"{seconds / 3600:.2f} h"
     clock = datetime.fromisoformat(recording.start) + timedelta(seconds=seconds - float(recording.time[0]))

@@ -1,4 +1,4 @@
-"""Figures of the report, as SVG text. Each answers one question, which is given in its docstring."""
+"""Figures of the report as SVG text. Each docstring states the purpose of the figure."""
 
 from collections.abc import Sequence
 
@@ -14,22 +14,22 @@ from thermocomp.report.drawing import Drawn, add_legend, drawing, log_ticks, nam
 
 FloatArray = NDArray[np.float64]
 
-#: colour-blind safe (Okabe, Ito 2008)
+#: colour-blind safe palette (Okabe, Ito 2008)
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 MEASURED, PREDICTED, RESIDUAL, NONE = "#444444", "#0072B2", "#D55E00", "#999999"
-#: how a dot is filled
+#: fill of a dot by verdict
 FILLED = {"accepted": PREDICTED, "unproven": "#9ecae1", "refused": "white"}
 SHADE = "#f1f1ee"
 BAND = "#d6e8f5"
-#: characters of a name along an axis
+#: maximum length of a name along an axis [characters]
 LONGEST = 28
-#: of the smallest writing, that find room across a page beside a legend
+#: number of characters in the smallest font across a page next to a legend
 LETTERS = 95
-POINTS = 1200  # of a curve across the page: enough for the eye, light enough for a file
+POINTS = 1200  # per curve across the page: sufficient resolution at a small file size
 
 
 def measured(recording: Recording) -> Drawn:
-    """Show what was measured in one test: speed, temperatures, displacements; thermal cycles shaded."""
+    """Plot the measurements of one test: speed, temperatures, displacements; thermal cycles shaded."""
     hours = recording.time / 3600
     speed = recording.speed
     heights = ([1] if speed else []) + [2.2, 2.2]
@@ -48,7 +48,7 @@ def measured(recording: Recording) -> Drawn:
             free = -np.inf
             for cycle in recording.cycles:
                 start, name = float(hours[cycle.start]), f" {shorten(cycle.name, LONGEST)}"
-                if start >= free:  # names that would run into the one before are left out
+                if start >= free:  # omit names that would overlap the preceding one
                     ax.text(start, 1.03, name, transform=ax.get_xaxis_transform(), fontsize=7, color="#666")
                     free = start + room * (len(name) + 1)
         for ax, channels, unit, title in (
@@ -78,7 +78,7 @@ def measured(recording: Recording) -> Drawn:
 
 
 def overview(comparison: Comparison) -> Drawn:
-    """Show which model is best, and whether it is better than none: RMS on unseen blocks; hollow is refused."""
+    """Plot the RMS of all models on unseen blocks, compared with no compensation; hollow dots are refused."""
     overall = comparison.overall()
     targets = list(dict.fromkeys(a.target for a in overall))
     models = list(dict.fromkeys(a.model for a in overall))
@@ -106,14 +106,14 @@ def overview(comparison: Comparison) -> Drawn:
 
 
 def prediction(assessment: Assessment, blocks: Sequence[Assessment], time: Sequence[FloatArray]) -> Drawn:
-    """Show how a model runs through each unseen block: measured, predicted and what is left.
+    """Plot a model over each unseen block: measured, predicted and residual.
 
     Parameters
     ----------
     assessment : Assessment
-        The model over all blocks.
+        Assessment of the model over all blocks.
     blocks : sequence of Assessment
-        The blocks, one panel each.
+        Assessments of the single blocks, one panel each.
     time : sequence of ndarray
         Times of each recording's rows [s].
     """
@@ -158,7 +158,7 @@ def prediction(assessment: Assessment, blocks: Sequence[Assessment], time: Seque
 
 
 def _draw_band(ax: Axes, block: Assessment, hours: FloatArray, points: int) -> None:
-    """Draw the band about what the model alone predicts; nothing where there is none."""
+    """Draw the band about the prediction of the model alone; nothing where it is missing."""
     alone = block.predicted if block.alone is None else block.alone
     assert block.half_widths is not None
     rows = slice(None, None, max(1, len(hours) // points))
@@ -167,7 +167,7 @@ def _draw_band(ax: Axes, block: Assessment, hours: FloatArray, points: int) -> N
 
 
 def robustness(comparison: Comparison, model: str) -> Drawn:
-    """Show what noise and a lost sensor cost: RMS clean, with noise, and with each sensor cut off."""
+    """Plot the effect of noise and of a lost sensor: RMS clean, with noise, and with each sensor cut off."""
     found = [a for a in comparison.overall() if a.model == model and a.robustness is not None]
     with drawing("robustness" + model):
         figure = Figure(figsize=(9.6, 0.6 + 0.42 * len(found)), layout="constrained")
@@ -207,7 +207,7 @@ def robustness(comparison: Comparison, model: str) -> Drawn:
 
 
 def clock(block: Assessment, time: Sequence[FloatArray]) -> FloatArray:
-    """Return hours since the block's first row; tests follow each other without a gap."""
+    """Return hours since the first row of a block; tests follow each other without a gap."""
     seconds = np.array([time[t][r] for t, r in zip(block.test, block.row, strict=True)])
     for k in np.flatnonzero(np.diff(block.test)) + 1:
         seconds[k:] += seconds[k - 1] - seconds[k]
@@ -222,7 +222,7 @@ def _shade_cycles(ax: Axes, recording: Recording) -> None:
 
 
 def thin_points(x: FloatArray, y: FloatArray, points: int = POINTS) -> tuple[FloatArray, FloatArray]:
-    """Return at most about `points` points, the extremes of each stretch among them."""
+    """Return about `points` points at most, including the extremes of each interval."""
     stretch = len(x) // (points // 2)
     if stretch < 2 or not np.isfinite(y).all():
         return x, y

@@ -1,4 +1,4 @@
-"""Numbers, then a dict, then a template, then one offline HTML file."""
+"""Reports as offline HTML files: numbers are collected in a dict and rendered by a template."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -21,15 +21,15 @@ from thermocomp.report.summary import summarise
 
 
 def render(comparison: Comparison, recordings: Sequence[Recording], samples: Samples | None = None) -> str:
-    """Return the report as one HTML page that needs no network.
+    """Return the report as a self-contained HTML page.
 
     Parameters
     ----------
     comparison : Comparison
     recordings : sequence of Recording
-        The tests behind it, in the order they were stacked.
+        Recordings of the comparison, in the order of its rows.
     samples : Samples, optional
-        All rows of the comparison: the formula shown is that of the best method fitted to them.
+        All rows of the comparison: the formula shown is that of the best method fitted to these rows.
 
     Returns
     -------
@@ -60,7 +60,7 @@ def render(comparison: Comparison, recordings: Sequence[Recording], samples: Sam
 
 
 def draw_runs(comparison: Comparison, recordings: Sequence[Recording]) -> dict[str, tuple[str, Drawn, str]]:
-    """Return figures of the best model of each target; if none may be used, of the least bad, marked as refused.
+    """Return figures of the best model of each target; if none may be used, of the least bad one, marked as refused.
 
     Parameters
     ----------
@@ -70,14 +70,14 @@ def draw_runs(comparison: Comparison, recordings: Sequence[Recording]) -> dict[s
     Returns
     -------
     dict of str to (str, Drawn, str)
-        By target: the model, its run through the judged blocks, and how its band did; of no target without a run.
+        By target: model, its course over the judged blocks, and coverage of its band; only targets with a course.
     """
     times = [r.time for r in recordings]
     overall = comparison.overall()
     drawn = {}
     for target in dict.fromkeys(a.target for a in overall):
         shown = comparison.best(target)
-        if shown is None:  # nothing may be used: show the least bad, marked as refused
+        if shown is None:  # no usable model: show the least bad one, marked as refused
             candidates = [a for a in overall if a.target == target and not a.failure]
             shown = min(candidates, key=lambda a: a.metric("rms"), default=None)
         if shown is not None:
@@ -93,12 +93,12 @@ def _held(shown: Assessment) -> str:
 
 
 def render_choices(choices: Sequence[Choice], recordings: Sequence[Recording]) -> str:
-    """Return a selection of sensors as one HTML page that needs no network.
+    """Return a selection of sensors as a self-contained HTML page.
 
     Parameters
     ----------
     choices : sequence of Choice
-        All by one method.
+        Choices, all by one method.
     recordings : sequence of Recording
 
     Returns
@@ -115,12 +115,12 @@ def render_choices(choices: Sequence[Choice], recordings: Sequence[Recording]) -
 
 
 def page(template: str, **content: Any) -> str:
-    """Return a page of a template; all of them name the version."""
+    """Return a page rendered from a template, with the version."""
     return environment().get_template(template).render(version=__version__, **content)
 
 
 def _shown(value: Any) -> Any:
-    """Return a value as a page shows it: words have no sign that cannot be printed, or that turns others around."""
+    """Return a value as shown on a page: text without unprintable or direction-changing characters."""
     return replace_unprintable(value) if isinstance(value, str) and not isinstance(value, Markup) else value
 
 

@@ -1,4 +1,4 @@
-"""A table as it is laid out, whatever shows it: a terminal draws it by rich, a page by a template."""
+"""Layout of a table, independent of its output: rich draws it on a terminal, a template on a page."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -35,19 +35,19 @@ def verdict(word: str) -> Toned:
 
 @dataclass(frozen=True)
 class Column:
-    """A column: what it shows of a row, and how.
+    """A column: the value taken from each row, and its format.
 
     Parameters
     ----------
     heading : str
     value : str, int or callable
-        Name or place of the value in the row, or what makes it of the row.
+        Name or index of the value in the row, or a function of the row.
     form : str
-        Format of numbers, as in Python, or ``um``: hundredths, and nothing finer on a page than makes sense. Without
-        one the column holds words, on the left; ``>`` sets what is not a number to the right.
+        Python format of numbers, or ``um``: hundredths, or fewer digits on a page where appropriate. Default: text,
+        left-aligned; with ``>`` right-aligned.
     unit : str
     whole : bool
-        Its cells are never broken over two lines.
+        Whether its cells are never wrapped.
     """
 
     heading: str
@@ -57,7 +57,7 @@ class Column:
     whole: bool = False
 
     def text(self, row: Any, *, page: bool = False) -> str:
-        """Return the cell of a row as text; what is not known is empty, or a dash among the numbers of a page."""
+        """Return the cell of a row as text; an unknown value is empty, or a dash among the numbers of a page."""
         found: Any = self.value(row) if callable(self.value) else row[self.value]
         if page and self.form == "um":
             return in_um(found)
@@ -66,13 +66,13 @@ class Column:
         if isinstance(found, str):
             return found
         if isinstance(found, float) and self.form == "um":
-            return f"{round(found, 2) + 0.0:.2f}"  # no minus zero
+            return f"{round(found, 2) + 0.0:.2f}"  # avoids -0.00
         return format(found, self.form) if isinstance(found, float) else str(found)
 
 
 @dataclass(frozen=True)
 class Layout:
-    """A table: columns, and the rows that they look at.
+    """A table: columns, and the rows from which they take their values.
 
     Parameters
     ----------
@@ -83,11 +83,11 @@ class Layout:
     caption : str
         Meaning of the numbers; a page explains it in its text around the table.
     note : str
-        A paragraph below it.
+        Paragraph below the table.
     tones : dict of int to str
         Highlighted rows, by index: best (the chosen one) or none (no compensation).
     sections : frozenset of int
-        Rows above which there is a line.
+        Indices of rows with a line above them.
     """
 
     columns: Sequence[Column]
@@ -114,10 +114,10 @@ def _cell(place: int, row: Sequence[Cell]) -> str:
 
 
 def in_um(value: float | None) -> str:
-    """Return a number as the pages show it."""
+    """Return a number as shown on pages."""
     if value is None or not math.isfinite(value):
         return "–"
-    return f"{round(value, 2) + 0.0:.2f}" if abs(value) < 100 else f"{value:.0f}"  # no minus zero
+    return f"{round(value, 2) + 0.0:.2f}" if abs(value) < 100 else f"{value:.0f}"  # avoids -0.00
 
 
 @dataclass(frozen=True)
@@ -128,9 +128,9 @@ class PrintedLine:
     ----------
     text : str
     mark : Toned or None
-        Highlighted text before it.
+        Highlighted text before the line.
     whole : bool
-        It is not broken where the terminal ends.
+        Whether the line is not wrapped at the width of the terminal.
     """
 
     text: str

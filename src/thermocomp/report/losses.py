@@ -1,4 +1,4 @@
-"""Capabilities of the temperature watch, and the loss of accuracy with a lost sensor, in words."""
+"""Capabilities of the temperature watch, and the loss of accuracy with a lost sensor, as text."""
 
 from collections.abc import Iterator, Sequence
 
@@ -7,7 +7,7 @@ from thermocomp.core.model import ErrorModel
 
 
 def describe_losses(models: Sequence[ErrorModel]) -> Iterator[str]:
-    """Yield lines about models that are watched over: what each lost sensor costs, and which are watched badly.
+    """Yield lines about watched models: the effect of each lost sensor, and sensors that are watched poorly.
 
     Parameters
     ----------

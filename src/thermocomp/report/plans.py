@@ -1,4 +1,4 @@
-"""The figure of a plan: the gap that the next test fills, what each test would bring, and how the error falls."""
+"""Figure of a plan: the gap filled by the next test, the expected benefit of each test, and the learning curve."""
 
 from typing import Any
 
@@ -12,12 +12,12 @@ from thermocomp.judging.planning.trial import Trial
 from thermocomp.report.drawing import Drawn, add_legend, drawing, name_ticks, svg
 from thermocomp.report.figures import MEASURED, NONE, PREDICTED, RESIDUAL, SHADE
 
-#: how the next test is marked
+#: marker of the next test
 _STAR: dict[str, Any] = {"marker": "*", "ms": 12, "ls": "", "color": RESIDUAL, "zorder": 4}
 
 
 def draw(plan: Plan, curve: LearningCurve | None) -> Drawn:
-    """Draw what was recorded with the next test in its gap; below it all tests, and the learning curve if there is one.
+    """Draw the recorded data with the next test in its gap; below it all tests, and the learning curve if any.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def draw(plan: Plan, curve: LearningCurve | None) -> Drawn:
 
 
 def _draw_runs(ax: Axes, plan: Plan) -> None:
-    """Show at which speed was run for how long, and where the next test is."""
+    """Plot speed and duration of the recorded runs, and the next test."""
     recorded = [(v, length / 3600) for v, length, _ in plan.covered.runs]
     ax.plot(*np.array(recorded).T, "o", color=MEASURED, ms=4, alpha=0.7, label="recorded")
     others = {(c.trial.speed, _longest(c.trial)) for c in plan.candidates if c.trial.kind != "room"}
@@ -60,7 +60,7 @@ def _draw_runs(ax: Axes, plan: Plan) -> None:
 
 
 def _draw_stops(ax: Axes, plan: Plan) -> None:
-    """Show how long was stopped after runs at which speed."""
+    """Plot the duration of stops against the speed of the preceding run."""
     recorded = [(v, stop / 3600) for v, _, stop in plan.covered.runs]
     ax.plot(*np.array(recorded).T, "o", color=MEASURED, ms=4, alpha=0.7)
     best = plan.candidates[0].trial
@@ -70,7 +70,7 @@ def _draw_stops(ax: Axes, plan: Plan) -> None:
 
 
 def _draw_room(ax: Axes, plan: Plan) -> None:
-    """Show how far the room changed within each test."""
+    """Plot the change of the ambient temperature within each test."""
     rooms = plan.covered.rooms
     ax.bar(range(1, 1 + len(rooms)), rooms, color=MEASURED, width=0.6)
     if not rooms:
@@ -90,7 +90,7 @@ def _draw_room(ax: Axes, plan: Plan) -> None:
 
 
 def _draw_tests(ax: Axes, plan: Plan) -> None:
-    """Show what each test would bring."""
+    """Plot the expected benefit of each test."""
     ax.barh(range(len(plan.candidates)), [c.gain for c in plan.candidates], color=PREDICTED, height=0.7)
     name_ticks(ax.yaxis, [c.trial.words for c in plan.candidates], fontsize=7)
     ax.invert_yaxis()
@@ -100,7 +100,7 @@ def _draw_tests(ax: Axes, plan: Plan) -> None:
 
 
 def _draw_curve(ax: Axes, curve: LearningCurve) -> None:
-    """Show how the error falls with what was learned from."""
+    """Plot the error against the number of training cycles."""
     levels = curve.by_cycles()
     ax.plot([p.learned for p in curve.points], [p.rms for p in curve.points], ".", color="#bbbbbb")
     learned, rms = [x.learned for x in levels], [x.rms for x in levels]
@@ -119,7 +119,7 @@ def _longest(trial: Trial) -> float:
 
 
 def _finish(ax: Axes, plan: Plan, title: str, what: str, room: float = 0.1) -> None:
-    """Shade what counts as the speed of the next test, name the axes, and leave room above the points."""
+    """Shade the speed range of the next test, label the axes, and leave room above the points."""
     best = plan.candidates[0].trial
     if best.kind != "room":
         near = SAME * plan.top_speed

@@ -1,4 +1,4 @@
-"""Terminal output of a result: lines and tables, in their order."""
+"""Terminal output of a result: lines and tables in order."""
 
 from collections.abc import Iterator, Sequence
 
@@ -24,7 +24,7 @@ BUT, NOTE = Toned("but", "doubtful"), Toned("note", "soft")
 
 
 def comparison(found: Comparison) -> Iterator[Item]:
-    """Yield a comparison of methods on unseen blocks."""
+    """Yield the output of a comparison of methods on unseen blocks."""
     yield from _starts(found.starts)
     yield PrintedLine(f"Judged on: {found.judging.name}")
     yield _assessment_table(found.assessments)
@@ -50,7 +50,7 @@ def comparison(found: Comparison) -> Iterator[Item]:
 
 
 def choices(found: Sequence[Choice]) -> Iterator[Item]:
-    """Yield selections of sensors."""
+    """Yield the output of sensor selections."""
     for c in found:
         for t in c.tables:
             yield from _titled(f"{c.target}: {t.title}", t)
@@ -60,7 +60,7 @@ def choices(found: Sequence[Choice]) -> Iterator[Item]:
 
 
 def fit(fitted: Fitted) -> Iterator[Item]:
-    """Yield models that were fitted."""
+    """Yield the output of fitted models."""
     overall = fitted.comparison.overall()
     models = [records.model(m, r2, a) for m, r2, a in zip(fitted.models, fitted.r_squared, overall, strict=True)]
     yield from _starts(fitted.comparison.starts)
@@ -82,7 +82,7 @@ def fit(fitted: Fitted) -> Iterator[Item]:
 
 
 def assess(judged: Judged, recordings: Sequence[Recording]) -> Iterator[Item]:
-    """Yield how models did on recordings."""
+    """Yield the output of models judged on recordings."""
     logs = find_faults(judged, recordings)
     yield from _starts(judged.starts)
     for line in describe_faults(logs, recordings):
@@ -190,11 +190,11 @@ def _band_words(assessments: Sequence[Assessment]) -> str:
 
 
 def _cycle_table(assessments: Sequence[Assessment]) -> Layout:
-    """Return the RMS in every unseen cycle, a section per target; whatever there is more of goes down the page."""
+    """Return the RMS in each unseen cycle, a section per target; rows are models or cycles, whichever are more."""
     models = ["none", *dict.fromkeys(a.model for a in assessments)]
     cycles = list(dict.fromkeys(c.name for a in assessments for c in a.verdict.units))
     down, across = (models, cycles) if len(models) > len(cycles) + 1 else (cycles, models)
-    space = " " if down is models else ""  # where others have their mark
+    space = " " if down is models else ""  # in place of the mark of other cells
     rows: list[tuple[str, ...]] = []
     sections = set()
     for mine in _by_target(assessments):

@@ -1,4 +1,4 @@
-"""Effect of probings: in words, and as a section of a page with the state learned after each."""
+"""Effect of probings: as text, and as a section of a page with the state learned after each probing."""
 
 from collections.abc import Iterator, Sequence
 
@@ -15,12 +15,12 @@ from thermocomp.report.sections import Section, Shown
 
 
 def describe_probings(assessments: Sequence[Assessment]) -> Iterator[str]:
-    """Yield lines about models that were judged with probings.
+    """Yield lines about models judged with probings.
 
     Parameters
     ----------
     assessments : sequence of Assessment
-        The last words on models and targets.
+        Overall assessments of models and targets.
 
     Yields
     ------
@@ -61,7 +61,7 @@ def section(judged: Judged, recordings: Sequence[Recording]) -> Section | None:
 
 
 def draw_shifts(probed: Sequence[Assessment], recordings: Sequence[Recording]) -> Drawn:
-    """Show, target by target, what models are wrong by without probings, and what was added after each."""
+    """Plot, for each target, the model error without probings, and the shift added after each probing."""
     times = [r.time for r in recordings]
     with drawing("probings"):
         figure = Figure(figsize=(9.6, 0.6 + 1.7 * len(probed)), layout="constrained")

@@ -1,4 +1,4 @@
-"""Results as plain numbers and words: what ``--json`` prints, and what tables look at."""
+"""Results as plain numbers and text: output of ``--json``, and source of the tables."""
 
 import json
 from collections.abc import Sequence
@@ -16,9 +16,9 @@ from thermocomp.recordings.checks.findings import Finding
 from thermocomp.recordings.recording import Recording
 from thermocomp.report.layout import Column
 
-#: values of a remedy that are shown
+#: maximum number of values of a remedy shown
 _FEW = 6
-#: of channels: from where to where they went, and what is missing
+#: columns of a channel table: range of the values, and missing values
 RANGE = (
     Column("smallest", "smallest", ".4g"),
     Column("largest", "largest", ".4g"),
@@ -54,7 +54,7 @@ def recording(r: Recording, found: Sequence[Finding]) -> dict[str, Any]:
 
 
 def remedy(content: Remedy) -> str:
-    """Return a remedy as a line of words: the tables of a mapping and their keys."""
+    """Return a remedy as a line of text: the tables of a mapping and their keys."""
     parts = []
     for step in content.get("clean", ()):
         parts.append(f"[[clean]] {_keys(step)}")
@@ -65,7 +65,7 @@ def remedy(content: Remedy) -> str:
 
 
 def _keys(table: Remedy) -> str:
-    """Return keys and values as TOML has them; of many values the first."""
+    """Return keys and values in TOML format; only the first of many values."""
     shown = {k: [*v[:_FEW], "..."] if isinstance(v, list) and len(v) > _FEW else v for k, v in table.items()}
     return ", ".join(f"{k} = {json.dumps(v, ensure_ascii=False)}" for k, v in shown.items())
 
@@ -86,14 +86,14 @@ def _channel(r: Recording, c: Channel) -> dict[str, Any]:
 
 
 def stretches(rows: Sequence[int] | np.ndarray[Any, Any]) -> list[list[int]]:
-    """Return rows as stretches: first row, and the row after the last."""
+    """Return runs of consecutive rows: first row, and the row after the last one."""
     ordered = np.unique(rows)
     cuts = [0, *(np.flatnonzero(np.diff(ordered) > 1) + 1).tolist(), len(ordered)]
     return [[int(ordered[a]), int(ordered[b - 1]) + 1] for a, b in pairwise(cuts)] if len(ordered) else []
 
 
 def assessment(a: Assessment) -> dict[str, Any]:
-    """Return the results of a model for a target, in a block or over all."""
+    """Return the results of a model for a target, in one block or overall."""
     content: dict[str, Any] = {
         "model": a.model,
         "target": a.target,
@@ -170,12 +170,12 @@ def _probed(a: Assessment) -> dict[str, Any]:
 
 
 def _band(a: Assessment) -> dict[str, Any]:
-    """Return the name of a model's band, the fraction of the judged rows inside it, and its width there."""
+    """Return the name of the band of a model, the fraction of judged rows inside it, and its mean half-width there."""
     return {"band": a.band or None, "coverage_pct": 100 * a.coverage, "half_width_um": a.half_width}
 
 
 def model(m: ErrorModel, r_squared: float, overall: Assessment) -> dict[str, Any]:
-    """Return a frozen model with its honest error, and how the bands did where the method was judged."""
+    """Return a frozen model with its honest error, and the coverage of its band on the judged data."""
     honest = m.honest_error
     return {
         "target": m.target,

@@ -1,10 +1,10 @@
-"""Compensator judged with the models: its gate and limits, in words."""
+"""Compensator judged with the models: its gate and limits, as text."""
 
 from collections.abc import Sequence
 
 from thermocomp.judging.results import Assessment
 
-#: models of which it is said what they leave without gate and limits; there is a number for each in the JSON
+#: maximum number of models reported without gate and limits; the JSON output has all
 MOST = 4
 
 
@@ -14,12 +14,12 @@ def describe_running(assessments: Sequence[Assessment]) -> list[str]:
     Parameters
     ----------
     assessments : sequence of Assessment
-        The last words on models and targets.
+        Overall assessments of models and targets.
 
     Returns
     -------
     list of str
-        The limits and what the models alone leave; targets without limits; readings that the gate turned away.
+        Limits and residuals of the models alone; targets without limits; readings rejected by the gate.
     """
     judged = [a for a in assessments if a.alone is not None and not a.failure]
     limited = [a for a in judged if a.limits is not None]

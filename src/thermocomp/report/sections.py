@@ -8,7 +8,7 @@ from thermocomp.report.layout import Layout
 
 
 class Shown(NamedTuple):
-    """A figure, and what it shows."""
+    """A figure and its caption."""
 
     figure: Drawn
     caption: str
@@ -19,4 +19,4 @@ class Section(NamedTuple):
 
     title: str
     parts: Sequence[str | Layout | Shown]
-    cautions: Sequence[str] = ()  #: what the verdict at the top of the page has to be read with
+    cautions: Sequence[str] = ()  #: reservations about the verdict at the top of the page

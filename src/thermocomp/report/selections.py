@@ -1,4 +1,4 @@
-"""Figures of a sensor selection, as SVG text. Each answers one question, which is given in its docstring."""
+"""Figures of a sensor selection as SVG text. Each docstring states the purpose of the figure."""
 
 from typing import Any, cast
 
@@ -13,10 +13,10 @@ from thermocomp.judging.choice import Choice, Table
 from thermocomp.report.drawing import Drawn, add_legend, drawing, log_ticks, name_ticks, svg
 from thermocomp.report.figures import COLOURS, LONGEST, NONE
 
-#: characters of the displacements above a figure
+#: maximum length of the displacement names above a figure [characters]
 TITLE = 80
 
-#: what is drawn of the other methods: the first of these that a table has, and the words beside it
+#: value plotted for the other methods: the first of these columns in the table, and its caption
 TOLD = {
     "RMS left out [um]": "Each number of sensors with its best set: what is left of thermal cycles that are left out.",
     "MSE_p [um^2]": "Each number of sensors with its best set: residual mean square.",
@@ -38,7 +38,7 @@ def draw(choice: Choice) -> tuple[Drawn, str] | None:
             "Left: correlation of every two temperatures, those of a group side by side and framed; names of "
             "representatives are bold. Right: the best subset of each number of representatives."
         )
-    # the sets that Wessel ranks come after the best for each displacement
+    # Wessel's ranked sets follow the best set for each displacement
     for table in reversed(choice.tables):
         for word, caption in TOLD.items():
             shown = [j for j, heading in enumerate(table.columns) if heading.startswith(word)]
@@ -48,9 +48,9 @@ def draw(choice: Choice) -> tuple[Drawn, str] | None:
 
 
 def rows(table: Table, value: int, target: str) -> Drawn:
-    """Show what each row of a table leaves: a number of sensors, a step, or a set, and a dot."""
+    """Plot the residual for each row of a table: a number of sensors, a step, or a set."""
     heading = table.columns[value]
-    share = not heading.endswith("]")  # 0.97 and 0.99 differ by a factor in what is left
+    share = not heading.endswith("]")  # 0.97 and 0.99 differ by a factor in the residual
     left = [abs(share - cast(float, row[value])) for row in table.rows]
     names = [j for j in table.words if j < value] or [0]
     words = [" ".join(str(row[j]) for j in names) for row in table.rows]
@@ -71,7 +71,7 @@ def rows(table: Table, value: int, target: str) -> Drawn:
 
 
 def grouping(g: Any, target: str) -> Drawn:
-    """Show collinear temperatures, groups in the correlation matrix, and the useful number of sensors: MSE_p.
+    """Plot collinear temperatures, groups in the correlation matrix, and the useful number of sensors: MSE_p.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def grouping(g: Any, target: str) -> Drawn:
 
 
 def budget(b: Budget) -> Drawn:
-    """Show how many sensors are needed: RMS on unseen cycles, how surely a sensor is chosen, how far they repeat."""
+    """Plot the number of sensors needed: RMS on unseen cycles, selection frequency, and collinearity of sensors."""
     sizes = np.arange(1, len(b.sensors) + 1)
     names = [str(n) for n in b.sizes]
     with drawing("budget" + ", ".join(b.targets)):

@@ -1,4 +1,4 @@
-"""A comparison as plain numbers and text: what the template prints."""
+"""A comparison as plain numbers and text, for the template."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -17,16 +17,16 @@ from thermocomp.recordings.samples import Samples
 from thermocomp.report import records
 from thermocomp.report.running import describe_running
 
-#: rows that are unlike the training are a caution if their RMS is so many times that of all rows
+#: ratio of the RMS of rows unlike the training to that of all rows above which they are a caution
 WORSE = 1.25
-#: metrics of the big table, in its order
+#: metrics of the main table, in order
 SHOWN = ("mae", "rms", "max_abs", "peak_to_peak", "reduction")
 
 
 def summarise(
     comparison: Comparison, recordings: Sequence[Recording], samples: Samples | None = None
 ) -> dict[str, Any]:
-    """Return the content of the report in words and numbers.
+    """Return the content of the report as text and numbers.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def summarise(
     recordings : sequence of Recording
     samples : Samples, optional
         All rows of the comparison: the best method is fitted to them for its formula, as ``thermocomp fit`` does.
-        Without them the formula is that of one fold, and is marked so.
+        Default: none, the formula is that of one fold, and is marked accordingly.
 
     Returns
     -------
@@ -84,7 +84,7 @@ def verdict(comparison: Comparison) -> str:
 
 
 def cautions(comparison: Comparison) -> list[str]:
-    """Return cautions not covered by the verdict: noise, lost sensors, readings outside the training range."""
+    """Return cautions not contained in the verdict: noise, lost sensors, readings outside the training range."""
     best = [a for t in dict.fromkeys(a.target for a in comparison.assessments) if (a := comparison.best(t)) is not None]
     known = [(a, a.robustness) for a in best if a.robustness is not None]
     found = []
@@ -99,7 +99,7 @@ def cautions(comparison: Comparison) -> list[str]:
     beyond = [f"{a.target} ({100 * r.outside:.0f} %)" for a, r in known if r.outside > 0.1]
     if beyond:
         found.append(f"many rows are outside the range the models were trained in: {_list(beyond)}.")
-    # where the error there is as elsewhere, it is no caution: left-out cycles have judged such rows
+    # no caution if the error there is as elsewhere: such rows were judged in left-out cycles
     found += [
         f"{a.target}: {describe_unlike(r)}."
         for a, r in known
@@ -109,9 +109,9 @@ def cautions(comparison: Comparison) -> list[str]:
 
 
 def harms(comparison: Comparison) -> list[str]:
-    """Return the usable models that noise or a lost sensor makes worse than no compensation, within the margin.
+    """Return usable models that noise or a lost sensor makes worse than no compensation, but within the margin.
 
-    Others are unproven for it, which is their reason.
+    Beyond the margin a model is unproven, with this as its reason.
     """
     best = [comparison.best(target) for target in dict.fromkeys(a.target for a in comparison.assessments)]
     return [
@@ -122,7 +122,7 @@ def harms(comparison: Comparison) -> list[str]:
 
 
 def describe_unlike(r: Robustness) -> str:
-    """Return the number of rows outside the joint support, and the error there, in words."""
+    """Return the fraction of rows outside the joint support and the error there, as text."""
     return (
         f"{100 * r.unlike:.0f} % of the rows are unlike the training (inputs together, or a speed between trained "
         f"ones), {r.unlike_rms:.2f} um RMS there"

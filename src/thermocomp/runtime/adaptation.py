@@ -1,13 +1,14 @@
-"""Adaptation: information from probings about a model's error, and its validity over time.
+"""Adaptation of a model by probings: estimated model error, and its decay over time.
 
-A Kalman filter over what may be wrong with a model: an offset of the size of its error on cycles that were left out,
-and, in a model that is the average of many structures, how much of each main direction of their differences is true. A
-probing says their sum. The offset is forgotten with a time constant of hours: it stands for what the machine does now;
-the rest is what the training left open, and is known for days. Without a probing the model says what it said.
+A Kalman filter estimates the components of the model error: an offset with the size of the error on left-out cycles,
+and, for a model that is the average of many structures, a coefficient for each principal direction of their
+differences. A probing measures the sum of these. The offset decays with a time constant of hours, since it represents
+the present state of the machine; the coefficients represent what the training left undetermined and decay over days.
+Without a probing, the output of the model is unchanged.
 
-A probing can be wrong: a chip on the sphere, the wrong tool, another unit. One probing alone moves a model by no more
-than `SUSPECT` standard deviations of what is expected; two that were made apart from each other and agree count in
-full; and none, however often it is repeated, moves it beyond what the model can be wrong by (`find_most`).
+A probing can be wrong: a chip on the sphere, the wrong tool, another unit. A single probing moves a model by no more
+than `SUSPECT` standard deviations of the expected error; two probings that agree and are separated in time count in
+full; and no probing, however often repeated, moves a model beyond its largest possible error (`find_most`).
 """
 
 from typing import NamedTuple
@@ -17,46 +18,46 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-#: with which the offset is forgotten, and what was learned of the structures [s]
+#: decay time constants of the offset and of the structure coefficients [s]
 OFFSET, STRUCTURES = 4 * 3600.0, 7 * 86400.0
-#: what no offset and no structure explains, as a share of the error on cycles that were left out
+#: error that neither the offset nor the structures explain, as a share of the error on left-out cycles
 UNEXPLAINED = 0.2
-#: a probing this many standard deviations from what is expected counts less, the further it is from it
+#: beyond this many standard deviations from the expected value, the weight of a probing decreases with the distance
 SUSPECT = 2.5
-#: a probing further than this many standard deviations from what is expected is refused
+#: beyond this many standard deviations from the expected value, a probing is refused
 IMPLAUSIBLE = 4.0
-#: errors of most cycles and days are smaller than their root mean square over all: down to this share of it
+#: errors in most cycles and days are smaller than the overall root mean square: lower bound of their share of it
 LEAST_USUAL = 0.5
-#: probings over which it is learned how large the errors of this day are
+#: number of probings over which the size of the present day's errors is averaged
 MEMORY = 5.0
-#: two probings confirm each other if they agree within this many standard deviations, and this much time lies between
-#: them [s]
+#: two probings confirm each other if they agree within this many standard deviations and are at least this far apart in
+#: time [s]
 AGREED, APART = 5.0, 600.0
-#: two that confirm each other show that the machine is unlike what the model was judged on: from then on errors of
-#: this many standard deviations are what it was seen to be wrong by
+#: two probings that confirm each other show that the machine behaves differently than in the validation of the model:
+#: from then on, their error counts as this many standard deviations of the offset
 UNLIKE = 3.0
-#: a model is wrong by at most this many times its error on cycles that were left out, and this many times the drift
-#: without compensation (both root mean squares)
+#: upper bounds of a model's error, as multiples of its error on left-out cycles and of the drift without compensation
+#: (both root mean squares)
 MOST, MOST_OF_DRIFT = 10.0, 3.0
-#: no error is counted on to be smaller [um]
+#: lower bound of all assumed errors [um]
 LEAST = 1e-3
 
 
 class Probing(NamedTuple):
-    """The deviation of the tool point as measured: without the correction that was in force [um].
+    """Measured deviation of the tool point without the correction in force [um].
 
-    It counts from the same zero as the model.
+    It has the same zero as the model.
     """
 
     deviation: float  #: [um]
-    repeatability: float = 0.5  #: of the probe, standard deviation [um]
-    position: float = 0.0  #: where on the axis [mm]
-    #: what tells it from others, such as an id or its time: a probing with one of them again is the same
+    repeatability: float = 0.5  #: of the probe, as standard deviation [um]
+    position: float = 0.0  #: position on the axis [mm]
+    #: identification, such as an id or its time: a further probing with one of these keys counts as the same probing
     keys: tuple[str, ...] = ()
 
     @property
     def identity(self) -> tuple[str, ...]:
-        """Its keys; its numbers if it has none."""
+        """Keys of the probing, or its numbers if it has none."""
         return self.keys or (f"{self.deviation} um at {self.position} mm, give or take {self.repeatability} um",)
 
 
@@ -65,16 +66,16 @@ class Adaptation(NamedTuple):
 
     mean: FloatArray  #: (n_directions + 1,)
     covariance: FloatArray  #: (n_directions + 1, n_directions + 1)
-    size: float  #: of the error without probings, root mean square [um]
-    spread: float  #: standard deviation of the offset without probings: the size, or more once it was seen [um]
-    time: float  #: of the last probing that was taken [s]
-    refused: float = np.nan  #: the error by the last probing, if that was not taken in full [um]
-    refused_since: float = -np.inf  #: when a probing said so first [s]
-    most: float = np.inf  #: no probing moves the model further [um]
-    usual: float = 1.0  #: variance of the errors of this day, as a share of that of the size
+    size: float  #: root mean square of the error without probings [um]
+    spread: float  #: standard deviation of the offset without probings: the size, or more if observed [um]
+    time: float  #: of the last probing that was used [s]
+    refused: float = np.nan  #: error measured by the last probing, if not used in full [um]
+    refused_since: float = -np.inf  #: time of the first probing with that error [s]
+    most: float = np.inf  #: maximum change of the model by probings [um]
+    usual: float = 1.0  #: variance of the errors on the present day, relative to that of the size
 
     def at(self, time: FloatArray | float) -> tuple[FloatArray, FloatArray]:
-        """Return mean, (..., n), and covariance, (..., n, n), at later times [s]: on their way back to no probing."""
+        """Return mean, (..., n), and covariance, (..., n, n), at later times [s], decaying to their prior values."""
         kept = self._kept(time)
         prior = np.ones(len(self.mean))
         prior[-1] = self.spread**2
@@ -100,9 +101,9 @@ class Adaptation(NamedTuple):
         return np.asarray(np.clip(found, -self.most, self.most))
 
     def narrowing(self, time: FloatArray | float, directions: FloatArray, floor: float) -> FloatArray:
-        """Return the remaining fraction of the half-width of a band; `floor` is that of the band [um].
+        """Return the factor on the half-width of an uncertainty band; `floor` is the floor of the band [um].
 
-        More than 1 where probings have shown that the machine is unlike what the band was judged on.
+        It exceeds 1 if probings have shown that the machine behaves differently than in the validation of the band.
         """
         _, covariance = self.at(time)
         weights = _beside(directions, floor / self.size)
@@ -122,9 +123,9 @@ def find_most(size: float, drift: float, magnitude: float) -> float:
     Parameters
     ----------
     size : float
-        Root mean square error on cycles that the model had not seen [um].
+        Root mean square error on unseen cycles [um].
     drift : float
-        The same without compensation: an error of a thermal model is no larger than what heat does to the machine [um].
+        The same without compensation: the error of a thermal model cannot exceed the thermal drift of the machine [um].
     magnitude : float
         Largest permitted correction [um].
 
@@ -141,11 +142,11 @@ def begin(size: float, n_directions: int, typical: float = np.inf, most: float =
     Parameters
     ----------
     size : float
-        Root mean square error on cycles that the model had not seen [um].
+        Root mean square error on unseen cycles [um].
     n_directions : int
-        0 to learn an offset alone.
+        Number of directions; 0 to estimate only an offset.
     typical : float
-        Root mean square error on most of these cycles; the size if that is less [um].
+        Root mean square error on most of these cycles, limited to the size [um].
     most : float
         See `find_most` [um].
 
@@ -174,7 +175,7 @@ def take(
     time : float
         Time of the probing [s].
     error : float
-        Measured error minus the output of the model without any probing [um].
+        Measured error minus the output of the model without probings [um].
     repeatability : float
         Repeatability of the probe, standard deviation [um].
 
@@ -197,7 +198,7 @@ def take(
     typical, noise, doubt = (known * before.usual + own) ** 0.5, own, (np.nan, -np.inf)
     alike = abs(error - before.refused) <= AGREED * (2 * own) ** 0.5
     since = before.refused_since if alike else time
-    if alike and time - since < APART:  # in the same chip
+    if alike and time - since < APART:  # possibly the same chip as before
         return before, f"as suspect as the one before: measure again {APART / 60:.0f} min or more after that"
     plausible = abs(surprise) <= IMPLAUSIBLE * typical
     if alike and not plausible:  # confirmed
@@ -207,7 +208,7 @@ def take(
         limit = f"{IMPLAUSIBLE * typical:.1f} um are plausible"
         why = f"{surprise:+.1f} um from what is expected, where {limit}: measure again after {APART / 60:.0f} min"
         return before._replace(refused=error, refused_since=since), why
-    elif not alike and abs(surprise) > SUSPECT * typical:  # as of a bad probe
+    elif not alike and abs(surprise) > SUSPECT * typical:  # possibly a bad probing
         noise, doubt = own + (known + own) * ((surprise / SUSPECT / typical) ** 2 - 1.0), (error, since)
     usual = before.usual + (min(surprise**2 / (known + own), SUSPECT**2) - before.usual) / MEMORY
     usual = max(usual, LEAST_USUAL**2)
@@ -228,5 +229,5 @@ def take(
 
 
 def _beside(directions: FloatArray, last: float) -> FloatArray:
-    """Return directions and behind them the weight of the offset."""
+    """Return the directions with the weight of the offset appended."""
     return np.concatenate([directions, np.full((*directions.shape[:-1], 1), last)], axis=-1)

@@ -1,4 +1,4 @@
-"""All models of a compensator, one reading further: each group with a separate zero."""
+"""Advance all models of a compensator by one reading, each group with a separate zero."""
 
 import math
 from collections.abc import Sequence
@@ -16,10 +16,10 @@ class Advanced(NamedTuple):
     """Models after a reading."""
 
     states: tuple[State, ...]
-    gathered: tuple[Gathered, ...]  #: readings that the zero is averaged of, where it is not known
-    said: list[float]  #: deviation of each; nan while its zero is not known
-    half_widths: list[float]  #: of the bands about them; nan without one
-    values: list[FloatArray]  #: what each took in; a reading of the zero is the mean of all of them
+    gathered: tuple[Gathered, ...]  #: readings averaged for a zero that is not yet known
+    said: list[float]  #: deviation of each model; nan while its zero is unknown
+    half_widths: list[float]  #: of the uncertainty bands; nan without a band
+    values: list[FloatArray]  #: inputs of each model; readings of the zero are replaced by their mean
     outside: tuple[str, ...]  #: inputs outside the trained range
 
 
@@ -31,7 +31,7 @@ def advance(
     time: float,
     dt: float,
 ) -> Advanced:
-    """Pass a reading that passed the gate to all models.
+    """Pass an accepted reading to all models.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def advance(
     time : float
         Time of the reading [s].
     dt : float
-        Since the reading before [s].
+        Time since the previous reading [s].
 
     Returns
     -------
@@ -80,8 +80,8 @@ def _zeroed(
 ) -> tuple[list[State], Gathered, bool, FloatArray]:
     """Add a reading to the zero if it belongs there; return whether the zero is now known, and the zeroed reading.
 
-    Once it is, the models go through the readings before this one, as if it had been known from the first of them; all
-    readings of the zero say their mean.
+    Once the zero is known, the models are advanced over the earlier readings as if it had been known from the start;
+    all readings of the zero are replaced by their mean.
     """
     before, values, zeroing = gathered, reading[1], group.lead.zeroing
     if gathered.belongs(zeroing, reading[0], reading[2]):

@@ -1,7 +1,7 @@
-"""The compensator over all readings of a test at once: what a replay is judged by.
+"""The compensator for all readings of a test at once, as used to judge a replay.
 
-The same gate, models and limits as `Compensator.step`, without the cost of one call per reading; a test
-holds the two together. The readings come when they were taken: none is stale, and the clock is their time.
+Same gate, models and limits as `Compensator.step`, without the cost of a call per reading; a test checks that they
+agree. Each reading arrives at its time of measurement, which is also the time of the clock, so none is stale.
 """
 
 import math
@@ -25,15 +25,15 @@ BoolArray = NDArray[np.bool_]
 class ModelRun(NamedTuple):
     """Outputs of a model in a test, and those of a compensator with it."""
 
-    deviation: FloatArray  #: (n_rows,), of the model alone: every complete reading is used, nothing is limited
-    compensated: FloatArray  #: (n_rows,), minus the correction in force: what is taken off the deviation
-    outside: BoolArray  #: (n_rows,), an input of the model alone was outside the trained range
-    rejected: BoolArray  #: (n_rows,), complete readings that the gate turned away
-    why: str  #: the first of them; empty if there is none
-    half_width: FloatArray  #: (n_rows,), of the band about `deviation`; nan without one, and where that is re-zeroed
-    shift: FloatArray  #: (n_rows,), what was learned from probings, and is in `compensated`
-    without: FloatArray  #: (n_rows,), `compensated` without any
-    refused: tuple[str, ...]  #: why probings were not used
+    deviation: FloatArray  #: (n_rows,), of the model alone: every complete reading is used, without limits
+    compensated: FloatArray  #: (n_rows,), minus the correction in force: the part removed from the deviation
+    outside: BoolArray  #: (n_rows,), whether an input of the model alone was outside the trained range
+    rejected: BoolArray  #: (n_rows,), complete readings that the gate rejected
+    why: str  #: reason for the first rejection; empty if there is none
+    half_width: FloatArray  #: (n_rows,), of the band about `deviation`; nan without a band, and after a re-zero
+    shift: FloatArray  #: (n_rows,), change due to probings, contained in `compensated`
+    without: FloatArray  #: (n_rows,), `compensated` without probings
+    refused: tuple[str, ...]  #: reasons why probings were refused
 
 
 def run(
@@ -49,29 +49,29 @@ def run(
     probed: FloatArray | None = None,
     repeatability: float = 0.5,
 ) -> ModelRun:
-    """Run a model, and a compensator with it, through a test.
+    """Run a model, and a compensator with this model, through a test.
 
     Parameters
     ----------
     model : ErrorModel
-        Model of any unit; refused or not: it is being judged.
+        Model of any unit, even if refused, since this run judges it.
     limits : Limits or None
-        None: the correction follows the model at once, as for a model that predicts another unit than that of limits.
+        None: the correction follows the model immediately, as for a model whose unit differs from that of the limits.
     time : ndarray of shape (n_rows,)
-        Rising [s].
+        Increasing time [s].
     values : ndarray of shape (n_rows, n_inputs)
-        In the order of the model's inputs; nan where a value is missing.
+        Values in the order of the model's inputs; nan where a value is missing.
     reference : array-like of shape (n_inputs,), optional
         Zero of the inputs; see `ErrorModel.init`.
     resting : ndarray of bool of shape (n_rows,), optional
-        The spindle is known to be stopped; nowhere if not given.
+        Whether the spindle is known to be stopped; default: never.
     anew : int, optional
-        Row from which deviations count again: from there it is the model minus what it says there, on average over the
-        rows that a zero is taken of, and the correction begins at zero again.
+        Row of a re-zero: from there, the deviation is the model output minus its mean over the rows of the new zero,
+        and the correction restarts at zero.
     undriven : ndarray of bool of shape (n_rows,), optional
-        The correction is not driven: sensors failed that the model must not lose. It is held, then fades.
+        Rows in which the correction is not driven because essential sensors failed: it is held, then fades.
     probed : ndarray of shape (n_rows,), optional
-        Deviation measured by a probing, nan where there was none: it takes effect from the next row on [um].
+        Deviation measured by a probing, nan elsewhere; it takes effect from the next row onwards [um].
     repeatability : float
         Repeatability of the probe, standard deviation [um].
 
@@ -90,7 +90,7 @@ def run(
     known = gate.known
     if anew is not None:
         counted, _ = _counted(alone.deviation, model, time, complete, stands, anew)
-        # the band is that of a deviation from the cold machine
+        # the band refers to a deviation from the cold machine
         alone = alone._replace(deviation=counted, half_width=np.full(len(time), np.nan))
         counted, known = _counted(gated.deviation, model, time, gate.passed, stands, anew)
         gated = gated._replace(deviation=counted)
@@ -126,7 +126,7 @@ def find_test_zero(
     usable: BoolArray,
     reference: Sequence[float] | FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray]:
-    """Find what counts as zero for a model in a test.
+    """Find the zero of a model in a test.
 
     Parameters
     ----------
@@ -141,9 +141,9 @@ def find_test_zero(
     Returns
     -------
     zero : ndarray of shape (n_inputs,)
-        nan where it is not known, for there is no reading.
+        nan if unknown because there is no reading.
     values : ndarray of shape (n_rows, n_inputs)
-        With the readings of the zero taken as their mean.
+        Values with the readings of the zero replaced by their mean.
     """
     return find_zero(model.zeroing, model.init(reference).reference, time, values, resting, usable)
 
@@ -155,21 +155,21 @@ class _Shown(NamedTuple):
 
 class _Answers(NamedTuple):
     deviation: FloatArray  #: (n_rows,)
-    outside: BoolArray  #: (n_rows,), an input was
-    half_width: FloatArray  #: (n_rows,), of the band; nan if it is not wanted
-    directions: FloatArray  #: (n_rows, n_directions); none if they are not wanted
+    outside: BoolArray  #: (n_rows,), whether an input was outside
+    half_width: FloatArray  #: (n_rows,), of the uncertainty band; nan if not requested
+    directions: FloatArray  #: (n_rows, n_directions); n_directions = 0 if not requested
 
 
 class _Gate(NamedTuple):
     passed: BoolArray  #: (n_rows,)
     zero: FloatArray  #: (n_inputs,)
-    known: int  #: the row in which it is known, and the correction begins to move
-    why: str  #: the first complete reading that did not pass
+    known: int  #: row from which the zero is known and the correction starts to move
+    why: str  #: reason why the first rejected complete reading did not pass
     window: list[int]  #: rows of the zero
 
 
 def _of_gate(values: FloatArray, gate: _Gate) -> tuple[FloatArray, BoolArray, FloatArray]:
-    """Return the readings with those of the zero taken as their mean, which of them pass, and the zero."""
+    """Return the readings with those of the zero replaced by their mean, which of them pass, and the zero."""
     rested = values.copy()
     if gate.window:
         rested[gate.window] = robust_mean(values[gate.window])
@@ -177,10 +177,10 @@ def _of_gate(values: FloatArray, gate: _Gate) -> tuple[FloatArray, BoolArray, Fl
 
 
 def _gated(model: ErrorModel, time: FloatArray, values: FloatArray, stands: BoolArray, zero: FloatArray) -> _Gate:
-    """Return the readings that pass the gate of the compensator."""
+    """Apply the gate of the compensator to all readings."""
     complete = np.asarray(np.isfinite(values).all(axis=1))
     passed, why, known, window = complete.copy(), "", 0, list[int]()
-    if np.isnan(zero).any():  # the first readings that pass decide what counts as zero
+    if np.isnan(zero).any():  # the first readings that pass determine the zero
         gathered, known = Gathered(), len(time)
         for row in np.flatnonzero(complete).tolist():
             found = explain_implausible(model, values[row].tolist(), zero.tolist())
@@ -210,7 +210,7 @@ def _gated(model: ErrorModel, time: FloatArray, values: FloatArray, stands: Bool
 def _counted(
     deviation: FloatArray, model: ErrorModel, time: FloatArray, used: BoolArray, stands: BoolArray, anew: int
 ) -> tuple[FloatArray, int]:
-    """Return deviations minus those where they count again, and the row from which the correction moves again."""
+    """Return the deviations relative to the re-zero, and the row from which the correction moves again."""
     own = anew + np.flatnonzero(used[anew:])
     count, known = first_rows(model.zeroing, time[own], stands[own])
     shift = float(deviation[own[:count]].mean()) if count else 0.0
@@ -220,7 +220,7 @@ def _counted(
 def _said(
     model: ErrorModel, time: FloatArray, values: FloatArray, used: BoolArray, zero: FloatArray, shown: _Shown
 ) -> _Answers:
-    """Return the output of the model per row; it is held at an unused reading."""
+    """Return the output of the model per row; it is held at unused readings."""
     rows = np.flatnonzero(used)
     nothing = np.full(len(time), np.nan)
     found = _Answers(np.zeros(len(time)), np.zeros(len(time), dtype=np.bool_), nothing, np.zeros((len(time), 0)))
@@ -240,11 +240,11 @@ def _said(
             if shown.directions:
                 each.append(model.directions(state, values[row]))
         directions = np.array(each) if each else directions
-    else:  # each reading stands alone: all in one step
+    else:  # readings are independent: all in one step
         state, answers = model.step(state, values[rows], 0.0)
         said, beyond = np.broadcast_to(answers, rows.shape), np.asarray(state.outside.any(axis=-1))
         width, directions = model.half_width(state, values[rows]), model.directions(state, values[rows])
-    before = np.cumsum(used) - 1  # the last reading that was used, per row
+    before = np.cumsum(used) - 1  # index of the last used reading, per row
     known = before >= 0
     directions, here = np.zeros((len(time), directions.shape[1])), directions
     for into, what in zip((*found[:3], directions), (said, beyond, width, here), strict=True):
@@ -260,7 +260,7 @@ def _adapted(
     repeatability: float,
     limits: Limits | None,
 ) -> tuple[_Answers, FloatArray, tuple[str, ...]]:
-    """Return answers with what is learned from probings, what that adds, and why probings were refused."""
+    """Return outputs adapted by probings, the change due to probings, and the reasons for refused probings."""
     honest = model.honest_error
     size, typical, drift = (0.0, 0.0, 0.0) if honest is None else (honest.rms, honest.typical, honest.none_rms)
     most = adaptation.find_most(size, drift, math.inf if limits is None else limits.magnitude)
@@ -280,7 +280,7 @@ def _adapted(
 
 
 def _moved(deviation: FloatArray, passed: BoolArray, time: FloatArray, limits: Limits | None, known: int) -> FloatArray:
-    """Return minus the correction in force after each reading; it stays zero until the row `known`."""
+    """Return minus the correction in force after each reading; it remains zero until the row `known`."""
     if limits is None:
         return np.where(np.arange(len(time)) < known, 0.0, deviation)
     found, offset, idle = np.zeros(len(time)), 0.0, 0.0

@@ -1,4 +1,4 @@
-"""Failure that explains the residuals of readings: of one sensor, or of two that are swapped."""
+"""Isolation of sensor faults: the failure of one sensor, or the swap of two, that best explains the residuals."""
 
 from typing import NamedTuple
 
@@ -11,30 +11,30 @@ from thermocomp.core.watch import Watch
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-#: how slow what is usual of a difference is [s]
+#: time constant of the low-passed difference of reading and prediction [s]
 USUAL = 1800.0
-#: two are not swapped if exchanging them ever left so much more than not, per sensor, in units of the unseen errors
+#: a swap is excluded once it has increased the mean square residual by this much, in units of the unseen errors
 AGAINST = 0.1
 
 
 class Blamed(NamedTuple):
-    """The likeliest failure of a kind, per run."""
+    """The most likely failure of one kind, per run."""
 
-    sensors: BoolArray  #: (..., n_sensors), who would have failed
-    rest: FloatArray  #: (...,), sum of squares of what it leaves, in units of the unseen errors; inf: there is none
-    worst: FloatArray  #: (...,), the largest of what it leaves, in units of the limits
+    sensors: BoolArray  #: (..., n_sensors), sensors that would have failed
+    rest: FloatArray  #: (...,), sum of squares of the residuals, in units of the unseen errors; inf: no failure
+    worst: FloatArray  #: (...,), largest residual, in units of the limits
 
 
 def one_fails(watch: Watch, difference: FloatArray, able: BoolArray) -> Blamed:
-    """Return the sensor whose failure, at once or after the lags, leaves least of the differences.
+    """Return the sensor whose failure, immediate or after the lags, leaves the smallest residuals.
 
     Parameters
     ----------
     watch : Watch
     difference : ndarray of shape (..., n_sensors)
-        Between reading and prediction; 0 where there is none [degC].
+        Difference of reading and prediction; 0 if there is none [degC].
     able : ndarray of bool of shape (..., n_sensors)
-        Sensors that can have failed.
+        Sensors that may have failed.
     """
     weights = watch.limits("unseen")
     scaled = difference / weights
@@ -61,37 +61,37 @@ def weigh_swaps(
     able: BoolArray,
     dt: FloatArray,
 ) -> tuple[FloatArray, Blamed]:
-    """Weigh whether two sensors have been swapped since the start.
+    """Assess whether two sensors have been swapped since the start.
 
-    What a sensor counts from was read at its terminals: exchanged are the changes, and their lags. Of two whose
-    responses differ, that soon speaks against it where all is well; a sensor that fails later is then alone.
+    The zero of each sensor was read at its own terminals, so the changes and their lags are exchanged. For two sensors
+    with different responses, sound data soon exclude a swap; a later failure can then only be that of a single sensor.
 
     Parameters
     ----------
     watch : Watch
     evidence : ndarray of shape (..., n_pairs)
-        For every two, low-passed; -inf once it spoke against them.
+        Low-passed evidence for each pair; -inf once excluded.
     x : ndarray of shape (..., n_sensors)
-        Readings, or their substitutes, minus the reference [degC].
+        Readings or their substitutes, minus the reference [degC].
     memory : ndarray of shape (..., n_memory)
         See `thermocomp.runtime.watch.WatchState`.
     able : ndarray of bool of shape (..., n_sensors)
-        Sensors whose readings and predictions can be gone by.
+        Sensors whose readings and predictions are reliable.
     dt : ndarray of shape (..., 1)
-        Since `evidence` was given; 0 where predictions are not known to hold [s].
+        Time since `evidence` was computed; 0 where predictions are not reliable [s].
 
     Returns
     -------
     evidence : ndarray of shape (..., n_pairs)
     both : Blamed
-        The two that leave least.
+        The pair that leaves the smallest residuals.
     """
     n, (direct, states) = len(watch.sensors), watch.read_out
     first, second = watch.pairs
     mine = np.isfinite(evidence) & able[..., first] & able[..., second]
     if not mine.any():
         return evidence, _nobody(able)
-    # most are spoken against soon: only what is open is computed, one row for each two of each run
+    # most pairs are soon excluded: compute only the remaining ones, with one row for each pair of each run
     *run, pair = np.nonzero(mine)
     one, other, of = first[pair], second[pair], tuple(run)
     own = np.eye(n) - direct
@@ -120,7 +120,7 @@ def _nobody(able: BoolArray) -> Blamed:
 
 
 def _least(rest: FloatArray, worst: FloatArray, sensors: BoolArray) -> Blamed:
-    """Return the failure of smallest residual; `sensors` (n_failures, n_sensors), the others (..., n_failures)."""
+    """Return the failure with the least residual; shapes: `sensors` (n_failures, n_sensors), rest (..., n_failures)."""
     place = rest.argmin(axis=-1)[..., None]
     return Blamed(
         sensors[place[..., 0]],

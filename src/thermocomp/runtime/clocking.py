@@ -1,8 +1,8 @@
-"""When a reading was taken, where clocks cannot be trusted.
+"""Time of a reading, with clocks that may be set.
 
-A reading carries a stamp of its source's clock, which may be set while the machine runs; the process has a monotone
-clock beside it. Stamps state how far two readings are apart if the monotone clock agrees. Corrections move by the
-monotone clock alone.
+A reading carries a stamp of its source's clock, which may be set while the machine runs; the process also has a
+monotonic clock. Stamps define the time between two readings if the monotonic clock agrees. Corrections move by the
+monotonic clock only.
 """
 
 import math
@@ -15,23 +15,23 @@ from thermocomp.runtime.state import CompensatorState, silence
 
 
 class Instant(NamedTuple):
-    """When a reading was taken."""
+    """Time of a reading."""
 
-    time: float  #: on the time of the state [s]
-    origin: float  #: of the state from now on [s]
+    time: float  #: on the time scale of the state [s]
+    origin: float  #: new origin of the state [s]
 
 
 def place(state: CompensatorState, reading: Reading, now: float, tick: float, limits: Limits) -> tuple[Instant, str]:
-    """Return the time of a reading, and the reason if the time is invalid; empty if it is valid.
+    """Return the time of a reading, and the reason if it is invalid (empty if valid).
 
     Parameters
     ----------
     state : CompensatorState
     reading : Reading
     now : float
-        The clock of the reading's source, now [s].
+        Present time of the clock of the reading's source [s].
     tick : float
-        The monotone clock of the process, now [s].
+        Present time of the monotonic clock of the process [s].
     limits : Limits
 
     Returns

@@ -1,12 +1,12 @@
-"""The compensator: one reading in, one correction per axis or target out. State in, state out.
+"""The compensator: one reading in, one correction per axis or target out; state in, state out.
 
-Processing chain of a reading: in time? -> watch (which temperatures are believed; substitutes) -> gate
-(complete? finite? plausible?) -> minus the zero and `ErrorModel.step` per model -> offset and slope per axis -> minus
-sign -> limits -> `Correction`. Rejected readings leave the state unchanged: every correction stays where it was, for
-`Limits.hold`, and fades after that; so does one whose model was never judged without the sensors that failed. The first
-readings after a start are averaged: they are what temperatures count from, and the corrections stay zero until it is
-known, while the spindle is stopped (`ErrorModel.zeroing`). A probing comes with a reading and counts from the next one
-on: it says what the models are wrong by (`thermocomp.runtime.adaptation`).
+Processing chain of a reading: time check -> watch (which temperatures are trusted; substitutes) -> gate (complete,
+finite, plausible) -> minus the zero and `ErrorModel.step` per model -> offset and slope per axis -> minus sign ->
+limits -> `Correction`. Rejected readings leave the state unchanged: every correction is held for `Limits.hold` and
+fades after that; the same applies to a correction whose model was never judged without the failed sensors. The first
+readings after a start, while the spindle is stopped, are averaged to the zero of the temperatures, and the corrections
+remain zero until it is known (`ErrorModel.zeroing`). A probing arrives with a reading and takes effect from the next
+reading onwards: it measures the error of the models (`thermocomp.runtime.adaptation`).
 """
 
 import math
@@ -40,7 +40,7 @@ from thermocomp.runtime.lookout import Lookout
 from thermocomp.runtime.state import Compensated, CompensatorState, Reference, Status
 from thermocomp.runtime.watch import WatchState, begin
 
-#: after a restart a correction has caught up once it is so near to what its models want [um]
+#: after a restart, a correction has caught up once it differs by no more than this from the output of its models [um]
 ARRIVED = 0.1
 
 ACTIVE = Status("active")
@@ -48,24 +48,25 @@ ACTIVE = Status("active")
 
 @dataclass(frozen=True, eq=False)
 class Compensator:
-    """Models, and what their corrections may never do. It remembers nothing: what it does is `CompensatorState`.
+    """Models, and the limits of their corrections. It has no memory: the state is a `CompensatorState`.
 
-    Made by `of` or `of_machine`.
+    Created by `of` or `of_machine`.
 
     Parameters
     ----------
     models : tuple of ErrorModel
-        Models of time, stepped one by one, each with a separate zero.
+        Models of time, stepped individually, each with a separate zero.
     lines : dict of str to DeviationLine
-        By target or axis.
+        Lines by target or axis.
     limits : Limits
     watching : bool
-        It may be made though none of its targets may run: to look at what they would do.
+        True: permit creation even if none of its targets may run, to observe their predictions.
 
     Raises
     ------
     InputError
-        None of its targets may run: the do-no-harm gate refused a model, or it is unproven and nobody has approved it.
+        None of its targets may run: the do-no-harm gate refused a model, or it is unproven and not approved by a
+        person.
     """
 
     models: tuple[ErrorModel, ...]
@@ -75,7 +76,7 @@ class Compensator:
 
     @cached_property
     def watches(self) -> tuple[Watch, ...]:
-        """Over the temperatures of the models: one per model file."""
+        """Watches over the temperatures of the models: one per model file."""
         found: list[Watch] = []
         for m in self.models:
             if m.watch is not None and m.watch not in found:
@@ -88,12 +89,12 @@ class Compensator:
 
     @cached_property
     def groups(self) -> tuple[Group, ...]:
-        """Models that go in step."""
+        """Models that are stepped together."""
         return Group.of(self.models)
 
     @cached_property
     def shadow(self) -> dict[str, Status]:
-        """Targets or axes that are predicted and must not run, and why."""
+        """Targets or axes that are predicted but must not run, with the reasons."""
         found = dict[str, Status]()
         for target, line in self.lines.items():
             try:
@@ -115,16 +116,16 @@ class Compensator:
         *,
         watching: bool = False,
     ) -> "Compensator":
-        """Return the compensator of some targets.
+        """Return the compensator of the given targets.
 
         Parameters
         ----------
         sources : sequence of ErrorModel or PositionModel
-            One per target [um]. Of a `PositionModel` the thermal part alone: its profile is a table in the controller;
-            where it is no straight line, the best one over the travel.
+            One per target [um]. Of a `PositionModel`, only the thermal part is used, since its profile is a table in
+            the controller; if the thermal part is not a straight line, it is replaced by the best line over the travel.
         limits : Limits
         watching : bool
-            It may be made though none of them may run.
+            True: permit creation even if none of the targets may run.
 
         Raises
         ------
@@ -152,16 +153,16 @@ class Compensator:
     def of_machine(
         cls, machine: Machine, at: ArrayLike, tool: ArrayLike | None = None, limits: Limits = Limits()
     ) -> "Compensator":
-        """Return the compensator of a machine's axes: the best straight line of each through one point.
+        """Return the compensator of a machine's axes, with the best straight line of each axis through one point.
 
         Parameters
         ----------
         machine : Machine
-            With its components.
+            Machine with its components.
         at : array-like of shape (3,)
             Positions of the other axes while one moves [mm].
         tool : array-like of shape (3,), optional
-            From the gauge point to the tip [mm]; the machine's own if not given.
+            Vector from the gauge point to the tip [mm]; default: that of the machine.
         limits : Limits
 
         Raises
@@ -170,7 +171,7 @@ class Compensator:
             A position is not finite, or a model may not run.
         """
         model = VolumetricModel(machine)
-        best_lines(model.field(np.zeros(len(model.stack.models))), at, tool)  # says what is wrong with them now
+        best_lines(model.field(np.zeros(len(model.stack.models))), at, tool)  # raises an error now if they are invalid
 
         def along(axis: str) -> Callable[[Sequence[float]], Deviation]:
             return lambda said: best_lines(model.field(np.asarray(said)), at, tool, axes=axis)[axis]
@@ -180,7 +181,7 @@ class Compensator:
         return cls(model.stack.models, {a.name: DeviationLine(every, a.travel, along(a.name)) for a in axes}, limits)
 
     def start(self) -> CompensatorState:
-        """Return the state of a compensator that has seen no reading: all corrections are zero."""
+        """Return the state of a compensator before the first reading: all corrections are zero."""
         none = {target: Correction(0.0) for target in self.lines}
         models, watches = [m.init() for m in self.models], tuple(begin(w) for w in self.watches)
         gathered = (Gathered(),) * len(self.models)
@@ -205,7 +206,7 @@ class Compensator:
         )
 
     def share(self, models: Sequence[State], state: CompensatorState) -> CompensatorState:
-        """Return a state with these models' states, in which what several of them have in common is one."""
+        """Return a state with the given model states, sharing objects that are equal in several of them."""
         found = list(models)
         for group in self.groups:
             for k, own in zip(group.members, group.share([found[k] for k in group.members]), strict=True):
@@ -213,20 +214,21 @@ class Compensator:
         return state._replace(models=tuple(found))
 
     def gate(self, state: CompensatorState, reading: Reading) -> str:
-        """Return the reason why a reading must not be used, regardless of its time; empty if it may.
+        """Return the reason why a reading must not be used, regardless of its time; empty if it may be used.
 
-        A temperature is plausible while it stays within its trained range widened by the whole span of that range. The
-        first readings decide what counts as zero: there the temperatures as a whole (their median) have to be within
-        `DAY` of the zero of the training, and each of them as near to the others as it was then, give or take
-        `MIN_SPAN` or its trained span. What nature sets no bounds to, a displacement or a bare number, has its trained
-        range, widened by `WIDE` times its width. The constants are those of `thermocomp.runtime.gate`.
+        A temperature is plausible within its trained range widened on either side by the span of that range. For the
+        first readings, which determine the zero, the median of the temperatures must lie within `DAY` of the zero of
+        the training, and the offset of each temperature from the others may differ from that in the training by at most
+        its trained span or `MIN_SPAN`, whichever is greater. Quantities without physical bounds (a displacement, a
+        dimensionless number) may take values in their trained range widened by `WIDE` times its width. The constants
+        are defined in `thermocomp.runtime.gate`.
 
         Parameters
         ----------
         state : CompensatorState
-            Before the reading.
+            State before the reading.
         reading : Reading
-            The inputs of all models have to be in it.
+            Must contain the inputs of all models.
 
         Returns
         -------
@@ -254,16 +256,16 @@ class Compensator:
         Parameters
         ----------
         state : CompensatorState
-            From `start`, `resume` or the previous `step`.
+            State from `start`, `resume` or the previous `step`.
         reading : Reading
         now : float
-            The clock of the reading's source, now [s].
+            Present time of the clock of the reading's source [s].
         probings : mapping of str to Probing, optional
-            By target or axis, made at the time of the reading. They count from the next reading on, each once: see
-            `thermocomp.runtime.identity`.
+            Probings by target or axis, made at the time of the reading. Each takes effect once, from the next reading
+            onwards: see `thermocomp.runtime.identity`.
         tick : float, optional
-            The monotone clock of the process, now [s]: corrections move by it. Without it `now` is taken; then a clock
-            that goes back makes them wait until it is where it was.
+            Present time of the monotonic clock of the process [s], by which corrections move. Default: `now`; if that
+            clock is set back, corrections wait until it has reached its previous time.
 
         Returns
         -------
@@ -300,7 +302,7 @@ class Compensator:
             answer = evaluate(line, self.models, stepped, instant.time, known, probing, failed, zero, most)
             raw[target], deviations[target] = answer.raw, answer.deviation
             if failed and (why := _unjudged(self.models[line.models], failed)):
-                held[target] = why  # no band either: how wrong the model is without these was never judged
+                held[target] = why  # no band either: the error without these sensors was never judged
                 continue
             if not math.isnan(answer.half_width):
                 widths[target] = answer.half_width
@@ -341,15 +343,15 @@ class Compensator:
         )
 
     def wait(self, state: CompensatorState, tick: float, why: str) -> tuple[CompensatorState, Compensated]:
-        """Let time go by without a usable reading: corrections stay for `Limits.hold`, then fade.
+        """Let time pass without a usable reading: corrections are held for `Limits.hold`, then fade.
 
         Parameters
         ----------
         state : CompensatorState
         tick : float
-            The monotone clock of the process, now [s].
+            Present time of the monotonic clock of the process [s].
         why : str
-            Reason why there is none.
+            Reason why there is no usable reading.
 
         Returns
         -------
@@ -396,7 +398,7 @@ class Compensator:
         return state._replace(watches=tuple(states)), Reading(reading.time, values, reading.positions)
 
     def _travel(self, state: CompensatorState, tick: float) -> float:
-        """Return the time that counts in a step: an outage, with rejected readings or with none, is no saved travel."""
+        """Return the time that counts in a step; outages and rejected readings do not accumulate travel."""
         if state.clock is None or not is_number(tick):
             return 0.0
         return max(0.0, min(tick - state.clock, self.limits.reading_age))
@@ -409,8 +411,8 @@ class Compensator:
         held: dict[str, str],
         driven: Collection[str] = (),
     ) -> "_Idle":
-        """Let corrections that nothing drives fade once they were held for long; state how they are."""
-        # one reading counts for no more than its age may be: a clock that leaps makes nothing fade
+        """Fade corrections that have not been driven for longer than the hold time; return their status."""
+        # each step counts for at most the maximum age of a reading: a clock jump does not cause fading
         travel = self._travel(state, tick)
         clock = state.clock if not is_number(tick) else tick if state.clock is None else max(state.clock, tick)
         corrections, states = dict(corrections), dict[str, Status]()
@@ -432,16 +434,16 @@ class Compensator:
 
 
 class _Idle(NamedTuple):
-    """Corrections that nothing drives, after a step; see `CompensatorState`."""
+    """Corrections after a step, and the status of those not driven; see `CompensatorState`."""
 
-    corrections: dict[str, Correction]  #: of all
+    corrections: dict[str, Correction]  #: of all targets or axes
     clock: float | None
     idle: dict[str, float]
-    states: dict[str, Status]  #: of those that nothing drives
+    states: dict[str, Status]  #: of those that are not driven
 
 
 def _unjudged(models: Sequence[ErrorModel], failed: Collection[str]) -> str:
-    """Return the reason why models must not drive a correction without the failed sensors; empty if they may."""
+    """Return the reason why models must not drive a correction without the failed sensors; empty if they may do so."""
     for model in models:
         lost = [n for n in failed if n in model.sensors]
         if lost and not model.may_lose(lost):

@@ -1,8 +1,8 @@
-"""One step for many: machines of one kind, each with its own zero, memory and correction, stepped in one tick.
+"""One step for many machines: machines of one kind, each with its own zero, memory and correction.
 
-For machines that share a linear model with lags (`LinearDynamic`): the same gate on each value, model and limits as in
-`Compensator.step`, as array operations over all machines at once. What is decided machine by machine (zeros, orders,
-restarts, sensor faults, probings) is not here: whoever runs a fleet does that with a `Compensator`.
+For machines that share a linear model with lags (`LinearDynamic`): the same gate for each value, model and limits as in
+`Compensator.step`, as array operations over all machines at once. Tasks for individual machines (zeros, commands,
+restarts, sensor faults, probings) are not included; use a `Compensator` for these.
 """
 
 from dataclasses import dataclass, field
@@ -18,29 +18,29 @@ from thermocomp.core.lagbank import step_response
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.runtime.gate import find_plausible_range
 
-#: any real array; its precision is that of the fleet
+#: any real array, with the precision of the fleet
 Array = NDArray[Any]
 
 
 @dataclass(eq=False)
 class Fleet:
-    """Machines that run one model, counted from their zeros; at first all corrections are zero.
+    """Machines that run one model, each relative to its own zero; initially all corrections are zero.
 
     Parameters
     ----------
     model : LinearDynamic
-        Accepted, or approved by a person; each signal a single input, and readings outside the training range clipped.
+        Accepted, or approved by a person; each signal is a single input, and readings are clipped to the trained range.
     zeros : array-like of shape (n_machines, n_inputs)
-        Zero of the inputs at each machine.
+        Zero of the inputs of each machine.
     limits : Limits
-        Limits of all of them.
+        Limits, the same for all machines.
     dtype : dtype
-        ``float32`` is half the memory and time; it differs from ``float64`` by less than 1e-3 um.
+        ``float32`` halves memory and time; it differs from ``float64`` by less than 1e-3 um.
 
     Raises
     ------
     InputError
-        The model is of another kind, must not run, or the zeros are not finite or of another shape.
+        The model is of another kind or must not run, or the zeros are not finite or have a wrong shape.
     """
 
     model: LinearDynamic
@@ -74,7 +74,7 @@ class Fleet:
             model.clip(np.full(len(model.inputs), -np.inf))[0],
             model.clip(np.full(len(model.inputs), np.inf))[0],
         )
-        # whole arrays: a broadcast bound takes numpy three times as long
+        # full arrays: numpy takes three times as long with a broadcast bound
         self._least, self._most = (np.repeat(b[:, None], n, axis=1).astype(kind) for b in (least, most))
         inputs = [signal[0] for signal in model.signals]
         self._follows = np.array([inputs[k] for k in model.lag_signals], dtype=np.intp)
@@ -95,19 +95,19 @@ class Fleet:
         Parameters
         ----------
         readings : ndarray of shape (n_inputs, n_machines)
-            In the order of the model's inputs [their units]; nan where there is none.
+            Readings in the order of the model's inputs [their units]; nan where a value is missing.
         dt : float
-            Since the tick before [s].
+            Time since the previous tick [s].
 
         Returns
         -------
         ndarray of bool of shape (n_machines,)
-            Machines whose reading was used. The others stay where they are for `Limits.hold`, then fade.
+            Machines whose reading was used. Corrections of the others are held for `Limits.hold`, then fade.
 
         Raises
         ------
         InputError
-            `readings` are of another shape, or `dt` is negative or not finite.
+            `readings` have a wrong shape, or `dt` is negative or not finite.
         """
         if np.shape(readings) != self._values.shape or not 0.0 <= dt < np.inf:
             raise InputError(f"readings of shape {np.shape(readings)} after {dt} s: expected {self._values.shape}")
@@ -140,7 +140,7 @@ class Fleet:
         return self._share[1]
 
     def _catch_up(self, rows: NDArray[np.intp], followed: Array) -> None:
-        """Advance the lags of machines over their own time since the reading before, or from rest."""
+        """Advance the lags of machines over the individual time since their last used reading, or from rest."""
         times = np.where(self._begun[rows], np.minimum(self._since[rows], GAP), np.inf)
         self._memory[:, rows] += step_response(times, self._taus[:, None]).astype(self.dtype) * followed
         self._begun[rows] = True

@@ -1,7 +1,7 @@
-"""The gate: readings that show a broken sensor, clock or wire, and not a warm machine, are rejected.
+"""The gate: rejects readings that indicate a broken sensor, clock or wire instead of a warm machine.
 
-It comes first, because numbers that are not numbers are treacherous further down: in Python ``max(-m, min(m, nan))`` is
-``m``, so a dead sensor would command the full correction.
+It is the first check, because nan values are dangerous in later steps: in Python ``max(-m, min(m, nan))`` is ``m``, so
+a dead sensor would command the full correction.
 """
 
 import math
@@ -19,35 +19,35 @@ from thermocomp.core.inputs import Input
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.reading import Reading
 
-#: what a sensor can say at all, per quantity: beyond it the sensor, not the machine, is the news
+#: possible values of each quantity: a value outside indicates a sensor failure
 PLAUSIBLE: dict[str, tuple[float, float]] = {
     "temperature": (-40.0, 150.0),  # degC
     "spindle_speed": (-500_000.0, 500_000.0),  # 1/min
     "position": (-100_000.0, 100_000.0),  # mm
 }
 
-#: any number at all; finite, so that an infinity is none
+#: any finite number
 ANY = (-sys.float_info.max, sys.float_info.max)
-#: how far the zero of a day may lie from the zero of the training [degC]
+#: maximum difference of the present zero from the zero of the training [degC]
 DAY = 15.0
-#: least room beyond the trained range of a temperature [degC]
+#: minimum margin outside the trained range of a temperature [degC]
 MIN_SPAN = 10.0
-#: room beyond the trained range of what nature sets no bounds to (a displacement, a number), in widths of that range
+#: margin outside the trained range of quantities without physical bounds (a displacement, a number), in range widths
 WIDE = 10.0
-#: how far ahead of the clock a reading may be stamped [s]
+#: maximum time by which the stamp of a reading may be ahead of the clock [s]
 CLOCK_SKEW = 1.0
 
 
 def explain_implausible(model: ErrorModel, values: Sequence[object], reference: Sequence[float]) -> str:
-    """Return which value of a reading must not be used and why; empty if all may.
+    """Return which value of a reading must not be used, and why; empty if all may be used.
 
     Parameters
     ----------
     model : ErrorModel
     values : sequence of shape (n_inputs,)
-        As a source gave them; None is a value that is missing.
+        As delivered by the source; None if a value is missing.
     reference : sequence of float of shape (n_inputs,)
-        Zero of the inputs; nan where it is not known yet.
+        Zero of the inputs; nan while unknown.
 
     Returns
     -------
@@ -58,7 +58,7 @@ def explain_implausible(model: ErrorModel, values: Sequence[object], reference: 
         if value is None:
             return f"{channel.name} is missing"
         low, high = find_plausible_range(channel, zero)
-        # a plain float needs no further look: a nan fails every comparison, an infinity those with finite bounds
+        # a plain float needs no further check: comparisons with nan fail, as do those of infinity with finite bounds
         if not ((type(value) is float or is_number(value)) and low <= value <= high):  # type: ignore[operator]
             return f"{channel.name} = {value} {channel.unit} is not plausible"
         if math.isnan(zero) and channel.quantity == "temperature":
@@ -85,7 +85,7 @@ def explain_untimely(reading: Reading, now: float, limits: Limits) -> str:
     ----------
     reading : Reading
     now : float
-        The clock of the reading's source, now [s].
+        Present time of the clock of the reading's source [s].
     limits : Limits
 
     Returns
@@ -105,9 +105,9 @@ def explain_untimely(reading: Reading, now: float, limits: Limits) -> str:
 
 
 def find_plausible_range(channel: Input, zero: float) -> tuple[float, float]:
-    """Return the range outside which a value shows that the sensor is broken, not that the machine is warm.
+    """Return the range outside which a value indicates a broken sensor instead of a warm machine.
 
-    `zero` is what counts as zero now; nan while it is not known.
+    `zero` is the present zero of the channel; nan while unknown.
     """
     low, high = PLAUSIBLE.get(channel.quantity, ANY)
     if channel.quantity == "temperature" and not math.isnan(zero):
@@ -121,7 +121,7 @@ def find_plausible_range(channel: Input, zero: float) -> tuple[float, float]:
 
 
 class Ranges:
-    """Plausible ranges of some inputs, computed once per zero: the fast path of `explain_implausible`.
+    """Plausible ranges of several inputs, computed once per zero: fast path of `explain_implausible`.
 
     Parameters
     ----------
@@ -131,28 +131,28 @@ class Ranges:
     def __init__(self, inputs: Sequence[Input]) -> None:
         self._inputs = tuple(inputs)
         self.names = tuple(i.name for i in inputs)
-        several = len(self.names) > 1  # of one name `itemgetter` gives no tuple
+        several = len(self.names) > 1  # with one name, `itemgetter` returns no tuple
         self._all: Callable[[Mapping[str, object]], Sequence[object]] = (
             itemgetter(*self.names) if several else lambda values: [values[name] for name in self.names]
         )
         self._of: tuple[NDArray[np.float64] | None, list[tuple[float, float]]] = (None, [])
 
     def pick(self, values: Mapping[str, object]) -> Sequence[object]:
-        """Return the values of the inputs as a source gave them; None for one that is missing."""
+        """Return the values of the inputs as delivered by the source; None for a missing value."""
         try:
             return self._all(values)
         except KeyError:
             return [values.get(name) for name in self.names]
 
     def hold(self, values: Sequence[object], reference: NDArray[np.float64]) -> bool:
-        """Return whether values are plausible beyond doubt: plain numbers, each in its range about a known zero.
+        """Return whether all values are certainly plausible: plain numbers, each in its range about a known zero.
 
         Parameters
         ----------
         values : sequence of shape (n_inputs,)
-            As a source gave them.
+            As delivered by the source.
         reference : ndarray of shape (n_inputs,)
-            Zero of the inputs; nan where it is not known yet.
+            Zero of the inputs; nan while unknown.
         """
         known, ranges = self._of
         if known is not reference:
@@ -168,12 +168,12 @@ class Ranges:
 
 
 def is_number(value: object) -> bool:
-    """Return whether a value is a finite number, and no truth value."""
+    """Return whether a value is a finite number and not a Boolean."""
     if type(value) is float:
         return math.isfinite(value)
     if type(value) is bool or not isinstance(value, Real):
         return False
     try:
         return math.isfinite(float(value))
-    except OverflowError:  # an integer of 400 digits
+    except OverflowError:  # such as an integer with 400 digits
         return False

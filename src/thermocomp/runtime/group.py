@@ -11,7 +11,7 @@ from thermocomp.core.paceddynamic import PacedDynamic
 from thermocomp.core.together import Together, TogetherState
 from thermocomp.runtime.gate import Ranges
 
-#: what is said to be outside where each input is inside its own range, but all together are unlike the training
+#: reported as outside if each input is inside its own range but their combination is unlike the training
 TOGETHER = "inputs together"
 
 
@@ -45,7 +45,7 @@ class Group:
         return tuple(Group(models, members) for members in alike.values())
 
     def share(self, states: Sequence[State]) -> list[State]:
-        """Return states that share what is the same in all of them."""
+        """Return states in which equal parts are shared objects."""
         lead = states[0]
         same = all(_equal(s.reference, lead.reference) and _equal(s.memory, lead.memory) for s in states)
         if not same:
@@ -61,9 +61,9 @@ class Group:
         -------
         states : list of State
         deviations : list of float
-            One per model [its unit].
+            One deviation per model [its unit].
         half_widths : list of float
-            Half-widths of their bands; nan without one.
+            Half-widths of the uncertainty bands; nan without a band.
         """
         lead = states[0]
         if self._together is None or any(

@@ -1,7 +1,7 @@
-"""Identity of probings: one that is delivered twice counts once.
+"""Identity of probings: a probing that is delivered twice counts once.
 
-A broker repeats a message that was not confirmed, a program repeats a command. A probing is the same as one before if
-it has the same id, or the same time, or, where it has neither, the same content. It is known for a day.
+A broker may repeat an unconfirmed message, and a program may repeat a command. A probing is identical to an earlier one
+if it has the same id or the same time or, if it has neither, the same content. It is remembered for a day.
 """
 
 from collections.abc import Mapping
@@ -9,13 +9,13 @@ from collections.abc import Mapping
 from thermocomp.runtime.adaptation import Probing
 from thermocomp.runtime.state import FORGOTTEN, CompensatorState
 
-#: keys that are remembered of each target
+#: maximum number of keys remembered for each target
 MOST_KEYS = 600
 KNOWN = "it was delivered before; give each probing its own id or time"
 
 
 def is_known(state: CompensatorState, target: str, probing: Probing) -> bool:
-    """Return whether a probing of a target or axis came before.
+    """Return whether a probing of a target or axis was delivered before.
 
     Parameters
     ----------
@@ -27,14 +27,14 @@ def is_known(state: CompensatorState, target: str, probing: Probing) -> bool:
 
 
 def sift(state: CompensatorState, probings: Mapping[str, Probing] | None) -> tuple[dict[str, Probing], dict[str, str]]:
-    """Return the probings that did not come before, and why the others are refused, by target or axis."""
+    """Return the new probings, and the reasons why the others are refused, by target or axis."""
     given = probings or {}
     fresh = {t: p for t, p in given.items() if not is_known(state, t, p)}
     return fresh, {t: KNOWN for t in given if t not in fresh}
 
 
 def remember(state: CompensatorState, probings: Mapping[str, Probing], time: float) -> dict[str, dict[str, float]]:
-    """Return the first arrival times of the keys of probings, with those of some more, by target or axis.
+    """Return the first arrival times of all remembered keys, including those of new probings, by target or axis.
 
     Parameters
     ----------

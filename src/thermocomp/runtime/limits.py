@@ -1,4 +1,4 @@
-"""Limits of a correction: its magnitude, its rate, its dead band."""
+"""Limits of a correction: magnitude, rate and dead band."""
 
 import math
 
@@ -6,7 +6,7 @@ from thermocomp.core.correction import Correction, Limits
 
 
 def limit_offset(target: float, current: float, dt: float, limits: Limits) -> float:
-    """Move a correction towards its target as far as the limits allow.
+    """Move a correction towards its target within the limits.
 
     Parameters
     ----------
@@ -15,14 +15,14 @@ def limit_offset(target: float, current: float, dt: float, limits: Limits) -> fl
     current : float
         Correction in force [um].
     dt : float
-        Time it has had to move [s].
+        Time available for the movement [s].
     limits : Limits
 
     Returns
     -------
     float
-        The new correction [um]. Anything that is not a finite target or a positive time leaves it where it is: in
-        Python ``max(-m, min(m, nan))`` is ``+m``, so a nan has to be turned away before it meets a minimum.
+        New correction [um]. If the target is not finite or the time is not positive, the correction is unchanged: in
+        Python ``max(-m, min(m, nan))`` is ``+m``, so nan must be excluded before taking a minimum.
     """
     if not (math.isfinite(target) and math.isfinite(dt) and dt > 0):
         return current
@@ -31,12 +31,12 @@ def limit_offset(target: float, current: float, dt: float, limits: Limits) -> fl
         return current
     reach = limits.rate * dt
     if abs(target - current) <= reach:
-        return target  # exactly: current + (target - current) may round past the magnitude
+        return target  # exact: current + (target - current) may be rounded beyond the magnitude
     return max(-limits.magnitude, min(limits.magnitude, current + math.copysign(reach, target - current)))
 
 
 def fade(current: Correction, travel: tuple[float, float], idle: float, dt: float, limits: Limits) -> Correction:
-    """Let a correction that nothing drives go to zero once it was held for long: no faster than the rate allows.
+    """Fade a correction to zero after the hold time without a demand, within the rate limit.
 
     Parameters
     ----------
@@ -46,13 +46,13 @@ def fade(current: Correction, travel: tuple[float, float], idle: float, dt: floa
     idle : float
         Time without a demand [s].
     dt : float
-        Time that counts in this step [s].
+        Duration of this step [s].
     limits : Limits
 
     Returns
     -------
     Correction
-        The same while it is held.
+        Unchanged during the hold time.
     """
     if not (idle > limits.hold and dt > 0):
         return current
@@ -65,9 +65,9 @@ def fade(current: Correction, travel: tuple[float, float], idle: float, dt: floa
 def limit_line(
     target: Correction, current: Correction, travel: tuple[float, float], dt: float, limits: Limits
 ) -> Correction:
-    """Move a correction with a slope towards its target as far as the limits allow at both ends of the travel.
+    """Move a correction with a slope towards its target within the limits at both ends of the travel.
 
-    Between the ends it is a straight line, so they hold everywhere on the axis.
+    It is a straight line between the ends, so the limits are met everywhere on the axis.
 
     Parameters
     ----------
@@ -78,13 +78,13 @@ def limit_line(
     travel : tuple of float
         Ends of the travel [mm].
     dt : float
-        Time it has had to move [s].
+        Time available for the movement [s].
     limits : Limits
 
     Returns
     -------
     Correction
-        With the reference position of `target`.
+        New correction, with the reference position of `target`.
     """
     low, high = travel
     if low == high or target.slope == current.slope == 0.0:

@@ -1,4 +1,4 @@
-"""Joint output of some models for one target or axis, adapted by probings."""
+"""Joint output of several models for one target or axis, adapted by probings."""
 
 import math
 from collections.abc import Callable, Collection, Sequence
@@ -17,31 +17,31 @@ from thermocomp.runtime.geometry.straight import best_line
 
 
 class DeviationLine(NamedTuple):
-    """Joint output of some models for one target or axis, in the form that controllers use."""
+    """Joint output of several models for one target or axis, in the form used by controllers."""
 
-    models: slice  #: which they are, of the compensator's models
-    travel: tuple[float, float]  #: where the axis goes [mm]: the limits hold from end to end
-    deviation: Callable[[Sequence[float]], Deviation]  #: of what these models say
+    models: slice  #: models of this line among those of the compensator
+    travel: tuple[float, float]  #: travel of the axis [mm]: the limits hold from end to end
+    deviation: Callable[[Sequence[float]], Deviation]  #: computes the deviation from their outputs
 
 
 class Said(NamedTuple):
     """Output of a line for one reading."""
 
-    deviation: Deviation  #: with what was learned from probings before
-    half_width: float  #: of the band about it [um]; nan without one
-    learned: Adaptation | None  #: after the probing, if there was one
-    refused: str  #: why the probing was; empty if it was not, or there was none
-    moved: float  #: by how much the probing moves the deviation [um]
-    raw: Deviation  #: what the models alone say, from their own zero
+    deviation: Deviation  #: including adaptation by earlier probings
+    half_width: float  #: of its uncertainty band [um]; nan without a band
+    learned: Adaptation | None  #: adaptation including the present probing, if any
+    refused: str  #: reason why the probing was refused; otherwise empty
+    moved: float  #: change of the deviation by the probing [um]
+    raw: Deviation  #: output of the models alone, relative to their own zero
 
 
 def constant(said: Sequence[float]) -> Deviation:
-    """Return the deviation of a single model, the same along the axis."""
+    """Return the deviation of a single model, constant along the axis."""
     return Deviation(said[0])
 
 
 def straight(source: PositionModel) -> Callable[[Sequence[float]], Deviation]:
-    """Return a function that converts the outputs of a model to their best straight line over the travel."""
+    """Return a function that converts the outputs of a model to the best straight line over the travel."""
     low, high = source.travel
     positions, zero = np.linspace(low, high, 41), source.reference_position
     lines = [best_line(positions, (1e-3 * (positions - zero)) ** k, zero) for k in source.powers]
@@ -76,15 +76,15 @@ def evaluate(
     time : float
         Time of the reading [s].
     learned : Adaptation or None
-        From the probings before.
+        Adaptation by earlier probings.
     probing : Probing or None
-        Made at the time of the reading: it counts from the next one on.
+        Probing made at the time of the reading; it takes effect from the next reading onwards.
     failed : collection of str
-        Sensors that are not believed.
+        Sensors that are not trusted.
     zero : Deviation
-        Deviation subtracted from the outputs of the models: the zero of the target.
+        Zero of the target: deviation subtracted from the outputs of the models.
     magnitude : float
-        Largest permitted correction [um]: no probing moves the deviation further.
+        Largest permitted correction [um]; no probing changes the deviation by more.
 
     Returns
     -------
@@ -116,6 +116,6 @@ def evaluate(
 
 
 def _mean_square(line: DeviationLine, models: Sequence[ErrorModel], name: str) -> float:
-    """Return a root mean square over cycles that the models of a line had not seen, of the line [um]."""
+    """Return the RMS value `name` of the line over cycles unseen by its models [um]."""
     errors = np.diag([0.0 if m.honest_error is None else getattr(m.honest_error, name) for m in models])
     return math.hypot(*(line.deviation(one).offset for one in errors.tolist()))

@@ -1,4 +1,4 @@
-"""A watch over what a source gives: values by channel in, values by channel out."""
+"""A watch applied to the values of a source: values by channel in, values by channel out."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -11,7 +11,7 @@ from thermocomp.runtime.watch import WORDS, WatchState, is_quiet, look
 
 
 class Lookout:
-    """A watch, and where its inputs are in a reading.
+    """A watch, with the positions of its inputs in a reading.
 
     Parameters
     ----------
@@ -30,11 +30,11 @@ class Lookout:
         Parameters
         ----------
         state : WatchState
-            Before the reading.
+            State before the reading.
         time : float
             Time of the reading [s].
         values : mapping of str to float
-            As a source gave them, by channel.
+            Values by channel, as delivered by the source.
         """
         given = self._ranges.pick(values)
         if is_quiet(state, time) and self._ranges.hold(given, state.reference):
@@ -47,7 +47,7 @@ class Lookout:
 
     @staticmethod
     def failed(lookouts: Sequence["Lookout"], states: Sequence[WatchState]) -> dict[str, str]:
-        """Return the sensors that are not believed, and what they are."""
+        """Return the sensors that are not trusted, with the kind of fault."""
         return {
             name: WORDS[fault]
             for lookout, state in zip(lookouts, states, strict=True)

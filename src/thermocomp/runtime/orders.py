@@ -1,4 +1,4 @@
-"""Commands to a compensator, from a person or the controller: suspend a target, reset its zero, release corrections."""
+"""Commands to a compensator by a person or the controller: suspend a target, reset its zero, remove corrections."""
 
 from dataclasses import replace
 
@@ -17,7 +17,7 @@ def withdraw(compensator: Compensator, state: CompensatorState, passed: float) -
     compensator : Compensator
     state : CompensatorState
     passed : float
-        Time since the step before [s]; an outage is no saved travel.
+        Time since the previous step [s]; outages do not accumulate travel.
     """
     free, passed = replace(compensator.limits, dead_band=0.0), min(passed, compensator.limits.reading_age)
     found = {
@@ -28,7 +28,7 @@ def withdraw(compensator: Compensator, state: CompensatorState, passed: float) -
 
 
 def order(compensator: Compensator, state: CompensatorState, target: str, status: Status | None) -> CompensatorState:
-    """Suspend a target or axis, or resume it.
+    """Suspend or resume a target or axis.
 
     Parameters
     ----------
@@ -36,9 +36,9 @@ def order(compensator: Compensator, state: CompensatorState, target: str, status
     state : CompensatorState
     target : str
     status : Status or None
-        ``holding``: it stays where it is until somebody says otherwise; ``shadow``: it is predicted, and its
-        correction goes to zero within the limits; ``suspended``: the controller has none in force, and it begins
-        at zero again. None: it runs.
+        ``holding``: the correction is held until a further command; ``shadow``: the target is predicted, and its
+        correction moves to zero within the limits; ``suspended``: the controller has no correction in force, and it
+        starts at zero again. None: run.
 
     Returns
     -------
@@ -47,7 +47,7 @@ def order(compensator: Compensator, state: CompensatorState, target: str, status
     Raises
     ------
     InputError
-        There is no such target, a word is none of these, or its models may not run.
+        The target does not exist, the status word is not one of these, or the models may not run.
     """
     if target not in compensator.lines:
         raise InputError(f"{target}: expected one of {', '.join(compensator.lines)}")
@@ -72,7 +72,7 @@ def rezero(
     why: str,
     in_force: Correction | None = None,
 ) -> CompensatorState:
-    """Let a target or axis count again from where it is: its correction stays, and moves on from there.
+    """Reset the zero of a target or axis: its correction is kept and moves on from there.
 
     Parameters
     ----------
@@ -80,21 +80,21 @@ def rezero(
     state : CompensatorState
     target : str
     time : float
-        On the stamps of the readings [s].
+        Time on the scale of the readings' stamps [s].
     why : str
-        For the ledger, such as ``homing`` or ``work offset, by M. Weber``.
+        Reason for the ledger, such as ``homing`` or ``work offset, by M. Weber``.
     in_force : Correction, optional
-        Correction now in force as reported by the controller. Default: the last one.
+        Present correction as reported by the controller. Default: the last one.
 
     Returns
     -------
     CompensatorState
-        State without the results of probings, which were relative to the previous zero.
+        State without the results of earlier probings, which were relative to the previous zero.
 
     Raises
     ------
     InputError
-        There is no such target, or its zero is still being averaged.
+        The target does not exist, or its zero is still being averaged.
     """
     if target not in compensator.lines:
         raise InputError(f"{target}: expected one of {', '.join(compensator.lines)}")

@@ -13,7 +13,7 @@ from thermocomp.runtime.watch import WatchState
 
 Word = Literal["active", "holding", "fading", "suspended", "shadow", "restarting"]
 
-#: a state that is older is of another day: the machine starts again, but for the corrections in force [s]
+#: maximum age of a state to be resumed; of an older one, only the corrections in force are kept [s]
 FORGOTTEN = 24 * 3600.0
 
 
@@ -25,65 +25,65 @@ class Status(NamedTuple):
 
 
 class Reference(NamedTuple):
-    """From which instant a target or axis counts, and why.
+    """Zero of a target or axis: instant and reason.
 
-    `shift` is what the models said there, together with the correction that was in force: nothing jumps where a zero is
-    set again.
+    `shift` is the output of the models at that instant plus the correction in force, so that a reset of the zero causes
+    no jump.
     """
 
-    time: float  #: on the stamps of the readings [s]
+    time: float  #: on the scale of the readings' stamps [s]
     why: str
-    shift: Deviation = Deviation(0.0)  #: what is taken off what the models say
+    shift: Deviation = Deviation(0.0)  #: subtracted from the output of the models
 
 
 class CompensatorState(NamedTuple):
-    """State of a compensator between two readings. Its times are stamps of the readings minus `origin`."""
+    """State of a compensator between two readings. Its times are the readings' stamps minus `origin`."""
 
     models: tuple[State, ...]  #: one per model
-    corrections: dict[str, Correction]  #: in force, by target or axis
-    time: float | None  #: of the last reading that passed the gate [s]
-    clock: float | None  #: the latest at which a step was taken, on the monotone clock of the process [s]
-    taken: float | None  #: on the same clock, when the last reading passed the gate, or `away` after that [s]
-    origin: float  #: what the clock of the readings was set by meanwhile [s]; nan: unknown, after a restart
-    gathered: tuple[Gathered, ...]  #: readings that the zero is averaged of, one per model; empty once it is known
-    watches: tuple[WatchState, ...]  #: over the temperatures
-    idle: dict[str, float]  #: how long no model has driven each target or axis; not there: one drives it [s]
-    learned: dict[str, Adaptation]  #: from probings, by target or axis
-    references: dict[str, Reference]  #: what each target or axis counts from; not there: its zero is being averaged
-    raw: dict[str, Deviation]  #: what the models said last, by target or axis
-    orders: dict[str, Status]  #: targets or axes that somebody, or the controller, has taken out, and why
-    away: float | None  #: so long nothing ran before the last restart, until the corrections have caught up [s]
-    #: when each key of a probing came first, by target or axis [s]
+    corrections: dict[str, Correction]  #: corrections in force, by target or axis
+    time: float | None  #: of the last accepted reading [s]
+    clock: float | None  #: latest time of a step, on the monotonic clock of the process [s]
+    taken: float | None  #: time of the last accepted reading on the same clock, or `away` after it [s]
+    origin: float  #: amount by which the clock of the readings was set; nan: unknown, after a restart [s]
+    gathered: tuple[Gathered, ...]  #: readings averaged for the zero, one per model; empty once it is known
+    watches: tuple[WatchState, ...]  #: of the temperatures
+    idle: dict[str, float]  #: time for which no model has driven a target or axis; absent: driven [s]
+    learned: dict[str, Adaptation]  #: adaptations by probings, by target or axis
+    references: dict[str, Reference]  #: zero of each target or axis; absent: still being averaged
+    raw: dict[str, Deviation]  #: last output of the models, by target or axis
+    orders: dict[str, Status]  #: targets or axes suspended by a person or the controller, and why
+    away: float | None  #: outage before the last restart; None once corrections have caught up [s]
+    #: first arrival time of each key of a probing, by target or axis [s]
     probed: Mapping[str, dict[str, float]] = MappingProxyType({})
 
 
 class Compensated(NamedTuple):
     """Output of a compensator for one reading."""
 
-    corrections: dict[str, Correction]  #: in force after this reading, by target or axis
-    rejected: str  #: why the gate turned the reading away; empty if it passed
+    corrections: dict[str, Correction]  #: corrections in force after this reading, by target or axis
+    rejected: str  #: reason why the gate rejected the reading; empty if accepted
     outside: tuple[str, ...]  #: inputs outside the trained range of a model
-    failed: dict[str, str]  #: sensors that are not believed, and what they are: see `thermocomp.runtime.watch`
-    states: dict[str, Status]  #: of each target or axis
-    deviations: dict[str, Deviation]  #: what the models say, with what was learned from probings
-    half_widths: dict[str, float]  #: of the band about the deviation, by target or axis that has one [um]
-    refused: dict[str, str]  #: targets or axes whose probing was not used, and why
-    moved: Mapping[str, float] = MappingProxyType({})  #: by how much probings move deviations from now on [um]
+    failed: dict[str, str]  #: sensors not trusted, with the kind of fault: see `thermocomp.runtime.watch`
+    states: dict[str, Status]  #: status of each target or axis
+    deviations: dict[str, Deviation]  #: outputs of the models, adapted by probings
+    half_widths: dict[str, float]  #: of the uncertainty bands, by target or axis with a band [um]
+    refused: dict[str, str]  #: targets or axes with a refused probing, and the reason
+    moved: Mapping[str, float] = MappingProxyType({})  #: change of deviations by new probings [um]
 
     @property
     def held(self) -> dict[str, str]:
-        """Targets or axes that no model drives, and why."""
+        """Targets or axes that are not driven by a model, and the reasons."""
         return {t: s.reason for t, s in self.states.items() if s.word in ("holding", "fading")}
 
 
 def silence(state: CompensatorState, tick: float) -> float:
-    """Return the time since the last reading that passed the gate, restarts included; 0 before the first [s].
+    """Return the time since the last accepted reading, restarts included; 0 before the first [s].
 
     Parameters
     ----------
     state : CompensatorState
     tick : float
-        The monotone clock of the process, now [s].
+        Present time of the monotonic clock of the process [s].
     """
     passed = 0.0 if state.taken is None else max(tick - state.taken, 0.0)
     return passed + (state.away or 0.0) if math.isnan(state.origin) else passed
@@ -96,24 +96,24 @@ def resume(
     in_force: Mapping[str, Correction] | None = None,
     tick: float | None = None,
 ) -> CompensatorState:
-    """Return the state to continue with after a restart.
+    """Return the state with which to continue after a restart.
 
-    Up to `FORGOTTEN` the models continue from what they remember, as after an outage: what they read then counts as
-    having been there all the time. After that, or of unknown age, the machine starts again. The correction in force
-    stays in either case, and moves from there within the limits.
+    Up to an age of `FORGOTTEN` the models continue from their memory, as after an outage: their first inputs are
+    assumed to have been constant during the outage. With a greater or unknown age, the compensator starts again. In
+    both cases the correction in force is kept and moves from there within the limits.
 
     Parameters
     ----------
     state : CompensatorState
-        As it was saved.
+        State as saved.
     cold : CompensatorState
-        State of a compensator that starts.
+        State of a newly started compensator.
     age : float
-        Since the last reading in it [s].
+        Time since the last reading of the state [s].
     in_force : mapping of str to Correction, optional
-        Correction in force as reported by the controller. Default: the saved one.
+        Present correction as reported by the controller. Default: the saved one.
     tick : float, optional
-        The monotone clock of the process, now: what goes by until the first reading is part of the outage, too [s].
+        Present time of the monotonic clock of the process; time until the first reading is also part of the outage [s].
 
     Returns
     -------

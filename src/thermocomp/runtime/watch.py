@@ -1,10 +1,10 @@
-"""The watch over the temperatures, reading by reading: which is believed, and substitutes for the others.
+"""The watch over the temperatures, reading by reading: which sensors are trusted, and substitutes for the others.
 
-State in, state out; leading axes are a batch of independent runs with the same clock. Only the past is used. A sensor
-that is missing is replaced at once by its prediction from the others and the speed; one that jumped, that is stuck or
-that is off, as soon as that is sure. What stands in begins where the sensor was and moves over to the prediction:
-nothing jumps. A sensor that was missing is believed again when it reads what is predicted; the others are until a
-restart, for a sensor that failed once is repaired, not believed.
+State in, state out; leading array axes are a batch of independent runs with the same clock. Only past readings are
+used. A missing sensor is replaced immediately by its prediction from the other sensors and the speed; a sensor that has
+jumped, is stuck or deviates, as soon as this is certain. A substitute starts at the last value of the sensor and moves
+to the prediction, so that there is no jump. A missing sensor is trusted again when it agrees with its prediction; other
+failed sensors are not trusted until a restart, since they must be repaired.
 """
 
 from typing import NamedTuple
@@ -22,57 +22,57 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int8]
 
-#: what a sensor is, by `WatchState.fault`
+#: states of a sensor, by `WatchState.fault`
 WORDS = ("good", "missing", "stepped", "stuck", "off", "swapped")
 GOOD, MISSING, STEPPED, STUCK, OFF, SWAPPED = range(len(WORDS))
 
-#: between two looks at the differences, at least: temperatures are slow [s]
+#: minimum time between two checks of the differences: temperatures are slow [s]
 TICK = 10.0
-#: how long a sensor that was missing has to read what is predicted until it is believed again [s]
+#: time for which a missing sensor must agree with its prediction before it is trusted again [s]
 RETURN = 600.0
-#: how fast what stands in moves over to the prediction [s]
+#: time constant with which a substitute moves to the prediction [s]
 FADE = 3600.0
-#: after a failure, its traces in the predictions of the others have to fade before another one is found by them [s]
+#: waiting time after a failure until its effect on other predictions has faded and a further failure can be found [s]
 REST = 3600.0
 
 
-#: a speed beyond so many times the fastest of the training heats no more than that
+#: multiple of the fastest trained speed above which no additional heat is assumed
 HEATS = 2.0
 
 
 class WatchState(NamedTuple):
     """State of the watch between two readings; arrays are (..., n_sensors) unless noted otherwise."""
 
-    reference: FloatArray  #: (..., n_inputs), what counts as zero; nan until it is known
-    gathered: Gathered  #: readings that it is averaged of
-    time: float  #: of the last look; nan before the first [s]
+    reference: FloatArray  #: (..., n_inputs), zero; nan while unknown
+    gathered: Gathered  #: readings averaged for the zero
+    time: float  #: of the last check; nan before the first [s]
     memory: FloatArray  #: (..., n_memory), of the predictions
-    traces: FloatArray  #: (..., n_lags * n_sensors), lags of the differences: what a failure leaves in `memory`
-    used: FloatArray  #: what was believed, minus the reference [degC]
+    traces: FloatArray  #: (..., n_lags * n_sensors), lags of the differences: effect of a failure on `memory`
+    used: FloatArray  #: values used, minus the reference [degC]
     predicted: FloatArray  #: minus the reference [degC]
     usual: FloatArray  #: difference between reading and prediction, low-passed [degC]
     fault: IntArray  #: see `WORDS`
-    since: FloatArray  #: when the fault was found [s]
-    bridge: FloatArray  #: what stands in is that much beside the prediction, fading from `since` on [degC]
-    jumped: FloatArray  #: when it jumped; nan: it did not [s]
-    off: FloatArray  #: since when it is off; nan: it is not [s]
-    same: FloatArray  #: what it reads since `still` [degC]
-    still: FloatArray  #: since when it reads the same [s]
-    then: FloatArray  #: what was predicted then [degC]
-    moving: FloatArray  #: since when its prediction has moved too far for that; nan: it has not [s]
-    back: FloatArray  #: since when one that was missing reads what is predicted; nan: it does not [s]
-    evidence: FloatArray  #: (..., n_pairs), low-passed, that two are swapped; -inf: once it spoke against it
-    fast: FloatArray  #: (...,), when the spindle last turned faster than in the training [s]
+    since: FloatArray  #: time at which the fault was found [s]
+    bridge: FloatArray  #: offset of the substitute from the prediction, fading from `since` [degC]
+    jumped: FloatArray  #: time of a jump; nan: none [s]
+    off: FloatArray  #: start of a deviation; nan: none [s]
+    same: FloatArray  #: constant reading since `still` [degC]
+    still: FloatArray  #: start of the constant reading [s]
+    then: FloatArray  #: prediction at that time [degC]
+    moving: FloatArray  #: time since which its prediction has moved too far for a constant reading; nan: it has not [s]
+    back: FloatArray  #: time since which a missing sensor agrees with its prediction; nan: it does not [s]
+    evidence: FloatArray  #: (..., n_pairs), low-passed evidence that two are swapped; -inf: excluded
+    fast: FloatArray  #: (...,), last time at which the spindle turned faster than in the training [s]
 
 
 def begin(watch: Watch, reference: FloatArray | None = None, runs: tuple[int, ...] = ()) -> WatchState:
-    """Return the state of a watch that has seen no reading.
+    """Return the state of a watch before the first reading.
 
     Parameters
     ----------
     watch : Watch
     reference : ndarray of shape (n_inputs,), optional
-        Zero of the inputs; without it the first readings decide for inputs with ``rezero``.
+        Zero of the inputs; default: determined by the first readings for inputs with ``rezero``.
     runs : tuple of int
         Shape of a batch of runs.
     """
@@ -107,8 +107,8 @@ def begin(watch: Watch, reference: FloatArray | None = None, runs: tuple[int, ..
 
 
 def is_quiet(state: WatchState, time: float) -> bool:
-    """Return whether all sensors are good and the next look is not due: a plausible reading is believed as it is."""
-    due = not time - state.time < TICK  # nor is it known
+    """Return whether all sensors are good and no check is due; a plausible reading is then used unchanged."""
+    due = not time - state.time < TICK  # also if the time is unknown
     return not (due or np.count_nonzero(state.fault) or np.count_nonzero(state.jumped == state.jumped))
 
 
@@ -121,24 +121,24 @@ def look(
     ----------
     watch : Watch
     state : WatchState
-        From `begin` or the previous `look`.
+        State from `begin` or the previous `look`.
     time : float
-        Time of the reading, later than the last [s].
+        Time of the reading, later than the previous one [s].
     values : ndarray of shape (..., n_inputs)
-        In the order of the watch's inputs; nan where a value is missing. Without its speeds nothing is predicted: it
-        is passed on as it is.
+        Values in the order of the watch's inputs; nan where a value is missing. If a speed is missing, nothing is
+        predicted and the values are returned unchanged.
     resting : bool
-        The spindle is known to be stopped.
+        Whether the spindle is known to be stopped.
 
     Returns
     -------
     state : WatchState
     values : ndarray of shape (..., n_inputs)
-        With something in the place of each temperature that is not believed.
+        Values with substitutes for temperatures that are not trusted.
     """
     heat = watch.bank.temperatures
     believed = values.copy()
-    fastest = PLAUSIBLE["spindle_speed"][1]  # what no spindle has must not get into a memory
+    fastest = PLAUSIBLE["spindle_speed"][1]  # an impossible speed must not enter the memory
     if not (np.abs(values.take(watch.speeds, axis=-1)) <= fastest).all():
         return state, believed
     if np.isnan(state.time):
@@ -156,24 +156,24 @@ def look(
 
 
 def _made_up(watch: Watch, values: FloatArray) -> FloatArray:
-    """Return the first readings; one that cannot be is as far from its training's zero as the others are on average.
+    """Return the first readings; an impossible one gets the median offset of the others from the zero of the training.
 
-    Possible readings are those that the gate of the compensator accepts as a start.
+    Possible readings are those that the gate of the compensator accepts at a start.
     """
     zero, (low, _, width) = np.array([watch.inputs[s.input].reference for s in watch.sensors]), watch.ranges
-    zero = zero + np.where([watch.inputs[s.input].rezero for s in watch.sensors], 0.0, low)  # what is absolute has none
+    zero = zero + np.where([watch.inputs[s.input].rezero for s in watch.sensors], 0.0, low)  # absolute inputs: no zero
     span = np.maximum(width, MIN_SPAN)
     least, most = PLAUSIBLE["temperature"]
     with np.errstate(all="ignore"):
         offset = np.where((values >= least) & (values <= most), values - zero, np.nan)
         middle = np.maximum(np.isfinite(offset).sum(axis=-1, keepdims=True) - 1, 0) // 2
-        day = np.nan_to_num(np.take_along_axis(np.sort(offset, axis=-1), middle, axis=-1))  # nan comes last
+        day = np.nan_to_num(np.take_along_axis(np.sort(offset, axis=-1), middle, axis=-1))  # nan is sorted last
         fits = np.abs(offset - day) <= span
     return np.where(fits, values, zero + np.clip(day, -DAY, DAY))
 
 
 def _start(watch: Watch, state: WatchState, time: float, values: FloatArray, resting: bool) -> WatchState:
-    """Add a reading to the zero if it is not known; start in its state, at rest in it or in the first reading."""
+    """Add a reading to the zero if unknown; then start at rest in the zero, or else in the first reading."""
     gathered, heat = state.gathered, watch.bank.temperatures
     unknown = bool(np.isnan(state.reference).any())
     if unknown and gathered.belongs(watch.zeroing, time, resting):
@@ -181,7 +181,7 @@ def _start(watch: Watch, state: WatchState, time: float, values: FloatArray, res
         if not gathered.complete(watch.zeroing):
             return state._replace(gathered=gathered)
     zero, begun = state.reference, values
-    if unknown:  # it rests in its zero, even if the spindle turns in the reading that ends that
+    if unknown:  # start at rest in the zero, even if the spindle turns in the reading that ends it
         begun = robust_mean(gathered.values)
         zero = np.where(np.isnan(zero), begun, zero)
     change = begun - zero
@@ -199,22 +199,22 @@ def _start(watch: Watch, state: WatchState, time: float, values: FloatArray, res
 
 
 def _plausible(watch: Watch, change: FloatArray, values: FloatArray) -> BoolArray:
-    """Return a mask of the temperatures that are plausible, by the same rules as the gate of the compensator."""
+    """Return a mask of the plausible temperatures, by the same rules as the gate of the compensator."""
     low, high, width = watch.ranges
     span = np.maximum(width, MIN_SPAN)
     least, most = PLAUSIBLE["temperature"]
-    within = (change >= low - span) & (change <= high + span) & (values >= least) & (values <= most)  # nan is not
+    within = (change >= low - span) & (change <= high + span) & (values >= least) & (values <= most)  # False for nan
     return np.asarray(within)
 
 
 def _stand_in(state: WatchState, time: float) -> FloatArray:
     """Return the substitute value of a sensor, minus the reference."""
-    gone = np.fmax(time - state.since, 0.0)  # 0 where it has not failed
+    gone = np.fmax(time - state.since, 0.0)  # 0 if not failed
     return state.predicted + state.bridge * np.exp(-gone / FADE)
 
 
 def _step(watch: Watch, state: WatchState, time: float, x: FloatArray, values: FloatArray) -> WatchState:
-    """Look at all sensors; `x` is nan where a temperature is missing."""
+    """Check all sensors; `x` is nan where a temperature is missing."""
     dt, seen = time - state.time, np.isfinite(x)
     s = state._replace(time=time)
     s, stepped = _jumps(watch, s, x, dt, seen & (s.fault == GOOD))
@@ -242,7 +242,7 @@ def _step(watch: Watch, state: WatchState, time: float, x: FloatArray, values: F
 
 
 def _calmed(watch: Watch, change: FloatArray) -> FloatArray:
-    """Return changes with speeds that a memory can bear: one reading of 65,535 1/min is no heat of a hundred runs."""
+    """Return changes with speeds clipped, so that one reading of 65,535 1/min does not flood the memory with heat."""
     most = HEATS * watch.top_speed
     calm = change.copy()
     calm[..., watch.speeds] = np.clip(calm[..., watch.speeds], -most, most)
@@ -250,7 +250,7 @@ def _calmed(watch: Watch, change: FloatArray) -> FloatArray:
 
 
 def _jumps(watch: Watch, s: WatchState, x: FloatArray, dt: float, able: BoolArray) -> tuple[WatchState, BoolArray]:
-    """Find jumps, those that were spikes, and those that last."""
+    """Find new jumps, discard spikes, and return the jumps that last."""
     limit = watch.limits("jump") * max(1.0, dt / watch.pace)
     waiting = np.isfinite(s.jumped)
     with np.errstate(invalid="ignore"):
@@ -274,7 +274,7 @@ def _missing(s: WatchState, seen: BoolArray) -> WatchState:
 
 
 def _stuck(watch: Watch, s: WatchState, x: FloatArray, calm: BoolArray) -> tuple[WatchState, BoolArray]:
-    """Find what reads the same though its prediction moves, or though all others have changed for long."""
+    """Find sensors that are constant although their prediction moves, or for too long while others change."""
     same = x == s.same
     with np.errstate(invalid="ignore"):
         apart = np.abs(s.predicted - s.then)
@@ -287,13 +287,13 @@ def _stuck(watch: Watch, s: WatchState, x: FloatArray, calm: BoolArray) -> tuple
     moves = same & calm & (apart > watch.limits("moved"))
     moving = np.where(moves, np.where(np.isfinite(s.moving), s.moving, s.time), np.nan)
     s = s._replace(moving=moving)
-    lives = (calm & fresh).sum(axis=-1, keepdims=True) > 0  # not all stand still: not the logger
+    lives = (calm & fresh).sum(axis=-1, keepdims=True) > 0  # not all are constant, as with a stopped logger
     long = same & calm & lives & (s.time - s.still > watch.limits("still"))
     return s, (moves & (s.time - moving >= LASTING)) | long
 
 
 def _beyond(watch: Watch, s: WatchState, difference: FloatArray, calm: BoolArray) -> tuple[WatchState, BoolArray]:
-    """Find the runs, (...,), in which a difference has been too large for long."""
+    """Find the runs, (...,), in which a difference has been too large for too long."""
     z = np.where(calm, difference, 0.0) / watch.limits("off")
     recent = np.nanmax(np.where(s.fault > MISSING, s.since, -np.inf), axis=-1, initial=-np.inf, keepdims=True)
     beyond = (np.abs(z) > 1.0) & (s.time - recent > REST) & (s.time - s.fast[..., None] > REST)
@@ -310,7 +310,7 @@ def _blame(
     dt: float,
     found: tuple[BoolArray, BoolArray, BoolArray],
 ) -> WatchState:
-    """Exclude failed sensors: two that are swapped if that explains all, and better than one; or each alone."""
+    """Exclude failed sensors: a swapped pair if it explains all residuals better than one failure; else single ones."""
     stepped, stuck, lasting = found
     counts = np.where(s.time - s.fast[..., None] > REST, dt, 0.0)
     evidence, both = weigh_swaps(watch, s.evidence, x, s.memory, able, counts)
@@ -325,19 +325,19 @@ def _blame(
         s = _fail(watch, s, alone & ~swapped[..., None] & (s.fault == GOOD), fault, bridge)
     calm = able & np.isnan(s.jumped)
     one = one_fails(watch, np.where(calm, x - s.predicted, 0.0), calm)
-    # else no single failure explains it: the machine is unlike its training
+    # otherwise no single failure explains the residuals: the machine is unlike its training
     sure = lasting & ~swapped & ~(stepped | stuck).any(axis=-1) & (one.worst <= 1.0)
     return _fail(watch, s, sure[..., None] & one.sensors, OFF, np.zeros(x.shape))
 
 
 def _fast(watch: Watch, s: WatchState, change: FloatArray) -> FloatArray:
-    """Return the last time the spindle turned faster than in the training: predictions then are not validated."""
+    """Return the last time at which the spindle exceeded the trained speeds, where predictions are not validated."""
     faster = (np.abs(change[..., watch.speeds]) > FASTER * watch.top_speed).any(axis=-1)
     return np.where(faster, s.time, s.fast)
 
 
 def _returns(watch: Watch, s: WatchState, difference: FloatArray) -> WatchState:
-    """Believe a sensor again that was missing and reads what is predicted."""
+    """Trust a missing sensor again once it agrees with its prediction."""
     with np.errstate(invalid="ignore"):
         fits = (s.fault == MISSING) & (np.abs(difference) <= watch.limits("off"))
         back = np.where(fits, np.where(np.isfinite(s.back), s.back, s.time), np.nan)

@@ -9,29 +9,29 @@ FloatArray = NDArray[np.float64]
 AXES = ("x", "y", "z")
 #: travel, from 0 [mm]
 TRAVEL = {"x": 600.0, "y": 550.0, "z": 600.0}
-#: where the deviations x, y, z of the tool point hold; the axes' own positioning comes on top elsewhere [mm]
+#: axis positions to which the tool-point deviations x, y, z apply; elsewhere the axes' positioning errors add [mm]
 TEST_POSITION = {"x": 300, "y": 250, "z": 300}
-#: from the spindle's gauge point, its nose, to the tip of the test bar, which is the tool point [mm]
+#: from the gauge point at the spindle nose to the tip of the test bar, which is the tool point [mm]
 TEST_BAR = (0.0, 0.0, -150.0)
-#: positions at which the machine tells the positioning of each axis [mm]
+#: stations at which the machine model outputs the positioning error of each axis [mm]
 STATIONS = {"x": tuple(range(0, 601, 100)), "y": tuple(range(0, 551, 50)), "z": tuple(range(0, 601, 100))}
-#: hat functions along each screw that take the heat of its nut
+#: number of hat functions that distribute the heat of the nut along each screw
 N_HATS = 7
 
 
 def weigh_stations(axis: str, positions: ArrayLike) -> FloatArray:
-    """Return the weights of an axis' stations in what is between them: cubic pieces with a continuous slope.
+    """Return the interpolation weights of an axis' stations: cubic pieces with a continuous slope.
 
     Parameters
     ----------
     axis : {'x', 'y', 'z'}
     positions : array-like of shape (n,)
-        [mm]; beyond the travel the value at its end holds.
+        [mm]; beyond the travel the value at its end is used.
 
     Returns
     -------
     ndarray of shape (n, n_stations)
-        Rows that sum to 1. Hermite pieces with slopes by differences of second order: parabolas are met exactly.
+        Rows that sum to 1. Hermite pieces with second-order difference slopes: parabolas are reproduced exactly.
     """
     at = np.asarray(STATIONS[axis], dtype=np.float64)
     p = np.clip(np.asarray(positions, dtype=np.float64), at[0], at[-1])

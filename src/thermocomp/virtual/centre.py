@@ -15,12 +15,12 @@ from thermocomp.virtual.machine import Air, FeedDrive, Truth, check, stretches
 from thermocomp.virtual.statespace import REFERENCE_TEMPERATURE, Operators, ReducedModel
 
 FloatArray = NDArray[np.float64]
-#: changes the state after a step of a drive, told what was watched before it and the air
+#: changes the state after a step of a drive, given the values watched before the step and the air
 Correction = Callable[[FloatArray, list[float], FloatArray], object]
 
-#: places that friction and thermostat look at after every step
+#: places evaluated for friction and thermostat after every step
 _WATCHED = ("front_bearing", "rear_bearing", "shaft", "front_seat", "coolant", "bed_front")
-#: inputs that depend on them
+#: heat inputs that depend on the watched values
 _FRICTION = ("front_bearing", "rear_bearing", "coolant")
 
 
@@ -33,7 +33,7 @@ class CentreState:
     field : ndarray of shape (n_states,)
         State of the reduced model.
     chilling : bool
-        The chiller runs.
+        Whether the chiller runs.
     slid : float
         Displacement of the column's foot on the bed [um].
     """
@@ -45,7 +45,7 @@ class CentreState:
 
 @dataclass(frozen=True, eq=False)
 class MachiningCentre:
-    """The virtual machine tool (X-01); fills `thermocomp.virtual.machine.VirtualMachine`.
+    """The virtual machine tool (X-01); implements `thermocomp.virtual.machine.VirtualMachine`.
 
     Structure ``w X' b Z Y (C1) t``: the table moves along X on the bed's front, the column along Z on its rear, the
     headstock along Y on the column's front, the spindle points towards -Z. Right is +X, front is -Z. Time constants
@@ -59,7 +59,7 @@ class MachiningCentre:
     heat : HeatSources
     joints : Joints
     longest_step : float
-        Friction and thermostat are looked at this often [s].
+        Longest interval between updates of friction and thermostat [s].
     """
 
     model: ReducedModel = field(default_factory=lambda: ReducedModel.load("centre"))
@@ -69,7 +69,7 @@ class MachiningCentre:
 
     @property
     def places(self) -> tuple[str, ...]:
-        """Names of the places whose temperatures are known."""
+        """Names of the places with known temperatures."""
         return self.model.places
 
     @property
@@ -78,7 +78,7 @@ class MachiningCentre:
         return self.model.observables
 
     def init(self, air: Air) -> CentreState:
-        """Return the state of a machine that was switched off for long, in this air."""
+        """Return the equilibrium state of a machine that has been switched off in this air for a long time."""
         rest = FeedDrive(powered=False)
         state = self.model.steady(np.zeros(len(self.model.inputs)), air.values, self._theta(rest))
         wish = self._observable("slide") @ (state - REFERENCE_TEMPERATURE * self.model.one)
@@ -93,7 +93,7 @@ class MachiningCentre:
         ----------
         state : CentreState
         drives : sequence of FeedDrive
-            Each holds during the whole of its step.
+            Each applies during the whole of its step.
         air : ndarray of shape (n_steps, 3)
             `Air.values` of each step.
         dt : float
@@ -107,8 +107,8 @@ class MachiningCentre:
         Raises
         ------
         InputError
-            `dt` is not positive, there is no drive, the air has another length or is not finite, a speed is beyond the
-            top speed, or a load is put in where there is no place for it.
+            `dt` is not positive, there is no drive, the air has another length or is not finite, a speed exceeds the
+            top speed, or a load is applied at a place that does not exist.
         """
         check(drives, air, dt)
         parts = math.ceil(dt / self.longest_step)
@@ -129,7 +129,7 @@ class MachiningCentre:
     def _advance(
         self, now: FloatArray, chilling: bool, drive: FeedDrive, air: FloatArray, dt: float, fields: FloatArray
     ) -> bool:
-        """Fill in the fields after each step of one drive; return whether the chiller runs at the end."""
+        """Fill in the fields after each step of one drive; return whether the chiller runs at the end of it."""
         self._check(drive)
         heat = self.heat
         operators = self.model.operators(self._theta(drive), dt, self._watched)
@@ -154,8 +154,8 @@ class MachiningCentre:
                 end = after[n:].tolist()
                 share = heat.until_switch(chilling, seen[4] - seen[5], end[4] - end[5])
                 if share < 1.0:
-                    # The chiller runs a part of the step: without it the times of switching, and the step's length,
-                    # would matter.
+                    # The chiller runs for part of the step: without this correction the result would depend on the
+                    # switching times and the step length.
                     change = heat.chiller * (1.0 - share)
                     after += variable[:, 2] * (change if chilling else -change)
                     chilling = not chilling
@@ -171,7 +171,7 @@ class MachiningCentre:
         wish = observables[:, index["slide"]]
         slide = slide_with_friction(slid, wish, self.joints.stiction)
         shaft = self._shaft(place, ratio)
-        # What the foot does not slide, the column is pushed.
+        # The part of the free displacement that the foot does not slide displaces the column.
         observables[:, index["z"]] += self.joints.share * (slide - wish) - shaft
         observables[:, index["y"]] += self.joints.lift * ratio**2
         observables[:, [index["nose"], index["tip"]]] += shaft[:, None]
@@ -180,25 +180,25 @@ class MachiningCentre:
 
     @property
     def _watched(self) -> tuple[str, ...]:
-        """Places looked at after every step; those of `_WATCHED` first."""
+        """Places evaluated after every step; those of `_WATCHED` first."""
         return _WATCHED
 
     def _friction(self, drive: FeedDrive, seen: list[float]) -> tuple[float, float]:
-        """Heat of the front and of the rear bearing, which floats on springs, at the temperatures watched [W]."""
+        """Return the heat of the front and of the spring-loaded rear bearing at the watched temperatures [W]."""
         front, rear, shaft, seat = seen[:4]
         ratio = abs(drive.speed) / self.heat.top_speed
         return self.heat.front.heat(ratio, front, shaft - seat), self.heat.rear.heat(ratio, rear, 0.0)
 
     def _correction(self, _operators: Operators, _drive: FeedDrive) -> Correction | None:
-        """Return a change of the state after a step, in addition to the reduced model: none here."""
+        """Return a change of the state after a step, in addition to the reduced model; None here."""
         return None
 
     def _shaft(self, place: Mapping[str, FloatArray], ratio: FloatArray) -> FloatArray:
-        """Shift of the shaft towards the workpiece [um]."""
+        """Return the shift of the shaft towards the workpiece [um]."""
         return self.joints.shaft(place["shaft"] - place["front_seat"], ratio)
 
     def _theta(self, drive: FeedDrive) -> tuple[float, ...]:
-        """Return the parameters of the conductances, in steps of 1/64: they are not known more accurately."""
+        """Return the parameters of the conductances, rounded to 1/64, as they are not known more accurately."""
         shares = {"rotation": self.heat.rotation(drive.speed), "flow": float(drive.cooled and drive.powered)}
         shares |= {f"feed_{a}": self.heat.moving(f) for a, f in zip("xyz", drive.feed, strict=True)}
         return tuple(round(64.0 * shares[name]) / 64.0 for name in self.model.theta)

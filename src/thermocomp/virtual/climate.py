@@ -1,4 +1,4 @@
-"""The workshop's air: a day, slow wandering, layers, and a warmer side."""
+"""Air of the workshop: daily cycle, slow fluctuations, stratification, and lateral gradient."""
 
 import math
 from dataclasses import dataclass
@@ -15,26 +15,27 @@ DAY = 86400.0
 
 @dataclass(frozen=True)
 class Climate:
-    """Air temperature over the days; plausible values of a workshop that is heated but not air-conditioned.
+    """Air temperature over several days; plausible values of a workshop that is heated but not air-conditioned.
 
     Parameters
     ----------
     mean : float
         [degC]
     daily : float
-        Amplitude of the day-night wave; warmest at 15 h [K].
+        Amplitude of the daily cycle; maximum at 15 h [K].
     wander : float
-        Standard deviation of what weather, doors and neighbours add [K].
+        Standard deviation of the fluctuations by weather, doors and neighbouring machines [K].
     memory : float
-        Time constant of that [s].
+        Time constant of these fluctuations [s].
     layers : float
-        Mean rise with height; it wanders and follows the day as well [K/m].
+        Mean rise with height; it fluctuates and follows the daily cycle [K/m].
     sun : float
-        Rise from left to right at noon, by day only [K/m].
+        Rise from left to right at noon, in daylight only [K/m].
     draught : float
-        Standard deviation of what doors on either side change in that, three times as fast [K/m].
+        Standard deviation of the fluctuations of the lateral gradient by doors, with a third of the time constant
+        [K/m].
     begin : float
-        Time of day at the start, after midnight [s].
+        Time of day at the start, from midnight [s].
     """
 
     mean: float = 22.0
@@ -57,23 +58,23 @@ class Climate:
 
     @property
     def middle(self) -> Air:
-        """The air on the whole."""
+        """Mean state of the air."""
         return Air(self.mean, self.layers)
 
     def init(self, rng: np.random.Generator) -> FloatArray:
-        """Return the initial state of the random fluctuations, which `air` updates."""
+        """Return the initial state of the random fluctuations, which `air` advances."""
         first, second = rng.standard_normal((2, 3))
         return np.array([math.sqrt(2.0) * first, first / math.sqrt(2.0) + second / math.sqrt(2.0)])
 
     def air(
         self, state: FloatArray, start: float, step: float, n_steps: int, rng: np.random.Generator
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the air at the end of each of some equal steps.
+        """Return the air at the end of each of several equal steps.
 
         Parameters
         ----------
         state : ndarray of shape (2, 3)
-            From `init`, or from the steps before.
+            From `init`, or from the preceding steps.
         start : float
             Start of the first step, since the start of the test [s].
         step : float
@@ -88,7 +89,7 @@ class Climate:
         air : ndarray of shape (n_steps, 3)
             Rows of `Air.values`.
         """
-        # Temperature, layers (slower) and sides (faster) wander on their own.
+        # Temperature, stratification (slower) and lateral gradient (faster) fluctuate independently.
         keep = np.exp(-step / (self.memory * np.array([1.0, 2.0, 1.0 / 3.0])))
         state, path = wandering(state, keep, rng.standard_normal((n_steps, 3)))
         day = 2.0 * math.pi * ((start + step * np.arange(1, n_steps + 1) + self.begin) / DAY)
@@ -100,11 +101,11 @@ class Climate:
         return state, air
 
 
-#: a room held at one temperature
+#: a room with a constant temperature
 STILL = Climate(daily=0.0, wander=0.0, layers=0.0, sun=0.0, draught=0.0)
-#: a measuring room's small changes ("a relatively stable environment", P-05)
+#: small changes in a measuring room ("a relatively stable environment", P-05)
 STABLE = Climate(daily=0.25, wander=0.1, layers=0.2, sun=0.0, draught=0.05)
-#: by the names that protocols use
+#: climates by their names in protocols
 CLIMATES: dict[str, Climate] = {"workshop": Climate(), "stable": STABLE, "still": STILL}
 
 
@@ -116,16 +117,16 @@ def wandering(state: FloatArray, keep: FloatArray, kicks: FloatArray) -> tuple[F
     Parameters
     ----------
     state : ndarray of shape (2, n_paths)
-        The process and its lag before the first step.
+        The process and its lagged value before the first step.
     keep : ndarray of shape (n_paths,)
-        Share that is left of both after a step.
+        Share of both that remains after a step.
     kicks : ndarray of shape (n_steps, n_paths)
         Standard normal numbers.
 
     Returns
     -------
     state : ndarray of shape (2, n_paths)
-        After the last step.
+        State after the last step.
     paths : ndarray of shape (n_steps, n_paths)
     """
     first = filter_first_order(keep, np.sqrt((1.0 - keep**2) * (1.0 + keep) ** 2 / (1.0 + keep**2)) * kicks, state[0])
@@ -149,7 +150,7 @@ def filter_first_order(keep: FloatArray, added: FloatArray, before: FloatArray) 
     """
     y = added.copy()
     y[0] += keep * before
-    # Each pass lets the sums reach twice as far back, until what is left of a value is nothing.
+    # Each pass doubles the length of the sums, until the remaining share is negligible.
     reach, left = 1, keep
     while reach < len(y) and np.any(left > 1e-18):
         y[reach:] += left * y[:-reach]

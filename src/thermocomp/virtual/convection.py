@@ -1,4 +1,4 @@
-"""Heat loss of surfaces to the air, depending on temperature and speed: free and rotating convection, radiation.
+"""Heat loss of surfaces to the air as a function of temperature and speed: free and forced convection, radiation.
 
 References
 ----------
@@ -30,18 +30,18 @@ class Face:
     area : float
         [m2]
     length : float
-        Its height, or the diameter of a cylinder that lies [m].
+        Height of the surface, or diameter of a horizontal cylinder [m].
     films : float
-        Coefficient that the linear model uses instead [W/(m2 K)].
+        Heat transfer coefficient of the linear model [W/(m2 K)].
     emissivity : float
     curvature : float
-        Length over diameter of a cylinder that stands; 0: flat.
+        Length over diameter of a vertical cylinder; 0: flat.
     lying : bool
-        A cylinder with a horizontal axis, which may turn.
+        Cylinder with a horizontal axis, which may rotate.
     wind : float
-        Forced convection at top speed from neighbouring rotating parts, with its power 2/3 [W/(m2 K)].
+        Forced convection at top speed from neighbouring rotating parts, proportional to its power 2/3 [W/(m2 K)].
     films_turning : float
-        Coefficient that the linear model adds to `films` at top speed [W/(m2 K)].
+        Addition of the linear model to `films` at top speed [W/(m2 K)].
     """
 
     area: float
@@ -55,7 +55,7 @@ class Face:
 
 
 class Faces:
-    """Several surfaces at once.
+    """Several surfaces, evaluated together.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class Faces:
         Parameters
         ----------
         rotation : float
-            Share of `Face.films_turning` in force.
+            Share of `Face.films_turning` in effect.
         """
         result: FloatArray = self._area * (self._films + self._films_turning * rotation)
         return result
@@ -88,7 +88,7 @@ class Faces:
         speed : float
             Speed of the horizontal rotating part [1/min].
         wind : float
-            Share of `Face.wind` in force.
+            Share of `Face.wind` in effect.
         """
         hot, cold = (np.asarray(t, dtype=np.float64) + KELVIN for t in (surface, air))
         film = (hot + cold) / 2.0
@@ -118,12 +118,12 @@ def air_at(temperature: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]
 
 
 def free_convection(rayleigh: FloatArray, prandtl: FloatArray, lying: FloatArray) -> FloatArray:
-    """Return the Nusselt numbers of vertical plates, and of cylinders that lie (Churchill and Chu 1975).
+    """Return the Nusselt numbers of vertical plates and horizontal cylinders (Churchill and Chu 1975).
 
     Parameters
     ----------
     rayleigh, prandtl : ndarray
-        With the height of a plate, the diameter of a cylinder.
+        For the height of a plate or the diameter of a cylinder.
     lying : ndarray
         1 for cylinders, 0 for plates.
     """
@@ -133,7 +133,7 @@ def free_convection(rayleigh: FloatArray, prandtl: FloatArray, lying: FloatArray
 
 
 def rotating_convection(reynolds: FloatArray, prandtl: FloatArray) -> FloatArray:
-    """Return the Nusselt numbers of turning cylinders (Becker 1963).
+    """Return the Nusselt numbers of rotating cylinders (Becker 1963).
 
     Parameters
     ----------

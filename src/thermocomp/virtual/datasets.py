@@ -20,7 +20,7 @@ _FILES = {path.stem: path for path in sorted(_FOLDER.glob("*.toml"), key=lambda 
 
 
 class _BuiltIn(Mapping[str, Experiment]):
-    """The experiments that come with the package; a file is read when it is asked for, once."""
+    """Experiments included in the package; each file is read once, on first access."""
 
     def __getitem__(self, name: str) -> Experiment:
         return _read(_FILES[name])
@@ -33,7 +33,7 @@ class _BuiltIn(Mapping[str, Experiment]):
 
 
 _read = cache(read_protocol)
-#: the experiments that come with the package, by name
+#: experiments included in the package, by name
 EXPERIMENTS: Mapping[str, Experiment] = _BuiltIn()
 
 
@@ -48,7 +48,7 @@ def find_experiment(experiment: str | Path) -> Experiment:
     Raises
     ------
     InputError
-        There is no such experiment, or the file cannot be used.
+        Experiment missing, or file invalid.
     """
     if Path(experiment).suffix == ".toml":
         return read_protocol(experiment)
@@ -76,13 +76,13 @@ def record(
     physics : {'linear', 'nonlinear'}, optional
         Physics of the machine. Default: as defined by the experiment. See :doc:`/virtual_machine`.
     seed : int
-        Random seed of weather, noise and random draws; the machine and its sensors stay the same.
+        Random seed of weather, noise and random draws; the machine and its sensors do not depend on it.
     sensor_noise : float, optional
-        Standard deviation of the temperature noise [degC]; the sensors' own if not given.
+        Standard deviation of the temperature noise [degC]. Default: as defined for each sensor.
     faults : sequence of SensorFault
         Faults in every test, in addition to those of the protocol.
     progress : callable
-        Told the name of each test that is done.
+        Called with the name of each completed test.
 
     Returns
     -------
@@ -92,7 +92,7 @@ def record(
     Raises
     ------
     InputError
-        There is no such experiment or physics, or the file cannot be used.
+        Experiment or physics unknown, or file invalid.
     """
     found = experiment if isinstance(experiment, Experiment) else find_experiment(experiment)
     if physics is not None:

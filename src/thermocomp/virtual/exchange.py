@@ -1,8 +1,8 @@
-"""Nonlinear heat exchange in a linear model: conductances that change, in addition to the constant ones.
+"""Nonlinear heat exchange in a linear model: variable conductances in addition to the constant ones.
 
-The model keeps its constant conductances; what the real ones differ by is put in as heat on one side and taken from the
-other. That heat depends on the temperatures at the end of the step, for which a small linear system is solved: however
-well a joint conducts, the step stays stable, and what leaves one side arrives at the other.
+The model keeps its constant conductances; the difference from the actual ones is applied as a heat source on one side
+and an equal sink on the other. This heat depends on the temperatures at the end of the step, so that a small linear
+system is solved: the step is stable for any conductance, and heat is conserved.
 """
 
 from collections.abc import Sequence
@@ -18,18 +18,18 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Exchange:
-    """Paths of heat during steps of one kind.
+    """Heat paths during steps of one kind.
 
     Parameters
     ----------
     into : ndarray of shape (n_states + n_watched, n_paths)
-        Effect of a watt along each path in a step.
+        Effect of one watt along each path during a step.
     difference : ndarray of shape (n_paths, n_watched)
-        First side minus second one; the air is no place.
+        First side minus second side, in terms of the watched places; the air is not one of them.
     to_air : ndarray of shape (n_paths, 3)
-        Air on the second side.
+        Weights of the air, for paths whose second side is the air.
     mutual : ndarray of shape (n_paths, n_paths)
-        Effect of a watt along each path on the difference at each.
+        Effect of one watt along each path on the temperature difference of each path.
     """
 
     into: FloatArray
@@ -41,17 +41,18 @@ class Exchange:
     def of(
         cls, model: ReducedModel, operators: Operators, watched: Sequence[str], paths: Sequence[tuple[str, str | None]]
     ) -> "Exchange":
-        """Prepare paths.
+        """Prepare heat paths.
 
         Parameters
         ----------
         model : ReducedModel
         operators : Operators
-            Operators of the step.
+            Operators of the time step.
         watched : sequence of str
-            Places that `operators` give after the step.
+            Places whose temperatures after the step are included in `operators`.
         paths : sequence of (str, str or None)
-            From a place that is watched, and an input of the same name, to another one, or to the room's air.
+            From a watched place, which is also the name of a heat input, to another such place, or to the room air
+            (None).
         """
         n = len(model.one)
         heat = np.zeros((len(model.inputs), len(paths)))
@@ -67,14 +68,14 @@ class Exchange:
         return cls(into, difference, to_air, difference @ into[n:])
 
     def settle(self, after: FloatArray, extra: FloatArray, air: FloatArray) -> FloatArray:
-        """Add what passes in a step to the state after it; return it, from the second side to the first [W].
+        """Add the heat exchanged during a step to the state after it; return the heat from second to first side [W].
 
         Parameters
         ----------
         after : ndarray of shape (n_states + n_watched,)
-            State after the step without it; is changed.
+            State after the step without the exchange; modified in place.
         extra : ndarray of shape (n_paths,)
-            Difference of each conductance from that of the model [W/K].
+            Difference of each conductance from its value in the model [W/K].
         air : ndarray of shape (3,)
         """
         apart = self.difference @ after[-self.difference.shape[1] :] - self.to_air @ air

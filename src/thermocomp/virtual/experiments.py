@@ -1,4 +1,4 @@
-"""Tests run on the virtual machines (X-01): from a protocol and a seed to the readings of the instruments."""
+"""Tests run on the virtual machines (X-01): from a protocol and a seed to instrument readings."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -22,13 +22,13 @@ from thermocomp.virtual.toolsystem import RestingTool
 FloatArray = NDArray[np.float64]
 S = TypeVar("S")
 
-#: the machine is asked at least this often [s]
+#: longest interval between two outputs of the machine model [s]
 LONGEST_TICK = 20.0
-#: ticks that are worked on at once: what is between machine and recording takes no more memory than these
+#: number of ticks processed at once, which limits the memory between machine and recording
 BLOCK = 4096
-#: quantities that count from the first row
+#: quantities recorded relative to the first row
 MOVEMENTS = ("displacement", "angle")
-#: by the names that protocols use for machine and physics
+#: machine models by machine and physics, as named in protocols
 MACHINES: dict[tuple[str, Physics], Callable[[], VirtualMachine[Any]]] = {
     ("centre", "linear"): MachiningCentre,
     ("tool", "linear"): RestingTool,
@@ -39,7 +39,7 @@ MACHINES: dict[tuple[str, Physics], Callable[[], VirtualMachine[Any]]] = {
 
 @dataclass(frozen=True, eq=False)
 class SimulatedTest:
-    """A recorded test, in plain arrays.
+    """A recorded test as plain arrays.
 
     Parameters
     ----------
@@ -47,15 +47,14 @@ class SimulatedTest:
     time : ndarray of shape (n_rows,)
         [s], from 0
     channels : tuple of Channel
-        Temperatures [degC]; displacements [um]; spindle speed [1/min], if there is a spindle; feed [mm/min], where axes
+        Temperatures [degC]; displacements [um]; spindle speed [1/min], if there is a spindle; feed [mm/min], if axes
         move.
     values : ndarray of shape (n_rows, n_channels)
-        Readings of sensors and probes; displacements are zero at the start but for the probes' noise.
+        Readings of sensors and probes; displacements are zero at the start except for the noise of the probes.
     truth : ndarray of shape (n_rows, n_displacements)
-        The displacements without noise and faults, in the order of their channels [um].
+        Displacements without noise and faults, in the order of their channels [um].
     observables : ndarray of shape (n_rows, n_observables) or None
-        All that the machine tells of itself, from 20 degC on, if that was asked for: see
-        `thermocomp.virtual.volume`.
+        All outputs of the machine model relative to 20 degC, if requested: see `thermocomp.virtual.volume`.
     """
 
     name: str
@@ -67,7 +66,7 @@ class SimulatedTest:
 
     @property
     def displacements(self) -> tuple[Channel, ...]:
-        """Channels that `truth` belongs to: displacements, and angles."""
+        """Channels of `truth`: displacements and angles."""
         return tuple(c for c in self.channels if c.quantity in MOVEMENTS)
 
 
@@ -79,25 +78,25 @@ def simulate(
     faults: Sequence[SensorFault] = (),
     whole: bool = False,
 ) -> Iterator[SimulatedTest]:
-    """Run the tests of an experiment, one after the other.
+    """Run the tests of an experiment in sequence.
 
     Parameters
     ----------
     experiment : Experiment
     seed : int
-        Random seed of weather, noise and random draws; the machine and its sensors stay the same.
+        Random seed of weather, noise and random draws; the machine and its sensors do not depend on it.
     sensor_noise : float, optional
-        Standard deviation of the temperature noise [degC] (C-33: 0.4); the sensors' own if not given. The truth does
-        not depend on it.
+        Standard deviation of the temperature noise [degC] (C-33: 0.4). Default: as defined for each sensor. The truth
+        does not depend on it.
     faults : sequence of SensorFault
         Faults in every test, in addition to those of the protocol.
     whole : bool
-        Keep all observables of the machine.
+        Whether to keep all observables of the machine.
 
     Returns
     -------
     iterator of SimulatedTest
-        Each test is run when it is asked for; none depends on the others.
+        Each test is run when it is iterated; no test depends on another.
 
     Raises
     ------
@@ -135,17 +134,17 @@ def run(
     ----------
     machine : VirtualMachine
     kit : Kit
-        Equipment mounted on it.
+        Equipment mounted on the machine.
     programme : Programme
-        Programme of the test, and recorded channels.
+        Programme of the test, with the recorded channels.
     weather, noise : numpy.random.Generator
         Generators of the ambient air, and of sensors and probes.
     sensor_noise : float, optional
-        Standard deviation of the temperature noise [degC]; the sensors' own if not given.
+        Standard deviation of the temperature noise [degC]. Default: as defined for each sensor.
     faults : sequence of SensorFault
-        Beside those of the programme.
+        Faults in addition to those of the programme.
     whole : bool
-        Keep all observables of the machine.
+        Whether to keep all observables of the machine.
 
     Returns
     -------
@@ -154,7 +153,7 @@ def run(
     Raises
     ------
     InputError
-        A place, a probe, or the channel of a fault is not there, or the machine refuses what it is asked to do.
+        A place, a probe or the channel of a fault is missing, or a command exceeds the capabilities of the machine.
     """
     instruments = programme.instruments(kit, sensor_noise)
     sensors = [i.sensor for i in instruments]
@@ -172,7 +171,7 @@ def run(
     recorded = np.empty((len(time), len(sensors) + len(channels)))
     recorded[:, len(sensors) :] = driven
     truth = np.empty((len(time), int(moves.sum())))
-    # Sensors have long felt what is true when the test begins.
+    # At the start of the test the sensors have settled to the true values.
     felt = true
     recorded[0, : len(sensors)] = read(sensors, (felt + shift)[None], time[:1], noise)
     truth[0] = (true + shift)[moves]
@@ -205,10 +204,7 @@ def run(
 def _soaked(
     machine: VirtualMachine[S], programme: Programme, weights: FloatArray, weather: np.random.Generator
 ) -> tuple[S, FloatArray, FloatArray, FloatArray]:
-    """Return the initial states of the test and of the weather, the true instrument values, and the observables.
-
-    The observables are those of the machine.
-    """
+    """Return the initial states of machine and weather, the true instrument values, and the machine observables."""
     climate = programme.climate
     state, sky = machine.init(climate.middle), climate.init(weather)
     begin = -sum(s.duration for s in programme.soak)
@@ -244,7 +240,7 @@ def _values(truth: Truth, air: FloatArray, weights: FloatArray) -> FloatArray:
 
 
 def _driven(programme: Programme, kit: Kit) -> tuple[list[Channel], FloatArray]:
-    """Return the recorded channels of the drive; a row has the command that led to it."""
+    """Return the recorded channels of the drive and their values; each row has the command that led to it."""
     segments = programme.segments
     lengths = [1, *(round(s.duration / programme.sampling) for s in segments)]
     channels, columns = [], []

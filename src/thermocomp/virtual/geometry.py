@@ -1,8 +1,8 @@
-"""The cold geometry of the virtual machining centre: what its axes do wrong while everything is at 20 degC.
+"""Cold geometry of the virtual machining centre: errors of its axes at 20 degC.
 
 A machine of the usual class (ISO 10791-2, ISO 10791-4): positioning within 5 to 27 um, straightness 3 to 8 um, angles
-10 to 40 urad, squareness 14 to 21 urad. Engineering values, but for the positioning of Y, which is Chen's. All count
-from `thermocomp.virtual.axes.TEST_POSITION`: where the workpiece's zero is set, nothing is wrong.
+10 to 40 urad, squareness 14 to 21 urad. Engineering values, except for the positioning of Y, which is Chen's. All
+errors are relative to `thermocomp.virtual.axes.TEST_POSITION`, the workpiece zero, where they vanish.
 """
 
 from dataclasses import dataclass
@@ -14,28 +14,28 @@ from thermocomp.virtual.axes import TEST_POSITION
 
 FloatArray = NDArray[np.float64]
 
-#: cold positioning error of Y in mm, for y in mm: Chen 1996, Eq. 6 (C-22), constant first
+#: cold positioning error of Y in mm as a polynomial of y in mm: Chen 1996, Eq. 6 (C-22), constant term first
 CHEN_COLD_PROFILE = (2.424e-4, 3.096e-4, -3.571e-6, 1.474e-8, -2.662e-11, 1.738e-14)
 
 
 def cold_profile(position: ArrayLike) -> FloatArray:
-    """Return the geometric positioning error of Y as Chen gives it [um], at a position [mm]."""
+    """Return the geometric positioning error of Y according to Chen [um] at a position [mm]."""
     p = np.asarray(position, dtype=np.float64)
     return np.asarray(1e3 * sum(c * p**k for k, c in enumerate(CHEN_COLD_PROFILE)))
 
 
 @dataclass(frozen=True)
 class Wave:
-    """A cold profile: a polynomial and a wave.
+    """A cold profile: a polynomial plus a sine wave.
 
     Parameters
     ----------
     slope, curvature, cubic : float
-        Factors of u, u^2, u^3; u runs from about -1 to 1 over the travel: 300 mm are one [um, urad].
+        Coefficients of u, u^2, u^3; u runs from about -1 to 1 over the travel, with 300 mm as unit [um, urad].
     amplitude : float
-        Amplitude of the wave [um, urad].
+        Amplitude of the sine wave [um, urad].
     length : float
-        Length of the wave [mm].
+        Wavelength [mm].
     """
 
     slope: float = 0.0
@@ -45,7 +45,7 @@ class Wave:
     length: float = 500.0
 
     def __call__(self, position: FloatArray, middle: float) -> FloatArray:
-        """Return its values at positions, zero at the middle [mm]."""
+        """Return the values at positions [mm]; zero at the middle."""
         away = position - middle
         u = away / _HALF
         wave = np.sin(2.0 * np.pi * away / self.length)
@@ -54,7 +54,7 @@ class Wave:
 
 
 _HALF = 300.0
-#: by ISO 230-1 code; that of EYY is `cold_profile`
+#: profiles by ISO 230-1 code; EYY is given by `cold_profile`
 PROFILES: dict[str, Wave] = {
     "EXX": Wave(slope=8.0, cubic=-3.0, amplitude=1.5, length=460.0),
     "EYX": Wave(curvature=-2.5, amplitude=0.8, length=520.0),
@@ -74,22 +74,22 @@ PROFILES: dict[str, Wave] = {
     "EBZ": Wave(slope=-9.0, cubic=2.0, amplitude=2.0, length=440.0),
     "ECZ": Wave(slope=5.0, curvature=4.0, amplitude=2.0, length=460.0),
 }
-#: [urad]
+#: squareness errors by code [urad]
 SQUARENESS = {"C0Y": 14.0, "B0Z": -21.0, "A0Z": 17.0}
-#: The column's weight bends the bed (C-06): with Z at the front, near the guides of X, these sag in their middle. Half
-#: of the travel of Z from the test position, at an end of the travel of X, is worth this [um].
+#: The weight of the column bends the bed (C-06): with Z at the front, near the X guides, these sag in the middle. Value
+#: at half of the travel of Z from the test position, at an end of the travel of X [um].
 SAG = 2.0
 
 
 def find_cold_component(code: str, points: FloatArray) -> FloatArray:
-    """Return a component of an axis in the cold machine.
+    """Return a component of an axis of the cold machine.
 
     Parameters
     ----------
     code : str
         Code of ISO 230-1, such as ``EXX``.
     points : ndarray of shape (..., 3)
-        Positions of X, Y and Z [mm]. All except EYX, which also depends on Z, depend on that of their own axis only.
+        Positions of X, Y and Z [mm]. Each component depends only on its own axis, except EYX, which also depends on Z.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Heat sources of the virtual machining centre; plausible engineering values, not those of a real machine."""
+"""Heat sources of the virtual machining centre; plausible engineering values, not taken from a real machine."""
 
 import math
 from dataclasses import dataclass
@@ -11,15 +11,16 @@ from thermocomp.virtual.machine import FeedDrive
 
 @dataclass(frozen=True)
 class BearingFriction:
-    """Heat of a spindle bearing, after Palmgren: a viscous and a load-dependent torque.
+    """Heat of a spindle bearing according to Palmgren: a viscous and a load-dependent torque.
 
     ``P = viscous r^(5/3) exp(-thinning (T - 40 degC)) + load r (1 + preload_gain max(0, T_shaft - T_housing))``
-    with r = speed / top speed. The oil thins as it warms; the shaft, warmer than the housing, tightens the preload.
+    with r = speed / top speed. Oil viscosity decreases with temperature; a shaft warmer than the housing raises the
+    preload.
 
     Parameters
     ----------
     viscous, load : float
-        At top speed, 40 degC and without a temperature difference [W].
+        Values at top speed, 40 degC and zero temperature difference [W].
     thinning : float
         [1/K]
     preload_gain : float
@@ -32,14 +33,14 @@ class BearingFriction:
     preload_gain: float = 0.04
 
     def heat(self, ratio: float, temperature: float, tightening: float) -> float:
-        """Heat [W] at a share of top speed, a bearing temperature [degC], and shaft minus housing [K]."""
+        """Return the heat [W] from the speed ratio, bearing temperature [degC], and shaft minus housing [K]."""
         viscous = self.viscous * math.pow(ratio, 5.0 / 3.0) * math.exp(-self.thinning * (temperature - 40.0))
         return viscous + self.load * ratio * (1.0 + self.preload_gain * max(0.0, tightening))
 
 
 @dataclass(frozen=True)
 class HeatSources:
-    """All heat put into the machine.
+    """All heat sources of the machine.
 
     Parameters
     ----------
@@ -47,27 +48,28 @@ class HeatSources:
         Maximum spindle speed [1/min].
     front, rear : BearingFriction
     motor_on, motor_top : float
-        Loss of the running spindle motor: magnetising; iron and windage at top speed, with its square [W].
+        Loss of the running spindle motor: magnetising; iron and windage at top speed, with speed squared [W].
     drive_nut, drive_bearing : float
-        Friction of a feed drive's nut, and of its bearing and motor, at 1000 mm/min [W].
+        Friction of the nut of a feed drive, and of its bearing and motor, at 1000 mm/min [W].
     hold : float
-        Motor of the vertical axis Y, which holds the headstock [W].
+        Heat of the motor of the vertical axis Y, which holds the headstock [W].
     cabinet, cabinet_share : float
-        Conducted into the column's rear right by the electric cabinet: always [W], and per watt of motor loss.
+        Heat conducted into the rear right of the column by the electric cabinet: constant [W], and per watt of motor
+        loss.
     rotor_share : float
-        Fraction of the motor's loss that arises in the rotor; the rest in the stator.
+        Fraction of the motor loss that arises in the rotor; the rest arises in the stator.
     screw_share : float
-        Fraction of the nut's friction that goes into the screw.
+        Fraction of the nut friction that goes into the screw.
     top_feed : float
-        Feed rate at which a screw has all its extra convection [mm/min].
+        Feed rate at which the additional convection of a screw is at its maximum [mm/min].
     hydraulics : float
-        Conducted into the bed's rear by the hydraulic unit [W].
+        Heat conducted into the rear of the bed by the hydraulic unit [W].
     pump : float
-        From the coolant pump [W].
+        Heat of the coolant pump [W].
     chiller : float
-        Taken from the coolant while the chiller runs [W].
+        Heat removed from the coolant while the chiller runs [W].
     setpoint, half_band : float
-        The chiller holds the coolant this far from the bed's temperature, and switches this far on either side [K].
+        Set point of the coolant relative to the bed temperature, and half of the switching hysteresis [K].
     """
 
     top_speed: float = 3500.0
@@ -90,15 +92,15 @@ class HeatSources:
     half_band: float = 0.8
 
     def rotation(self, speed: float) -> float:
-        """Share of the rotating parts' extra convection in force at a speed [1/min]: with n^(2/3) (Becker 1963)."""
+        """Return the share of the rotating parts' additional convection at a speed [1/min]: n^(2/3) (Becker 1963)."""
         return float((abs(speed) / self.top_speed) ** (2.0 / 3.0))
 
     def moving(self, feed: float) -> float:
-        """Share of a turning screw's extra convection in force at a feed rate [mm/min], in the same way."""
+        """Return the share of a rotating screw's additional convection at a feed rate [mm/min]: power 2/3."""
         return float(min(abs(feed) / self.top_feed, 1.0) ** (2.0 / 3.0))
 
     def given(self, drive: FeedDrive) -> dict[str, float]:
-        """Return the heat put in at each named place that does not depend on temperatures [W]."""
+        """Return the heat at each named place that does not depend on temperatures [W]."""
         if not drive.powered:
             return {}
         ratio = abs(drive.speed) / self.top_speed
@@ -125,36 +127,36 @@ class HeatSources:
         Parameters
         ----------
         chilling : bool
-            The chiller runs at the start of the step.
+            Whether the chiller runs at the start of the step.
         before, after : float
-            Coolant minus bed at the start of the step, and at its end if nothing switches [K].
+            Coolant minus bed at the start of the step, and at its end without switching [K].
         """
         limit = self.setpoint + (-self.half_band if chilling else self.half_band)
         if (before > limit) != chilling:
-            return 0.0  # long beyond it, such as after a stop of the loop
+            return 0.0  # far beyond the limit, for example after a stop of the coolant loop
         if (after > limit) == chilling:
             return 1.0
         return min(max((limit - before) / (after - before), 0.0), 1.0) if after != before else 0.0
 
 
 def swept(stroke: tuple[float, float], travel: float) -> list[float]:
-    """Return the distribution of an even movement over a stroke on the hat functions along a travel.
+    """Return the distribution of a uniform movement over a stroke on the hat functions along a travel.
 
     Parameters
     ----------
     stroke : tuple of float
-        From where to where [mm]; a movement on the spot has both alike.
+        Start and end of the stroke [mm]; equal for a movement on the spot.
     travel : float
         [mm], from 0
 
     Returns
     -------
     list of float
-        One share per hat function, their sum is 1.
+        One share per hat function; the shares sum to 1.
     """
     knots = np.linspace(0.0, travel, N_HATS)
     low, high = (min(max(p, 0.0), travel) for p in sorted(stroke))
-    # Exact for piecewise linear hats where every knot within the stroke is a node of the trapezoidal rule.
+    # Exact for piecewise linear hats if every knot within the stroke is a node of the trapezoidal rule.
     nodes = np.unique([low, high, *knots[(knots > low) & (knots < high)]])
     hats = np.maximum(0.0, 1.0 - np.abs(nodes[:, None] - knots) / (knots[1] - knots[0]))
     shares = np.trapezoid(hats, nodes, axis=0) / (high - low) if len(nodes) > 1 else hats[0]

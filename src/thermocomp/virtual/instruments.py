@@ -1,7 +1,7 @@
-"""Instruments applied to the true values; plausible values of their data sheets.
+"""Instruments applied to the true values, with plausible data-sheet values.
 
-Whatever an instrument reads is a weighted sum of what the machine tells (temperatures of places, displacements) and of
-the air: so all of them together are one matrix.
+Each instrument reads a weighted sum of the outputs of the machine model (temperatures of places, displacements) and of
+the air; all instruments together form one matrix.
 """
 
 from collections.abc import Mapping
@@ -32,9 +32,9 @@ class Mounting:
     bias : float
         [degC]
     contact : float
-        Weight of the part's temperature in what it feels; the rest is the air round it.
+        Weight of the part's temperature in the sensor value; the rest is the surrounding air.
     drift : float
-        Drift of its zero [degC per day].
+        Zero drift [degC per day].
     """
 
     lag: float
@@ -53,21 +53,21 @@ def mounting(place: str) -> Mounting:
 
 @dataclass(frozen=True)
 class Instrument:
-    """A sensor, and the weights of what it reads.
+    """A sensor and the weights of the quantities that it reads.
 
     Parameters
     ----------
     sensor : Sensor
     reads : mapping of str to float
-        Weights by the machine's names of places and observables.
+        Weights by the names of places and observables of the machine.
     air : tuple of float
-        Values of `Air.values`.
+        Weights of `Air.values`.
     cold : float
-        Value in the state from which it counts [um].
+        Value in the reference state [um].
     zeroed : bool
-        It is relative to the state in which the test begins; False: to the values of the machine and the air at zero.
+        Whether the reference is the state at the start of the test; False: machine and air values of zero.
     touches : bool
-        It gives readings in probing cycles only.
+        Whether it gives readings in probing cycles only.
     """
 
     sensor: Sensor
@@ -89,9 +89,9 @@ def thermometer(kit: Kit, label: str, place: str, *, perfect: bool, noise: float
         Its channel is ``t_LABEL_C``.
     place : str
     perfect : bool
-        Without lag, bias, drift and steps, and it feels nothing of the air.
+        Without lag, bias, drift and quantisation, and not affected by the air.
     noise : float or None
-        Standard deviation [degC]; None: the sensor's own.
+        Standard deviation [degC]; None: as defined for the sensor.
     """
     channel = Channel(f"t_{label}_C", "temperature", "degC", kit.place(place, perfect=perfect))
     mounted = mounting(place)
@@ -109,14 +109,14 @@ def thermometer(kit: Kit, label: str, place: str, *, perfect: bool, noise: float
 
 
 def displacement(label: str, probe: VirtualProbe, *, perfect: bool) -> Instrument:
-    """Return a displacement probe, or a line of a laser; its channel is ``LABEL_um``, that of an angle ``LABEL_urad``.
+    """Return a displacement probe or a laser line; its channel is ``LABEL_um``, for an angle ``LABEL_urad``.
 
     Parameters
     ----------
     label : str
     probe : VirtualProbe
     perfect : bool
-        Without noise, drift and steps.
+        Without noise, drift and quantisation.
     """
     quantity = "angle" if probe.unit == "urad" else "displacement"
     channel = Channel(f"{label}_{probe.unit}", quantity, probe.unit, probe.place)
@@ -127,11 +127,11 @@ def displacement(label: str, probe: VirtualProbe, *, perfect: bool) -> Instrumen
 
 @dataclass(frozen=True)
 class Touch:
-    """A probing cycle: a touch probe in the spindle measures points of an artefact on the table, again and again.
+    """A probing cycle: a touch probe in the spindle repeatedly measures points of an artefact on the table.
 
-    Each point gives three channels, ``x_LABEL_um``, ``y_LABEL_um`` and ``z_LABEL_um``: how far the tool point is off it
-    since the start, actual minus commanded; a spindle that grows towards the artefact reads a negative z. Between two
-    cycles they have no value. A cycle that is due while the spindle turns waits until it stands.
+    Each point gives three channels, ``x_LABEL_um``, ``y_LABEL_um`` and ``z_LABEL_um``: the deviation of the tool point
+    since the start, actual minus commanded; a spindle that grows towards the artefact gives a negative z. Between two
+    cycles they have no value. A cycle that is due while the spindle rotates waits until it has stopped.
 
     Parameters
     ----------
@@ -140,9 +140,9 @@ class Touch:
     points : mapping of str to tuple of float
         Positions X, Y, Z of the axes at each point [mm].
     noise : float
-        Repeatability of the probe, one standard deviation [um]; data sheets specify 1 um for two.
+        Repeatability of the probe, one standard deviation [um]; data sheets specify 1 um for two standard deviations.
     resolution : float
-        Resolution of the controller's reading [um].
+        Resolution of the controller [um].
     """
 
     every: float
@@ -182,14 +182,14 @@ class Touch:
         ]
 
     def rows(self, time: FloatArray, still: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Return the rows at which a cycle is run.
+        """Return the rows at which a cycle is performed.
 
         Parameters
         ----------
         time : ndarray of shape (n_rows,)
             [s]
         still : ndarray of shape (n_rows,)
-            The spindle is stopped.
+            Whether the spindle is stopped.
         """
         run = np.zeros(len(time), dtype=np.bool_)
         due = 0.0

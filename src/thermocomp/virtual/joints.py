@@ -1,4 +1,4 @@
-"""Nonlinear parts of the virtual machining centre: preload, spinning shaft, sliding foot; engineering values."""
+"""Nonlinear joints of the virtual machining centre: preload, rotating shaft, sliding foot; engineering values."""
 
 from dataclasses import dataclass
 
@@ -15,14 +15,14 @@ class Joints:
     Parameters
     ----------
     preload : float
-        Axial shift of the shaft by thermal preload, per kelvin that it is warmer than its seat; a colder one does not
-        move [um/K].
+        Axial shift of the shaft by thermal preload per kelvin above the temperature of its seat; no shift if colder
+        [um/K].
     centrifugal, lift : float
-        Shift of the shaft along Z and Y at top speed by centrifugal forces, with the square of speed [um].
+        Shift of the shaft along Z and Y at top speed by centrifugal forces, proportional to speed squared [um].
     stiction : float
         Free displacement of the column's foot on the bed at which it starts to slide [um].
     share : float
-        Of what the foot does not slide, the share that moves the tool: the column is located midway between carriages.
+        Fraction of the blocked sliding that moves the tool: the column is located midway between the carriages.
     """
 
     preload: float = 0.4
@@ -32,14 +32,14 @@ class Joints:
     share: float = 0.5
 
     def shaft(self, tightening: FloatArray, ratio: FloatArray) -> FloatArray:
-        """Shift of the shaft towards the workpiece [um].
+        """Return the shift of the shaft towards the workpiece [um].
 
         Parameters
         ----------
         tightening : ndarray of shape (n_steps,)
             Shaft minus housing [K].
         ratio : ndarray of shape (n_steps,)
-            Share of top speed.
+            Speed over top speed.
         """
         result: FloatArray = self.preload * np.maximum(0.0, tightening) - self.centrifugal * ratio**2
         return result
@@ -51,11 +51,11 @@ def slide_with_friction(slid: float, wish: FloatArray, stiction: float | FloatAr
     Parameters
     ----------
     slid : float
-        Before the first step [um].
+        Sliding before the first step [um].
     wish : ndarray of shape (n_steps,)
         Free displacement without friction [um].
     stiction : float, or ndarray of shape (n_steps,)
-        Free displacement at which it starts to slide [um].
+        Free displacement at which sliding starts [um].
 
     Returns
     -------

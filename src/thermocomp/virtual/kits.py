@@ -1,4 +1,4 @@
-"""Equipment of the virtual machines, and their loads: places, probes, lasers, loads."""
+"""Equipment of the virtual machines: temperature places, probes, lasers, loads."""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -54,7 +54,7 @@ HWANG_PLACES = (
     "bed_front",
     "bed_rear",
 )
-#: a usual outfit: what a user would mount on a machine
+#: a usual set of sensors, as a user would mount it on a machine
 USUAL_PLACES = (
     "front_seat",
     "motor",
@@ -82,20 +82,20 @@ class Kit:
     Parameters
     ----------
     places : mapping of str to str
-        Place of a temperature sensor -> where it is, in words.
+        Description of the location, by place of a temperature sensor.
     air : mapping of str to float
-        Height above the floor of those `places` that are in the air [m].
+        Height above the floor of the `places` in the air [m].
     probes : mapping of str to VirtualProbe
     observables : tuple of str
         Quantities from which probes can be made.
     outfits, nests : mapping of str to tuple of str
-        Names that denote several places, or several probes.
+        Names that denote several places or several probes.
     loads : mapping of str to str
-        Places where further heat can be applied.
+        Places where additional heat can be applied.
     inner : mapping of str to str
-        Places that only a calculation can read: they turn.
+        Rotating places, whose temperatures can only be calculated.
     top_speed : float
-        Maximum spindle speed [1/min]; 0: there is none.
+        Maximum spindle speed [1/min]; 0: no spindle.
     """
 
     places: Mapping[str, str]
@@ -109,19 +109,19 @@ class Kit:
     top_speed: float = 0.0
 
     def place(self, name: str, *, perfect: bool) -> str:
-        """Return the place of a temperature in words.
+        """Return the description of a temperature place.
 
         Parameters
         ----------
         name : str
             Name of the place.
         perfect : bool
-            It is calculated, not measured.
+            Whether the temperature is calculated, not measured.
 
         Raises
         ------
         SettingError
-            There is no such place, or it cannot be measured.
+            Place missing, or not measurable.
         """
         if name in self.inner and not perfect:
             raise SettingError(f"{name!r} is a rotation: it can only be calculated, with perfect = true")
@@ -136,7 +136,7 @@ class Kit:
         Raises
         ------
         SettingError
-            There is no such probe or observable, or its position is beyond the travel.
+            Probe or observable missing, or its position is beyond the travel.
         """
         if not isinstance(name, str):
             for observable in name:
@@ -159,14 +159,14 @@ class Kit:
 
 
 def labelled(names: Sequence[str] | Mapping[str, T], sets: Mapping[str, tuple[str, ...]]) -> dict[str, str | T]:
-    """Return the mounted instruments by the label used in their channel names.
+    """Return the names of mounted instruments by the label used in their channel names.
 
     Parameters
     ----------
     names : sequence of str, or mapping of str to str
-        Without labels a name is its own label.
+        Names by label; in a sequence each name is its own label.
     sets : mapping of str to tuple of str
-        Names that denote several.
+        Names that denote several instruments.
     """
     if not isinstance(names, Mapping):
         return {n: n for given in names for n in sets.get(given, (given,))}
@@ -175,7 +175,7 @@ def labelled(names: Sequence[str] | Mapping[str, T], sets: Mapping[str, tuple[st
 
 
 def check_labels(labels: Iterable[str]) -> None:
-    """Raise `SettingError` if a label cannot be part of a channel's name."""
+    """Raise `SettingError` if a label cannot be part of a channel name."""
     for label in labels:
         if not re.fullmatch(r"[A-Za-z0-9_]+", label):
             raise SettingError(f"{label!r} cannot name a channel: use letters, digits and underscores")
@@ -187,7 +187,7 @@ _COLUMN = {
     "column_rear_right": "column, upper rear right",
     "column_rear_left": "column, upper rear left",
 }
-#: the usual places of the machining centre; shaft and screws turn: nobody measures them
+#: usual places of the machining centre; shaft and screws rotate and are not measured
 PLACES: dict[str, str] = {
     "front_seat": "spindle housing round the front bearing",
     "rear_seat": "spindle housing round the rear bearing",
@@ -255,7 +255,7 @@ CENTRE = Kit(
     top_speed=HeatSources().top_speed,
 )
 
-#: Wessel's resting tool (W-08), from the tool down to the fit of the bearing; T9 is the room
+#: Wessel's resting tool (W-08), from the tool down to the bearing fit; T9 is the room
 _TOOL_PLACES = {
     "t1": "tool shank",
     "t2": "chuck, front",
@@ -283,5 +283,5 @@ TOOL = Kit(
     loads={"heater": "heating elements at the bearing's fit of the shaft", "tip": "hot air at the tip"},
 )
 
-#: by the names that protocols use
+#: equipment by machine name in protocols
 KITS: dict[str, Kit] = {"centre": CENTRE, "tool": TOOL}

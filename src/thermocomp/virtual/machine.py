@@ -1,7 +1,6 @@
-"""The interface of a virtual machine tool: state in, state out.
+"""Interface of a virtual machine tool: state in, state out.
 
-Reduced finite-element models fill it (`thermocomp.virtual.centre`, `thermocomp.virtual.toolsystem`): they are
-asked the same and answer the same.
+It is implemented by reduced finite-element models (`thermocomp.virtual.centre`, `thermocomp.virtual.toolsystem`).
 """
 
 import math
@@ -21,12 +20,12 @@ S = TypeVar("S")
 
 @dataclass(frozen=True)
 class Air:
-    """Air round the machine.
+    """Air around the machine.
 
     Parameters
     ----------
     temperature : float
-        In the middle of the machine, `REFERENCE_HEIGHT` above the floor [degC].
+        Temperature at the middle of the machine, `REFERENCE_HEIGHT` above the floor [degC].
     stratification : float
         Rise with height [K/m].
     side : float
@@ -37,12 +36,12 @@ class Air:
     stratification: float = 0.0
     side: float = 0.0
 
-    #: height above the floor at which `temperature` holds [m]
+    #: height above the floor to which `temperature` refers [m]
     REFERENCE_HEIGHT = 1.2
 
     @property
     def values(self) -> FloatArray:
-        """Temperature, stratification, side: a row of what `VirtualMachine.run` takes."""
+        """Temperature, stratification and side gradient: one row of the `air` of `VirtualMachine.run`."""
         return np.array([self.temperature, self.stratification, self.side])
 
 
@@ -57,18 +56,18 @@ class FeedDrive:
     feed : tuple of float
         Mean feed rates of X, Y, Z [mm/min].
     stroke : tuple of (tuple of float or None)
-        From where to where X, Y and Z move [mm]; None: over the whole travel.
+        Start and end of the movements of X, Y and Z [mm]; None: over the whole travel.
     loads : mapping of str to float
-        Further heat put in at a named place, such as that of cutting [W].
+        Additional heat by place, such as heat of cutting [W].
     cooled : bool
-        The coolant loop runs.
+        Whether the coolant loop runs.
     powered : bool
-        The machine is switched on; if not there is no heat at all, and no coolant loop.
+        Whether the machine is switched on; if not there is no heat and no coolant flow.
 
     Raises
     ------
     InputError
-        A number is not finite, a stroke is beyond the travel, or a machine that is switched off is to turn or move.
+        A number is not finite, a stroke is beyond the travel, or a machine that is switched off is commanded to move.
     """
 
     speed: float = 0.0
@@ -92,16 +91,16 @@ class FeedDrive:
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """True behaviour of the machine, before any sensor: one row per step.
+    """True state of the machine, without sensors: one row per step.
 
     Parameters
     ----------
     temperatures : ndarray of shape (n_steps, n_places)
         In the order of `VirtualMachine.places` [degC].
     observables : ndarray of shape (n_steps, n_observables)
-        In the order of `VirtualMachine.observables` [um], angles [urad]. Of the tool point against the workpiece,
-        actual minus commanded, in machine coordinates (ISO 841): a spindle that grows towards the workpiece has a
-        negative z.
+        In the order of `VirtualMachine.observables` [um], angles [urad]. Deviations of the tool point relative to the
+        workpiece, actual minus commanded, in machine coordinates (ISO 841): a spindle that grows towards the workpiece
+        has a negative z.
     """
 
     temperatures: FloatArray
@@ -122,11 +121,11 @@ class VirtualMachine(Protocol[S]):
         ...
 
     def init(self, air: Air) -> S:
-        """Return the state of a machine that was switched off for long, in this air."""
+        """Return the equilibrium state of a machine that has been switched off in this air for a long time."""
         ...
 
     def run(self, state: S, drives: Sequence[FeedDrive], air: FloatArray, dt: float) -> tuple[S, Truth]:
-        """Return the state after `n_steps` steps of `dt`, and what was true at the end of each.
+        """Return the state after `n_steps` steps of `dt`, and the true values at the end of each step.
 
         Parameters
         ----------
@@ -142,7 +141,7 @@ class VirtualMachine(Protocol[S]):
 
 
 def check(drives: Sequence[FeedDrive], air: FloatArray, dt: float) -> None:
-    """Refuse what `VirtualMachine.run` cannot take.
+    """Raise an error for invalid arguments of `VirtualMachine.run`.
 
     Parameters
     ----------
@@ -167,7 +166,7 @@ def check(drives: Sequence[FeedDrive], air: FloatArray, dt: float) -> None:
 
 
 def stretches(drives: Sequence[FeedDrive]) -> Iterator[tuple[int, int]]:
-    """Yield the start and end of each stretch with a constant drive."""
+    """Yield start and end of each run of steps with a constant drive."""
     first = 0
     for k in range(1, len(drives) + 1):
         if k == len(drives) or (drives[k] is not drives[first] and drives[k] != drives[first]):

@@ -1,9 +1,9 @@
-"""The virtual machines with the physics of real joints, bearings and surfaces, in addition to the linear ones.
+"""Virtual machines with nonlinear joints, bearings and surfaces, in addition to the linear ones.
 
-What they differ in: films that depend on temperatures and speed (`thermocomp.virtual.convection`), joints that open
-and close (`thermocomp.virtual.fits`), preload and friction of the bearings (`thermocomp.virtual.preload`),
-expansion that grows as a part warms. Each value has its source, or says that it is an engineering value; none was
-chosen by what a method makes of it.
+Differences: films that depend on temperatures and speed (`thermocomp.virtual.convection`), joints that open and close
+(`thermocomp.virtual.fits`), preload and friction of the bearings (`thermocomp.virtual.preload`), and expansion
+coefficients that increase with temperature. Each value has a source or is marked as an engineering value; none was
+tuned to the results of a method.
 """
 
 from collections.abc import Mapping, Sequence
@@ -24,17 +24,17 @@ from thermocomp.virtual.toolsystem import RestingTool, ToolState
 
 FloatArray = NDArray[np.float64]
 
-#: By how much the expansion of steel grows per kelvin at 20 degC: EN 1993-1-2, 3.4.1.1, dL/L = 1.2e-5 T + 0.4e-8 T^2
-#: - 2.416e-4; grey iron and carbide are taken alike (an engineering value) [1/K]
+#: Relative increase of the expansion coefficient of steel per kelvin at 20 degC: EN 1993-1-2, 3.4.1.1, dL/L = 1.2e-5 T
+#: + 0.4e-8 T^2 - 2.416e-4; also used for grey iron and carbide (an engineering value) [1/K]
 EXPANSION_GROWS = 0.8e-8 / 1.216e-5
-#: emissivity of paint, and of ground steel (Incropera, Table A.11: 0.9 and more; 0.1 to 0.3)
+#: emissivity of paint and of ground steel (Incropera, Table A.11: 0.9 and more; 0.1 to 0.3)
 PAINT, BARE = 0.9, 0.25
 
 #: HSK-A63: shank of 48.007 to 48.011 mm at the gauge line (ISO 12164, in Y. Ito, Modular Design for Machine Tools, fig.
-#: 9-21) in a socket of 48 mm: 4.5 um in radius; hollow shank and nose as in the finite elements
+#: 9-21) in a socket of 48 mm: interference of 4.5 um in radius; hollow shank and nose as in the finite elements
 TAPER = Fit(radius=21.5, bore=10.0, outside=44.0, length=32.0, squeeze=4.5, linear=4000.0)
-#: Hydraulic chuck, 20 mm carbide shank over 50 mm: pressed by 70 MPa (an engineering value: makers' catalogues promise
-#: some hundred N m, which 330 N m with a friction of 0.15 stand for); behind the sleeve the linear model's oil
+#: Hydraulic chuck, 20 mm carbide shank over 50 mm: pressure of 70 MPa (an engineering value: catalogues state some
+#: hundred N m, which agrees with 330 N m at a friction of 0.15); behind the sleeve the oil of the linear model
 GRIP = Fit(
     radius=10.0,
     bore=0.0,
@@ -48,22 +48,22 @@ GRIP = Fit(
     behind=1200.0,
     conductivity=55.0,
 )
-#: Outer rings of the front bearing in the housing: a gap of 6 um in diameter (an engineering value: some um are usual)
+#: Outer rings of the front bearing in the housing: gap of 6 um in diameter (an engineering value: some um are usual)
 SEAT = Fit(radius=55.0, bore=45.0, outside=80.0, length=60.0, squeeze=-3.0, linear=3500.0, expansion=(12.0, 11.7))
-#: Three 7014 of 25 degrees, two 7012 under springs: sizes and ratings of makers' catalogues, rounded; the preload of
-#: some hundred N is an engineering value
+#: Three 7014 with 25 degrees contact angle, two spring-loaded 7012: sizes and ratings from catalogues, rounded; the
+#: preload of some hundred N is an engineering value
 FRONT = AngularContact(pitch=90.0, ball=12.7, balls=20, static=44e3, preload=600.0)
 REAR = AngularContact(pitch=77.5, ball=11.1, balls=19, static=33e3, preload=300.0, pair=1, sprung=True)
 
-#: Surfaces of the resting tool: areas and lengths of the finite elements
+#: Surfaces of the resting tool: areas and lengths from the finite elements
 TOOL_FACES: Mapping[str, Face] = {
     "on_tool": Face(0.00723, 0.110, 9.0, BARE, curvature=5.5),
     "on_chuck": Face(0.01800, 0.090, 8.0, BARE, curvature=1.8),
     "on_shaft": Face(0.06289, 0.200, 8.0, BARE, curvature=2.9),
     "on_body": Face(0.08294, 0.100, 7.0, PAINT, curvature=0.5),
 }
-#: Surfaces of the machining centre; those of the lumps are their conductance over 8 W/(m2 K). Lengths of lumps are
-#: engineering values.
+#: Surfaces of the machining centre; areas of the lumps are their conductance divided by 8 W/(m2 K). Lengths of lumps
+#: are engineering values.
 CENTRE_FACES: Mapping[str, Face] = {
     "spindle_rotating": Face(0.03372, 0.060, 8.0, BARE, lying=True, films_turning=60.0),
     "spindle_front": Face(0.09142, 0.180, 8.0, BARE, wind=12.0, films_turning=12.0),
@@ -74,23 +74,23 @@ CENTRE_FACES: Mapping[str, Face] = {
     "table": Face(0.750, 0.30, 8.0, BARE),
     **{f"{axis}_bearing": Face(0.1875, 0.25, 8.0, PAINT) for axis in "xyz"},
 }
-#: of these the work space is the air
+#: surfaces exposed to the air of the work space
 IN_WORK_SPACE = ("spindle_rotating", "spindle_front")
 
 
 @dataclass(frozen=True, eq=False)
 class NonlinearTool(RestingTool):
-    """The resting tool whose films, joints and expansion depend on its temperatures.
+    """The resting tool with films, joints and expansion that depend on its temperatures.
 
     Parameters
     ----------
     model : ReducedModel
-        With joints.
+        Model with joints.
     faces : mapping of str to Face
     taper, grip : Fit or None
-        Of the shank in the shaft, and of the tool in the chuck, where it slips; None: as the reduced model has it.
+        Joint of the shank in the shaft, and of the tool in the chuck, where it slips; None: as in the reduced model.
     expansion_grows : float
-        [1/K]
+        Relative increase of the expansion coefficient per kelvin [1/K].
     stiction, convection, usual_rise
         Settings of the linear tool; not used here.
     """
@@ -102,7 +102,7 @@ class NonlinearTool(RestingTool):
     expansion_grows: float = EXPANSION_GROWS
 
     def init(self, air: Air) -> ToolState:
-        """Return the state of a tool that was mounted at 20 degC and has long been in this air."""
+        """Return the state of a tool that was mounted at 20 degC and has been in this air for a long time."""
         state = super().init(air).field
         return ToolState(state, float(self._slip(state[None], 0.0)[0]))
 
@@ -138,7 +138,7 @@ class NonlinearTool(RestingTool):
         return observables, float(behind[-1])
 
     def _slip(self, fields: FloatArray, slipped: float) -> FloatArray:
-        """Displacement of the shank behind the front of the chuck, which expands more than it [um]."""
+        """Return the shank displacement lost by slip in the chuck, which expands more than the shank [um]."""
         if self.grip is None:
             return np.zeros(len(fields))
         chuck, tool = self.model.rows(("grip_a", "grip_b")) @ fields.T
@@ -149,19 +149,19 @@ class NonlinearTool(RestingTool):
 
 @dataclass(frozen=True, eq=False)
 class NonlinearCentre(MachiningCentre):
-    """The machining centre whose films, joints, bearings and expansion depend on temperatures and speed.
+    """The machining centre with films, joints, bearings and expansion that depend on temperatures and speed.
 
     Parameters
     ----------
     model : ReducedModel
-        With joints.
+        Model with joints.
     faces : mapping of str to Face
     taper, seat : Fit or None
-        Of the test bar in the shaft, and of the outer rings in the housing; None: as the reduced model has it.
+        Joint of the test bar in the shaft, and of the outer rings in the housing; None: as in the reduced model.
     front, rear : AngularContact or None
         None: friction and thermal preload of the linear machine.
     expansion_grows : float
-        Temperature coefficient of the expansion of spindle and test bar [1/K].
+        Relative increase of the expansion coefficient of spindle and test bar per kelvin [1/K].
     """
 
     model: ReducedModel = field(default_factory=lambda: ReducedModel.load("centre_joints"))
@@ -207,7 +207,7 @@ class NonlinearCentre(MachiningCentre):
         return correct
 
     def _pressed(self, ring: ArrayLike, housing: ArrayLike) -> FloatArray:
-        """By how much the housing makes the front outer raceway smaller, once its gap has closed [um]."""
+        """Return the contraction of the front outer raceway by the housing once the gap has closed [um]."""
         if self.seat is None:
             return np.zeros(np.shape(ring))
         inner, outer = self.seat.compliances
@@ -228,7 +228,7 @@ class NonlinearCentre(MachiningCentre):
         return truth, slid
 
 
-#: sides of the joints, in the order in which they are watched
+#: sides of the joints, in the order of the watched values
 _SIDES = ("balls_a", "balls_b", "seat_a", "seat_b", "taper_a", "taper_b")
 
 
@@ -238,7 +238,7 @@ def _more(fit: Fit | None, inner: float, outer: float) -> float:
 
 
 def _squared(model: ReducedModel, fields: FloatArray) -> dict[str, FloatArray]:
-    """Return the response of some observables to the squared temperatures [um K], by their names."""
+    """Return the response of observables to the squared temperatures [um K], by name."""
     rise = fields - REFERENCE_TEMPERATURE * model.one
     if model.squares is None or model.squared is None:
         return {}

@@ -1,4 +1,4 @@
-"""Bearings whose preload and friction depend on temperatures: angular contact, back to back.
+"""Bearings with temperature-dependent preload and friction: angular contact, back to back.
 
 References
 ----------
@@ -6,7 +6,7 @@ T. A. Harris, Rolling Bearing Analysis, 4th ed. 2001: Palmgren's friction torque
 J. L. Stein and J. F. Tu, A state-space model for monitoring thermally induced preload in anti-friction spindle bearings
 of high-speed machine tools, J. Dyn. Syst. Meas. Control 116 (1994) 372; B. Bossmanns and J. F. Tu, A thermal model for
 high speed motorized spindles, Int. J. Mach. Tools Manuf. 39 (1999) 1345: an inner ring warmer than the outer one
-tightens the preload, which makes heat. ASTM D341: viscosity against temperature.
+increases the preload, which generates heat. ASTM D341: viscosity against temperature.
 """
 
 import math
@@ -23,7 +23,7 @@ EXPANSION = 12.0
 
 @dataclass(frozen=True)
 class Grease:
-    """Base oil of a grease for spindles, ISO VG 22.
+    """Base oil of a spindle grease, ISO VG 22.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class Grease:
     at_100: float = 4.3
 
     def viscosity(self, temperature: float) -> float:
-        """Kinematic viscosity at a temperature [degC], after ASTM D341 (Walther) [mm2/s]."""
+        """Return the kinematic viscosity at a temperature [degC] according to ASTM D341 (Walther) [mm2/s]."""
         low, high = (math.log10(math.log10(v + 0.7)) for v in (self.at_40, self.at_100))
         slope = (high - low) / math.log10(373.15 / 313.15)
         return float(10.0**10.0 ** (low + slope * math.log10((temperature + 273.15) / 313.15)) - 0.7)
@@ -43,29 +43,29 @@ class Grease:
 
 @dataclass(frozen=True)
 class AngularContact:
-    """A set of angular contact bearings: `pair` of them take the load towards the machine, one the other direction.
+    """A set of angular contact bearings: `pair` of them take the load towards the machine, one the opposite load.
 
     Parameters
     ----------
     pitch, ball : float
         Diameters [mm].
     balls : int
-        In each bearing.
+        Number of balls per bearing.
     static : float
-        Basic static load rating of one [N].
+        Basic static load rating of one bearing [N].
     preload : float
-        Axial, at 20 degC [N].
+        Axial preload at 20 degC [N].
     pair : int
-        Bearings in tandem against one.
+        Number of bearings in tandem, against a single one.
     angle : float
         Contact angle [degrees].
     spread : float
-        Length of rings between the two sides; a longer inner one loosens a set that is back to back [mm].
+        Length of rings between the two sides; a longer inner ring reduces the preload of a back-to-back set [mm].
     sprung : bool
-        Springs hold the preload, whatever the temperatures.
+        Whether springs keep the preload constant at any temperature.
     grease : Grease
     drag : float
-        Palmgren's f0 for grease.
+        Palmgren's factor f0 for grease.
     """
 
     pitch: float
@@ -82,7 +82,7 @@ class AngularContact:
 
     @property
     def _unlike(self) -> float:
-        """Deflection of the single bearing over that of each of the pair: they share its load."""
+        """Ratio of the deflection of the single bearing to that of each bearing of the pair, which share its load."""
         return math.pow(self.pair, 2 / 3)
 
     @property
@@ -93,14 +93,14 @@ class AngularContact:
         return single * (1.0 + 1.0 / self._unlike) / 2.0
 
     def approach(self, inner: ArrayLike, outer: ArrayLike, pressed: ArrayLike = 0.0) -> FloatArray:
-        """Mean approach at temperatures of both rings [degC]; 0: the preload is gone [um].
+        """Return the mean approach at the temperatures of both rings [degC]; 0: no preload left [um].
 
         Parameters
         ----------
         inner, outer : array-like
             [degC]
         pressed : array-like
-            By how much the housing has the outer raceway smaller [um].
+            Contraction of the outer raceway by the housing [um].
         """
         if self.sprung:
             return np.full(np.broadcast(inner, outer, pressed).shape, self.mounted)
@@ -110,16 +110,16 @@ class AngularContact:
         return np.asarray(np.maximum(0.0, self.mounted + radial * math.cos(angle) - axial * math.sin(angle)))
 
     def force(self, approach: float) -> float:
-        """Axial preload at a mean approach [um]: Hertz, with its power 3/2 [N]."""
+        """Return the axial preload at a mean approach [um]: Hertz, power 3/2 [N]."""
         return self.preload * math.pow(approach / self.mounted, 1.5)
 
     def shift(self, approach: ArrayLike) -> FloatArray:
-        """Displacement of the shaft since 20 degC: the pair yields less than the single bearing [um]."""
+        """Return the displacement of the shaft since 20 degC: the pair is stiffer than the single bearing [um]."""
         lean = (self._unlike - 1.0) / (self._unlike + 1.0) / math.sin(math.radians(self.angle))
         return np.asarray(lean * (np.asarray(approach) - self.mounted))
 
     def heat(self, speed: float, temperature: float, approach: float) -> float:
-        """Heat of the whole set, after Palmgren: a viscous torque, and one by the load of each bearing [W].
+        """Return the heat of the whole set according to Palmgren: viscous torque plus load torque of each bearing [W].
 
         Parameters
         ----------

@@ -12,27 +12,27 @@ from thermocomp.virtual.geometry import SQUARENESS, cold_profile, find_cold_comp
 
 FloatArray = NDArray[np.float64]
 
-#: distance of the two probes of X, and of Y, along the test bar [m]
+#: distance between the two X probes, and between the two Y probes, along the test bar [m]
 PROBE_DISTANCE = 0.1
 
 
 @dataclass(frozen=True)
 class VirtualProbe:
-    """A displacement probe, a line of a laser, or a touch probe on an artefact.
+    """A displacement probe, a laser line, or a touch probe on an artefact.
 
     Parameters
     ----------
     place : str
-        In words.
+        Location as text.
     reads : mapping of str to float
-        Weights of the machine's observables in its value; the value is 1 um per um, 1 um per urad and m.
+        Weights of the machine's observables: um per um, or um per (urad m).
     cold : float
-        Its value in the state in which the test begins, in its unit.
+        Value in the initial state of the test, in its unit.
     unit : {'um', 'urad'}
     noise : float
         Standard deviation, in its unit.
     zeroed : bool
-        Its value is counted from the start of the test, where it is `cold`; False: from the machine at 20 degC.
+        Whether the value is relative to the start of the test, where it is `cold`; False: relative to 20 degC.
     """
 
     place: str
@@ -44,7 +44,7 @@ class VirtualProbe:
 
 
 def positioning(axis: str, position: float) -> dict[str, float]:
-    """Return the weights of the observables in the positioning of an axis [um], linear between two stations.
+    """Return the weights of the observables for the positioning error of an axis [um], linear between stations.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def positioning(axis: str, position: float) -> dict[str, float]:
 
 
 def _between(along: str, axis: str, position: float) -> dict[str, float]:
-    """Return the weights of the contribution along an axis of an axis at a position."""
+    """Return the weights for the contribution of an axis at a position to the deviation along an axis."""
     if not 0.0 <= position <= TRAVEL[axis]:
         raise SettingError(f"{axis.upper()} = {position:g} mm is beyond the travel from 0 to {TRAVEL[axis]:g} mm")
     stations = STATIONS[axis]
@@ -72,12 +72,12 @@ def _between(along: str, axis: str, position: float) -> dict[str, float]:
 
 
 def station_name(axis: str, station: int) -> str:
-    """Return the name of the observable that is the positioning of an axis at a station."""
+    """Return the name of the observable for the positioning error of an axis at a station."""
     return f"{axis}{axis}@{station}"
 
 
 def _summed(*parts: tuple[float, Mapping[str, float]]) -> dict[str, float]:
-    """Return the sum of weights, each with its factor."""
+    """Return the weighted sum of sets of weights."""
     total: dict[str, float] = {}
     for factor, weights in parts:
         for name, w in weights.items():
@@ -87,8 +87,8 @@ def _summed(*parts: tuple[float, Mapping[str, float]]) -> dict[str, float]:
 
 def laser(axis: str, position: float) -> VirtualProbe:
     """Return a laser that measures the positioning of an axis at a position [mm]."""
-    # The reflector stands at the tool point. A laser measures each profile from its first position: the shift of the
-    # origin is not in it.
+    # The reflector is at the tool point. A laser measures each profile relative to its first position: the shift of the
+    # origin is not included.
     reads = _summed((1.0, positioning(axis, position)), (-1.0, positioning(axis, 0.0)))
     geometry = float(cold_profile(position)) if axis == "y" else 0.0
     return VirtualProbe(f"positioning of {axis.upper()} at {position:g} mm, laser", reads, geometry)
@@ -101,16 +101,16 @@ def pitch(position: int) -> VirtualProbe:
 
 
 def weigh_tool_point(axis: str, point: Mapping[str, float]) -> dict[str, float]:
-    """Return the weights of the observables in the tool point's deviation along an axis, for any axis positions.
+    """Return the weights for the tool-point deviation along an axis, for any axis positions.
 
-    Cross-axis deviations of Z and X are not included: the machine has no such observables.
+    Cross-axis deviations of Z and X are not included, as the machine model has no such observables.
 
     Parameters
     ----------
     axis : {'x', 'y', 'z'}
-        Along which the deviation is.
+        Direction of the deviation.
     point : mapping of str to float
-        Positions of the axes [mm]; one that is not named stands at `TEST_POSITION`.
+        Positions of the axes [mm]; an axis not named is at `TEST_POSITION`.
     """
     parts = [(1.0, {axis: 1.0})]
     for moved, lead in ((axis, axis), ("y", "z")) if axis == "z" else ((axis, axis),):
@@ -125,7 +125,7 @@ def at_position(axis: str, position: float) -> VirtualProbe:
     return VirtualProbe(where, weigh_tool_point(axis, {axis: position}))
 
 
-#: what an axis does, along or about which axis; the codes of ISO 230-1 end with the axis
+#: motion of an axis along or about a direction; the ISO 230-1 code is completed by the axis
 MOTIONS = {
     "EX": "motion along X",
     "EY": "motion along Y",
@@ -134,16 +134,16 @@ MOTIONS = {
     "EB": "turn about Y",
     "EC": "turn about Z",
 }
-#: the 18 components of the axes, in the order of ISO 230-1
+#: the 18 components of the linear axes, in the order of ISO 230-1
 COMPONENTS = tuple(f"{motion}{axis.upper()}" for axis in AXES for motion in MOTIONS)
-#: noise of the laser with six degrees of freedom [um, urad]
+#: noise of the six-degree-of-freedom laser [um, urad]
 SIX_NOISE = {"um": 0.3, "urad": 0.5}
-#: what heat does not do: the bed knows no right and left, and at the test position X turns about X alone
+#: components without thermal change: the bed is symmetric, and X at the test position has no B and C rotation
 STILL = frozenset(f"{code}Z@{p}" for code in ("EX", "EB", "EC") for p in STATIONS["z"]) | {"EBX@300", "ECX@300"}
 
 
 def station(code: str, position: int) -> tuple[str, ...]:
-    """Return the name of the observable that is a component at a station [mm]; none if the machine does not do this."""
+    """Return the name of the observable of a component at a station [mm]; none if the component does not change."""
     name = f"{code}@{position}"
     return () if name in STILL else (name,)
 
@@ -153,11 +153,11 @@ NEARER = {"x": "", "z": "x", "y": "xz"}
 
 
 def component(code: str, position: float, z: float = TEST_POSITION["z"]) -> VirtualProbe:
-    """Return a component of an axis as a laser with six degrees of freedom between table and spindle reads it.
+    """Return a component of an axis as measured by a six-degree-of-freedom laser between table and spindle.
 
-    It is set to zero at the test position, in each run. The tool point is that of the test bar, and the other axes
-    stand at `TEST_POSITION`. Turns of the axes that stand nearer to the workpiece swing the way of the axis that moves;
-    the laser sees that too.
+    It is set to zero at the test position in each run. The tool point is the tip of the test bar, and the other axes
+    are at `TEST_POSITION`. Rotations of axes nearer to the workpiece tilt the path of the moving axis; the laser
+    measures this effect, too.
 
     Parameters
     ----------
@@ -166,13 +166,13 @@ def component(code: str, position: float, z: float = TEST_POSITION["z"]) -> Virt
     position : float
         Position of its axis [mm].
     z : float
-        Where Z stands instead [mm]; the bed gives way under the column. Only X can be measured so: what its turns do by
-        the lever is read too.
+        Position of Z, if different [mm]; the bed yields under the column. Possible for X only; the effect of its
+        rotations by the lever is then included in the reading.
 
     Raises
     ------
     SettingError
-        A position is beyond the travel, or Z stands elsewhere while another axis than X is measured.
+        A position is beyond the travel, or Z is elsewhere while an axis other than X is measured.
     """
     axis, unit = code[2].lower(), "um" if code[1] in "XYZ" else "urad"
     for a, p in ((axis, position), ("z", z)):
@@ -185,7 +185,7 @@ def component(code: str, position: float, z: float = TEST_POSITION["z"]) -> Virt
     weights, geometry = _between_two(code, position), float(find_cold_component(code, point))
     if unit == "um":
         for turn, arm in swing(code[1], point - test):
-            # of the axes nearer to the workpiece, which stand still; of X itself if Z stands elsewhere
+            # of the stationary axes nearer to the workpiece; of X itself if Z is elsewhere
             for nearer in NEARER[axis]:
                 weights = _summed((1.0, weights), (arm, _at_station(f"E{turn}{nearer.upper()}", TEST_POSITION[nearer])))
         if axis == "x":
@@ -198,7 +198,7 @@ def component(code: str, position: float, z: float = TEST_POSITION["z"]) -> Virt
 
 
 def _between_two(code: str, position: float) -> dict[str, float]:
-    """Return the weights of the observables in what a component is at a position less that at the test position."""
+    """Return the weights for a component at a position relative to the test position."""
     axis = code[2].lower()
     weights = weigh_stations(axis, [position])[0] - weigh_stations(axis, [TEST_POSITION[axis]])[0]
     found = zip(STATIONS[axis], weights.tolist(), strict=True)
@@ -206,23 +206,23 @@ def _between_two(code: str, position: float) -> dict[str, float]:
 
 
 def _at_station(code: str, position: int) -> dict[str, float]:
-    """Return the weight of the observable that is a component at a station."""
+    """Return the weight of the observable of a component at a station."""
     return dict.fromkeys(station(code, position), 1.0)
 
 
 def swing(along: str, way: FloatArray) -> list[tuple[str, float]]:
-    """Return the rotations that move the end of a lever along an axis, with their effect: turn x way.
+    """Return the rotations that move the end of a lever along an axis, with their effect: rotation x lever.
 
     Parameters
     ----------
     along : {'X', 'Y', 'Z'}
     way : ndarray of shape (3,)
-        [mm]
+        Lever [mm].
 
     Returns
     -------
     list of (str, float)
-        A, B or C, and um per urad; those that do not move it are left out.
+        A, B or C, and um per urad; rotations without effect are omitted.
     """
     x, y, z = (1e-3 * way).tolist()
     arms = {"X": (("B", z), ("C", -y)), "Y": (("C", x), ("A", -z)), "Z": (("A", y), ("B", -x))}
@@ -230,7 +230,7 @@ def swing(along: str, way: FloatArray) -> list[tuple[str, float]]:
 
 
 def make_squareness_probe(code: str) -> VirtualProbe:
-    """Return the squareness of two axes at 20 degC, by an artefact; what heat does is in the lasers' straightness."""
+    """Return the squareness of two axes at 20 degC, by an artefact; thermal changes are in straightness readings."""
     return VirtualProbe(
         place=f"{code}: squareness at 20 degC, artefact",
         reads={},
@@ -248,7 +248,7 @@ NEST = {
     "y2": VirtualProbe("Y towards the spindle", {"y": 1.0, "a": -PROBE_DISTANCE}),
     "z": VirtualProbe("Z at the tip of the test bar; negative: the tool nears the workpiece", {"z": 1.0}),
 }
-#: measured where nothing moves the spindle: in a calculation, or on the spindle itself
+#: measured relative to the spindle housing: in a calculation, or on the spindle itself
 SPINDLE = {
     "nose": VirtualProbe("axial growth of the spindle nose from the housing's flange", {"nose": 1.0}),
     "tip": VirtualProbe("axial growth of the tool's tip from the housing's flange", {"tip": 1.0}),

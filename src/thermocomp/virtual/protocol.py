@@ -1,7 +1,7 @@
-"""Protocols: what is done to a virtual machine and what is recorded, as data.
+"""Protocols as data: commands to a virtual machine, and recorded channels.
 
-What is written (`Experiment`, `PlannedTest`) may leave numbers and orders open, which a seed then draws by lot; what is
-run (`Programme`) is fixed.
+Written protocols (`Experiment`, `PlannedTest`) may leave numbers and orders open, to be drawn at random from a seed;
+executed ones (`Programme`) are fixed.
 """
 
 import math
@@ -21,20 +21,20 @@ from thermocomp.virtual.segments import Path, SteadySegment, Stretch, values
 from thermocomp.virtual.sensors import SensorFault
 
 HOUR = 3600.0
-#: what is recorded of the drive: of a machine with a spindle, and where axes move
+#: recorded drive channels: speed for a machine with a spindle, feed if axes move
 SPEED = Channel("spindle_rpm", "spindle_speed", "1/min", "spindle")
 FEED = Channel("feed_mm_min", "feed", "mm/min", "of the axes, along the path")
 
 
-#: how the machine is modelled: heat and joints by constant conductances, or as they depend on temperature and speed
+#: machine model: constant conductances for heat and joints, or dependent on temperature and speed
 Physics = Literal["linear", "nonlinear"]
-#: what a protocol may ask for; more is a mistake, or would take for ever
+#: limits of a protocol; more is an error, or would run indefinitely
 MOST_ROWS, MOST_COPIES = 10_000_000, 10_000
 
 
 @dataclass(frozen=True, kw_only=True)
 class RecordingSetup:
-    """Recorded channels of a test, and their places.
+    """Recorded channels of a test and their places.
 
     Parameters
     ----------
@@ -42,11 +42,11 @@ class RecordingSetup:
         Time between two rows [s].
     climate : Climate
     places : tuple of str, or mapping of str to str
-        Places of temperature sensors, see `thermocomp.virtual.kits`; a mapping gives the channels other names.
+        Places of temperature sensors, see `thermocomp.virtual.kits`; a mapping assigns other channel names.
     probes : tuple of str, or mapping of str to str or mapping of str to float
-        Displacements, in the same way; a mapping of the machine's observables to weights is a custom probe.
+        Displacements, in the same way; a mapping of observables of the machine to weights defines a custom probe.
     perfect : bool
-        Sensors without lag, bias, drift, noise and steps: a calculation, not a measurement.
+        Sensors without lag, bias, drift, noise and quantisation: a calculation, not a measurement.
     touch : Touch, optional
         A probing cycle.
     faults : tuple of SensorFault
@@ -74,12 +74,12 @@ class RecordingSetup:
         kit : Kit
             Equipment of the machine.
         noise : float, optional
-            Standard deviation of the temperature noise [degC]; the sensors' own if not given.
+            Standard deviation of the temperature noise [degC]. Default: as defined for each sensor.
 
         Raises
         ------
         SettingError
-            A place or probe is not there, or two channels have the same name.
+            Place or probe missing, or two channels have the same name.
         """
         perfect = self.perfect
         with add_path("places"):
@@ -101,15 +101,15 @@ class RecordingSetup:
 
 @dataclass(frozen=True, kw_only=True)
 class Programme(RecordingSetup):
-    """One test that is ready to run, with the settings of `RecordingSetup`.
+    """A test that is ready to run, with the settings of `RecordingSetup`.
 
     Parameters
     ----------
     name : str
     segments : tuple of SteadySegment
-        Each lasts a whole number of samplings.
+        Each lasts an integer number of sampling intervals.
     soak : tuple of SteadySegment
-        Segments before the test, from a machine that was off for a long time; the test begins in the resulting state.
+        Segments before the test, from a machine that has been off for a long time; they define the initial state.
     """
 
     name: str
@@ -124,17 +124,17 @@ class Programme(RecordingSetup):
 
 @dataclass(frozen=True, kw_only=True)
 class PlannedTest(RecordingSetup, Stretch):
-    """One test as written in a protocol, or several alike, with the settings of `RecordingSetup` and `Stretch`.
+    """A test, or several alike, as written in a protocol; with the settings of `RecordingSetup` and `Stretch`.
 
     Parameters
     ----------
     name : str
-        Appended to the experiment's; empty: its number, if there are several tests.
+        Suffix to the name of the experiment. Default: the test number, if there are several tests.
     copies : int
         Number of tests, each with separate random draws.
     soak : Stretch
-        What was done before, from a machine that was off for long; the test begins in the state it leads to. What the
-        test says of speed, coolant ... does not hold in it.
+        Stretch before the test, from a machine that has been off for a long time; it defines the initial state. The
+        test's own speed, coolant etc. do not apply to it.
     """
 
     name: str = ""
@@ -165,12 +165,12 @@ class PlannedTest(RecordingSetup, Stretch):
             )
 
     def programme(self, name: str, rng: np.random.Generator) -> Programme:
-        """Return a test that is ready to run, with all that is left open drawn by lot."""
+        """Return a test that is ready to run, with all open values drawn at random."""
         setup = {f.name: getattr(self, f.name) for f in fields(RecordingSetup)}
         return Programme(name=name, segments=tuple(self.draw(rng)), soak=tuple(self.soak.draw(rng)), **setup)
 
     def check(self, kit: Kit) -> None:
-        """Raise `SettingError` if something is asked of a machine that it does not have."""
+        """Raise `SettingError` if the test requires something that the machine lacks."""
         channels = [i.sensor.channel.name for i in self.instruments(kit)]
         channels += [c.name for c in (SPEED, FEED) if kit.top_speed]
         for k, fault in enumerate(self.faults):
@@ -202,7 +202,7 @@ class Experiment:
     description : str
         One line.
     machine : str
-        A key of `thermocomp.virtual.kits.KITS`: the machining ``centre``, or the resting ``tool``.
+        Key of `thermocomp.virtual.kits.KITS`: the machining ``centre``, or the resting ``tool``.
     physics : {'linear', 'nonlinear'}
         See `thermocomp.virtual.nonlinear`.
     """
@@ -230,12 +230,12 @@ class Experiment:
 
     @property
     def kit(self) -> Kit:
-        """Equipment of its machine."""
+        """Equipment of the machine."""
         return KITS[self.machine]
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the tests, in their order."""
+        """Names of the tests, in order."""
         found = []
         for number, plan in enumerate(self.tests, start=1):
             own = plan.name or (str(number) if len(self.tests) > 1 else "")
@@ -244,7 +244,7 @@ class Experiment:
         return tuple(found)
 
     def programmes(self, seed: int = 0) -> list[Programme]:
-        """Return the tests, with all open settings drawn at random; each test has separate draws."""
+        """Return the tests with all open values drawn at random, separately for each test."""
         plans = [plan for plan in self.tests for _ in range(plan.copies)]
         return [
             plan.programme(name, np.random.default_rng(make_seed(seed, name, "lots")))
@@ -253,13 +253,13 @@ class Experiment:
 
 
 def make_seed(seed: int, test: str, what: str) -> list[int]:
-    """Return the seed of one kind of chance in one test: no test, and no kind, depends on the others."""
+    """Return the seed of one kind of randomness in one test, independent of other tests and kinds."""
     return [seed, *f"{test}/{what}".encode()]
 
 
 @contextmanager
 def add_path(*path: str | int) -> Iterator[None]:
-    """Add the location to a `SettingError` that is raised inside."""
+    """Prefix the location to a `SettingError` raised inside."""
     try:
         yield
     except SettingError as e:
@@ -267,7 +267,7 @@ def add_path(*path: str | int) -> Iterator[None]:
 
 
 def _check_duration(durations: tuple[float, ...], path: Path, sampling: float | None = None) -> None:
-    """Refuse durations that are not there, not positive, or no whole number of samplings."""
+    """Raise an error for durations that are missing, not positive, or not an integer number of sampling intervals."""
     if not durations:
         raise SettingError('is missing: state how long it lasts, such as duration = "30 min"', path)
     for duration in durations:

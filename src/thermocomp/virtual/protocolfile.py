@@ -1,4 +1,4 @@
-"""Protocols of tests on the virtual machines, written as TOML; see :doc:`/protocols`."""
+"""Protocols of tests on the virtual machines as TOML files; see :doc:`/protocols`."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -19,17 +19,17 @@ from thermocomp.virtual.segments import Feed, Lot, Stretch, Stroke
 from thermocomp.virtual.segments import Path as Keys
 from thermocomp.virtual.sensors import SensorFault
 
-#: the one door for a protocol from outside
+#: validator of external protocols
 ADAPTER = TypeAdapter(with_config(ConfigDict(strict=True, extra="forbid", allow_inf_nan=False))(Experiment))
 
-#: keys that hold a time, which is written with its unit
+#: keys of durations, which are written with a unit
 TIMES = ("sampling", "duration", "every", "start", "end", "memory", "begin")
-#: keys that hold true or false, and texts that may look like a number
+#: keys of Boolean values, and of texts that may look like numbers
 SWITCHES = ("perfect", "cooled", "powered")
 TEXTS = ("description", "name", *TIMES)
-#: keys of the whole file; all others belong to the tests
+#: keys of the whole file; all others may also belong to a test
 _OF_ALL = ("description", "machine", "physics", "tests")
-#: what stands under a key; numbers that are drawn by lot stand under any other
+#: type of the table under a key; tables under other keys are random numbers
 _TABLES: dict[str, type] = {
     "tests": PlannedTest,
     "segments": Stretch,
@@ -40,14 +40,14 @@ _TABLES: dict[str, type] = {
     "touch": Touch,
     "faults": SensorFault,
 }
-#: what a bare text means
+#: expansion of a bare text under a key
 _SHORT: dict[str, Callable[[str], Any]] = {
     "soak": lambda text: {"duration": text},
     "climate": lambda text: {"like": text},
     "places": lambda text: [text],
     "probes": lambda text: [text],
 }
-#: what pydantic says in words of Python
+#: plain wording of pydantic's errors
 _PLAIN = {
     "dataclass_type": "must be a table, such as {key = 1}",
     "tuple_type": "must be a list: [...]",
@@ -70,11 +70,11 @@ def read_protocol(path: str | Path) -> Experiment:
     Raises
     ------
     InputError
-        No such file, not TOML, or a key or value that is not understood; the message names file, table and key.
+        File missing, not TOML, or with an invalid key or value; the message names file, table and key.
 
     Examples
     --------
-    Four jobs of random speed, each with a stop behind it::
+    Four jobs of random speed, each followed by a stop::
 
         sampling = "10 s"
         probes = ["x1", "z"]
@@ -99,7 +99,7 @@ def read_protocol(path: str | Path) -> Experiment:
 
 
 def _check_types(value: Any, path: Keys) -> None:
-    """Refuse true and false where a number belongs, and numbers in quotes: both would pass for something else."""
+    """Raise an error for Booleans where numbers belong, and for quoted numbers: both could be misinterpreted."""
     if isinstance(value, dict):
         for key, v in value.items():
             _check_types(v, (*path, key))
@@ -117,7 +117,7 @@ def _check_types(value: Any, path: Keys) -> None:
 
 
 def _in_house_units(content: dict[str, Any]) -> dict[str, Any]:
-    """Return the file's content with what all tests share in each of them, times in seconds, and names replaced."""
+    """Return the content with shared settings copied into each test, times in seconds, and names replaced."""
     known = [*_OF_ALL, *(f.name for f in fields(PlannedTest))]
     for key in content:
         if key not in known:
@@ -154,7 +154,7 @@ def _value(key: str, value: Any, path: Keys) -> Any:
 
 
 def _seconds(value: Any, path: Keys) -> Any:
-    """Return a time in seconds, or all times of a lot."""
+    """Return a duration in seconds, or all durations of a random choice."""
     if isinstance(value, dict):
         return {key: _seconds(v, (*path, key)) for key, v in value.items()}
     if isinstance(value, list):
@@ -169,7 +169,7 @@ def _seconds(value: Any, path: Keys) -> Any:
 
 
 def _explain(failure: ValidationError, given: Mapping[str, Any]) -> tuple[Keys, str]:
-    """Return the location of pydantic's first error and the remedy; of a union the nearest type counts."""
+    """Return location and remedy of pydantic's first error; for a union, of the nearest type."""
     errors = failure.errors()
     first = _keys(errors[0], given)
     error = max(
@@ -188,7 +188,7 @@ def _explain(failure: ValidationError, given: Mapping[str, Any]) -> tuple[Keys, 
 
 
 def _keys(error: ErrorDetails, given: Any) -> Keys:
-    """Return the keys and positions of an error that are in the file; the rest are kinds that pydantic tried."""
+    """Return the keys and list positions of an error that occur in the file, without the types tried by pydantic."""
     keys = []
     for key in error["loc"]:
         try:
@@ -202,7 +202,7 @@ def _keys(error: ErrorDetails, given: Any) -> Keys:
 def _where(keys: Keys, content: Mapping[str, Any]) -> str:
     """Return the table of a key, and the value found there."""
     if keys[:1] == ("tests",) and len(keys) > 2 and _found(keys[:3], content) is None:
-        keys = keys[2:]  # what all tests share stands above them
+        keys = keys[2:]  # shared settings are at the top level
     said = []
     for k, key in enumerate(keys):
         nxt = keys[k + 1] if k + 1 < len(keys) else None

@@ -10,19 +10,19 @@ from thermocomp.core.exceptions import SettingError
 from thermocomp.virtual.axes import AXES, TRAVEL
 from thermocomp.virtual.machine import FeedDrive
 
-# Keys and positions that lead to something inside a protocol
+# Keys and list positions of a location in a protocol
 Path = tuple[str | int, ...]
-# A segment and what holds in it, with where it stands
+# Location of a segment and its settings
 Leaf = tuple[Path, dict[str, Any]]
 
 
-#: what a protocol may ask for; more is a mistake, or would take for ever
+#: limits of a protocol; more is an error, or would run indefinitely
 MOST_VALUES, MOST_REPEATS = 10_000, 10_000
 
 
 @dataclass(frozen=True)
 class SteadySegment:
-    """A stretch of a test in which everything stays as it is.
+    """A part of a test with constant conditions.
 
     Parameters
     ----------
@@ -37,12 +37,12 @@ class SteadySegment:
 
 @dataclass(frozen=True)
 class Lot:
-    """Numbers of which one is drawn, each as likely as the others: either `one_of`, or `between` with `step`.
+    """A number drawn at random with equal probabilities: either `one_of`, or `between` with `step`.
 
     Parameters
     ----------
     between : tuple of float, optional
-        Lowest and highest.
+        Lowest and highest value.
     step : float, optional
     one_of : tuple of float
     """
@@ -79,7 +79,7 @@ Number = float | Lot
 
 
 def values(number: Number | None) -> tuple[float, ...]:
-    """Return all that a number can be; nothing if it is not given."""
+    """Return all possible values of a number; empty if it is not given."""
     return () if number is None else number.values if isinstance(number, Lot) else (number,)
 
 
@@ -99,7 +99,7 @@ class Feed:
 
 @dataclass(frozen=True)
 class Stroke:
-    """From where to where the axes move [mm]; None: over the whole travel.
+    """Start and end of the axis movements [mm]; None: over the whole travel.
 
     Parameters
     ----------
@@ -119,34 +119,33 @@ class Stroke:
 
 @dataclass(frozen=True, kw_only=True)
 class Stretch:
-    """A part of a test as it is written: one segment, or several.
+    """A part of a test as written in a protocol: one segment, or several.
 
-    What it says of duration, speed, feed, stroke, loads, cooled and powered holds for the segments within it that do
-    not say otherwise.
+    Its duration, speed, feed, stroke, loads, cooled and powered are the defaults of the segments within it.
 
     Parameters
     ----------
     duration : float or Lot, optional
         [s]
     speed : float or Lot, optional
-        Spindle speed [1/min]; 0 if not given anywhere.
+        Spindle speed [1/min]. Default: inherited, else 0.
     feed : Feed, optional
-        Feed; the axes are stopped if not given anywhere.
+        Feed rates. Default: inherited, else the axes are stopped.
     stroke : Stroke, optional
     loads : mapping of str to float or Lot, optional
-        Further heat, by where it is put in [W].
+        Additional heat by place [W].
     cooled : bool, optional
-        Whether the coolant loop runs. Default: it does, if not given anywhere.
+        Whether the coolant loop runs. Default: inherited, else it runs.
     powered : bool, optional
-        Whether the machine is switched on. Default: it is, if not given anywhere.
+        Whether the machine is switched on. Default: inherited, else it is on.
     segments : tuple of Stretch
-        Segments within it; none: it is a segment itself.
+        Nested segments; none: this is a segment itself.
     repeat : int
-        So often its `segments` are done; or so many draws.
+        Number of repetitions of its `segments`, or number of draws.
     order : {'given', 'shuffled', 'drawn'}
-        One after the other; all of them (`repeat` times each) in random order; or each time one of them drawn by lot.
+        In sequence; all (`repeat` times each) in random order; or one drawn at random each time.
     weight : float
-        Probability weight of this one relative to its neighbours where the outer order is ``drawn``.
+        Relative probability where the outer order is ``drawn``.
     """
 
     duration: Number | None = None
@@ -175,7 +174,7 @@ class Stretch:
 
     @property
     def longest(self) -> float:
-        """Longest possible duration, for any draw [s]."""
+        """Longest possible duration over all draws [s]."""
         return self._longest(0.0)
 
     def _longest(self, outer: float) -> float:
@@ -186,7 +185,7 @@ class Stretch:
         return self.repeat * (max(parts) if self.order == "drawn" else sum(parts))
 
     def leaves(self, outer: Mapping[str, Any] | None = None, path: Path = ()) -> Iterator[Leaf]:
-        """Yield the position of each segment, and its settings."""
+        """Yield the location and settings of each segment."""
         given = self._given(outer or {})
         if not self.segments:
             yield path, given
@@ -194,7 +193,7 @@ class Stretch:
             yield from s.leaves(given, (*path, "segments", k))
 
     def draw(self, rng: np.random.Generator, outer: Mapping[str, Any] | None = None) -> list[SteadySegment]:
-        """Return the segments, with all that is left open drawn by lot."""
+        """Return the segments, with all open values drawn at random."""
         given = self._given(outer or {})
         if not self.segments:
             return [_segment(given, rng)]
@@ -227,7 +226,7 @@ def _segment(given: Mapping[str, Any], rng: np.random.Generator) -> SteadySegmen
     speed = _drawn(given.get("speed", 0.0), rng)
     feeds = (_drawn(feed.x, rng), _drawn(feed.y, rng), _drawn(feed.z, rng))
     powered = given.get("powered", True)
-    # A machine that is switched off stands, whatever speed it has inherited.
+    # A machine that is switched off does not rotate, even with an inherited speed.
     drive = FeedDrive(
         speed=speed if powered else 0.0,
         feed=feeds if powered else (0.0, 0.0, 0.0),

@@ -1,4 +1,4 @@
-"""Sensor models: lag, bias, noise, quantisation; and their behaviour in a failure."""
+"""Sensor models: lag, bias, noise, quantisation; and sensor faults."""
 
 import math
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ FaultKind = Literal["stuck", "lost", "drift", "spike"]
 
 @dataclass(frozen=True)
 class Sensor:
-    """Difference of one channel from the true value; the default is a perfect sensor.
+    """Measurement errors of one channel; the default is a perfect sensor.
 
     Parameters
     ----------
@@ -29,11 +29,11 @@ class Sensor:
     lag : float
         Time constant of a first-order lag [s].
     resolution : float
-        Step of the reading, in the channel's unit; 0 for none.
+        Quantisation step, in the channel's unit; 0 for none.
     bias : float
-        In the channel's unit.
+        Constant offset, in the channel's unit.
     drift : float
-        Drift of the zero, in the channel's unit per day.
+        Zero drift, in the channel's unit per day.
     """
 
     channel: Channel
@@ -54,14 +54,14 @@ def apply_lags(lags: FloatArray, felt: FloatArray, before: FloatArray, true: Flo
     felt, before : ndarray of shape (n_sensors,)
         Sensor values, and true values, before the first step.
     true : ndarray of shape (n_steps, n_sensors)
-        At the end of each step.
+        True values at the end of each step.
     dt : float
         [s]
 
     Returns
     -------
     ndarray of shape (n_steps, n_sensors)
-        Exact for a truth that changes linearly in every step.
+        Exact for true values that change linearly within each step.
     """
     slow = lags > 0
     said = true.copy()
@@ -75,13 +75,13 @@ def apply_lags(lags: FloatArray, felt: FloatArray, before: FloatArray, true: Flo
 
 
 def read(sensors: Sequence[Sensor], felt: FloatArray, time: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """Return the readings of the sensors: with bias, drift of the zero, noise and quantisation.
+    """Return the sensor readings, with bias, zero drift, noise and quantisation.
 
     Parameters
     ----------
     sensors : sequence of Sensor
     felt : ndarray of shape (n_rows, n_sensors)
-        From `follow`, in house units.
+        Output of `apply_lags`, in house units.
     time : ndarray of shape (n_rows,)
         [s]
     rng : Generator
@@ -94,25 +94,25 @@ def read(sensors: Sequence[Sensor], felt: FloatArray, time: FloatArray, rng: np.
     noise, bias, drift, steps = np.array([(s.noise, s.bias, s.drift, s.resolution) for s in sensors]).T
     said: FloatArray = felt + bias + np.outer(time / DAY, drift) + noise * rng.standard_normal(felt.shape)
     stepped = steps > 0
-    # The second rounding takes away the last binary digit, that 21.9 is not written as 21.900000000000002.
+    # The second rounding removes binary residues, such as 21.900000000000002 instead of 21.9.
     said[:, stepped] = np.round(np.round(said[:, stepped] / steps[stepped]) * steps[stepped], 9)
     return said
 
 
 @dataclass(frozen=True)
 class SensorFault:
-    """A sensor that fails (C-34).
+    """A sensor fault (C-34).
 
     Parameters
     ----------
     channel : str
         Name of the channel.
     kind : {'stuck', 'lost', 'drift', 'spike'}
-        It keeps its last value; gives no value (nan); runs away; or jumps.
+        The sensor keeps its last value; gives no value (nan); drifts; or jumps.
     start : float
         Start time [s].
     end : float or None
-        End time [s]; None: never, but a spike after one row.
+        End time [s]; None: no end, except that a spike lasts one row.
     size : float
         Drift per hour, or height of the spike, in the channel's unit.
     """
@@ -137,7 +137,7 @@ class SensorFault:
 def with_faults(
     time: FloatArray, channels: Sequence[Channel], values: FloatArray, faults: Sequence[SensorFault]
 ) -> FloatArray:
-    """Return readings in which some sensors fail.
+    """Return readings with sensor faults applied.
 
     Parameters
     ----------
@@ -145,9 +145,9 @@ def with_faults(
         [s]
     channels : sequence of Channel
     values : ndarray of shape (n_rows, n_channels)
-        Left as they are.
+        Not modified.
     faults : sequence of SensorFault
-        Applied in turn; a fault that begins after the last row changes nothing.
+        Applied in sequence; a fault that starts after the last row has no effect.
 
     Returns
     -------
@@ -156,7 +156,7 @@ def with_faults(
     Raises
     ------
     InputError
-        There is no such channel.
+        Channel missing.
     """
     values = values.copy()
     names = [c.name for c in channels]

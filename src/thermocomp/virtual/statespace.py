@@ -1,4 +1,4 @@
-"""A machine reduced to a small state space: plain numbers that step in microseconds."""
+"""A machine reduced to a small state-space model: plain numbers with steps of microseconds of computing time."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ from thermocomp.core.exceptions import InputError
 
 FloatArray = NDArray[np.float64]
 
-#: temperature at which nothing deviates (ISO 1) [degC]
+#: temperature of the reference state without deviations (ISO 1) [degC]
 REFERENCE_TEMPERATURE = 20.0
 
 
@@ -38,7 +38,7 @@ class Operators:
 class ReducedModel:
     """``dz/dt = -(K + sum_j theta_j K_j) z + B u + (A + sum_j theta_j A_j) a``, all K symmetric.
 
-    Made by ``tools/finite_elements`` of the repository; the mass matrix has become the unit matrix.
+    Created by ``tools/finite_elements`` of the repository; scaled to a unit mass matrix.
 
     Parameters
     ----------
@@ -57,14 +57,14 @@ class ReducedModel:
     observable : ndarray of shape (n_observables, n_states)
         Displacements [um] and angles [urad] are ``observable @ (z - 20 one)``.
     one : ndarray of shape (n_states,)
-        The state of a machine that is at 1 degC everywhere.
+        State of a machine at 1 degC everywhere.
     theta, inputs, places, observables : tuple of str
         Names.
     squares : ndarray of shape (n_squared, n_states, n_states), optional
-        ``d @ square @ d`` with ``d = z - 20 one`` is what an observable would be of the squared temperatures [um K]:
-        for materials whose expansion grows as they warm.
+        ``d @ square @ d`` with ``d = z - 20 one`` is the response of an observable to the squared temperatures [um K],
+        for materials whose expansion coefficient increases with temperature.
     squared : tuple of str, optional
-        The observables it is known of.
+        Names of the observables of `squares`.
     """
 
     conduction: FloatArray
@@ -85,32 +85,32 @@ class ReducedModel:
         default_factory=dict, init=False, repr=False
     )
 
-    #: regimes kept ready; a programme has a few speeds, a live source may have any
+    #: number of operators kept; a programme has a few speeds, a live source may have any
     _KEEP = 128
 
     @classmethod
     def load(cls, name: str) -> "ReducedModel":
-        """Return the numbers shipped under a name: ``centre`` or ``tool``, or either with ``_joints``."""
+        """Load a model included in the package: ``centre`` or ``tool``, or either with ``_joints``."""
         with as_file(files("thermocomp.virtual") / "reduced" / f"{name}.npz") as path:
             return cls.read(path)
 
     @classmethod
     def read(cls, path: Path) -> "ReducedModel":
-        """Read a file of plain arrays; the keys are those of the parameters."""
+        """Read a file of plain arrays; its keys are the names of the parameters."""
         names = ("theta", "inputs", "places", "observables", "squared")
         with np.load(path, allow_pickle=False) as data:
             texts = {k: tuple(str(n) for n in data[k]) for k in names if k in data.files}
-            # a dict of both kinds: the dataclass's own types decide what is what
+            # mixed value types in one dict; the dataclass defines the type of each
             values: dict[str, Any] = {k: data[k] for k in data.files if k not in names} | texts
         return cls(**values)
 
     def rows(self, places: Sequence[str]) -> FloatArray:
-        """Return the rows of `temperature` at some places.
+        """Return the rows of `temperature` for some places.
 
         Raises
         ------
         InputError
-            There is no such place.
+            Place missing.
         """
         for place in places:
             if place not in self.places:
@@ -126,7 +126,7 @@ class ReducedModel:
         return self.air + np.tensordot(np.asarray(theta, dtype=np.float64), self.air_theta, 1)
 
     def steady(self, heat: FloatArray, air: FloatArray, theta: Sequence[float]) -> FloatArray:
-        """Return the state that constant heat [W] and air lead to."""
+        """Return the steady state for constant heat [W] and air."""
         loads = self.heat @ heat + self.to_air(theta) @ air
         return np.asarray(np.linalg.solve(self.stiffness(theta), loads), dtype=np.float64)
 
@@ -135,30 +135,30 @@ class ReducedModel:
         return np.asarray(1.0 / np.linalg.eigvalsh(self.stiffness(theta)), dtype=np.float64)
 
     def operators(self, theta: tuple[float, ...], dt: float, watched: tuple[str, ...] = ()) -> Operators:
-        """Return a step of `dt` [s] that is exact while heat, air and `theta` are constant.
+        """Return the operators of a step of `dt` [s], exact for constant heat, air and `theta`.
 
         Parameters
         ----------
         theta : tuple of float
-            One per name in `theta`.
+            One value per name in `theta`.
         dt : float
             [s]
         watched : tuple of str
-            Places whose temperatures after the step are needed at once, below the states.
+            Places whose temperatures after the step are appended to the states.
         """
         key = (theta, dt, watched)
         found = self._kept.get(key)
         if found is None:
             found = self._exponential(theta, dt, watched)
             if len(self._kept) >= self._KEEP:
-                self._kept.clear()  # at once: another thread may be looking
+                self._kept.clear()  # cleared in one operation: another thread may read it
             self._kept[key] = found
         return found
 
     def _exponential(self, theta: tuple[float, ...], dt: float, watched: tuple[str, ...]) -> Operators:
         rates, modes = np.linalg.eigh(self.stiffness(theta))
         decay = (modes * np.exp(-rates * dt)) @ modes.T
-        # A machine without air has a rate of zero (or its rounding): there the integral is the step itself.
+        # A machine without air has a zero rate (within rounding): there the integral equals the step.
         slow = np.abs(rates * dt) < 1e-12
         integral = (modes * np.where(slow, dt, -np.expm1(-rates * dt) / np.where(slow, 1.0, rates))) @ modes.T
         watch = np.vstack([np.eye(len(rates)), self.rows(watched)])

@@ -1,4 +1,4 @@
-"""A heated tool that rests in a fixed spindle shaft: the set-up of Wessel 2004, section IV (W-08)."""
+"""A heated tool at rest in a fixed spindle shaft: the set-up of Wessel 2004, section IV (W-08)."""
 
 import math
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from thermocomp.virtual.machine import Air, FeedDrive, Truth, check, stretches
 from thermocomp.virtual.statespace import REFERENCE_TEMPERATURE, ReducedModel
 
 FloatArray = NDArray[np.float64]
-#: where heat can be put in
+#: places where heat can be applied
 LOADS = ("heater", "tip")
 
 
@@ -35,22 +35,23 @@ class ToolState:
 
 @dataclass(frozen=True, eq=False)
 class RestingTool:
-    """A chuck with its tool on a fixed shaft; fills `thermocomp.virtual.machine.VirtualMachine`.
+    """A chuck with its tool on a fixed shaft; implements `thermocomp.virtual.machine.VirtualMachine`.
 
-    Heaters at the bearing's fit warm it from behind, hot air from the tip. Its heat loss grows faster than its
-    temperature (natural convection, radiation), and the shank slips in the chuck only when friction gives way.
+    Heaters at the bearing fit warm it from behind, hot air from the tip. Its heat loss is superlinear in temperature
+    (natural convection, radiation), and the shank slips in the chuck only when friction is exceeded.
 
     Parameters
     ----------
     model : ReducedModel
     stiction : float
-        Free displacement of the shank in the chuck at which it starts to slip [um]; an engineering value.
+        Free displacement of the shank in the chuck at which slip starts [um]; an engineering value.
     convection : float
-        Conductance by free convection that is in the model, at `usual_rise` [W/K]: half of what its films amount to.
+        Conductance by free convection contained in the model at `usual_rise` [W/K]: half of the film conductance.
     usual_rise : float
-        Mean rise of the surface at which the films hold [K]; free convection goes with its power of 1/4 (laminar).
+        Mean temperature rise of the surface at which the film values apply [K]; free convection has exponent 1/4
+        (laminar).
     longest_step : float
-        The loss is looked at this often [s].
+        Longest interval between updates of the heat loss [s].
     """
 
     model: ReducedModel = field(default_factory=lambda: ReducedModel.load("tool"))
@@ -61,7 +62,7 @@ class RestingTool:
 
     @property
     def places(self) -> tuple[str, ...]:
-        """Names of the places whose temperatures are known."""
+        """Names of the places with known temperatures."""
         return self.model.places
 
     @property
@@ -70,7 +71,7 @@ class RestingTool:
         return self.model.observables
 
     def init(self, air: Air) -> ToolState:
-        """Return the state of a tool that has long been at the temperature of the room."""
+        """Return the state of a tool in equilibrium with the room."""
         state = self.model.steady(np.zeros(len(self.model.inputs)), air.values, ())
         return ToolState(state, self._wish(self._linear(state[None])).item())
 
@@ -81,7 +82,7 @@ class RestingTool:
         ----------
         state : ToolState
         drives : sequence of FeedDrive
-            Only their loads count.
+            Only their loads are used.
         air : ndarray of shape (n_steps, 3)
             `Air.values` of each step.
         dt : float
@@ -95,8 +96,8 @@ class RestingTool:
         Raises
         ------
         InputError
-            `dt` is not positive, there is no drive, the air has another length or is not finite, the tool is asked to
-            turn, or a load is put in where there is no place for it.
+            `dt` is not positive, there is no drive, the air has another length or is not finite, rotation is commanded,
+            or a load is applied at a place that does not exist.
         """
         check(drives, air, dt)
         parts = math.ceil(dt / self.longest_step)
@@ -125,7 +126,7 @@ class RestingTool:
                 watched = float(after[-1])
 
     def _move(self, fields: FloatArray, slipped: float) -> tuple[FloatArray, float]:
-        """Return the displacements that temperatures make [um], and how far the shank has slipped at the end."""
+        """Return the displacements caused by the temperatures [um], and the slip of the shank at the end."""
         observables = self._linear(fields)
         wish = self._wish(observables)
         slides = slide_with_friction(slipped, wish, self.stiction)
@@ -137,7 +138,7 @@ class RestingTool:
         return result
 
     def _wish(self, observables: FloatArray) -> FloatArray:
-        """Growth of the clamped shank [um], from the chuck's front to the tip: what friction holds back."""
+        """Return the free growth of the clamped shank [um], from the chuck front to the tip, without friction."""
         s1, s2 = (self.observables.index(n) for n in ("s1", "s2"))
         result: FloatArray = observables[:, s1] - observables[:, s2]
         return result

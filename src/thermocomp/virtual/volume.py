@@ -1,6 +1,6 @@
-"""Errors of the virtual machining centre in its work volume: the truth by which a compensation is judged.
+"""True errors of the virtual machining centre in its work volume, as a reference for assessing compensation.
 
-It knows how this machine is built, ``w X' b Z Y (C1) t``, and nothing of the package's own kinematics: turns are
+The structure ``w X' b Z Y (C1) t`` is implemented here independently of the package's own kinematics: rotations are
 composed as matrices, from the tool back to the workpiece.
 """
 
@@ -25,15 +25,15 @@ class VolumetricTruth:
     Parameters
     ----------
     observables : sequence of str
-        Names of the machine's observables, in their order: ``machine.observables``.
+        Names of the machine's observables, in order: ``machine.observables``.
     geometry : bool
-        The machine has its cold geometry too (`thermocomp.virtual.geometry`); False: what heat does, alone.
+        Whether to include the cold geometry (`thermocomp.virtual.geometry`); False: thermal changes only.
     """
 
     def __init__(self, observables: Sequence[str], *, geometry: bool = True) -> None:
         self.geometry = geometry
         index = {name: k for k, name in enumerate(observables)}
-        # rows (n, n_observables) @ of[code] = what it is at the stations of its axis; nothing where nothing is told
+        # rows (n, n_observables) @ of[code] = values at the stations of its axis; empty if not modelled
         self._stations: dict[str, FloatArray] = {}
         for code in COMPONENTS:
             at = STATIONS[code[2].lower()]
@@ -41,7 +41,7 @@ class VolumetricTruth:
             for k, p in enumerate(at):
                 for name in station(code, p):
                     self._stations[code][index[name], k] = 1.0
-        # The spindle does what is left of the tool point's deviation at the test position.
+        # The spindle contributes the rest of the tool point's deviation at the test position.
         self._spindle: dict[str, FloatArray] = {}
         for code, name in _SPINDLE.items():
             row = np.zeros(len(observables))
@@ -51,21 +51,21 @@ class VolumetricTruth:
             self._spindle[code] = row
 
     def components(self, rows: FloatArray, points: ArrayLike) -> dict[str, FloatArray]:
-        """Return the components at points, as deviations of the tool's side against the workpiece's.
+        """Return the components at points, as deviations of the tool side relative to the workpiece side.
 
         Parameters
         ----------
         rows : ndarray of shape (n_observables,) or (n, n_observables)
-            Observables in one state, or in one for each point, such as ``SimulatedTest.observables``: from the machine
-            at 20 degC on, which has its cold geometry.
+            Observables in one state, or one state per point, such as ``SimulatedTest.observables``: relative to the
+            machine at 20 degC with its cold geometry.
         points : array-like of shape (n, 3)
             Positions of X, Y and Z [mm].
 
         Returns
         -------
         dict of str to ndarray of shape (n,)
-            The 18 of the axes, which hold at the tip of the test bar while the other axes stand at `TEST_POSITION`;
-            three squareness errors; five drifts of the spindle [um, urad].
+            The 18 axis components, valid at the tip of the test bar with the other axes at `TEST_POSITION`; three
+            squareness errors; five spindle drifts [um, urad].
         """
         points = np.asarray(points, dtype=np.float64)
         found = {}
@@ -81,16 +81,16 @@ class VolumetricTruth:
         return found
 
     def error(self, rows: FloatArray, points: ArrayLike, tool: ArrayLike | None = None) -> FloatArray:
-        """Return the error of the tool's tip against the workpiece, actual minus commanded.
+        """Return the error of the tool tip relative to the workpiece, actual minus commanded.
 
         Parameters
         ----------
         rows : ndarray of shape (n_observables,) or (n, n_observables)
-            As of `components`.
+            See `components`.
         points : array-like of shape (n, 3)
             Positions of X, Y and Z [mm].
         tool : array-like of shape (3,) or (n, 3), optional
-            From the spindle's gauge point to the tip [mm]; the test bar's if not given.
+            Vector from the gauge point of the spindle to the tip [mm]. Default: that of the test bar.
 
         Returns
         -------
@@ -109,7 +109,7 @@ class VolumetricTruth:
         def turn(a: FloatArray, b: FloatArray, g: FloatArray, at: FloatArray) -> FloatArray:
             return np.asarray(np.einsum("nij,nj->ni", _about(0, a) @ _about(1, b) @ _about(2, g), at))
 
-        # The tip against the tip of the test bar; then each body turns about it and moves [mm].
+        # Tip relative to the tip of the test bar; then each body rotates about it and moves [mm].
         at = turn(c["A0C"], c["B0C"], none, np.broadcast_to(overhang, points.shape)) + shift("X0C", "Y0C", "Z0C")
         guides = {
             "y": np.stack([-1e-6 * c["C0Y"], none + 1.0, none], axis=-1),
@@ -124,7 +124,7 @@ class VolumetricTruth:
 
 
 def _about(axis: int, angle: FloatArray) -> FloatArray:
-    """Return the matrices that turn about an axis by angles [urad], (n,) -> (n, 3, 3)."""
+    """Return the matrices of rotations about an axis by angles [urad], (n,) -> (n, 3, 3)."""
     s, c = np.sin(1e-6 * angle), np.cos(1e-6 * angle)
     i, j = (axis + 1) % 3, (axis + 2) % 3
     matrix = np.zeros((*angle.shape, 3, 3))

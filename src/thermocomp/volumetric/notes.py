@@ -1,4 +1,4 @@
-"""Notes for the user on a machine before its errors are added: possible double counting, values that are only held."""
+"""Notes on a machine before its errors are summed: possible double counting, values held beyond their range."""
 
 import numpy as np
 
@@ -7,19 +7,19 @@ from thermocomp.core.machine import Machine, Source
 from thermocomp.core.position import PositionModel
 from thermocomp.runtime.geometry.kinematics import Kinematics
 
-#: a lever effect that nobody sees [um]
+#: negligible lever effect [um]
 NEGLIGIBLE = 0.5
-#: what is nearer to the end of a travel than that reaches it [mm]
+#: tolerance for reaching the end of a travel [mm]
 _NEAR = 1e-3
 
 
 def notes(machine: Machine) -> tuple[str, ...]:
-    """Return the notes on a machine, in sentences: `untilted`, `counted_twice`, `held`."""
+    """Return the notes on a machine as sentences: `note_untilted`, `note_counted_twice`, `note_short_profiles`."""
     return (*note_untilted(machine), *note_counted_twice(machine), *note_short_profiles(machine))
 
 
 def note_untilted(machine: Machine) -> tuple[str, ...]:
-    """Return that the spindle's tilt is not known though the tool is not as long as what its drift was measured with.
+    """Return a note if the spindle tilt is unknown and the tool length differs from that of the drift measurement.
 
     Parameters
     ----------
@@ -38,21 +38,21 @@ def note_untilted(machine: Machine) -> tuple[str, ...]:
 
 
 def note_counted_twice(machine: Machine) -> tuple[str, ...]:
-    """Return the turns that were not zero while another axis was measured.
+    """Return notes on rotations that were not zero while another axis was measured.
 
-    An instrument between table and spindle that measures an axis j sees what the turn of an axis i nearer to the
-    workpiece does, turn times way of j, because the way of j is a lever of i. If the turn is not counted from the
-    position at which i stood then, readings and turn hold the same error.
+    An instrument between table and spindle that measures axis j also measures the rotation of an axis i nearer to the
+    workpiece as rotation times travel of j, because the travel of j is a lever of i. Unless the rotation is relative to
+    the position of i during that measurement, readings and rotation contain the same error.
 
     Parameters
     ----------
     machine : Machine
-        In its reference state: constants and profiles; what models of time add begins at zero.
+        Machine in its reference state: constants and profiles; time-dependent models start at zero.
 
     Returns
     -------
     tuple of str
-        One sentence for each turn and axis.
+        One sentence per rotation and axis.
     """
     kinematics, found = Kinematics(machine), []
     for axis in machine.structure.axes:
@@ -61,7 +61,7 @@ def note_counted_twice(machine: Machine) -> tuple[str, ...]:
             low, high = machine.axis(other).travel
             for about, letter in enumerate("ABC"):
                 along = "XYZ".index(other)
-                if about == along:  # a way along the axis of the turn is no lever
+                if about == along:  # a travel along the axis of rotation is not a lever
                     continue
                 code, towards = f"E{letter}{axis}", "XYZ"[3 - about - along]
                 turn = _static(machine.components.get(code), np.array(stood))
@@ -79,7 +79,7 @@ def note_counted_twice(machine: Machine) -> tuple[str, ...]:
 
 
 def note_short_profiles(machine: Machine) -> tuple[str, ...]:
-    """Return the profiles and slopes that are known in a part of the travel only, one sentence each."""
+    """Return notes on profiles and slopes that are known for part of the travel only, one sentence each."""
     found = []
     for code, source in machine.components.items():
         if not isinstance(source, PositionModel):

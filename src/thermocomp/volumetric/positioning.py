@@ -1,4 +1,4 @@
-"""`Positioning`: deviations of an axis at its targets, approached from one or both directions, again and again."""
+"""`Positioning`: deviations of an axis at its targets, repeatedly approached from one or both directions."""
 
 from dataclasses import dataclass
 
@@ -17,26 +17,26 @@ class Positioning:
     Parameters
     ----------
     axis : str
-        Such as ``Y``; empty if unknown.
+        Axis, such as ``Y``; empty if unknown.
     state : str
         Thermal state, such as ``cold`` or ``after 4 h``; empty if there is only one.
     unit : {'um', 'urad'}
         Unit of the deviations.
     positions : ndarray of shape (n_targets,)
-        Target positions, rising [mm].
+        Target positions, increasing [mm].
     up : ndarray of shape (n_runs, n_targets)
-        Deviations, actual minus target, approached in the positive direction [unit]. One run gives no repeatability.
+        Deviations, actual minus target, for approaches in the positive direction [unit]; no repeatability from one run.
     down : ndarray of shape (n_runs, n_targets) or None
         The same in the negative direction; None for a unidirectional test. A unidirectional test in the negative
-        direction has `up` None.
+        direction has `up` = None.
     source : str
-        File it was read from.
+        File from which it was read.
 
     Raises
     ------
     InputError
-        Fewer than two targets, no run, targets that do not rise, arrays that do not fit, or a number that is not
-        finite.
+        Fewer than two targets, no run, targets that do not increase, arrays of different shapes, or a number that is
+        not finite.
     """
 
     axis: str
@@ -70,5 +70,5 @@ class Positioning:
 
     @property
     def directions(self) -> dict[str, FloatArray]:
-        """Deviations by direction, ``+`` and ``-``, of those that were measured."""
+        """Deviations of the measured directions of approach, denoted ``+`` and ``-``."""
         return {name: d for name, d in (("+", self.up), ("-", self.down)) if d is not None}

@@ -9,7 +9,7 @@ from thermocomp.core.exceptions import InputError
 if TYPE_CHECKING:
     from thermocomp.api.inputs import LeaveOne
 
-#: from this number of recordings each recording is left out in turn, else each thermal cycle
+#: minimum number of recordings for leaving out each recording in turn, else each thermal cycle
 MANY = 3
 
 
@@ -79,7 +79,7 @@ class PositionSettings:
     jobs: int = -1
 
     def left_out(self, recordings: int) -> "LeaveOne | None":
-        """Return the unit left out in turn; by default each recording if there are many."""
+        """Return the unit left out in turn; by default each recording if there are at least `MANY`."""
         asked = (self.split is not None) + self.leave_one_cycle_out + self.leave_one_file_out
         if asked > 1:
             raise InputError("--split, --leave-one-cycle-out, --leave-one-file-out exclude each other: choose one")

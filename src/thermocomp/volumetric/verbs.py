@@ -30,7 +30,7 @@ from thermocomp.volumetric.models.positionoptions import Setting
 from thermocomp.volumetric.positionsettings import PositionSettings
 from thermocomp.volumetric.report import records, volumetric_tables
 
-#: denotes all components that have separate columns
+#: denotes all components with separate columns
 ALL = "all"
 #: default number of points along each axis
 GRID = 5
@@ -48,7 +48,7 @@ class Positioned:
     left_open : tuple of str
         Settings determined from the profiles.
     several : bool
-        Several components, or all of them, were requested.
+        Whether several components, or all, were requested.
     trouble : tuple of str
         Data-quality problems of the recordings.
     accept_unproven : str, optional

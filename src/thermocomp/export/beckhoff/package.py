@@ -1,4 +1,4 @@
-"""TwinCAT CNC (ISG kernel): a compensator as function block, and what the axis parameters take."""
+"""TwinCAT CNC (ISG kernel): a compensator as a function block, and the values of the axis parameters."""
 
 from collections.abc import Mapping
 
@@ -49,12 +49,12 @@ The CNC spreads a change over a number of cycles of its own; here a correction c
 def write_package(
     compensator: Compensator, name: str, facts: Facts, axes: Mapping[str, str] | None = None
 ) -> dict[str, bytes]:
-    """Return all files by their names.
+    """Return all files by name.
 
     Parameters
     ----------
     compensator : Compensator
-        Made by `Compensator.of`.
+        Created by `Compensator.of`.
     name : str
     facts : Facts
     axes : mapping of str to str, optional
@@ -63,7 +63,7 @@ def write_package(
     Raises
     ------
     InputError
-        A model has no formula, the models do not go together, or no axis is known.
+        A model has no formula, the models cannot be combined, or no axis is known.
     """
     tables, own = gather(compensator), identifier(name)
     drives = find_drives(tables, axes or {})
@@ -76,5 +76,5 @@ def write_package(
     return write_blocks(compensator, name, facts, "twincat", [more], page)
 
 
-#: it counts 0.1 um in whole numbers of 32 bits
+#: the controller counts in steps of 0.1 um, as 32-bit integers
 TARGET = Target(write=write_package, axes=True, magnitude=2e8)

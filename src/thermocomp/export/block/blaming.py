@@ -1,4 +1,4 @@
-"""Failure that explains the residuals of readings, as scalars and loops: see `thermocomp.runtime.blame`."""
+"""Sensor failure that explains the residuals of readings, as scalars and loops: see `thermocomp.runtime.blame`."""
 
 from thermocomp.export.block.names import Names
 from thermocomp.export.block.numbers import follow, larger
@@ -7,14 +7,14 @@ from thermocomp.runtime.watch import GOOD, OFF, REST, STEPPED, STUCK, SWAPPED
 
 
 def blame(s: Names, w: Names, t: Names, elapsed: float) -> None:
-    """Exclude failed sensors: two that are swapped if that explains all, and better than one; or each alone.
+    """Exclude failed sensors: a swapped pair if it explains all, and better than one sensor; else single sensors.
 
     Parameters
     ----------
     s, w, t : Names
-        Variables that are kept, worked out again, and known.
+        State kept between calls, work variables, and constants.
     elapsed : float
-        Since the last look [s].
+        Time since the last check [s].
     """
     for i in range(t.SENSORS):
         w.able[i] = w.calm[i] or w.waiting[i]
@@ -48,7 +48,7 @@ def blame(s: Names, w: Names, t: Names, elapsed: float) -> None:
             w.able[i] = w.able[i] and not s.has_jumped[i]
             w.weighed[i] = w.x[i] - s.predicted[i] if w.able[i] else 0.0
         weigh_one(s, w, t)
-        # else no single failure explains it: the machine is unlike its training
+        # otherwise no single failure explains the difference: the machine behaves differently from its training
         if w.lasting and not swapped and not alone and w.one >= 0 and w.one_worst <= 1.0:
             for i in range(t.SENSORS):
                 w.failing[i] = i == w.one
@@ -58,7 +58,7 @@ def blame(s: Names, w: Names, t: Names, elapsed: float) -> None:
 
 
 def find_one(s: Names, w: Names, t: Names) -> None:
-    """Find the sensor whose failure explains most of what is read now."""
+    """Find the sensor whose failure explains most of the current readings."""
     differ(s, w, t)
     for i in range(t.SENSORS):
         if not w.able[i]:
@@ -67,7 +67,7 @@ def find_one(s: Names, w: Names, t: Names) -> None:
 
 
 def differ(s: Names, w: Names, t: Names) -> None:
-    """Leave the differences between what is read now and what the others predict."""
+    """Compute in `weighed` the differences between the current readings and the predictions from the other sensors."""
     for i in range(t.SENSORS):
         w.weighed[i] = w.x[i]
         for k in range(t.SENSORS):
@@ -77,7 +77,7 @@ def differ(s: Names, w: Names, t: Names) -> None:
 
 
 def weigh_one(s: Names, w: Names, t: Names) -> None:
-    """Find the sensor whose failure, at once or after the lags, leaves least of the differences."""
+    """Find the sensor whose failure, immediate or lagged, leaves the smallest differences."""
     w.one = -1
     w.one_rest = 0.0
     w.one_worst = 0.0
@@ -103,14 +103,14 @@ def weigh_one(s: Names, w: Names, t: Names) -> None:
 
 
 def weigh_swaps(s: Names, w: Names, t: Names, counts: float) -> None:
-    """Weigh whether two sensors have been swapped since the start, and find the two whose exchange leaves least.
+    """Weigh the evidence for swapped sensors, and find the pair whose exchange leaves the smallest differences.
 
     Parameters
     ----------
     s, w, t : Names
-        Variables that are kept, worked out again, and known.
+        State kept between calls, work variables, and constants.
     counts : float
-        Time that counts as evidence [s].
+        Time counted as evidence [s].
     """
     differ(s, w, t)
     w.both = -1
@@ -149,7 +149,7 @@ def weigh_swaps(s: Names, w: Names, t: Names, counts: float) -> None:
 
 
 def fail(s: Names, w: Names, t: Names) -> None:
-    """Exclude sensors; the effect of their last readings on the predictions is removed."""
+    """Exclude sensors, and remove the effect of their last readings on the predictions."""
     fails = False
     for i in range(t.SENSORS):
         if w.failing[i]:

@@ -10,16 +10,16 @@ MOST_TICKS = 2e9
 
 
 def run_clock(s: Names, w: Names, t: Names, c: int, begun: bool) -> None:
-    """Let a value continue to now; between two ticks it goes straight to what the next would be.
+    """Advance a value to the current time, with linear interpolation between two ticks.
 
     Parameters
     ----------
     s, w, t : Names
-        Variables that are kept, worked out again, and known.
+        State kept between calls, work variables, and constants.
     c : int
         Index of the clock.
     begun : bool
-        It was called before.
+        The block was called before.
     """
     dt = w.step
     first = t.leaf_begin[c]
@@ -30,18 +30,18 @@ def run_clock(s: Names, w: Names, t: Names, c: int, begun: bool) -> None:
             s.averages[t.average_begin[c] + i] = w.leaf[first + i]
     ticks = 0.0 + math.floor(smaller((s.phase[c] + dt) / t.interval[c] + 0.000001, MOST_TICKS))
     phase = s.phase[c] + dt - ticks * t.interval[c]
-    if ticks >= MOST_TICKS:  # a whole number of 32 bits ends there; it has settled
+    if ticks >= MOST_TICKS:  # limit of a 32-bit integer; by then the value has settled
         phase = 0.0
     if ticks > 0.0:
         dt = phase
     moves = True
-    while ticks > 0.0 and moves:  # what has settled moves no more
+    while ticks > 0.0 and moves:  # a settled value does not change any more
         moves = False
         for i in range(first, first + leaves):
             w.average[i] = (s.total[i] + (t.interval[c] - s.phase[c]) * w.leaf[i]) / t.interval[c]
             s.total[i] = 0.0
         tick(s, w, t, c)
-        for k in range(t.past_begin[c + 1] - t.past_begin[c] - 1):  # the oldest first
+        for k in range(t.past_begin[c + 1] - t.past_begin[c] - 1):  # oldest first
             j = t.past_begin[c + 1] - 1 - k
             moves = moves or s.past[j] != s.past[j - 1]
             s.past[j] = s.past[j - 1]

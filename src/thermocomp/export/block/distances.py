@@ -7,12 +7,12 @@ from thermocomp.export.block.numbers import larger, smaller
 
 
 def find_distances(s: Names, w: Names, t: Names, k: int) -> None:
-    """Leave `excess`, of each input alone, and `distance`, of all together.
+    """Compute `excess`, the largest of all single inputs, and `distance`, of all inputs together.
 
     Parameters
     ----------
     s, w, t : Names
-        Variables that are kept, worked out again, and known.
+        State kept between calls, work variables, and constants.
     k : int
         Index of the support.
     """
@@ -33,21 +33,21 @@ def find_distances(s: Names, w: Names, t: Names, k: int) -> None:
         for m in range(t.level_begin[j] + 1, t.level_begin[j + 1]):
             least = smaller(least, abs(change - t.level[m]))
         w.distance = larger(w.distance, least / t.tolerance[j])
-    # the same on every processor
+    # identical on every processor
     w.distance = math.floor(smaller(w.distance, 1000.0) * 1000000.0 + 0.5) / 1000000.0
 
 
 def find_nearest(s: Names, w: Names, t: Names, k: int, columns: int) -> None:
-    """Leave the distance to the nearest training state in `distance`; 1 is the limit.
+    """Compute in `distance` the distance to the nearest training state; 1 is the limit.
 
     Parameters
     ----------
     s, w, t : Names
-        Variables that are kept, worked out again, and known.
+        State kept between calls, work variables, and constants.
     k : int
         Index of the support.
     columns : int
-        Inputs that count.
+        Number of inputs used.
     """
     nearest = 0.0
     for p in range(t.points[k]):

@@ -6,18 +6,18 @@ Kind = Literal["real", "time", "int", "bool"]
 
 
 class Var(NamedTuple):
-    """A variable, or an array of them.
+    """A variable or an array.
 
     Parameters
     ----------
     kind : {'real', 'time', 'int', 'bool'}
-        ``time`` is a number of double precision everywhere [s].
+        ``time`` is always in double precision [s].
     about : str
         Meaning and unit.
     dims : tuple of str
         Dimensions: names of `sizes`.
     cap : bool
-        Upper bound that nothing may exceed: if digits are lost it becomes smaller, never larger.
+        Upper bound never to be exceeded: rounding makes it smaller, never larger.
     """
 
     kind: Kind
@@ -26,7 +26,7 @@ class Var(NamedTuple):
     cap: bool = False
 
 
-#: what is kept from call to call, all 0 at the start
+#: variables kept between calls, initially 0
 STATE = {
     "begun": Var("bool", "it was called before"),
     "clock": Var("time", "since the first call [s]"),
@@ -57,7 +57,7 @@ STATE = {
     "fault": Var("int", "of each sensor: 0 good, 1 missing, 2 stepped, 3 stuck, 4 off, 5 swapped", ("SENSORS",)),
 }
 
-#: of the watch over the temperatures, see `thermocomp.runtime.watch.WatchState`
+#: state of the temperature watch, see `thermocomp.runtime.watch.WatchState`
 WATCH = {
     "looked": Var("bool", "the watch has begun"),
     "look": Var("time", "of the last look [s]"),
@@ -91,7 +91,7 @@ WATCH = {
     "fast": Var("time", "when it last did [s]"),
 }
 
-#: what is worked out again in every call
+#: variables computed in every call
 WORK = {
     "age": Var("time", "of the values [s]"),
     "dt": Var("time", "since the call before [s]"),
@@ -120,7 +120,7 @@ WORK = {
     "end": Var("real", "corrections at the ends of the travel [um]", ("ENDS",)),
 }
 
-#: the same, of the watch
+#: variables of the watch computed in every call
 WATCH_WORK = {
     "made": Var("bool", "what is read continues as it is"),
     "x": Var("real", "readings, less the zero [degC]", ("SENSORS",)),
@@ -148,7 +148,7 @@ WATCH_WORK = {
     "both_worst": Var("real", "the largest of what it leaves"),
 }
 
-#: what the block knows: numbers of the models and of the limits
+#: constants of the block: numbers of the models and of the limits
 TABLES = {
     "magnitude": Var("real", "largest correction [um]", cap=True),
     "rate": Var("real", "fastest change of a correction [um/s]", cap=True),

@@ -1,4 +1,4 @@
-"""Formulas of models as functions of a block: one variable per part, lags and clocks in what is kept."""
+"""Formulas of models as functions of a block: one variable per node, with lags and clocks in the state."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -10,21 +10,21 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.export.block.supporting import Supports
 from thermocomp.export.recurrences import Clock
 
-#: beyond every value that a table is asked for
+#: beyond every argument of a table
 _BEYOND = 1e30
-#: a larger exponent is left to a library, which may not take a negative base
+#: a larger exponent is left to a library, which may reject a negative base
 _FACTORS = 16
 
 
 class Formulas:
-    """Bodies of the functions of `thermocomp.export.block.formulas`, in Python, and the numbers that they need.
+    """Bodies of the functions of `thermocomp.export.block.formulas`, as Python source, and the numbers that they need.
 
     Parameters
     ----------
     ranges : sequence of Input
-        Inputs of the models, each once.
+        Inputs of the models, without duplicates.
     channels : sequence of int
-        Index of each of them among the values that are read.
+        Index of each input among the values of a reading.
     """
 
     def __init__(self, ranges: Sequence[Input], channels: Sequence[int]) -> None:
@@ -40,14 +40,14 @@ class Formulas:
         self._lines, self._known, self._gains = list[str](), dict[e.Node, str](), dict[str, str]()
 
     def add(self, name: str, models: Iterable[tuple[int, ErrorModel, e.Node]]) -> None:
-        """Write a function that works models out.
+        """Write a function that computes the outputs of models.
 
         Parameters
         ----------
         name : str
             Name of the function; ``models_`` is prefixed.
         models : iterable of (int, ErrorModel, Node)
-            Place of each, and its formula, whose inputs are numbered as the ranges are.
+            Index, model and formula; the inputs of a formula are numbered like the ranges.
         """
         self._begin()
         worked_out = set[int]()
@@ -92,7 +92,7 @@ class Formulas:
         self.functions[name] = "\n".join([f"def {name}({parameters}):", *(f"    {line}" for line in lines or ["pass"])])
 
     def _value(self, node: e.Node, clock: "_Clock | None" = None) -> str:
-        """Return the name of a part's value; a part that occurs in several places is computed once."""
+        """Return the variable name of a node's value; a repeated node is computed once."""
         if isinstance(node, e.Named):
             return self._value(node.of, clock)
         if isinstance(node, e.Constant):
@@ -137,7 +137,7 @@ class Formulas:
         self._lines.append(f"{lag} = {lag} + {self._gains[paces]} * ({signal} - {lag}) if begun else {signal}")
         return lag
 
-    def _arithmetic(self, node: e.Node, clock: "_Clock | None" = None) -> str:  # noqa: PLR0911 - a case for every kind
+    def _arithmetic(self, node: e.Node, clock: "_Clock | None" = None) -> str:  # noqa: PLR0911 - one case per node type
         def value(part: e.Node) -> str:
             return self._value(part, clock)
 
@@ -171,7 +171,7 @@ class _Clock(Clock):
         self.average_begin = sum(c.means * len(c.leaves) for c in before)
 
     def text(self, node: e.Node) -> str:
-        """Return the location of a past value; empty if it is none."""
+        """Return the location of a past value; empty if `node` is not a past value."""
         match node:
             case e.Past(ticks):
                 return f"s.past[{self.past_begin + ticks - 1}]"
@@ -183,7 +183,7 @@ class _Clock(Clock):
 
 
 def number(value: float) -> str:
-    """Return a number as Python writes it, exactly."""
+    """Return a number as exact Python source."""
     if not math.isfinite(value):
         raise ValueError(f"{value}: is not finite")
     return repr(float(value))

@@ -1,10 +1,10 @@
-"""Variables by name: what the block's functions work on when Python runs them."""
+"""Variables by name: namespace of the block's functions when they run in Python."""
 
 from typing import Any
 
 
 class Names:
-    """A bag of variables; see `thermocomp.export.block.layout`.
+    """A namespace of variables; see `thermocomp.export.block.layout`.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Means, medians and lags as scalars and loops, on the column of `thermocomp.export.block.layout.WORK`."""
+"""Means, medians and lags as scalars and loops, in the array ``column`` of `thermocomp.export.block.layout.WORK`."""
 
 import math
 
@@ -7,7 +7,7 @@ from thermocomp.export.block.names import Names
 
 
 def find_mean(s: Names, w: Names, t: Names) -> None:
-    """Leave the mean of a column without its outliers in `middle`."""
+    """Compute the mean of a column without its outliers in `middle`."""
     total = 0.0
     if w.rows < 3:
         for k in range(w.rows):
@@ -20,7 +20,7 @@ def find_mean(s: Names, w: Names, t: Names) -> None:
         high = w.rows - 1
         apart = 0.0
         nearer = 0.0
-        # the median of the distances from the median: from the outside inwards, the farther end first
+        # median of the distances from the median: from the outside inwards, the farther end first
         for k in range(w.rows - w.rows // 2):
             nearer = apart
             if centre - w.column[low] >= w.column[high] - centre:
@@ -42,7 +42,7 @@ def find_mean(s: Names, w: Names, t: Names) -> None:
 
 
 def sort(s: Names, w: Names, t: Names) -> None:
-    """Sort the column."""
+    """Sort the column in ascending order."""
     gap = w.rows // 2
     while gap > 0:
         for k in range(gap, w.rows):
@@ -81,16 +81,16 @@ def clip(value: float, low: float, high: float) -> float:
 
 
 def find_linear(s: Names, w: Names, t: Names, at: float, first: int, end: int) -> None:
-    """Look a value up in a table of straight lines, constant beyond its ends: `found`.
+    """Interpolate linearly in a table, with constant values beyond its ends: `found`.
 
     Parameters
     ----------
     s, w, t : Names
-        Variables that are kept, worked out again, and known.
+        State kept between calls, work variables, and constants.
     at : float
-        Position.
+        Argument.
     first, end : int
-        Points of the table.
+        Range of the table's points, `end` excluded.
     """
     find_place(s, w, t, at, first, end)
     k = w.place
@@ -104,32 +104,32 @@ def find_linear(s: Names, w: Names, t: Names, at: float, first: int, end: int) -
 
 
 def find_step(s: Names, w: Names, t: Names, at: float, first: int, end: int) -> None:
-    """Look a value up in a table of stairs: `found`.
+    """Look up a value in a table of steps: `found`.
 
     Parameters
     ----------
     s, w, t : Names
-        Variables that are kept, worked out again, and known.
+        State kept between calls, work variables, and constants.
     at : float
-        Position.
+        Argument.
     first, end : int
-        Points of the table, the last beyond everything.
+        Range of the table's points, `end` excluded; the last is beyond every argument.
     """
     find_place(s, w, t, at, first, end)
     w.found = t.table_y[w.place]
 
 
 def find_place(s: Names, w: Names, t: Names, at: float, first: int, end: int) -> None:
-    """Leave the first point of a table that is beyond a value in `place`.
+    """Find the first point of a table beyond a value: `place`.
 
     Parameters
     ----------
     s, w, t : Names
-        Variables that are kept, worked out again, and known.
+        State kept between calls, work variables, and constants.
     at : float
         The value.
     first, end : int
-        Points of the table.
+        Range of the table's points, `end` excluded.
     """
     w.place = first
     going = True
@@ -142,11 +142,11 @@ def find_place(s: Names, w: Names, t: Names, at: float, first: int, end: int) ->
 
 
 def exp_less_one(x: float) -> float:
-    """Return exp(x) - 1, as exactly for a small x: of a language that has none."""
+    """Return exp(x) - 1, accurate for small x, for languages without such a function."""
     small = x * (1.0 + x / 2.0 * (1.0 + x / 3.0 * (1.0 + x / 4.0 * (1.0 + x / 5.0 * (1.0 + x / 6.0)))))
     return small if abs(x) < 0.01 else math.exp(x) - 1.0
 
 
 def power(base: float, exponent: float) -> float:
-    """Return a power of a number that is not negative, the exponent being positive: of a language that has none."""
+    """Return a power of a non-negative base and a positive exponent, for languages without a power function."""
     return 0.0 if base <= 0.0 else math.exp(exponent * math.log(base))

@@ -1,4 +1,4 @@
-"""The block's functions as syntax trees: which there are, without what a compensator does without."""
+"""The block's functions as syntax trees: those needed by a compensator, without unused branches."""
 
 import ast
 import inspect
@@ -11,7 +11,7 @@ from thermocomp.export.block import blaming, clocks, distances, formulas, number
 from thermocomp.export.block.layout import STATE, TABLES, WATCH, WATCH_WORK, WORK, Kind, Var
 from thermocomp.export.block.tables import Tables
 
-#: variables by the name of what they are in
+#: variables by the name of their namespace
 VARIABLES: dict[str, dict[str, Var]] = {"s": STATE | WATCH, "w": WORK | WATCH_WORK, "t": TABLES}
 
 
@@ -20,21 +20,21 @@ class Function(NamedTuple):
 
     name: str
     tree: ast.FunctionDef
-    constants: Mapping[str, object]  #: of the module it stands in
+    constants: Mapping[str, object]  #: constants of its module
 
     @property
     def parameters(self) -> list[str]:
-        """Parameters other than the variables."""
+        """Parameters other than the namespaces of variables."""
         return [a.arg for a in self.tree.args.args if a.arg not in VARIABLES]
 
     @property
     def is_of_numbers(self) -> bool:
-        """Whether it gives a number, and changes nothing."""
+        """Whether the function returns a number and has no side effects."""
         return not any(a.arg in VARIABLES for a in self.tree.args.args)
 
     @property
     def about(self) -> str:
-        """Its docstring."""
+        """Docstring of the function."""
         return ast.get_docstring(self.tree) or ""
 
 
@@ -50,19 +50,19 @@ def _all() -> dict[str, Function]:
 
 
 def called(node: ast.Call) -> str:
-    """Return the name of the function that a call is of."""
+    """Return the name of the called function."""
     return node.func.attr if isinstance(node.func, ast.Attribute) else node.func.id  # type: ignore[attr-defined]
 
 
 def functions(tables: Tables, own: Mapping[str, str] = MappingProxyType({})) -> list[Function]:
-    """Return the functions that a block needs, each behind those that it calls; `step` is the last.
+    """Return the functions that a block needs, callees before callers; `step` is the last.
 
     Parameters
     ----------
     tables : Tables
         Tables of the compensator: an ``if`` that depends on one of their sizes is resolved here.
     own : mapping of str to str
-        Functions of the block that replace those of a library, by the names of these.
+        Functions of the block that replace library functions, by the names of the latter.
     """
     known = _all() | {name: _made(name, text) for name, text in tables.formulas.items()}
     known |= {name: known[of]._replace(name=name) for name, of in own.items()}
@@ -89,7 +89,7 @@ def _made(name: str, text: str) -> Function:
 
 
 class _Decided(ast.NodeTransformer):
-    """Takes away what a compensator does without."""
+    """Transformer that removes branches and loops not used by a compensator."""
 
     def __init__(self, sizes: Mapping[str, int]) -> None:
         self._sizes = sizes
@@ -111,8 +111,8 @@ class _Decided(ast.NodeTransformer):
         return node
 
 
-def kind_of(node: ast.expr, local: Mapping[str, Kind]) -> Kind:  # noqa: PLR0911 - a case for every kind of node
-    """Return the type of an expression: ``time`` if it contains one."""
+def kind_of(node: ast.expr, local: Mapping[str, Kind]) -> Kind:  # noqa: PLR0911 - one case per node type
+    """Return the type of an expression: ``time`` if any part of it is a time."""
     match node:
         case ast.Compare() | ast.BoolOp() | ast.UnaryOp(ast.Not()):
             return "bool"
@@ -139,7 +139,7 @@ def kind_of(node: ast.expr, local: Mapping[str, Kind]) -> Kind:  # noqa: PLR0911
 
 
 def locals_of(tree: ast.FunctionDef, parameters: Mapping[str, Kind]) -> dict[str, Kind]:
-    """Return the kinds of the variables that a function has for itself, in their order."""
+    """Return the types of a function's local variables, in order of appearance."""
     found: dict[str, Kind] = dict(parameters)
     for node in ast.walk(tree):
         if isinstance(node, ast.For) and isinstance(node.target, ast.Name):
@@ -159,12 +159,12 @@ def _in_order(node: ast.AST) -> Iterator[ast.AST]:
         yield from _in_order(child)
 
 
-#: of the parameters of functions
+#: types of function parameters, by annotation
 PARAMETER: dict[str, Kind] = {"int": "int", "float": "real", "bool": "bool"}
 
 
 def parameters_of(function: Function) -> dict[str, Kind]:
-    """Return the kinds of a function's parameters other than the variables."""
+    """Return the types of a function's parameters other than the namespaces."""
     return {
         a.arg: PARAMETER[ast.unparse(a.annotation)]
         for a in function.tree.args.args

@@ -1,9 +1,9 @@
-"""The compensator's way of a reading as scalars and loops: what is written for a controller, in any language.
+"""Processing chain of a reading as scalars and loops: exported to controllers in any language.
 
-The same as `thermocomp.runtime.compensator` does, of models whose zero is the start, without probings and orders. The
-functions run in Python, and are printed as they stand (`thermocomp.export.printer`): assignments, ``if``, ``for``
-and ``while`` over variables of three kinds, ``s`` that is kept, ``w`` that is not, ``t`` that is known. A procedure
-leaves its result in a variable; a function is of numbers alone.
+Equivalent to `thermocomp.runtime.compensator` for models whose zero is the start, without probings and commands. The
+functions run in Python and are translated literally (`thermocomp.export.printer`): assignments, ``if``, ``for`` and
+``while`` on three groups of variables: ``s``, kept between calls; ``w``, recomputed; ``t``, constant. A procedure
+leaves its result in a variable; a function depends on numbers only.
 """
 
 import math
@@ -21,10 +21,10 @@ UNTIMELY, IMPLAUSIBLE, NO_START = 1, 2, 3
 
 
 def step(s: Names, w: Names, t: Names) -> None:
-    """Process values that were measured some time ago, and move the corrections."""
+    """Process values of a given age, and move the corrections."""
     tell_time(s, w, t)
     for c in range(t.CHANNELS):
-        w.given[c] = w.value[c] >= -1e30 and w.value[c] <= 1e30  # what is not a number is not
+        w.given[c] = w.value[c] >= -1e30 and w.value[c] <= 1e30  # False for NaN
     w.stands = False
     if t.has_speed:
         w.stands = w.given[t.speed_channel] and abs(w.value[t.speed_channel]) <= STANDS
@@ -47,7 +47,7 @@ def step(s: Names, w: Names, t: Names) -> None:
 
 
 def tell_time(s: Names, w: Names, t: Names) -> None:
-    """Determine when the values were measured, and whether their time is valid."""
+    """Determine the time of measurement, and whether it is valid."""
     w.passes = w.dt >= 0.0 and w.dt <= GAP
     w.travel = 0.0
     if not s.begun:
@@ -76,7 +76,7 @@ def tell_time(s: Names, w: Names, t: Names) -> None:
 
 
 def check(s: Names, w: Names, t: Names) -> None:
-    """Return whether all values are present, finite and plausible; before the zero is known, as a start."""
+    """Check that all values are present, finite and plausible; while the zero is unknown, also for a start."""
     for r in range(t.RANGES):
         c = t.channel[r]
         least = t.least[r]
@@ -93,12 +93,12 @@ def check(s: Names, w: Names, t: Names) -> None:
 
 
 def check_start(s: Names, w: Names, t: Names, g: int) -> None:
-    """Return whether the temperatures of a model are plausible for a machine that starts.
+    """Check that the temperatures of a model are plausible for a starting machine.
 
     Parameters
     ----------
     s, w, t : Names
-        Variables that are kept, worked out again, and known.
+        State kept between calls, work variables, and constants.
     g : int
         Index of the set of ranges.
     """
@@ -121,7 +121,7 @@ def check_start(s: Names, w: Names, t: Names, g: int) -> None:
 
 
 def take(s: Names, w: Names, t: Names) -> None:
-    """Add a reading to the zero, or pass it to the models, and let these drive the corrections."""
+    """Add a reading to the zero, or pass it to the models and move the corrections accordingly."""
     w.step = 0.0
     if s.seen:
         w.step = w.now - s.time
@@ -156,7 +156,7 @@ def take(s: Names, w: Names, t: Names) -> None:
 
 
 def gather(s: Names, w: Names, t: Names) -> None:
-    """Add a reading to the zero; once that is known, the models process the readings before this one."""
+    """Add a reading to the zero; once the zero is known, process the earlier readings with the models."""
     belongs = s.gathered == 0
     if not belongs and s.gathered < t.MOST and (w.stands or not s.resting):
         belongs = w.now - s.gathered_at[0] <= (t.at_rest if s.resting else t.otherwise)
@@ -194,12 +194,12 @@ def gather(s: Names, w: Names, t: Names) -> None:
 
 
 def drive(s: Names, w: Names, t: Names, k: int) -> None:
-    """Move a correction towards the demand of its models, as far as the limits allow at both ends of the travel.
+    """Move a correction towards the value required by its models, within the limits at both ends of the travel.
 
     Parameters
     ----------
     s, w, t : Names
-        Variables that are kept, worked out again, and known.
+        State kept between calls, work variables, and constants.
     k : int
         Index of the target.
     """
@@ -229,12 +229,12 @@ def drive(s: Names, w: Names, t: Names, k: int) -> None:
 
 
 def idle(s: Names, w: Names, t: Names, k: int) -> None:
-    """Let a correction that nothing drives stay, and go to zero once it was held for long.
+    """Hold a correction that no model drives, and fade it to zero after the hold time.
 
     Parameters
     ----------
     s, w, t : Names
-        Variables that are kept, worked out again, and known.
+        State kept between calls, work variables, and constants.
     k : int
         Index of the target.
     """
@@ -255,14 +255,14 @@ def idle(s: Names, w: Names, t: Names, k: int) -> None:
 
 
 def limit(wanted: float, current: float, travel: float, magnitude: float, rate: float, band: float) -> float:
-    """Return a correction after a move towards the demand: no further, no faster, and not within the dead band [um].
+    """Return a correction moved towards the required value, within magnitude, rate and dead band [um].
 
     Parameters
     ----------
     wanted, current : float
         [um]
     travel : float
-        Time it has had to move [s].
+        Time available for the move [s].
     magnitude, rate, band : float
         As for `thermocomp.core.correction.Limits`.
     """

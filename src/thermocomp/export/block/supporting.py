@@ -1,4 +1,4 @@
-"""Models outside their training range: ``hold`` and ``fade``, as statements of a block and their numbers."""
+"""Models outside their training range: ``hold`` and ``fade``, as statements of a block, and their numbers."""
 
 import math
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from thermocomp.core.model import ErrorModel
 
 
 class Supports:
-    """Support policies of some models; what several have in common is there once.
+    """Support policies of several models; identical supports are stored once.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class Supports:
         said : str
             Output of the model.
         worked_out : set of int
-            Distances that the function has already.
+            Indices of the distances already computed in the function.
         """
         own, policy = f"s.deviation[{place}]", model.support.policy
         if policy == "clip":

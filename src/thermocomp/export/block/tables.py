@@ -15,21 +15,21 @@ from thermocomp.export.block.models import Formulas
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.gate import MIN_SPAN, PLAUSIBLE, WIDE
 
-#: any number at all, in single precision too
+#: any number, in single precision too
 ANY = (-1e30, 1e30)
 
 
 class Tables(NamedTuple):
     """Source data of a block."""
 
-    channels: tuple[Input, ...]  #: in the order of the values that it takes
-    ranges: tuple[Input, ...]  #: inputs of the models, each once
-    sensors: tuple[str, ...]  #: temperatures that are watched
+    channels: tuple[Input, ...]  #: in the order of the block's input values
+    ranges: tuple[Input, ...]  #: inputs of the models, without duplicates
+    sensors: tuple[str, ...]  #: monitored temperatures
     targets: tuple[str, ...]
     models: tuple[ErrorModel, ...]
-    sizes: dict[str, int]  #: by the names in the dimensions of the variables, and what the block does without
+    sizes: dict[str, int]  #: array dimensions of the variables by name, and flags of optional features
     values: dict[str, Any]  #: numbers, or nested lists of them, by the names of `layout.TABLES`
-    formulas: dict[str, str]  #: functions that are made of the models' formulas, in Python
+    formulas: dict[str, str]  #: functions generated from the models' formulas, in Python
 
 
 def gather(compensator: Compensator) -> Tables:
@@ -38,12 +38,12 @@ def gather(compensator: Compensator) -> Tables:
     Parameters
     ----------
     compensator : Compensator
-        Made by `Compensator.of`.
+        Created by `Compensator.of`.
 
     Raises
     ------
     InputError
-        Its models are watched over, or average their zero, in different ways.
+        Its models have different watches, or average their zero in different ways.
     """
     models, watches = compensator.models, compensator.watches
     zeroings = {m.zeroing for m in models} | {w.zeroing for w in watches}
@@ -105,7 +105,7 @@ def gather(compensator: Compensator) -> Tables:
 
 
 def _channels(known: list[Input], speed: str) -> tuple[Input, ...]:
-    """Return the channels of a reading, each once: inputs of models and watch, and the spindle speed."""
+    """Return the channels of a reading without duplicates: inputs of models and watch, and the spindle speed."""
     if speed:
         known.append(Input(speed, "spindle_speed", unit="1/min", reference=0.0, rezero=False, low=0.0, high=0.0))
     by_name = {i.name: i for i in reversed(known)}
@@ -160,7 +160,7 @@ def _ranges(ranges: tuple[Input, ...], models: tuple[ErrorModel, ...], place: di
 def _lines(compensator: Compensator) -> dict[str, Any]:
     lines = list(compensator.lines.values())
     shares = [line.deviation(unit) for line in lines for unit in np.eye(line.models.stop - line.models.start).tolist()]
-    # of one model alone the same at every position
+    # the correction of a single model is the same at every position
     travels = [(0.0, 0.0) if line.travel[0] == line.travel[1] else line.travel for line in lines]
     return {
         "line_begin": [line.models.start for line in lines] + [len(compensator.models)],
@@ -174,7 +174,7 @@ def _lines(compensator: Compensator) -> dict[str, Any]:
 
 
 def _judged(models: tuple[ErrorModel, ...], sensors: tuple[str, ...]) -> dict[str, Any]:
-    """Return without which sensors the models may run; each alone, and several together as they were judged."""
+    """Return the sensors without which the models may run: single sensors, and the combinations judged."""
     judged: list[tuple[int, list[bool]]] = []
     for k, m in enumerate(models):
         own = [i.name for i in m.inputs if i.name in sensors]

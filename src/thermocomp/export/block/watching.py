@@ -1,4 +1,4 @@
-"""The watch over the temperatures as scalars and loops: see `thermocomp.runtime.watch` for explanations."""
+"""Monitoring of the temperatures as scalars and loops: see `thermocomp.runtime.watch` for explanations."""
 
 import math
 
@@ -16,7 +16,7 @@ HOLDING = 2
 
 
 def believe(s: Names, w: Names, t: Names) -> None:
-    """Put something in the place of each temperature that is not to be believed."""
+    """Replace each temperature that is not trusted."""
     w.made = True
     for k in range(t.SPEEDS):
         c = t.watch_channel[t.speed_input[k]]
@@ -44,7 +44,7 @@ def believe(s: Names, w: Names, t: Names) -> None:
 
 
 def make_up(s: Names, w: Names, t: Names) -> None:
-    """Of the first readings, put one that cannot be as far from its training's zero as the others are."""
+    """Replace first readings whose distance from their training zero is not plausible given the other sensors."""
     w.rows = 0
     for i in range(t.SENSORS):
         c = t.sensor_channel[i]
@@ -65,7 +65,7 @@ def make_up(s: Names, w: Names, t: Names) -> None:
 
 
 def begin(s: Names, w: Names, t: Names) -> None:
-    """Add a reading to the zero, if that is not known; start at rest in it, or in the first reading."""
+    """Add a reading to the zero if it is unknown; start from rest at the zero, or at the first reading."""
     belongs = t.watch_waits and s.watch_gathered == 0
     if t.watch_waits and not belongs and s.watch_gathered < t.MOST and (w.stands or not s.watch_resting):
         belongs = w.now - s.watch_gathered_at[0] <= (t.at_rest if s.watch_resting else t.otherwise)
@@ -105,7 +105,7 @@ def begin(s: Names, w: Names, t: Names) -> None:
 
 
 def calm_down(s: Names, w: Names, t: Names) -> None:
-    """Keep speeds within what a memory can bear."""
+    """Limit speeds to a multiple of the top speed."""
     for k in range(t.SPEEDS):
         most = HEATS * t.top_speed
         w.change[t.speed_input[k]] = larger(-most, smaller(most, w.change[t.speed_input[k]]))
@@ -122,7 +122,7 @@ def predict(s: Names, w: Names, t: Names) -> None:
 
 
 def look(s: Names, w: Names, t: Names) -> None:
-    """Look at all sensors."""
+    """Check all sensors and advance the predictions."""
     elapsed = w.now - s.look
     s.look = w.now
     find_jumps(s, w, t, elapsed)
@@ -160,14 +160,14 @@ def look(s: Names, w: Names, t: Names) -> None:
 
 
 def find_jumps(s: Names, w: Names, t: Names, elapsed: float) -> None:
-    """Find jumps, those that were spikes, and those that last.
+    """Find jumps, discard spikes, and confirm lasting jumps.
 
     Parameters
     ----------
     s, w, t : Names
-        Variables that are kept, worked out again, and known.
+        State kept between calls, work variables, and constants.
     elapsed : float
-        Since the last look [s].
+        Time since the last check [s].
     """
     for i in range(t.SENSORS):
         slack = t.jump_limit[i]
@@ -192,9 +192,9 @@ def advance(s: Names, w: Names, t: Names, elapsed: float) -> None:
     Parameters
     ----------
     s, w, t : Names
-        Variables that are kept, worked out again, and known.
+        State kept between calls, work variables, and constants.
     elapsed : float
-        Since the last look [s].
+        Time since the last check [s].
     """
     for k in range(t.SPEEDS):
         w.change[t.speed_input[k]] = w.value[t.watch_channel[t.speed_input[k]]] - s.watch_zero[t.speed_input[k]]
@@ -213,7 +213,7 @@ def advance(s: Names, w: Names, t: Names, elapsed: float) -> None:
 
 
 def find_stuck(s: Names, w: Names, t: Names) -> None:
-    """Find what reads the same though its prediction moves, or though another one has changed for long."""
+    """Find sensors with constant readings although the prediction, or for too long another sensor, has changed."""
     lives = False
     for i in range(t.SENSORS):
         same = w.there[i] and s.read_once[i] and w.x[i] == s.same[i]
@@ -236,7 +236,7 @@ def find_stuck(s: Names, w: Names, t: Names) -> None:
 
 
 def find_off(s: Names, w: Names, t: Names) -> None:
-    """Find whether a difference has been too large for long."""
+    """Find differences that have been too large for too long."""
     rested = not s.was_fast or w.now - s.fast > REST
     for i in range(t.SENSORS):
         if s.fault[i] > MISSING and w.now - s.since[i] <= REST:
@@ -252,7 +252,7 @@ def find_off(s: Names, w: Names, t: Names) -> None:
 
 
 def believe_again(s: Names, w: Names, t: Names) -> None:
-    """Believe a sensor again that was missing and reads what is predicted."""
+    """Trust a missing sensor again once its readings agree with the prediction."""
     for i in range(t.SENSORS):
         fits = s.fault[i] == MISSING and w.there[i] and abs(w.difference[i]) <= t.off_limit[i]
         if fits and not s.is_back[i]:
@@ -267,12 +267,12 @@ def believe_again(s: Names, w: Names, t: Names) -> None:
 
 
 def judge(s: Names, w: Names, t: Names, k: int) -> None:
-    """Hold a correction whose models were not judged without the sensors that failed, or do harm without them.
+    """Hold a correction if its models were judged harmful, or not judged at all, without the failed sensors.
 
     Parameters
     ----------
     s, w, t : Names
-        Variables that are kept, worked out again, and known.
+        State kept between calls, work variables, and constants.
     k : int
         Index of the target.
     """

@@ -1,4 +1,4 @@
-"""C99: a compensator as one header and one source, without allocation and without globals."""
+"""C99: a compensator as one header and one source file, without dynamic memory and without globals."""
 
 import re
 import textwrap
@@ -146,7 +146,7 @@ class Sources:
 def translate(tables: Tables, name: str, facts: Sequence[str] = (), *, double_only: bool = False) -> Sources:
     """Return a compensator in C99.
 
-    What it does with values is what `Compensator.step` does with a reading.
+    The code processes values as `Compensator.step` processes a reading.
 
     Parameters
     ----------
@@ -157,12 +157,12 @@ def translate(tables: Tables, name: str, facts: Sequence[str] = (), *, double_on
     facts : sequence of str
         Lines at the top of the files.
     double_only : bool
-        It does not compile in single precision.
+        The code does not compile in single precision.
 
     Raises
     ------
     InputError
-        A model is of a family that has no formula.
+        A model belongs to a family without a formula.
     """
     name, n, sizes = identifier(name), len(tables.channels), tables.sizes
     functions = write_functions(tables, name)
@@ -190,7 +190,7 @@ def translate(tables: Tables, name: str, facts: Sequence[str] = (), *, double_on
 
 
 def _wrapped(line: str) -> str:
-    """Return a long line as several: a compiler need not take more than 4,095 characters."""
+    """Return a long line as several: C compilers need not accept more than 4,095 characters."""
     if len(line) <= 200:
         return line
     return textwrap.fill(line, 110, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False) + "\n"
@@ -207,13 +207,13 @@ def _enumerated(name: str, kind: str, texts: Sequence[str]) -> str:
 
 
 def identifier(name: str) -> str:
-    """Return a name that C takes, as near to another as it gets."""
+    """Return a valid C identifier close to a name."""
     text = re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_")
     return f"tc_{text}"
 
 
 def comment(text: str) -> str:
-    """Return a text that ends no comment."""
+    """Return a text that cannot end a comment."""
     for sign in ("*/", "/*", "??"):
         text = text.replace(sign, " ".join(sign))
     return " ".join(text.split())

@@ -18,20 +18,20 @@ TYPES: dict[Kind, str] = {"real": "tc_real", "time": "double", "int": "int", "bo
 
 
 def write_functions(tables: Tables, state: str) -> str:
-    """Return the functions that a block needs, `step` the last.
+    """Return the functions that a block needs, `step` last.
 
     Parameters
     ----------
     tables : Tables
         Tables of the compensator.
     state : str
-        Name of the type that keeps its variables.
+        Name of the type of the state.
     """
     return "\n".join(_Writer(f, tables.sizes, state).text() for f in functions(tables))
 
 
 class _Writer(Printer):
-    """Writes one function."""
+    """Writer of one function."""
 
     operators: ClassVar = {
         ast.Add: "+",
@@ -69,7 +69,7 @@ class _Writer(Printer):
         unused = [f"    (void){v};" for v in passed]
         return f"{head}\n{{\n" + "\n".join([*declared, *([""] if declared else []), *unused, *lines]) + "\n}\n"
 
-    def statement(self, node: ast.stmt, depth: int) -> list[str]:  # noqa: PLR0911 - a case for every kind of node
+    def statement(self, node: ast.stmt, depth: int) -> list[str]:  # noqa: PLR0911 - one case per node type
         pad, inner = "    " * depth, depth + 1
         match node:
             case ast.Assign([target], value):
@@ -119,7 +119,7 @@ class _Writer(Printer):
 
 
 def _number(value: float, kind: Kind, *, cap: bool = False) -> str:
-    """Return a number as C writes it: exact in double precision, within its bounds in single."""
+    """Return a number in C syntax: exact in double precision, within its bounds in single precision."""
     if kind in ("int", "bool"):
         return str(int(value))
     if kind == "time":
@@ -133,7 +133,7 @@ def _number(value: float, kind: Kind, *, cap: bool = False) -> str:
 
 
 def write_tables(tables: Tables, used: str) -> str:
-    """Return the numbers that a text uses, as constants."""
+    """Return the numbers used in a text, as C constants."""
     return "".join(
         f"/* {var.about} */\nstatic const {TYPES[var.kind]} c_{name}{_dims(var, tables.sizes)} = "
         f"{_list(tables.values[name], var)};\n"
@@ -157,7 +157,7 @@ def _list(value: Any, var: Var) -> str:
 
 
 def write_variables(sizes: Mapping[str, int], owner: str, used: str) -> str:
-    """Return the members of the type that keeps variables, those that a text uses."""
+    """Return the struct members for the variables used in a text."""
     return "".join(
         f"    {TYPES[var.kind]} {name}{_dims(var, sizes)}; /* {var.about} */\n"
         for name, var in _used(owner, used, f"{owner}->").items()

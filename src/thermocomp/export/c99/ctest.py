@@ -83,7 +83,7 @@ _FAULTS = """        for (j = 0; j < SENSORS; j++) {
 
 
 def write_test(name: str, tables: Tables, readings: Readings, answers: Answers, double: float, single: float) -> str:
-    """Return a program that checks whether the code gives the same outputs as the compensator.
+    """Return a program that compares the outputs of the code with those of the compensator.
 
     Parameters
     ----------
@@ -94,8 +94,8 @@ def write_test(name: str, tables: Tables, readings: Readings, answers: Answers, 
     answers : Answers
         Outputs of the compensator.
     double, single : float
-        Difference that is allowed in double and in single precision, as a share of a correction, or in um of one below
-        1 um; 0: it is not made for single precision.
+        Tolerance in double and in single precision, as a fraction of the correction, or in um for corrections below
+        1 um; `single` is 0 if single precision is not supported.
     """
     calls = range(len(readings.age))
     return _PROGRAM.format(

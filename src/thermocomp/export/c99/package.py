@@ -1,4 +1,4 @@
-"""All files of an export to C99: the code, its test, and how to use it."""
+"""All files of an export to C99: the code, its test, and the instructions."""
 
 import math
 from collections.abc import Callable
@@ -74,26 +74,26 @@ controller must not compensate for temperature itself at the same time.
 """
 
 
-#: last digits by which a difference of two readings is off
+#: last digits by which the difference of two readings may be wrong
 _DIGITS = 2.0
-#: largest share of a correction by which single precision may be off; beyond it is refused
+#: largest error of single precision as a fraction of the correction; above it, single precision is rejected
 _COARSE = 1.0
 
 
 def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str, bytes]:
-    """Return all files by their names.
+    """Return all files by name.
 
     Parameters
     ----------
     compensator : Compensator
-        Made by `Compensator.of`.
+        Created by `Compensator.of`.
     name : str
     facts : Facts
 
     Raises
     ------
     InputError
-        A model has no formula, or the models do not go together.
+        A model has no formula, or the models cannot be combined.
     """
     tables, said = gather(compensator), facts.lines(compensator)
     readings = make_readings(tables)
@@ -129,12 +129,12 @@ def _double(compensator: Compensator, tables: Tables, readings: Readings, answer
 def _single(compensator: Compensator, tables: Tables, readings: Readings, answers: Answers) -> float:
     """Return the tolerance for single precision: ten times the effect of rounding all numbers; 0 if too large.
 
-    Where a curve has steps, a reading beside one may get to its other side: so readings are moved to either side, too,
-    by what rounding does to the difference of two.
+    Where a curve has steps, a reading close to a step may end up on its other side: therefore readings are also shifted
+    to either side, by the effect of rounding on the difference of two readings.
     """
     try:
         coarse = replace(compensator, models=round_all(compensator.models, round_single))
-    except SettingError:  # a free run that decays in double precision alone
+    except SettingError:  # a recurrence that is stable in double precision only
         return 0.0
 
     def moved(way: int, rounded: Callable[[FloatArray], FloatArray] | None = None) -> float:
@@ -149,13 +149,13 @@ def _single(compensator: Compensator, tables: Tables, readings: Readings, answer
 
 
 def _apart(one: Answers, other: Answers) -> float:
-    """Return the largest difference of corrections, as a share of one, or in um of one below 1 um."""
+    """Return the largest difference of corrections, as a fraction of the correction, or in um below 1 um."""
     pairs = (one.correction, other.correction), (one.slope, other.slope)
     return max(float((np.abs(a - b) / np.maximum(1.0, np.abs(a))).max(initial=0.0)) for a, b in pairs)
 
 
 def _shifted(values: FloatArray, way: int, kind: type[np.floating[Any]] = np.float64) -> FloatArray:
-    """Return readings moved by their last digits in a precision: one up, the next down, the same always alike."""
+    """Return readings shifted by their last digits in a precision: odd up, even down, equal readings alike."""
     with np.errstate(invalid="ignore"):
         last = np.where(np.isfinite(values), np.spacing(values.astype(kind)).astype(np.float64), 0.0)
         odd = np.where(last != 0.0, values / np.where(last == 0.0, 1.0, last), 0.0) % 2.0 >= 1.0

@@ -45,7 +45,7 @@ Parameter(name="*")(ReductionOptions)
 
 
 def no_file(output: Path, _: Mapping[str, Any]) -> list[Path]:
-    """Refuse a file where a folder is expected; the target determines the files written there."""
+    """Reject a file where a folder is expected; the target determines the files written there."""
     if output.exists() and not output.is_dir():
         raise InputError(f"{output}: is not a directory")
     return []
@@ -64,7 +64,7 @@ def no_file(output: Path, _: Mapping[str, Any]) -> list[Path]:
     words=("model", "recordings"),
 )
 def export(found: ExportedCode, face: CommandFace) -> int:
-    """Show it.
+    """Save the files and print the result.
 
     Parameters
     ----------

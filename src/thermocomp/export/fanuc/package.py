@@ -1,4 +1,4 @@
-"""A custom macro for Fanuc controls that puts a linear formula into the external workpiece zero offset."""
+"""A custom macro for Fanuc controls that writes a linear formula to the external workpiece zero offset."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -18,7 +18,7 @@ SIGN = (
     "Sign: the correction, minus the deviation (actual minus commanded), is added to the external workpiece zero offset"
 )
 UNITS = "Units: offsets in mm, temperatures in degC"
-#: what nobody has confirmed, told first and at its place
+#: unconfirmed assumptions, stated at the top and repeated in the code
 UNCONFIRMED = (
     "UNCONFIRMED: no line of this was tried on a Fanuc control, nor confirmed by its manuals here",
     "UNCONFIRMED: #5201, #5202, #5203 as external workpiece zero offset of X, Y, Z in mm, which a program may write",
@@ -26,11 +26,11 @@ UNCONFIRMED = (
     "UNCONFIRMED: that IF...THEN is known to your control, and that it waits for a new offset before the next move",
 )
 _OFFSETS = {"X": 5201, "Y": 5202, "Z": 5203}
-#: common variables, kept at power-off: on or off, the first temperature, the corrections in force
+#: common variables, retained at power-off: enable, first temperature, corrections in force
 _ON, _FIRST, _FORCE = 500, 501, {"X": 521, "Y": 522, "Z": 523}
-#: sensors that find room between
+#: number of variables available for sensors
 _ROOM = _FORCE["X"] - _FIRST
-#: a call at least so often [s]: what the rate allows in it is the largest change of a call
+#: longest time between two calls [s]: the rate times this is the largest change per call
 INTERVAL = 60.0
 
 _ABOUT = """\
@@ -75,7 +75,7 @@ are 0 it has gone, and the calls may go, too. Never clear the external offset by
 def write_fanuc(
     reductions: Sequence[Reduced], limits: Limits, name: str, facts: Facts, *, figure: str = ""
 ) -> dict[str, bytes]:
-    """Return all files by their names, the page how to use them the last.
+    """Return all files by name, the page of instructions last.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def write_fanuc(
     Raises
     ------
     InputError
-        More sensors than variables, or a limit that is 0 in the digits of a control.
+        There are more sensors than variables, or a limit is rounded to 0 in the digits of a control.
     """
     marks = find_marks(reductions)
     if len(marks) > _ROOM:
@@ -168,7 +168,7 @@ def _within(variable: str, most: float) -> Iterator[str]:
 def _cap(limits: Limits, option: str, times: float) -> float:
     """Return a limit [um] in the digits of a control, times a factor: not larger than requested."""
     asked: float = getattr(limits, option)
-    # the product in decimals: 0.1 um/s is 6 um in a minute, not a digit of double precision more
+    # exact decimal product: 0.1 um/s is 6 um per minute, without a rounding error of double precision
     taken = float(Decimal(shorten(in_mm(float(Decimal(repr(asked)) * Decimal(times))), cap=True)).scaleb(3))
     if not taken:
         raise InputError(
@@ -179,7 +179,7 @@ def _cap(limits: Limits, option: str, times: float) -> float:
 
 
 def _plausible(r: Reduced) -> list[tuple[float, float]]:
-    """Return beyond what a temperature is none; days of another zero included."""
+    """Return the plausible range of each temperature, including changes of the zero from day to day."""
     least, most = PLAUSIBLE["temperature"]
     found = []
     for (i, _), zero in zip(r.terms, r.zeros, strict=True):
@@ -189,7 +189,7 @@ def _plausible(r: Reduced) -> list[tuple[float, float]]:
 
 
 def _vectors(reductions: Sequence[Reduced], marks: dict[str, str], most: float) -> str:
-    """Return test vectors as CSV; a vacant temperature is an empty one."""
+    """Return test vectors as CSV; a vacant temperature variable is an empty field."""
     rows = [",".join(["axis", *(f"{m}_degC" for m in marks.values()), "growth_mm", "correction_um", "tolerance_um"])]
     for r in reductions:
         names, ranges = [i.name for i, _ in r.terms], _plausible(r)
@@ -208,7 +208,7 @@ def _vectors(reductions: Sequence[Reduced], marks: dict[str, str], most: float) 
 
 
 def _real(number: float | str) -> str:
-    """Return a number of eight digits with a decimal point: without it a control may read other units."""
+    """Return a number of eight digits with a decimal point: without a point a control may assume other units."""
     text = shorten(number if isinstance(number, str) else in_um(number))
     return text if "." in text else f"{text}.0"
 

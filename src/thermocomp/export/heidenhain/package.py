@@ -1,4 +1,4 @@
-"""A linear formula of present temperatures for Heidenhain controls: MP7530 / TEMPCOMP, and the words of a TNC 360."""
+"""A linear formula of current temperatures for Heidenhain controls: MP7530 / TEMPCOMP, and the words of a TNC 360."""
 
 import math
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ SIGN = (
     "a TNC 360 word is the correction in um, minus the deviation"
 )
 UNITS = "Units: formula in mm, TNC 360 word in whole um, W<...> in degC"
-#: what nobody has confirmed, told first and at its place
+#: unconfirmed assumptions, stated at the top and repeated in the file
 UNCONFIRMED = (
     "UNCONFIRMED: which way a dimension counts in your kinematics table; the wrong way doubles the error: try it as "
     "the page says",
@@ -23,7 +23,7 @@ UNCONFIRMED = (
     "UNCONFIRMED: which of the words W576 to W582 of a TNC 360 is of which axis",
     "UNCONFIRMED: whether your software takes as many digits and brackets as the formula has",
 )
-#: of a TNC 360 [um]
+#: largest value of a TNC 360 word [um]
 _WORD = 32_767
 
 _ABOUT = """\
@@ -63,7 +63,7 @@ axis follows at 1 um/s), and set the datums again: a dimension that changes move
 def write_heidenhain(
     reductions: Sequence[Reduced], limits: Limits, name: str, facts: Facts, *, figure: str = ""
 ) -> dict[str, bytes]:
-    """Return all files by their names, the page how to use them the last.
+    """Return all files by name, the page of instructions last.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def write_heidenhain(
 
 
 def find_marks(reductions: Sequence[Reduced]) -> dict[str, str]:
-    """Return the symbols of the temperatures in several formulas, by their names."""
+    """Return the symbols of the temperatures in all formulas, by name."""
     found: dict[str, str] = {}
     for r in reductions:
         for i, _ in r.terms:
@@ -127,7 +127,7 @@ def find_marks(reductions: Sequence[Reduced]) -> dict[str, str]:
 
 
 def formula(r: Reduced, marks: dict[str, str], *, word: bool = False) -> str:
-    """Return a formula as it continues behind a dimension; the correction in um for a `word`."""
+    """Return a formula to be appended to a dimension; the correction is in um for a `word`."""
     sign, number = (-1, in_um) if word else (1, in_mm)
     text = _signed(number(sign * r.model.intercept)) if r.model.intercept else ""
     for (i, factor), zero in zip(r.terms, r.zeros, strict=True):

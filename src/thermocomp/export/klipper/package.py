@@ -1,4 +1,4 @@
-"""Klipper's ``[z_thermal_adjust]``: one temperature, one coefficient, Z alone."""
+"""Klipper's ``[z_thermal_adjust]``: one temperature, one coefficient, Z only."""
 
 import math
 from collections.abc import Sequence
@@ -17,11 +17,11 @@ SIGN = (
     "Klipper's source (z_thermal_adjust.py, calc_adjust), not tried on a printer: try it as the page says"
 )
 UNITS = "Units: temp_coeff in mm/K, temperatures in degC, times in s"
-#: what Klipper lets a coefficient be [mm/K]
+#: largest coefficient accepted by Klipper [mm/K]
 _MOST = 1.0
-#: room for the sensor about what was recorded; Klipper stops the printer beyond [degC]
+#: margin of the sensor range about the recorded range [degC]; Klipper stops the printer outside the sensor range
 _ROOM = 30.0
-#: what Klipper lets `min_temp` be, at least [degC]
+#: lowest `min_temp` accepted by Klipper [degC]
 _COLDEST = -273
 
 _SECTION = """{head}
@@ -77,12 +77,12 @@ For good: take the section out of `printer.cfg`, `RESTART`, `G28`."""
 def write_klipper(
     reductions: Sequence[Reduced], limits: Limits, name: str, facts: Facts, *, figure: str = ""
 ) -> dict[str, bytes]:
-    """Return all files by their names, the page how to use them the last.
+    """Return all files by name, the page of instructions last.
 
     Parameters
     ----------
     reductions : sequence of Reduced
-        One, of Z.
+        A single reduction, of Z.
     limits : Limits
     name : str
         Name of the files.
@@ -93,7 +93,7 @@ def write_klipper(
     Raises
     ------
     InputError
-        There are several, or the coefficient is beyond what Klipper takes.
+        There are several reductions, or the coefficient exceeds Klipper's limit.
     """
     if len(reductions) > 1:
         raise InputError(

@@ -1,4 +1,4 @@
-"""A component of LinuxCNC's HAL around the C99 of a compensator, and the HAL that moves axes with it."""
+"""A LinuxCNC HAL component around the C99 code of a compensator, and the HAL file that moves axes with it."""
 
 import textwrap
 from collections.abc import Mapping, Sequence
@@ -7,9 +7,9 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.export.block.tables import Tables
 from thermocomp.export.c99.c99 import comment
 
-#: of an external offset: its counts [mm]
+#: resolution of the external offset counts [mm]
 RESOLUTION = 1e-5
-#: characters of a name in HAL, and the longest that comes behind that of the component and a dot
+#: longest name in HAL, and longest suffix after the name of the component and a dot [characters]
 _LONGEST, _BEHIND = 47, len("motion-enabled")
 
 _COMPONENT = """{facts}component {component} "thermal compensation; {name}.md says how to use it";
@@ -167,7 +167,7 @@ net {hal}-teleop motion.teleop-mode => {hal}.teleop-mode
 
 
 def name_component(name: str) -> str:
-    """Return the name of the component of a compensator: another one than that of its source.
+    """Return the name of a compensator's component, different from the name of its source.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def name_component(name: str) -> str:
     Raises
     ------
     InputError
-        It is too long for HAL.
+        The name is too long for HAL.
     """
     component = f"{name}_hal"
     if (over := len(component) + 1 + _BEHIND - _LONGEST) > 0:
@@ -193,7 +193,7 @@ def write_component(tables: Tables, name: str, facts: Sequence[str], letters: Ma
     tables : Tables
         Tables of the compensator.
     name : str
-        Name of its C99.
+        Name of the C99 code.
     facts : sequence of str
         Lines at the top of the file.
     letters : mapping of str to str
@@ -229,14 +229,14 @@ def write_component(tables: Tables, name: str, facts: Sequence[str], letters: Ma
 
 
 def write_hal(tables: Tables, name: str, facts: Sequence[str], letters: Mapping[str, str]) -> str:
-    """Return the HAL that loads a component and moves axes with it.
+    """Return the HAL file that loads a component and moves axes with it.
 
     Parameters
     ----------
     tables : Tables
         Tables of the compensator.
     name : str
-        Name of its C99.
+        Name of the C99 code.
     facts : sequence of str
         Lines at the top of the file.
     letters : mapping of str to str
@@ -273,12 +273,12 @@ def write_hal(tables: Tables, name: str, facts: Sequence[str], letters: Mapping[
 
 
 def has_slopes(tables: Tables) -> bool:
-    """Return whether a correction depends on where an axis is."""
+    """Return whether a correction depends on the axis position."""
     return any(tables.values["to_slope"])
 
 
 def remark(text: str) -> str:
-    """Return a text as remarks in HAL, whose lines have an end and continue behind a backslash."""
+    """Return a text as HAL comments: wrapped, and without backslashes, which would continue a line."""
     lines = textwrap.wrap(comment(text).replace("\\", "/"), 110, break_on_hyphens=False)
     return "".join(f"# {line}\n" for line in lines or [""])
 

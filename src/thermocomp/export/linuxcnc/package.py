@@ -1,4 +1,4 @@
-"""All files of an export to LinuxCNC: the C99, a component of HAL around it, HAL that moves axes, and a page."""
+"""All files of an export to LinuxCNC: the C99 code, a HAL component around it, a HAL file that moves axes, a page."""
 
 import re
 from collections.abc import Mapping
@@ -83,22 +83,22 @@ the line out of the INI. Never set `axis.L.eoffset-clear` or take `eoffset-enabl
 def write_package(
     compensator: Compensator, name: str, facts: Facts, axes: Mapping[str, str] | None = None
 ) -> dict[str, bytes]:
-    """Return all files by their names.
+    """Return all files by name.
 
     Parameters
     ----------
     compensator : Compensator
-        Made by `Compensator.of`.
+        Created by `Compensator.of`.
     name : str
     facts : Facts
     axes : mapping of str to str, optional
-        Letters by target; by the targets' names if not given.
+        Letters by target. Default: derived from the target names.
 
     Raises
     ------
     InputError
-        A model has no formula, the models do not go together, a target goes along no axis or two along one, or the name
-        is too long.
+        A model has no formula, the models cannot be combined, a target has no axis, two targets have the same axis, or
+        the name is too long.
     """
     tables, said, code = gather(compensator), facts.lines(compensator), cpackage.write_package(compensator, name, facts)
     name = identifier(name)
@@ -107,7 +107,7 @@ def write_package(
         raise InputError(f"expected a separate axis for each target, found {letters}")
     component = name_component(name)
     about = describe(compensator, tables)
-    about["corrections"] = str(about["corrections"]).replace("[um]", "[mm]")  # as pins
+    about["corrections"] = str(about["corrections"]).replace("[um]", "[mm]")  # the pins are in mm
     sections = [f"`[AXIS_{a}]`" for a in letters.values()]
     page = _README.format(
         facts="  \n".join(said),
@@ -132,5 +132,5 @@ def _joined(words: list[str]) -> str:
     return f"{', '.join(words[:-1])} and {words[-1]}" if len(words) > 1 else words[0]
 
 
-#: it counts 0.01 um in whole numbers of 32 bits
+#: the component counts in steps of 0.01 um, as 32-bit integers
 TARGET = Target(write=write_package, axes=True, corrected="XYZ", magnitude=2e7)

@@ -1,4 +1,4 @@
-"""The expression of a model as operators of ONNX, and what it remembers between two calls."""
+"""The formula of a model as ONNX operators, and its state between two calls."""
 
 from collections.abc import Callable, Sequence
 
@@ -8,14 +8,14 @@ from thermocomp.core import expression as e
 from thermocomp.export.onnx.nodes import Graph
 from thermocomp.export.recurrences import Clock
 
-#: ticks made at once, at most (0.6 s of work): a model whose largest root is below 0.9997 has settled by then
+#: largest number of ticks in one call (0.6 s of computing time): a model with roots below 0.9997 has settled by then
 MOST_TICKS = 100_000
-#: share of an interval by which a reading may come early and still make the tick
+#: fraction of an interval by which an early reading still triggers the tick
 EARLY = 1e-6
 
 
 class Memory:
-    """A vector that comes in and goes out: places are given away one behind the other.
+    """A state vector passed in and out; its elements are allocated consecutively.
 
     Parameters
     ----------
@@ -23,21 +23,21 @@ class Memory:
     state : str
         Incoming state.
     begin : int
-        First place that is free.
+        First free element.
     """
 
     def __init__(self, graph: Graph, state: str, begin: int = 0) -> None:
         self._graph, self._state, self.begin, self.end = graph, state, begin, begin
-        self.after: list[str] = []  #: what goes out
+        self.after: list[str] = []  #: names of the new values, in order
 
     def before(self, size: int = 1) -> str:
-        """Return the values stored in the next places; those to be stored there are in `after`, in the same order."""
+        """Return the stored values of the next elements; the caller appends their new values to `after` in order."""
         self.end += size
         return self._graph.part(self._state, self.end - size, self.end)
 
 
 class Walk:
-    """Converter of trees; a part that occurs in several places is converted once.
+    """Converter of expression trees; a repeated node is converted once.
 
     Parameters
     ----------
@@ -45,9 +45,9 @@ class Walk:
     change : sequence of str
         Inputs minus their zero.
     begun : str
-        Whether there was a reading before this one.
+        Whether there was an earlier reading.
     dt : str
-        Time since that [s]; 0 without one.
+        Time since the previous reading [s]; 0 without one.
     memory : Memory
     """
 
@@ -56,7 +56,7 @@ class Walk:
         self._known: dict[e.Node, str] = {}
 
     def value(self, node: e.Node) -> str:
-        """Return the name of a part's value."""
+        """Return the name of a node's value."""
         if isinstance(node, e.Named):
             return self.value(node.of)
         if (known := self._known.get(node)) is None:
@@ -80,7 +80,7 @@ class Walk:
 
     def _lag(self, signal: str, paces: str) -> str:
         g = self._graph
-        # 1 - exp(-x) as tanh(x/2) (1 + exp(-x)): nothing cancels where a step is short
+        # 1 - exp(-x) as tanh(x/2) (1 + exp(-x)): no cancellation for short steps
         share = g.put("Mul", g.put("Tanh", g.put("Mul", paces, 0.5)), g.add(1.0, g.put("Exp", g.put("Neg", paces))))
         before = self._memory.before()
         moved = g.add(before, g.put("Mul", share, g.put("Sub", signal, before)))
@@ -125,7 +125,7 @@ class Walk:
             [_tick(g, clock, past, kept, mean), *([g.part(past, 0, clock.past - 1)] if clock.past > 1 else [])]
         )
         seen = g.join([mean, *([g.part(kept, 0, (means - 1) * n)] if means > 1 else [])])
-        # what has settled moves no more
+        # a settled value does not change any more
         moved = g.put("Abs", g.put("Sub", g.join([new, seen]), g.join([past, kept])))
         going = g.put("Squeeze", g.put("Greater", g.put("ReduceMax", moved, keepdims=1), 0.0))
         g.leave(g.name(), going, (), np.bool_)
@@ -136,7 +136,7 @@ class Walk:
         return g
 
 
-#: `onnx.TensorProto.INT64`, which is not imported before it is needed
+#: `onnx.TensorProto.INT64`, without importing onnx
 _INT64 = 7
 
 
@@ -148,11 +148,11 @@ def _tick(g: Graph, clock: Clock, past: str, kept: str, mean: str) -> str:
     g : Graph
     clock : Clock
     past : str
-        Its last values, the newest first.
+        Past values, newest first.
     kept : str
-        The means over the last intervals.
+        Means over the past intervals.
     mean : str
-        That over the interval that ends now.
+        Mean over the current interval.
     """
     places, known = {leaf: k for k, leaf in enumerate(clock.leaves)}, dict[e.Node, str]()
 
@@ -173,8 +173,8 @@ def _tick(g: Graph, clock: Clock, past: str, kept: str, mean: str) -> str:
     return value(clock.tick)
 
 
-def arithmetic(g: Graph, node: e.Node, value: Callable[[e.Node], str]) -> str:  # noqa: PLR0911 - a case for every kind
-    """Return the ONNX form of a part without memory, with its parts named by `value`."""
+def arithmetic(g: Graph, node: e.Node, value: Callable[[e.Node], str]) -> str:  # noqa: PLR0911 - one case per node type
+    """Return the ONNX form of a node without memory; `value` names its parts."""
     match node:
         case e.Constant(number):
             return g.constant(float(number))
@@ -201,7 +201,7 @@ def arithmetic(g: Graph, node: e.Node, value: Callable[[e.Node], str]) -> str:  
 
 
 def _sum(g: Graph, terms: Sequence[e.Node], value: Callable[[e.Node], str]) -> str:
-    """Return a sum; terms with a separate weight are computed at once."""
+    """Return a sum; all terms with constant weights are computed together."""
     weights, weighted, others = list[float](), list[str](), list[str]()
     for term in terms:
         match term:
@@ -216,7 +216,7 @@ def _sum(g: Graph, terms: Sequence[e.Node], value: Callable[[e.Node], str]) -> s
 
 
 def _look_up(g: Graph, at: str, x: np.ndarray, y: np.ndarray, *, steps: bool) -> str:
-    """Return a function of one value from a table.
+    """Return the value of a tabulated function of one variable.
 
     Parameters
     ----------
@@ -224,7 +224,7 @@ def _look_up(g: Graph, at: str, x: np.ndarray, y: np.ndarray, *, steps: bool) ->
     at : str
     x, y : ndarray
     steps : bool
-        From break to break constant, and not a straight line.
+        Piecewise constant instead of linear.
     """
     reached = g.put("Cast", g.put("LessOrEqual", x, at), to=_INT64)
     place = g.put("ReduceSum", reached, keepdims=1)

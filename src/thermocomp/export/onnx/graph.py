@@ -1,7 +1,7 @@
 """A compensator as one step of ONNX: values and a state in, corrections and the next state out.
 
-The way of a reading is that of `thermocomp.export.block.steps`, but for the watch over the sensors and the averaging
-of the zero: what temperatures count from comes in.
+The processing chain is that of `thermocomp.export.block.steps`, without the watch over the sensors and without the
+averaging of the zero: the caller supplies the zero.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from thermocomp.export.onnx.limits import Drive
 from thermocomp.export.onnx.nodes import Graph
 from thermocomp.export.onnx.support import support
 
-#: a state begins with: has it begun, its clock, were values used, and when were they
+#: elements at the beginning of the state: has begun, clock, values were used, time of last use
 CLOCKS = 4
 
 
@@ -29,9 +29,9 @@ class GraphBlock:
     ----------
     graph : Graph
     size : int
-        Numbers in its state.
+        Number of elements of its state.
     deviation : int
-        Index in the state at which the deviations of the models begin.
+        Index of the models' deviations in the state.
     """
 
     graph: Graph
@@ -41,16 +41,16 @@ class GraphBlock:
 
 @dataclass(frozen=True)
 class _Moment:
-    """When a call is, and whether its values are used.
+    """Time of a call, and whether its values are used.
 
     Parameters
     ----------
     passes, seen : str
-        Whether they are; whether any were before.
+        Whether the values are used; whether earlier values were used.
     travel, step : str
-        Time that counts for the corrections, and since the values that were used last [s].
+        Time available for moving the corrections, and time since the last values used [s].
     clocks : str
-        As they are kept.
+        Elements of the next state.
     """
 
     passes: str
@@ -71,7 +71,7 @@ def translate(tables: Tables) -> GraphBlock:
     Raises
     ------
     InputError
-        A model is of a family that has no formula.
+        A model belongs to a family without a formula.
     """
     g, n, targets = Graph(), len(tables.channels), len(tables.targets)
     places = [CLOCKS + k * targets for k in range(4)]
@@ -99,7 +99,7 @@ def translate(tables: Tables) -> GraphBlock:
 
 
 def _checked(g: Graph, drive: Drive, state: str, places: list[int]) -> str:
-    """Return the state that comes in; one with a number that this graph has not made counts as that of a start."""
+    """Return the incoming state, or the initial state if it contains values that this graph cannot have produced."""
     correction, slope = (g.part(state, a, b) for a, b in pairwise(places[1:]))
     finite = g.every(g.put("LessOrEqual", g.put("Abs", state), MEMORY))
     sound = g.put("And", finite, drive.holds(correction, slope))
@@ -107,9 +107,9 @@ def _checked(g: Graph, drive: Drive, state: str, places: list[int]) -> str:
 
 
 def _changes(g: Graph, tables: Tables, value: str, zero: str) -> tuple[str, str]:
-    """Return all inputs minus their zero, and whether all are there, finite and plausible.
+    """Return all inputs minus their zero, and whether all are present, finite and plausible.
 
-    A value that is not counts as its zero, and a zero that is none as that of the training: nothing is made of them.
+    An invalid value is replaced by its zero, an invalid zero by the training zero; such a call is rejected.
     """
     t = tables.values
     rezero, applies, reference = np.array(t["rezero"]), np.array(t["applies"]), np.array(t["reference"])
@@ -134,7 +134,7 @@ def _moment(g: Graph, tables: Tables, state: str, dt: str, plausible: str) -> _M
     tables : Tables
     state, dt : str
     plausible : str
-        Whether all values are.
+        Whether all values are plausible.
     """
     begun, clock, seen, last = (g.pick(state, k) for k in range(CLOCKS))
     begun, seen = g.put("Greater", begun, 0.5), g.put("Greater", seen, 0.5)
@@ -151,7 +151,7 @@ def _moment(g: Graph, tables: Tables, state: str, dt: str, plausible: str) -> _M
 
 
 def _models(g: Graph, tables: Tables, memory: Memory, moment: _Moment, change: str) -> str:
-    """Return the outputs of the models, and their state afterwards.
+    """Return the outputs of the models, and their next state.
 
     Parameters
     ----------

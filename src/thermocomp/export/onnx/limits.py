@@ -1,4 +1,4 @@
-"""Limits of a correction as operators of ONNX: all targets at once."""
+"""Limits of the corrections as ONNX operators: all targets at once."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +8,7 @@ from thermocomp.export.onnx.nodes import Graph
 
 
 class Drive:
-    """Moves corrections; those of `thermocomp.export.block.steps` that are called ``drive`` and ``idle``.
+    """Movement of corrections, equivalent to ``drive`` and ``idle`` of `thermocomp.export.block.steps`.
 
     Parameters
     ----------
@@ -31,14 +31,14 @@ class Drive:
         self._to_slope = np.where(mine, t["to_slope"], 0.0)
 
     def holds(self, correction: str, slope: str) -> str:
-        """Return whether corrections are within their magnitude, and none has a slope that moves along nothing."""
+        """Return whether all corrections are within the magnitude, and only axes with a travel have a slope."""
         g = self._graph
         within = g.put("LessOrEqual", self._largest(correction, slope), self._magnitude * (1.0 + 1e-9))
         flat = g.put("Or", g.put("Equal", slope, 0.0), self._travels)
         return g.every(g.put("And", within, flat))
 
     def move(self, deviation: str, correction: str, slope: str, travel: str) -> tuple[str, str]:
-        """Return corrections and slopes after a move towards the demand of the models.
+        """Return corrections and slopes moved towards the values required by the models.
 
         Parameters
         ----------
@@ -62,13 +62,13 @@ class Drive:
         )
 
     def rest(self, correction: str, slope: str, idle: str, travel: str) -> tuple[str, str]:
-        """Return corrections and slopes that nothing drives: they stay, and go to zero once they were held for long.
+        """Return corrections and slopes that no model drives: held, and faded to zero after the hold time.
 
         Parameters
         ----------
         correction, slope : str
         idle : str
-            Time without a demand [s].
+            Time without an update from the models [s].
         travel : str
         """
         g, largest = self._graph, self._largest(correction, slope)
@@ -95,7 +95,7 @@ class Drive:
         return g.add(offset, g.put("Mul", g.put("Mul", slope, 0.001), place))
 
     def _limit(self, wanted: str, current: str, travel: str) -> str:
-        """Return corrections no further, no faster, and not moved for a trifle."""
+        """Return corrections moved towards the required values, within magnitude, rate and dead band."""
         g, most = self._graph, self._magnitude
         aim = g.between(wanted, -most, most)
         way, reach = g.put("Sub", aim, current), g.put("Mul", self._rate, travel)

@@ -1,4 +1,4 @@
-"""A graph of ONNX under construction: numbers and names in, the name of the result out."""
+"""An ONNX graph under construction: methods accept numbers and names, and return the name of the result."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from onnx import GraphProto, NodeProto, ValueInfoProto
 
-#: a value by its name, or numbers
+#: a value by its name, or as numbers
 Value = str | float | Sequence[float] | NDArray[Any]
-#: operators that a runtime of 2022 knows
+#: versions supported by runtimes since 2022
 OPSET, IR = 17, 8
 
 
@@ -26,7 +26,7 @@ class Port:
     name : str
     shape : tuple of int
     kind : type
-        Type of its numbers.
+        Type of the elements.
     """
 
     name: str
@@ -43,7 +43,7 @@ class Node:
     op : str
     inputs, outputs : tuple of str
     attributes : dict of str to Any
-        A `Graph` among them becomes a graph within the graph.
+        A `Graph` among them becomes a subgraph.
     """
 
     op: str
@@ -71,7 +71,7 @@ class Graph:
         self._known: dict[object, str] = dict(outer._known) if outer else {}
 
     def name(self) -> str:
-        """Return a name that nothing has."""
+        """Return an unused name."""
         return f"v{next(self._free)}"
 
     def enter(self, name: str, shape: tuple[int, ...] = (1,), kind: type = np.float64) -> str:
@@ -80,7 +80,7 @@ class Graph:
         return name
 
     def leave(self, name: str, value: str, shape: tuple[int, ...] = (1,), kind: type = np.float64) -> None:
-        """Give a value out under a name.
+        """Add an output with a given name and value.
 
         Parameters
         ----------
@@ -92,7 +92,7 @@ class Graph:
         self.outputs.append(Port(name, shape, kind))
 
     def constant(self, numbers: Value) -> str:
-        """Return the name of numbers; a single one is a vector of one."""
+        """Return the name of a numeric constant; a scalar becomes a vector of one element."""
         if isinstance(numbers, str):
             return numbers
         table = np.atleast_1d(numbers)
@@ -104,7 +104,7 @@ class Graph:
         return name
 
     def put(self, op: str, *inputs: Value, **attributes: Any) -> str:
-        """Return the name of what an operator makes."""
+        """Return the name of an operator's output."""
         names = tuple(map(self.constant, inputs))
         key = (op, names, repr(sorted(attributes.items())))
         if (known := self._known.get(key)) is None:
@@ -113,28 +113,28 @@ class Graph:
         return known
 
     def add(self, *terms: Value) -> str:
-        """Return a sum, added up from left to right."""
+        """Return a sum, evaluated from left to right."""
         return self.put("Sum", *terms) if len(terms) > 1 else self.constant(terms[0])
 
     def choose(self, when: Value, this: Value, other: Value) -> str:
-        """Return one of two values, number by number."""
+        """Return one of two values, element by element."""
         return self.put("Where", when, this, other)
 
     def between(self, value: Value, low: Value, high: Value) -> str:
-        """Return a value kept between two bounds."""
+        """Return a value clipped to two bounds."""
         return self.put("Min", self.put("Max", value, low), high)
 
     def every(self, conditions: str) -> str:
-        """Return whether all of some conditions hold."""
+        """Return whether all conditions are true."""
         held = self.put("ReduceMin", self.put("Cast", conditions, to=_kind(np.int64)), keepdims=1)
         return self.put("Greater", held, 0)
 
     def pick(self, of: Value, places: int | Sequence[int]) -> str:
-        """Return numbers of a vector by their places."""
+        """Return elements of a vector by index."""
         return self.put("Gather", of, np.array(np.atleast_1d(places), dtype=np.int64), axis=0)
 
     def join(self, parts: Sequence[Value]) -> str:
-        """Return vectors one behind the other."""
+        """Return the concatenation of vectors."""
         return self.put("Concat", *parts, axis=0) if len(parts) > 1 else self.constant(parts[0])
 
     def part(self, of: str, begin: int, end: int) -> str:
@@ -149,16 +149,16 @@ class Graph:
         trips : str
             Number of iterations, unless the body ends the loop.
         carried : sequence of str
-            Their first values.
+            Initial values.
         body : Graph
-            Of the number of the trip, whether to continue, and the values; of whether to continue, and the values.
+            Inputs: iteration number, whether to continue, and the values. Outputs: whether to continue, and the values.
         """
         left = tuple(self.name() for _ in carried)
         self.nodes.append(Node("Loop", (trips, "", *carried), left, {"body": body}))
         return list(left)
 
     def proto(self, name: str) -> "GraphProto":
-        """Return the graph as ONNX has it; numbers are in the outermost."""
+        """Return the graph as an ONNX proto; constants are in the outermost graph."""
         from onnx import helper
 
         return helper.make_graph(
@@ -167,16 +167,16 @@ class Graph:
 
 
 def serialize(graph: Graph, name: str, facts: Sequence[str], properties: dict[str, str], version: str) -> bytes:
-    """Return the file of a graph.
+    """Return the contents of the file of a graph.
 
     Parameters
     ----------
     graph : Graph
     name : str
     facts : sequence of str
-        Its description.
+        Description of the model.
     properties : dict of str to str
-        The same for programs.
+        Description as machine-readable metadata.
     version : str
         Version of thermocomp.
     """

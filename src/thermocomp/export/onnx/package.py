@@ -1,4 +1,4 @@
-"""All files of an export to ONNX: the graph, its test vectors with what runs them, and how to use it."""
+"""All files of an export to ONNX: the graph, its test vectors with a program that runs them, and the instructions."""
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.export.block.tables import Tables, gather
@@ -11,7 +11,7 @@ from thermocomp.export.target import Target
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.gate import DAY
 
-#: said wherever the facts are
+#: stated with the facts in all files
 NOT_INSIDE = (
     "Not inside: averaging of the zero, the age of a reading, the watch over the sensors with what stands in for one "
     "that failed, probings"
@@ -87,19 +87,19 @@ controller must not compensate for temperature itself at the same time.
 
 
 def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str, bytes]:
-    """Return all files by their names.
+    """Return all files by name.
 
     Parameters
     ----------
     compensator : Compensator
-        Made by `Compensator.of`.
+        Created by `Compensator.of`.
     name : str
     facts : Facts
 
     Raises
     ------
     InputError
-        A model has no formula, or the models do not go together.
+        A model has no formula, or the models cannot be combined.
     """
     if len({m.zeroing for m in compensator.models}) > 1:
         raise InputError("models that average their zero in different ways: export each file alone")
@@ -133,12 +133,12 @@ def _properties(tables: Tables, said: list[str], facts: Facts) -> dict[str, str]
 
 
 def _readme(compensator: Compensator, tables: Tables, name: str, said: list[str], block: GraphBlock, calls: int) -> str:
-    """Return the page.
+    """Return the page of instructions.
 
     Parameters
     ----------
     compensator : Compensator
-        With its watch.
+        Including its watch.
     tables : Tables
     name : str
     said : list of str
@@ -179,7 +179,7 @@ def _readme(compensator: Compensator, tables: Tables, name: str, said: list[str]
 
 
 def _rows(tables: Tables) -> list[str]:
-    """Return the meaning of each value."""
+    """Return a table row with the meaning of each value."""
     rows, t = list[str](), tables.values
     for k, c in enumerate(tables.channels):
         of = [r for r in range(len(tables.ranges)) if t["channel"][r] == k]
@@ -190,7 +190,7 @@ def _rows(tables: Tables) -> list[str]:
 
 
 def _plausible(tables: Tables, r: int) -> str:
-    """Return between which bounds a value is used."""
+    """Return the range in which a value is used."""
     t = tables.values
     least, most, low, high = t["least"][r], t["most"][r], t["low"][r] - t["room"][r], t["high"][r] + t["room"][r]
     if not t["applies"][r]:

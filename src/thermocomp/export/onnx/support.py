@@ -1,4 +1,4 @@
-"""Behaviour of a model outside its training range as ONNX operators: ``hold`` and ``fade``, alone and together."""
+"""Behaviour of a model outside its training range as ONNX operators: ``hold`` and ``fade``, separately and combined."""
 
 import math
 
@@ -17,11 +17,11 @@ def support(g: Graph, model: ErrorModel, change: str, said: str, before: str) ->
     g : Graph
     model : ErrorModel
     change : str
-        Its inputs minus their zero.
+        Inputs of the model minus their zero.
     said : str
         Output of the model within its range.
     before : str
-        The last deviation that passed.
+        Last deviation within the range.
     """
     policy = model.support.policy
     if policy == "clip":
@@ -49,5 +49,5 @@ def distance(g: Graph, joint: JointSupport, change: str) -> str:
     for k, levels, tolerance in zip(joint.speeds, joint.levels, joint.tolerances, strict=True):
         away = g.put("Abs", g.put("Sub", g.pick(change, k), np.array(levels, dtype=np.float64)))
         parts.append(g.put("Div", g.put("ReduceMin", away, keepdims=1), tolerance))
-    # the same on every processor
+    # identical on every processor
     return g.put("Div", g.put("Round", g.put("Mul", g.put("Max", *parts), 1e6)), 1e6)

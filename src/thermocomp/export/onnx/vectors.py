@@ -16,7 +16,7 @@ from thermocomp.runtime.gate import CLOCK_SKEW
 
 FloatArray = NDArray[np.float64]
 
-#: share of a correction, or um of one below 1 um, that a runtime may be off at least
+#: minimum tolerance of a runtime, as a fraction of the correction, or in um for corrections below 1 um
 _TOLERANCE = 1e-9
 
 PROGRAM = '''"""Runs {name}.onnx over {name}_vectors.json; exits with 0 if all is well: {name}.md says how."""
@@ -64,22 +64,22 @@ sys.exit(wrong > 0)
 
 
 def without_watch(compensator: Compensator) -> Compensator:
-    """Return a compensator as it is in a graph: nothing watches its sensors, and its zero is given."""
+    """Return a compensator as represented in a graph: without a watch over its sensors, and with a given zero."""
     models = tuple(replace(m, watch=None, zeroing=FIRST_READING) for m in compensator.models)
     return replace(compensator, models=models)
 
 
 def pick_zero(tables: Tables) -> FloatArray:
-    """Return a zero for test vectors, per channel: near that of the training, and not the same."""
+    """Return a zero for test vectors, per channel: close to the training zero but different."""
     return np.array([c.reference + 0.25 * c.rezero for c in tables.channels])
 
 
 def pick_readings(tables: Tables) -> Readings:
-    """Return readings for test vectors; readings that are too old are missing, as the caller must mark them."""
+    """Return readings for test vectors; outdated readings are marked as missing, as required of the caller."""
     readings, age = make_readings(tables), tables.values["reading_age"]
     timely = (readings.age >= -CLOCK_SKEW) & (readings.age <= age)
     values = np.where(timely[:, None], readings.values, np.nan)
-    # a long silence before values that want much: the time that counts is no longer than an age
+    # a long gap before values that require a large move: the time available is limited to the reading age
     wide = np.array([[c.reference + c.low + share * (c.high - c.low) for c in tables.channels] for share in (0.9, 0.1)])
     return Readings(
         np.concatenate([values, wide, wide]),
@@ -89,7 +89,7 @@ def pick_readings(tables: Tables) -> Readings:
 
 
 def answer(compensator: Compensator, tables: Tables, readings: Readings, zero: FloatArray) -> Answers:
-    """Return the outputs of a compensator for readings, its zero being known from the start.
+    """Return the outputs of a compensator for readings, with the zero known from the start.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def answer(compensator: Compensator, tables: Tables, readings: Readings, zero: F
 def write_vectors(
     tables: Tables, readings: Readings, answers: Answers, zero: FloatArray, facts: Sequence[str], sha256: str, size: int
 ) -> str:
-    """Return test vectors as JSON; what is not a number is a text that `float` of Python takes.
+    """Return test vectors as JSON; NaN and infinity are strings that Python's `float` accepts.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def write_vectors(
     sha256 : str
         SHA-256 of the model file.
     size : int
-        Numbers in the state.
+        Number of elements of the state.
     """
     head = {
         "facts": list(facts),

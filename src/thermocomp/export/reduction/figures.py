@@ -1,4 +1,4 @@
-"""Figure of a reduction: what a full and a reduced model leave of cycles that both have not seen."""
+"""Figure of a reduction: residuals of the full and the reduced model on unseen cycles."""
 
 from collections.abc import Sequence
 
@@ -12,12 +12,12 @@ from thermocomp.report.figures import LONGEST, MEASURED, PREDICTED, RESIDUAL, SH
 
 
 def residuals(reductions: Sequence[Reduction]) -> Drawn:
-    """Show what is lost by a reduction: the deviation, and what either model leaves of each unseen cycle in turn.
+    """Plot the loss of a reduction: the deviation, and the residual of either model on each unseen cycle in turn.
 
     Parameters
     ----------
     reductions : sequence of Reduction
-        A panel each.
+        One panel each.
     """
     with drawing("reduction"):
         figure = Figure(figsize=(9.6, 0.4 + 2.9 * len(reductions)), layout="constrained")

@@ -1,4 +1,4 @@
-"""Reduction: the best model of a controller's form, judged on unseen cycles, next to the full one."""
+"""Reduction: the best model of a controller's form, judged on unseen cycles, next to the full model."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -29,25 +29,25 @@ from thermocomp.recordings.starts import Start
 FloatArray = NDArray[np.float64]
 
 NAME = "reduced"
-#: a controller's formula knows no trained range: it continues as it is
+#: a controller's formula has no trained range and extrapolates
 UNBOUNDED = Support("clip", margin=1e3)
-#: what of a single cycle is learned from, and what judged: no proof, but a figure
+#: training and judged fractions of a single cycle: an estimate, not a proof
 _SHARES = (0.6, 0.4)
 
 
 @dataclass(frozen=True, eq=False)
 class Reduction:
-    """A reduced model and how it did.
+    """A reduced model and its judging results.
 
     Parameters
     ----------
     reduced : Reduced
     blocks : tuple of Assessment
-        On each unseen block.
+        Results on each unseen block.
     full : tuple of Assessment
-        The full model on the same ones; empty if it could not be fitted again.
+        Results of the full model on the same blocks; empty if it could not be refitted.
     time : tuple of ndarray
-        Times of each recording's rows [s].
+        Times of the rows of each recording [s].
     """
 
     reduced: Reduced
@@ -68,30 +68,30 @@ def reduce_model(
     jobs: int = 1,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Reduction:
-    """Fit the best model of a form to recordings, and judge it next to the full one.
+    """Fit the best model of a form to recordings, and judge it next to the full model.
 
-    Sensors are chosen again without each unseen cycle, by cycles left out of the others. What is judged says its
-    numbers in the digits that are printed, and knows no range: neither does the controller. The full model is fitted
-    again without each cycle, too, if its method is known; else its error is that in its file.
+    For each unseen cycle, sensors are selected by cross-validation on the other cycles. The judged model has rounded
+    coefficients, as printed, and no trained range, like the controller. The full model is also refitted without each
+    cycle if its method is known; otherwise its error is taken from its file.
 
     Parameters
     ----------
     model : ErrorModel
-        The full one.
+        The full model.
     axis : str
-        That its target goes along.
+        Axis of its target.
     recordings : sequence of Recording
     shape : Shape
     sensors : sequence of str, optional
-        Temperatures to choose from; all if not given.
+        Candidate temperatures. Default: all.
     starts : Start or sequence of Start, optional
         Initial state of the recordings. Default: determined from the recordings.
     rules : Rules
         Rules stated before judging.
     jobs : int
-        Processes to share the work among; -1 takes all cores.
+        Number of parallel processes; -1: one per core.
     progress : callable
-        Called with a line of text after each piece of work.
+        Called with a line of text after each task.
 
     Returns
     -------
@@ -142,7 +142,7 @@ def reduce_model(
 
 
 def method_of(model: ErrorModel, samples: Samples) -> str:
-    """Return the method that a model was fitted by, if it can be fitted so again; else the empty string."""
+    """Return the method by which a model was fitted if it can be refitted in this way; otherwise an empty string."""
     known = model.provenance
     if known is None or known.method not in METHODS or not deployable(known.method):
         return ""
@@ -154,7 +154,7 @@ def method_of(model: ErrorModel, samples: Samples) -> str:
 def _samples(
     model: ErrorModel, recordings: Sequence[Recording], shape: Shape, starts: Start | Sequence[Start] | None
 ) -> Samples:
-    """Return all that the full model may need of recordings, and what the reduced one is chosen from."""
+    """Return the samples needed for refitting the full model, and for selecting the reduced one."""
     first = recordings[0]
     speeds = (first.speed.name,) if first.speed is not None else ()
     names = dict.fromkeys([*(c.name for c in first.temperatures), *speeds, *(i.name for i in model.inputs)])
@@ -164,14 +164,14 @@ def _samples(
 
 
 def _judging(samples: Samples) -> Judging:
-    """Return the thermal cycles, each left out in turn; of a single one the last part."""
+    """Return a scheme that leaves out each thermal cycle in turn, or the last part of a single cycle."""
     if len(samples.cycle_names) > 1:
         return leave_one_cycle_out(samples)
     return by_rows(samples, *_SHARES)
 
 
 def _blocks(found: Comparison | None) -> tuple[Assessment, ...]:
-    """Return the assessments of single blocks; of one block alone that of all."""
+    """Return the assessments of the single blocks; the overall assessment if there is only one block."""
     if found is None:
         return ()
     return tuple(a for a in found.assessments if not a.overall) or found.overall()

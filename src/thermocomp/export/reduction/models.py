@@ -1,4 +1,4 @@
-"""The linear model of a poor controller: a few present temperatures, each times a number that can be printed."""
+"""Linear model for simple controllers: a few current temperatures, each times a printable coefficient."""
 
 from itertools import combinations
 from math import comb
@@ -12,42 +12,43 @@ from thermocomp.models.linear import TermRegressor
 
 Sets = NDArray[np.intp]
 
-#: a further sensor has to lessen the RMS on the cycles left out by this share
+#: minimum relative decrease of the RMS on the left-out cycles for a further sensor
 GAIN = 0.05
-#: a set that does no harm with an input lost may leave so many times what one leaves that does
+#: a set that does no harm with an input lost is preferred up to this ratio of its RMS to the best RMS
 DEAR = 2.0
-#: of more sets than this of one size only those are tried that hold the best set of the size before
+#: above this number of sets of a size, only supersets of the best smaller set are tried
 _MOST_SETS = 50_000
-#: keeps what depends on itself solvable, beside columns scaled to 1
+#: regularisation for collinear columns, relative to columns scaled to 1
 _LITTLE = 1e-12
 
 
 class LinearReduction(TermRegressor):
-    """Least squares on the one to `max_sensors` inputs that predict best what they have not seen, in printed digits.
+    """Least squares on the one to `max_sensors` inputs that best predict unseen cycles, with printable coefficients.
 
-    Every set is fitted without each thermal cycle in turn and looked at on that cycle, whole and with each input lost:
-    nothing at a poor controller notices that, so sets that leave more than no model then are passed over, unless the
-    others are `DEAR`. The smallest set is taken that no larger one beats by `GAIN`; then it is fitted to all cycles,
-    and its numbers are rounded to those that a controller's file has: what is judged is what is printed.
+    Every set is fitted without each thermal cycle in turn and tested on that cycle, complete and with each input lost:
+    a simple controller does not detect a lost input. Sets that are then worse than no model are passed over, unless
+    the RMS of the others exceeds `DEAR` times the best one. The smallest set that no larger one beats by `GAIN` is
+    fitted to all cycles, and its coefficients are rounded as in the controller's file: the judged model is the printed
+    one.
 
     Parameters
     ----------
     max_sensors : int
     fit_intercept : bool
-        False: the model gives zero in the reference state.
+        False: the output is zero in the reference state.
     digits : int
-        Significant digits of a number.
+        Significant digits of a coefficient.
 
     Attributes
     ----------
     selected_ : tuple of int
-        Features in the model, in rising order.
+        Indices of the features in the model, in ascending order.
     unseen_ : float
-        RMS over the cycles left out [unit of y].
+        RMS over the left-out cycles [unit of y].
     chosen_by_ : str
-        Units left out for the choice.
+        Units left out for the selection.
     terms_, coef_, intercept_, r_squared_, adjusted_r_squared_, standard_error_, n_effective_, condition_
-        See `thermocomp.models.linear.TermRegressor`; of the coefficients before they are rounded.
+        See `thermocomp.models.linear.TermRegressor`; they refer to the coefficients before rounding.
 
     Examples
     --------
@@ -67,7 +68,7 @@ class LinearReduction(TermRegressor):
         self.digits = digits
 
     def fit(self, X: ArrayLike, y: ArrayLike, *, cycle: ArrayLike | None = None) -> "LinearReduction":
-        """Choose, fit and round.
+        """Select sensors, fit the model and round the coefficients.
 
         Parameters
         ----------
@@ -76,8 +77,8 @@ class LinearReduction(TermRegressor):
         y : array-like of shape (n_rows,)
             Deviation.
         cycle : array-like of int of shape (n_rows,), optional
-            Thermal cycle of each row; rows with -1 are not learned from. Without it, five stretches of equal length
-            take the place of the cycles.
+            Thermal cycle of each row; rows with -1 are not used for training. Default: five blocks of equal length as
+            cycles.
 
         Returns
         -------
@@ -86,9 +87,9 @@ class LinearReduction(TermRegressor):
         Raises
         ------
         FitError
-            Fewer than two rows to learn from.
+            There are fewer than two training rows.
         InputError
-            A setting is out of its range.
+            A setting is out of range.
         """
         if self.max_sensors < 1 or not 1 <= self.digits <= 17:
             raise InputError(f"max_sensors {self.max_sensors}, digits {self.digits}: expected at least 1, and 1 to 17")
@@ -103,7 +104,7 @@ class LinearReduction(TermRegressor):
         return float(f"{value:.{self.digits}g}")
 
     def _choose(self, X: FloatArray, y: FloatArray, folds: IntArray) -> tuple[tuple[int, ...], float]:
-        """Return the set that leaves least of cycles it has not seen, and the RMS that it leaves."""
+        """Return the set with the smallest RMS on unseen cycles, and this RMS."""
         moving = np.flatnonzero(np.ptp(X, axis=0) > 0)
         if not moving.size:
             return (), float(np.sqrt(np.mean(y**2)))
@@ -115,7 +116,7 @@ class LinearReduction(TermRegressor):
         return tuple(moving[best].tolist()), least
 
     def _best(self, parts: FloatArray, n: int, rows: int, *, fragile: bool) -> tuple[Sets, float]:
-        """Return the best set of n columns, also of those that do harm with an input lost if `fragile`."""
+        """Return the best set of n columns and its RMS; `fragile` admits sets that do harm with an input lost."""
         none = float(parts[:, -1, -1].sum())
         best: Sets = np.empty(0, np.intp)
         least = np.inf
@@ -132,22 +133,22 @@ class LinearReduction(TermRegressor):
 
 
 def _sets(n: int, size: int, best: Sets) -> Sets:
-    """Return sets of some of n columns, (n_sets, size), each in rising order."""
+    """Return sets of the n columns, (n_sets, size), each in ascending order."""
     if comb(n, size) <= _MOST_SETS:
         return np.array(list(combinations(range(n), size)), dtype=np.intp)
     return np.array([sorted([*best.tolist(), j]) for j in range(n) if j not in best], dtype=np.intp)
 
 
 def _unseen(parts: FloatArray, sets: Sets, *, intercept: bool) -> tuple[FloatArray, FloatArray]:
-    """Return the sums of squares that sets leave of parts left out in turn, whole and with their worst input lost.
+    """Return the residual sums of squares of sets on parts left out in turn, complete and with the worst input lost.
 
     Parameters
     ----------
     parts : ndarray of shape (n_parts, n_columns + 1, n_columns + 1)
-        Products of the columns with each other and with what they shall predict, per part.
+        Products of the columns with each other and with the target, per part.
     sets : ndarray of int of shape (n_sets, size)
     intercept : bool
-        The last column but one is that of ones, and belongs to every set.
+        The last but one column is constant and belongs to every set.
 
     Returns
     -------
@@ -162,7 +163,7 @@ def _unseen(parts: FloatArray, sets: Sets, *, intercept: bool) -> tuple[FloatArr
         rest = whole - part if len(parts) > 1 else whole
         little = _LITTLE * max(float(np.trace(rest[:-1, :-1])), _LITTLE)
         weights = np.linalg.solve(rest[across, down] + little * np.eye(sets.shape[1]), rest[sets, -1][..., None])
-        for lost in range(1 + inputs):  # the last: none is
+        for lost in range(1 + inputs):  # last iteration: no input lost
             w = weights[..., 0].copy()
             if lost < inputs:
                 w[:, lost] = 0.0

@@ -12,22 +12,22 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.export.facts import Facts
 
-#: of eight digits
+#: largest number of eight digits
 _LARGEST = Decimal(99_999_999)
 
 
 @dataclass(frozen=True)
 class Shape:
-    """Form of a controller's formula: present temperatures times numbers.
+    """Form of a controller's formula: current temperatures times coefficients.
 
     Parameters
     ----------
     sensors : int
-        At most.
+        Maximum number of sensors.
     constant : bool
-        A constant may be added. False: it is relative to the temperature at homing.
+        A constant may be added. False: the formula is relative to the temperature at homing.
     axes : str
-        Letters of the axes that have one.
+        Letters of the axes with a formula.
     """
 
     sensors: int
@@ -35,7 +35,7 @@ class Shape:
     axes: str
 
 
-#: by target of the export
+#: by export target
 SHAPES = {
     "klipper": Shape(1, False, "Z"),
     "heidenhain": Shape(3, True, "XYZ"),
@@ -44,7 +44,7 @@ SHAPES = {
 
 
 class RemainingError(NamedTuple):
-    """Residual of a deviation [um]; nan if it is not known."""
+    """Residual of a deviation [um]; nan if unknown."""
 
     rms: float
     largest: float
@@ -52,16 +52,16 @@ class RemainingError(NamedTuple):
 
 @dataclass(frozen=True)
 class LeftOut:
-    """Model fitted without a cycle, and its result there.
+    """Model fitted without a cycle, and its result on that cycle.
 
     Parameters
     ----------
     name : str
         Name of the cycle.
     model : ErrorModel
-        Reduced.
+        The reduced model.
     none, full, reduced : float
-        RMS without compensation, with the full model and with this one [um]; nan if it is not known.
+        RMS without compensation, with the full and with the reduced model [um]; nan if unknown.
     """
 
     name: str
@@ -73,24 +73,24 @@ class LeftOut:
 
 @dataclass(frozen=True)
 class Reduced:
-    """A model in the form of a controller, with the full one for comparison.
+    """A model in the form supported by a controller, with the full model for comparison.
 
     Parameters
     ----------
     model : ErrorModel
-        Linear in temperatures, without memory; its honest error is that on unseen cycles.
+        Linear in temperatures, without memory; its honest error is from unseen cycles.
     axis : str
         X, Y or Z.
     beside : str
         Description of the full model, and the data on which its error was found.
     none, full, reduced : RemainingError
-        On unseen cycles: without compensation, with the full model, with this one.
+        Residuals on unseen cycles: without compensation, with the full and with the reduced model.
     cycles : tuple of LeftOut
-        One by one; empty where the model was of that shape already.
+        Results per cycle; empty if the full model already had this form.
     replayed : RemainingError or None
-        With the model as it is written, over all rows of the recordings that it was fitted to.
+        Residual of the exported model over all rows of the recordings used for its fit.
     most : float
-        Largest output in all of this [um].
+        Largest output in judging and replay [um].
     """
 
     model: ErrorModel
@@ -105,7 +105,7 @@ class Reduced:
 
     @property
     def loss(self) -> float:
-        """RMS on unseen cycles over that of the full model; nan if that is not known."""
+        """RMS on unseen cycles over that of the full model; nan if unknown."""
         if self.full.rms > 0:
             return self.reduced.rms / self.full.rms
         return 1.0 if self.reduced.rms == self.full.rms else math.nan
@@ -121,7 +121,7 @@ class Reduced:
         )
 
     def why_not(self, most_loss: float) -> str:
-        """Return the reason why it must not be written; empty if it may."""
+        """Return the reason why it must not be exported; empty if it may be."""
         found = self.model.honest_error
         if found is None:
             return "it was never judged on cycles it has not seen"
@@ -137,14 +137,14 @@ class Reduced:
 
     @property
     def terms(self) -> list[tuple[Input, float]]:
-        """The temperatures, and the deviation that each degree makes [um/K]."""
+        """Temperatures, and the deviation per degree of each [um/K]."""
         factors = linear_factors(self.model)
         assert factors is not None
         return [(i, f) for i, f in zip(self.model.inputs, factors, strict=True) if f]
 
     @property
     def zeros(self) -> list[float]:
-        """Reference of each temperature in a formula that has no start of a test [degC]."""
+        """Reference of each temperature, for a formula without a start of a test [degC]."""
         return [round(i.reference, 2) if i.rezero else i.reference for i, _ in self.terms]
 
     def deviation(self, temperatures: Sequence[float]) -> float:
@@ -154,7 +154,7 @@ class Reduced:
 
 
 def linear_factors(model: ErrorModel) -> list[float] | None:
-    """Return the effect of a degree of each input [um/K]; None if a model is not a sum of present temperatures."""
+    """Return the effect of each input [um/K]; None if the model is not a linear combination of current temperatures."""
     if not isinstance(model, Polynomial) or any(len(t) != 1 for t in model.terms):
         return None
     if any(i.quantity != "temperature" for i in model.inputs) or model.support.policy != "clip":
@@ -167,7 +167,7 @@ def linear_factors(model: ErrorModel) -> list[float] | None:
 
 
 def fits(model: ErrorModel, shape: Shape) -> bool:
-    """Return whether a model is of a shape already."""
+    """Return whether a model already has the form of a controller."""
     factors = linear_factors(model)
     if factors is None or not 0 < sum(map(bool, factors)) <= shape.sensors:
         return False
@@ -175,7 +175,7 @@ def fits(model: ErrorModel, shape: Shape) -> bool:
 
 
 def as_it_is(model: ErrorModel, axis: str) -> Reduced:
-    """Return a model of that shape in the digits that are printed, without a loss."""
+    """Return a model that already has the form of the controller, with rounded coefficients and no loss."""
     found = model.honest_error
     assert isinstance(model, Polynomial)
     model = replace(
@@ -197,7 +197,7 @@ def as_it_is(model: ErrorModel, axis: str) -> Reduced:
 
 
 def vectors(reduced: Reduced) -> list[tuple[float, ...]]:
-    """Return temperatures that a formula is tried with, in the order of its terms: each alone, all, far beyond."""
+    """Return test temperatures of a formula, in the order of its terms: each alone, all, beyond the trained range."""
     inputs, zeros = [i for i, _ in reduced.terms], reduced.zeros
     rows = [tuple(zeros)]
     for k, i in enumerate(inputs):
@@ -205,7 +205,7 @@ def vectors(reduced: Reduced) -> list[tuple[float, ...]]:
             row = list(zeros)
             row[k] += i.low + share * (i.high - i.low)
             rows.append(tuple(row))
-    for share in (-1.5, -0.2, 0.3, 0.8, 1.2, 2.5):  # beyond the trained range below 0 and above 1
+    for share in (-1.5, -0.2, 0.3, 0.8, 1.2, 2.5):  # beyond the trained range: below 0 and above 1
         rows.append(tuple(z + i.low + share * (i.high - i.low) for i, z in zip(inputs, zeros, strict=True)))
     return [tuple(round(t, 2) for t in row) for row in dict.fromkeys(rows)]
 
@@ -219,24 +219,24 @@ def find_axis(target: str, named: dict[str, str]) -> str:
 
 
 def in_mm(um: float) -> str:
-    """Return a number of micrometres in millimetres, digit by digit the same."""
+    """Return micrometres converted to millimetres as text, without rounding."""
     return _plain(Decimal(repr(um)).scaleb(-3))
 
 
 def in_um(um: float) -> str:
-    """Return a number, digit by digit the same, without an exponent."""
+    """Return a number as text, without rounding and without an exponent."""
     return _plain(Decimal(repr(um)))
 
 
 def shorten(text: str, *, cap: bool = False) -> str:
-    """Return a number in eight digits, seven of them behind the point at most: more a Fanuc control does not take.
+    """Return a number of eight digits, at most seven of them after the point: the limit of Fanuc controls.
 
     Parameters
     ----------
     text : str
-        Without an exponent, as `in_mm` and `in_um` write it.
+        Number without an exponent, as returned by `in_mm` and `in_um`.
     cap : bool
-        Nothing may exceed it: round it towards zero.
+        The number is an upper bound: round it towards zero.
     """
     value = Decimal(text)
     if abs(value) >= _LARGEST:
@@ -252,7 +252,7 @@ def _plain(value: Decimal) -> str:
 
 
 def mark(name: str, taken: Sequence[str] = ()) -> str:
-    """Return a name as letters, digits and ``_`` alone, other than those taken, whatever the case."""
+    """Return a name of letters, digits and ``_`` only that differs from those in `taken`, ignoring case."""
     found = re.sub(r"[^0-9A-Za-z_]", "_", name) or "_"
     used = {t.upper() for t in taken}
     return found if found.upper() not in used else f"{found}_{len(taken)}"
@@ -266,7 +266,7 @@ def head(reductions: Sequence[Reduced], facts: Facts, sign: str, units: str) -> 
     reductions : sequence of Reduced
     facts : Facts
     sign, units : str
-        As the controller takes them.
+        Sign convention and units of the controller.
     """
     words, more = [], []
     for r in reductions:

@@ -1,4 +1,4 @@
-"""The page of an export to a poor controller: what it leaves and loses, how to install, check and switch it off."""
+"""Page of an export to a simple controller: residual and loss, installation, check, and switching it off."""
 
 from collections.abc import Iterator, Sequence
 
@@ -58,14 +58,14 @@ def write_page(
     off: str,
     figure: str,
 ) -> str:
-    """Return the page.
+    """Return the page of instructions.
 
     Parameters
     ----------
     name : str
         Name of the files.
     head : sequence of str
-        The verdict, and what else is to be known first.
+        The verdict, and other facts for the top of the page.
     reductions : sequence of Reduced
     what, about : str
         Target of the export, and its computation.

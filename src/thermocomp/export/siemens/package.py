@@ -1,4 +1,4 @@
-"""SINUMERIK 840D sl, 828D, ONE: a compensator in SCL, and what its setting data take."""
+"""SINUMERIK 840D sl, 828D, ONE: a compensator in SCL, and the values of the setting data."""
 
 from collections.abc import Mapping
 
@@ -55,12 +55,12 @@ default; at most 0.10 there) and MD32000 = 10000 mm/min, dv is 100 mm/min.
 def write_package(
     compensator: Compensator, name: str, facts: Facts, axes: Mapping[str, str] | None = None
 ) -> dict[str, bytes]:
-    """Return all files by their names.
+    """Return all files by name.
 
     Parameters
     ----------
     compensator : Compensator
-        Made by `Compensator.of`.
+        Created by `Compensator.of`.
     name : str
     facts : Facts
     axes : mapping of str to str, optional
@@ -69,7 +69,7 @@ def write_package(
     Raises
     ------
     InputError
-        A model has no formula, the models do not go together, or no axis is known.
+        A model has no formula, the models cannot be combined, or no axis is known.
     """
     tables, own = gather(compensator), identifier(name)
     drives = find_drives(tables, axes or {})

@@ -1,4 +1,4 @@
-"""All files of an export to structured text: the blocks, their test, and how to use them."""
+"""All files of an export to structured text: the blocks, their test, and the instructions."""
 
 from collections.abc import Sequence
 from typing import get_args
@@ -85,12 +85,12 @@ _OBJECT = """<?xml version="1.0" encoding="utf-8"?>
 
 
 def write_package(compensator: Compensator, name: str, facts: Facts, dialect: Dialect = "codesys") -> dict[str, bytes]:
-    """Return all files by their names.
+    """Return all files by name.
 
     Parameters
     ----------
     compensator : Compensator
-        Made by `Compensator.of`.
+        Created by `Compensator.of`.
     name : str
     facts : Facts
     dialect : {'codesys', 'twincat', 'scl'}
@@ -98,7 +98,7 @@ def write_package(compensator: Compensator, name: str, facts: Facts, dialect: Di
     Raises
     ------
     InputError
-        A model has no formula, or the models do not go together.
+        A model has no formula, or the models cannot be combined.
     """
     return write_blocks(compensator, name, facts, dialect)
 
@@ -111,24 +111,24 @@ def write_blocks(
     more: Sequence[SourceUnit] = (),
     about: str = "",
 ) -> dict[str, bytes]:
-    """Return all files of a compensator, and of more blocks for a controller.
+    """Return all files of a compensator, and of further blocks for a controller.
 
     Parameters
     ----------
     compensator : Compensator
-        Made by `Compensator.of`.
+        Created by `Compensator.of`.
     name : str
     facts : Facts
     dialect : {'codesys', 'twincat', 'scl'}
     more : sequence of SourceUnit
-        Beside the compensator.
+        Further blocks.
     about : str
         Description on the page.
 
     Raises
     ------
     InputError
-        A model has no formula, or the models do not go together.
+        A model has no formula, or the models cannot be combined.
     """
     tables, said, name = gather(compensator), facts.lines(compensator), identifier(name)
     readings = make_readings(tables)
@@ -158,7 +158,7 @@ def write_blocks(
 
 
 def _kilobytes(tables: Tables) -> int:
-    """Return about how much an instance takes, readings of the zero above all."""
+    """Return the approximate size of an instance [kB], mainly readings of the zero."""
     sizes = tables.sizes
     readings = sizes["MOST"] * (sizes["CHANNELS"] + sizes.get("WATCHED", 0) + 2)
     return 10 + (8 * (readings + sizes.get("MEMORY", 0) * (sizes["SENSORS"] + 1) + sizes["POINTS"])) // 1000
@@ -169,7 +169,7 @@ def _joined(units: Sequence[SourceUnit], head: str, dialect: Dialect) -> str:
 
 
 def _object(unit: SourceUnit, head: str) -> tuple[str, str]:
-    """Return name and text of a file of TwinCAT 3."""
+    """Return name and text of a TwinCAT 3 file."""
     body = f"\n    <Implementation><ST><![CDATA[{unit.statements}]]></ST></Implementation>" if unit.end else ""
     kind = "POU" if unit.end else "DUT"
     first, rest = unit.declaration.split("\n", 1)

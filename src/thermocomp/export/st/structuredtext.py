@@ -22,10 +22,10 @@ from thermocomp.export.st.ststatements import (
     write_type,
 )
 
-#: no number at all: a controller may stop at a NaN
+#: represents NaN and infinity: a controller may stop at a NaN
 NOTHING = 1e31
 
-#: what a caller sees, and how many there are
+#: outputs visible to the caller, and their sizes
 OUTPUTS: dict[str, str] = {
     "correction": "TARGETS",
     "slope": "TARGETS",
@@ -59,7 +59,7 @@ class SourceUnit:
     ----------
     name : str
     declaration, statements : str
-        A type has no statements.
+        Declarations and code; a type has no statements.
     end : str
         Last line of a block.
     """
@@ -70,7 +70,7 @@ class SourceUnit:
     end: str = ""
 
     def text(self, dialect: Dialect) -> str:
-        """Return all of it."""
+        """Return the complete source text."""
         if not self.end:
             return self.declaration + "\n"
         begin = ["BEGIN"] if dialect == "scl" else []
@@ -78,9 +78,9 @@ class SourceUnit:
 
 
 def translate(tables: Tables, name: str, dialect: Dialect) -> list[SourceUnit]:
-    """Return a compensator in structured text, each part behind those that it uses.
+    """Return a compensator in structured text, with every unit after those that it uses.
 
-    What it does with values is what `Compensator.step` does with a reading.
+    The code processes values as `Compensator.step` processes a reading.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def translate(tables: Tables, name: str, dialect: Dialect) -> list[SourceUnit]:
     Raises
     ------
     InputError
-        A model is of a family that has no formula.
+        A model belongs to a family without a formula.
     """
     scl = dialect == "scl"
     functions = write_functions(tables, name, dialect)
@@ -107,7 +107,7 @@ def translate(tables: Tables, name: str, dialect: Dialect) -> list[SourceUnit]:
 
 
 def _start(tables: Tables, name: str, used: str, scl: bool) -> SourceUnit:
-    """Return the function that restarts; the corrections in force stay, and move from there."""
+    """Return the function that restarts the compensator; the corrections in force are kept as the starting point."""
     mark = "#" if scl else ""
     lines = []
     for n, var in used_in("s", used).items():
@@ -179,7 +179,7 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def comment(text: str) -> str:
-    """Return a text that ends no comment."""
+    """Return a text that cannot end a comment."""
     for sign in ("*)", "(*", "]]>"):
         text = text.replace(sign, " ".join(sign))
     return " ".join(text.split())

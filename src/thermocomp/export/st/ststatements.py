@@ -15,7 +15,7 @@ Dialect = Literal["codesys", "twincat", "scl"]
 
 TYPES: dict[Kind, str] = {"real": "LREAL", "time": "LREAL", "int": "DINT", "bool": "BOOL"}
 
-#: what is a word of the language, or of its library, in one of the dialects
+#: reserved words of the language, or names of its library, in any of the dialects
 RESERVED = frozenset(
     """
     abs acos action add and any array asin at atan begin bool by byte case concat configuration const constant
@@ -25,23 +25,23 @@ RESERVED = frozenset(
     replace resource result retain return right rol ror round sel shl shr sin single sint sqrt step stop string
     struct sub super swap tan task then this time to tod transition true trunc type udint uint ulint until usint var
     void while with word write xor
-    """.split()  # noqa: SIM905 - a list of a line per word is long
+    """.split()  # noqa: SIM905 - a list with one word per line would be long
 )
 
-#: below the name of a block: data that are not optimized end at 64 kB
+#: attributes after the name of a block: data blocks without optimized access are limited to 64 kB
 SCL = ["{ S7_Optimized_Access := 'TRUE' }", "VERSION : 0.1"]
 
-#: functions of the library that every dialect has
+#: library functions common to all dialects
 _LIBRARY = {"abs": "ABS", "exp": "EXP", "log": "LN", "sqrt": "SQRT"}
 
 
 def safe(name: str) -> str:
-    """Return a name that is no word of the language; upper and lower case are the same there."""
+    """Return a name that is not a reserved word; upper and lower case are not distinguished."""
     return f"tc_{name}" if name.lower() in RESERVED else name
 
 
 def number(value: float, kind: Kind = "real") -> str:
-    """Return a number as the language writes it, exact in double precision."""
+    """Return a number in structured text, exact in double precision."""
     if kind == "bool":
         return "TRUE" if value else "FALSE"
     if kind == "int":
@@ -51,14 +51,14 @@ def number(value: float, kind: Kind = "real") -> str:
 
 
 def write_functions(tables: Tables, name: str, dialect: Dialect) -> dict[str, tuple[str, str]]:
-    """Return declaration and statements of the functions that a block needs, by their names.
+    """Return declaration and statements of the functions that a block needs, by name.
 
     Parameters
     ----------
     tables : Tables
         Tables of the compensator.
     name : str
-        Before all names.
+        Prefix of all names.
     dialect : {'codesys', 'twincat', 'scl'}
     """
     found = functions(tables, {"expm1": "exp_less_one", "pow": "power"})
@@ -67,7 +67,7 @@ def write_functions(tables: Tables, name: str, dialect: Dialect) -> dict[str, tu
 
 
 class _Writer(Printer):
-    """Writes one function."""
+    """Writer of one function."""
 
     operators: ClassVar = {
         ast.Add: "+",
@@ -109,7 +109,7 @@ class _Writer(Printer):
         parts += [section("VAR_TEMP" if self._scl else "VAR", own)]
         return "\n".join(filter(None, parts)), "\n".join(wrapped(x) for x in self.block(self.statements, 0))
 
-    def statement(self, node: ast.stmt, depth: int) -> list[str]:  # noqa: PLR0911 - a case for every kind of node
+    def statement(self, node: ast.stmt, depth: int) -> list[str]:  # noqa: PLR0911 - one case per node type
         pad, inner = "    " * depth, depth + 1
         match node:
             case ast.Assign([target], ast.IfExp(test, body, orelse)):
@@ -169,11 +169,11 @@ class _Writer(Printer):
     def negated(self, text: str) -> str:
         return f"(NOT {text})"
 
-    def real(self, text: str, kind: Kind) -> str:  # noqa: ARG002 - there is one precision
+    def real(self, text: str, kind: Kind) -> str:  # noqa: ARG002 - only one precision
         return f"DINT_TO_LREAL({text[1:-1] if text.startswith('(') else text})"
 
     def call(self, name: str, args: list[ast.expr]) -> str:
-        if name == "floor":  # of what is not negative
+        if name == "floor":  # the argument is never negative
             return f"DINT_TO_LREAL(TRUNC({self.bare(args[0], 'real')}))"
         if name in _LIBRARY:
             return f"{_LIBRARY[name]}({self.bare(args[0], self.kind(args[0]))})"
@@ -183,7 +183,7 @@ class _Writer(Printer):
         return number(value, kind) if value >= 0 else f"({number(value, kind)})"
 
 
-#: what the functions are given, and the types of it
+#: structures passed to the functions, with the suffix of their type
 BAGS = {"s": "state", "w": "work", "t": "tables"}
 
 
@@ -193,7 +193,7 @@ def quoted(name: str, scl: bool) -> str:
 
 
 def section(word: str, variables: Mapping[str, str]) -> str:
-    """Return a section of declarations; nothing without variables."""
+    """Return a section of declarations; empty without variables."""
     lines = [f"    {safe(name)} : {what};" for name, what in variables.items()]
     return "\n".join([word, *lines, "END_VAR"]) if lines else ""
 
@@ -210,7 +210,7 @@ def values(found: Any, kind: Kind) -> str:
 
 
 def wrapped(line: str) -> str:
-    """Return a long line as several."""
+    """Return a long line as several lines."""
     if len(line) <= 120:
         return line
     indent = line[: len(line) - len(line.lstrip())] + "    "
@@ -218,17 +218,17 @@ def wrapped(line: str) -> str:
 
 
 def write_type(tables: Tables, name: str, bag: str, used: str, dialect: Dialect) -> str:
-    """Return the type of a bag: its variables that a text uses, with the numbers of those that are known.
+    """Return the type of a structure: the variables used in a text, with the values of constants.
 
     Parameters
     ----------
     tables : Tables
         Tables of the compensator.
     name : str
-        Before all names.
+        Prefix of all names.
     bag : {'s', 'w', 't'}
     used : str
-        The text.
+        Text in which the variables are used.
     dialect : {'codesys', 'twincat', 'scl'}
     """
     scl = dialect == "scl"
@@ -244,7 +244,7 @@ def write_type(tables: Tables, name: str, bag: str, used: str, dialect: Dialect)
 
 
 def used_in(bag: str, used: str) -> dict[str, Var]:
-    """Return the variables of a bag that a text uses."""
+    """Return the variables of a structure that are used in a text."""
     return {n: v for n, v in VARIABLES[bag].items() if re.search(rf"\b{bag}\.{safe(n)}\b", used)}
 
 

@@ -1,4 +1,4 @@
-"""A function block that runs the structured text of a compensator over its test vectors, a call per cycle."""
+"""A function block that runs the structured text of a compensator over its test vectors, one call per cycle."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -11,7 +11,7 @@ from thermocomp.export.st.structuredtext import NOTHING, SourceUnit
 from thermocomp.export.st.ststatements import SCL, Dialect, array, number, quoted, section, values, wrapped
 from thermocomp.export.vectors import Answers, Readings, find_tolerance
 
-#: difference that is allowed at least, as a share of a correction, or in um of one below 1 um
+#: minimum tolerance, as a fraction of the correction, or in um for corrections below 1 um
 _TOLERANCE = 1e-9
 
 _BODY = """IF NOT {_}done THEN
@@ -53,13 +53,13 @@ _FAULTS = """    FOR {_}j := 0 TO {last_sensor} DO
 
 
 def write_test(tables: Tables, name: str, dialect: Dialect, readings: Readings, answers: Answers) -> list[SourceUnit]:
-    """Return the type that holds the vectors, and the block that runs them.
+    """Return the type with the test vectors, and the block that runs them.
 
     Parameters
     ----------
     tables : Tables
     name : str
-        Name of the function block that is tested.
+        Name of the tested function block.
     dialect : {'codesys', 'twincat', 'scl'}
     readings : Readings
     answers : Answers
@@ -120,10 +120,10 @@ def write_test(tables: Tables, name: str, dialect: Dialect, readings: Readings, 
 
 
 def allow(tables: Tables) -> float:
-    """Return the difference that is allowed, as a share of a correction, or in um of one below 1 um."""
+    """Return the tolerance, as a fraction of the correction, or in um for corrections below 1 um."""
     return max(_TOLERANCE, find_tolerance(tables))
 
 
 def _finite(given: Iterable[float]) -> list[float]:
-    """Return numbers as a controller can hold them."""
+    """Return numbers that a controller can hold."""
     return [float(v) if math.isfinite(v) else NOTHING for v in given]

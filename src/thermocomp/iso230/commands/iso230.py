@@ -42,7 +42,7 @@ def read_tests(paths: list[Path], mapping: Path | None, *, tell: bool = True) ->
     reads={"recordings": read_tests},
 )
 def iso230(found: Evaluated, face: CommandFace) -> int:
-    """Show it.
+    """Write and show the results.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def iso230(found: Evaluated, face: CommandFace) -> int:
 
 
 def _show(found: Evaluated, page: Path | None) -> None:
-    # numbers must not be cut: a narrow terminal wraps whole lines instead
+    # numbers must not be truncated: a narrow terminal wraps whole lines instead
     wide = make_console(width=max(console.width, TABLE_WIDTH))
     for t in found.thermal:
         console.print(f"\n[bold]{words(t.name)}: {TITLES[t.kind]}[/]")

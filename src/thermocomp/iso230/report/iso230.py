@@ -11,7 +11,7 @@ from thermocomp.judging.settling.settling import Settling
 from thermocomp.recordings.recording import Recording
 from thermocomp.report.html import page
 
-#: recordings with the time constants of their channels
+#: recordings, each with the time constants of its channels
 Settlings = Sequence[tuple[Recording, Sequence[Settling]]]
 
 

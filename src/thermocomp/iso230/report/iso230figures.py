@@ -1,4 +1,4 @@
-"""Figures of ISO 230 tests, as SVG text. Each answers one question, which is given in its docstring."""
+"""Figures of ISO 230 tests as SVG text. Each docstring states the purpose of the figure."""
 
 from collections.abc import Sequence
 
@@ -18,12 +18,12 @@ from thermocomp.report.figures import COLOURS, MEASURED, NONE, PREDICTED, RESIDU
 FloatArray = NDArray[np.float64]
 
 _BESIDE = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5), "fontsize": 7, "handlelength": 1.6}
-#: more temperatures than this are drawn without names
+#: maximum number of temperatures drawn with names
 _NAMED = 24
 
 
 def thermal(test: ThermalTest) -> str:
-    """Show what moved, how it tilted, and what the temperatures did; shaded: the drives run; the 60-min mark."""
+    """Plot displacements, tilts and temperatures over time; shaded: drives running; with the 60-min mark."""
     panels = _panels(test)
     heights = [2.6, *[1.6 if len(curves) < 3 else 2.2 for _, _, curves in panels[1:]], 2.4]
     with drawing(test.name + test.kind):
@@ -36,7 +36,7 @@ def thermal(test: ThermalTest) -> str:
         _temperatures(axes[-1], test)
         for ax in axes:
             _mark(ax, test)
-        # above the first panel, where no curve is
+        # above the first panel, where there are no curves
         axes[0].annotate(
             "60 min", (1.0, 1.0), (2, 2), ("data", "axes fraction"), "offset points", fontsize=7, color="#555"
         )
@@ -62,7 +62,7 @@ def _panels(test: ThermalTest) -> list[tuple[str, str, Sequence[ThermalCurve]]]:
 
 
 def _draw(ax: Axes, test: ThermalTest, curves: Sequence[ThermalCurve]) -> None:
-    """Draw curves, and in dashes what a model leaves of them."""
+    """Draw curves, and dashed their residuals with a model."""
     hours = test.time / HOUR
     ax.axhline(0, color="#aaa", lw=0.8)
     if len(curves) > len(COLOURS):
@@ -121,7 +121,7 @@ def _mark(ax: Axes, test: ThermalTest) -> None:
 
 
 def profiles(test: ThermalTest, number: int) -> str:
-    """Show how an axis' error lies over its travel: at the start, after 60 min, when it stops, at the end.
+    """Plot the error of an axis over its travel: at the start, after 60 min, at the stop of the drives, at the end.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def profiles(test: ThermalTest, number: int) -> str:
 
 
 def time_constants(settlings: Sequence[Settling]) -> str:
-    """Show how fast each channel follows: times to 63 and 90 %, and the time constants that fit, on one scale."""
+    """Plot the response of each channel on one scale: times to 63 and 90 %, and fitted time constants."""
     phases = list(dict.fromkeys(s.phase for s in settlings))[:2]
     names = list(dict.fromkeys(s.channel for s in settlings if s.moves))
     with drawing("time constants" + "".join(names)):
@@ -193,7 +193,7 @@ def _draw_times(ax: Axes, s: Settling, row: int) -> None:
 
 
 def positioning(result: PositioningResult) -> str:
-    """Show how true an axis positions: every deviation, mean lines of both directions with 2 s, and A, E and M."""
+    """Plot the positioning of an axis: all deviations, mean lines of both directions with 2 s, and A, E and M."""
     positions, unit = result.test.positions, result.test.unit
     with drawing(result.test.axis + result.test.state + "positioning"):
         figure = Figure(figsize=(9.6, 3.6), layout="constrained")
@@ -218,7 +218,7 @@ def positioning(result: PositioningResult) -> str:
 
 
 def _spans(ax: Axes, result: PositioningResult) -> None:
-    """Draw A, E and M as arrows to the right of the travel, from their lowest to their highest value."""
+    """Draw A, E and M as arrows to the right of the travel, from lowest to highest value."""
     directions = list(result.directions.values())
     means = np.concatenate([d.mean for d in directions])
     twice = 2.0 * np.concatenate([d.s for d in directions])
@@ -231,7 +231,7 @@ def _spans(ax: Axes, result: PositioningResult) -> None:
     if result.mean is not None:
         spans.append(("M", float(result.mean.min()), float(result.mean.max())))
     low, high = float(result.test.positions[0]), float(result.test.positions[-1])
-    # a single run tells no A
+    # no A from a single run
     for k, (symbol, bottom, top) in enumerate(s for s in spans if np.isfinite(s[1:]).all()):
         x = high + (0.045 + 0.075 * k) * (high - low)
         ax.annotate("", (x, top), (x, bottom), arrowprops={"arrowstyle": "<->", "lw": 1.1, "shrinkA": 0, "shrinkB": 0})

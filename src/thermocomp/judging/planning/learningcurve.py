@@ -1,4 +1,4 @@
-"""Learning curve: the error on unseen thermal cycles against the number of training cycles and speeds."""
+"""Learning curve: error on unseen thermal cycles as a function of the number of training cycles and speeds."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,34 +21,34 @@ from thermocomp.recordings.samples import Samples
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-#: draws of cycles to learn from, of each number and for each unseen one
+#: random draws of training cycles, for each number and each unseen cycle
 DRAWS = 2
-#: numbers of cycles that are tried, at most
+#: maximum number of training set sizes
 MOST_SIZES = 6
-#: speeds nearer than this share of the highest are one
+#: speeds that differ by less than this fraction of the highest are merged
 _SAME_SPEED = 0.05
 
 
 class Point(NamedTuple):
-    """One model, learned from some cycles and judged on one that it had not seen."""
+    """One model, trained on some cycles and judged on an unseen one."""
 
-    learned: int  #: cycles
-    speeds: int  #: different speeds in them, 0 where none was recorded
-    unseen: int  #: which block was judged
-    rms: float  #: mean over the targets [um]; nan: it could not be fitted
+    learned: int  #: number of training cycles
+    speeds: int  #: number of different speeds in the training cycles, 0 if none was recorded
+    unseen: int  #: index of the judged block
+    rms: float  #: mean over the targets [um]; nan: the model could not be fitted
 
 
 class Level(NamedTuple):
-    """All models that learned from so much."""
+    """All models trained on the same number of cycles or speeds."""
 
-    learned: int  #: cycles, or speeds
+    learned: int  #: number of training cycles, or speeds
     rms: float  #: mean over the unseen blocks [um]
-    error: float  #: standard error of that between the blocks [um]; nan with one
+    error: float  #: standard error of this mean between the blocks [um]; nan with a single block
 
 
 @dataclass(frozen=True, eq=False)
 class LearningCurve:
-    """Error on unseen thermal cycles over what was learned from.
+    """Error on unseen thermal cycles as a function of the amount of training data.
 
     Parameters
     ----------
@@ -63,11 +63,11 @@ class LearningCurve:
     none: float
 
     def by_cycles(self) -> tuple[Level, ...]:
-        """Return the error over the number of cycles learned from."""
+        """Return the error for each number of training cycles."""
         return self._levels([p.learned for p in self.points])
 
     def by_speeds(self) -> tuple[Level, ...]:
-        """Return the error over the number of speeds learned from; the cycles of a model differ in it by chance."""
+        """Return the error for each number of training speeds, which varies at random between the draws."""
         return self._levels([p.speeds for p in self.points])
 
     def _levels(self, of: Sequence[int]) -> tuple[Level, ...]:
@@ -82,19 +82,19 @@ class LearningCurve:
 
     @property
     def last_gain(self) -> float:
-        """Reduction of the error per cycle over the last cycles [um]: slope over the upper half of the numbers."""
+        """Reduction of the error per further cycle [um]: negative slope over the upper half of the sizes."""
         levels = self.by_cycles()
         upper = levels[(len(levels) - 1) // 2 :]
         return -float(np.polyfit([x.learned for x in upper], [x.rms for x in upper], 1)[0]) if len(upper) > 1 else 0.0
 
     @property
     def worth(self) -> float:
-        """Reduction that makes a further cycle worth its time [um]: as for a sensor, see `assessment.budget`."""
+        """Reduction that makes a further cycle worthwhile [um]: as for a sensor, see `thermocomp.judging.budget`."""
         return min(WORTH, SHARE * self.none)
 
     @property
     def enough(self) -> bool:
-        """A further cycle of the kind that is there is not worth its time."""
+        """True if a further cycle of the same kind is not worthwhile."""
         return self.last_gain <= self.worth
 
     @property
@@ -122,21 +122,21 @@ def learning_curve(
     seed: int = 0,
     progress: Progress = lambda _, steps=1: None,  # noqa: ARG005
 ) -> LearningCurve:
-    """Train on some of the cycles and judge on others: for each unseen one, on 1, 2, ... of those that are left.
+    """Train on some cycles and judge on others: for each unseen cycle, train on 1, 2, ... of the remaining ones.
 
     Parameters
     ----------
     samples : Samples
     judging : Judging
-        Its blocks are left out in turn, and what is learned from is drawn of the others.
+        Its blocks are left out in turn; training blocks are drawn from the others.
     model : str
-        A method.
+        Name of the method.
     jobs : int
-        Processes to share the work among; -1 takes all cores.
+        Number of parallel processes; -1: one per core.
     seed : int
-        Seed of the draw.
+        Seed of the random draws.
     progress : callable
-        Called with a line of text after each piece of work; there are `n_pieces` of them.
+        Called with a line of text after each task; there are `n_pieces` of them.
 
     Returns
     -------
@@ -171,13 +171,13 @@ def learning_curve(
 
 
 def n_pieces(judging: Judging) -> int:
-    """Return the number of pieces of work of `learning_curve`, at most."""
+    """Return the maximum number of tasks of `learning_curve`."""
     n = len(judging.splits)
     return n * len(_sizes(n)) * DRAWS
 
 
 def _sizes(blocks: int) -> list[int]:
-    """Return the numbers of blocks to learn from: from one to all but one."""
+    """Return the numbers of training blocks: from one to all but one."""
     return sorted({round(x) for x in np.linspace(1, blocks - 1, min(MOST_SIZES, blocks - 1))})
 
 

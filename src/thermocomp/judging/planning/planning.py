@@ -1,4 +1,4 @@
-"""Next test: expected reduction of the error on unseen data by each of a grid of tests."""
+"""Next test: expected reduction of the error on unseen data for each of a grid of tests."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,31 +16,31 @@ from thermocomp.recordings.samples import Samples
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-#: shares of the top speed that are tried
+#: fractions of the top speed in the grid
 SPEEDS = (0.2, 0.4, 0.6, 0.8, 1.0)
-#: what is done with each
+#: kinds of test at each speed
 KINDS: tuple[Kind, ...] = ("repeated", "stop", "run")
-#: the stop before the start, in which the zero is taken, and a run or stop of a repeated test [s]
+#: initial stop for averaging the zero, and runs and stops of a repeated test [s]
 REST, SHORT = 900.0, 1800.0
-#: of what the room does to a part of the machine [s]
+#: time constant of the room's effect on a machine part [s]
 LAG = 7200.0
-#: rows of a test that is predicted [s]
+#: interval of the rows of a predicted test [s]
 _STEP = 60.0
-#: of them those that are counted
+#: only every fifth row is used
 _EVERY = 5
-#: speeds nearer than this share of the top speed are one
+#: speeds that differ by less than this fraction of the top speed are merged
 SAME = 0.1
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A test, and what it would bring.
+    """A test and its expected benefit.
 
     Parameters
     ----------
     trial : Trial
     doubt : float
-        Error that is expected in the test itself, mean over the targets [um].
+        Expected error in the test itself, mean over the targets [um].
     gain : float
         Expected reduction of the error over all tests of the grid, mean over the targets [um].
     news : str
@@ -60,9 +60,9 @@ class Covered:
     Parameters
     ----------
     runs : tuple of (float, float, float)
-        Mean speed [1/min] and length [s] of each run, and length of the stop after it [s]; 0 without one.
+        Mean speed [1/min] and duration [s] of each run, and duration of the following stop [s]; 0 without a stop.
     rooms : tuple of float
-        Change of the ambient temperature within each test [degC]; none: it is not known.
+        Change of the ambient temperature within each test [degC]; empty if unknown.
     """
 
     runs: tuple[tuple[float, float, float], ...]
@@ -70,7 +70,7 @@ class Covered:
 
     @classmethod
     def of(cls, samples: Samples, column: int) -> "Covered":
-        """Return the conditions covered by some samples; their spindle speed is in a column."""
+        """Return the conditions covered by samples; `column` is the index of the spindle speed."""
         runs: list[tuple[float, float, float]] = []
         ranges = []
         air = [j for j, c in enumerate(samples.inputs) if AMBIENT.search(c.name) and c.quantity == "temperature"]
@@ -88,7 +88,7 @@ class Covered:
         return cls(tuple(runs), tuple(ranges))
 
     def news(self, trial: Trial, top_speed: float, swing: float) -> str:
-        """Return the new conditions in a test: its speeds, durations and stops, each separately."""
+        """Return the new conditions in a test, as text: speed, duration or stop."""
         if trial.kind == "room" and not self.rooms:
             return "no temperature of the room was recorded"
         if trial.kind == "room":
@@ -111,14 +111,14 @@ class Covered:
 
 @dataclass(frozen=True)
 class Plan:
-    """Tests that could be run next, the one that would bring most first.
+    """Tests that could be run next, in descending order of their benefit.
 
     Parameters
     ----------
     candidates : tuple of Candidate
     expected : float
-        Error over all tests of the grid as things are, mean over the targets [um]. Of the same calculation as the
-        gains; an order of size, no judged error.
+        Expected error over all tests of the grid at present, mean over the targets [um]. From the same calculation as
+        the gains; an order of magnitude, not a judged error.
     top_speed, hours, swing : float
         Settings of the grid [1/min], [h], [degC].
     covered : Covered
@@ -134,14 +134,14 @@ class Plan:
 
 
 def make_grid(top_speed: float, hours: float) -> tuple[Trial, ...]:
-    """Return the tests that are compared: all of one length.
+    """Return the tests to be compared, all of the same duration.
 
     Parameters
     ----------
     top_speed : float
         Maximum spindle speed of the machine [1/min].
     hours : float
-        Duration of each, after a stop of 15 min [h].
+        Duration of each test, after a stop of 15 min [h].
 
     Returns
     -------
@@ -150,7 +150,7 @@ def make_grid(top_speed: float, hours: float) -> tuple[Trial, ...]:
     Raises
     ------
     InputError
-        No such speed, or less than two hours.
+        The speed is invalid, or the duration is below two hours.
     """
     if not 0 < top_speed < np.inf:
         raise InputError(f"top speed {top_speed:g} 1/min: expected the highest of the machine, above 0")
@@ -170,12 +170,12 @@ def make_grid(top_speed: float, hours: float) -> tuple[Trial, ...]:
 
 
 def plan(samples: Samples, top_speed: float | None = None, *, hours: float = 12.0, swing: float = 5.0) -> Plan:
-    """Return the test with the largest expected benefit.
+    """Rank possible next tests by their expected benefit.
 
-    What is expected to be wrong follows from the covariance of the weights of `averaged` (`thermocomp.models.doubt`),
-    over all tests of the grid, the room changing in each of them. A test takes from the covariance what regression on
-    its rows would: its spindle speed is known exactly, its temperatures are predicted from the speed, and the room
-    reaches the machine with a lag of 2 h.
+    The expected error follows from the covariance of the weights of `averaged` (`thermocomp.models.doubt`), over all
+    tests of the grid with a changing room temperature. A test reduces the covariance like a regression on its rows: its
+    spindle speed is known exactly, its temperatures are predicted from the speed, and the room temperature reaches the
+    machine with a lag of 2 h.
 
     Parameters
     ----------
@@ -184,10 +184,10 @@ def plan(samples: Samples, top_speed: float | None = None, *, hours: float = 12.
     top_speed : float, optional
         Maximum spindle speed of the machine [1/min]. Default: the highest recorded speed.
     hours : float
-        Length of a test [h].
+        Duration of a test [h].
     swing : float
-        How far the room's temperature changes within so long where the machine stands [degC]; 0: it never does, and no
-        test of it is proposed.
+        Change of the room temperature within this duration [degC]; 0: the room temperature is constant, and no test of
+        its effect is proposed.
 
     Returns
     -------
@@ -196,9 +196,9 @@ def plan(samples: Samples, top_speed: float | None = None, *, hours: float = 12.
     Raises
     ------
     InputError
-        A setting is no such number, there is no spindle speed or no temperature, or the spindle never turned.
+        A setting is invalid, there is no spindle speed or no temperature, or the spindle never turned.
     FitError
-        Too few rows are complete.
+        There are too few complete rows.
     """
     if not 0 <= swing <= 50:
         raise InputError(f"a room that changes by {swing:g} degC: expected 0 to 50")
@@ -230,9 +230,9 @@ def plan(samples: Samples, top_speed: float | None = None, *, hours: float = 12.
 
 
 def _all_that_is_done(grid: Sequence[Trial], tables: Sequence[FloatArray]) -> FloatArray:
-    """Return rows whose mean square is that of every spindle test of the grid with the room changing in it.
+    """Return rows with the mean square of all spindle tests of the grid with a changing room temperature.
 
-    The room rises as often as it falls, so that its share adds in the square.
+    The room temperature rises as often as it falls, so that its contribution adds in the square.
     """
     spindle = [f for t, f in zip(grid, tables, strict=True) if t.kind != "room"]
     room = [f for t, f in zip(grid, tables, strict=True) if t.kind == "room"]
@@ -243,7 +243,7 @@ def _all_that_is_done(grid: Sequence[Trial], tables: Sequence[FloatArray]) -> Fl
 
 
 def _foretell(trial: Trial, doubt: Doubt, swing: float, ambient: BoolArray) -> FloatArray:
-    """Return the features of a test that was not run."""
+    """Return the predicted features of a test."""
     speed = np.concatenate([np.full(round(d / _STEP), v) for v, d in trial.steps])
     if trial.kind != "room":
         return doubt.table(speed, _STEP)[::_EVERY]

@@ -1,10 +1,10 @@
-"""A thermal test that could be run next: speeds, durations, and what the room does."""
+"""A thermal test that could be run next: speeds, durations, and the change of the room temperature."""
 
 from dataclasses import dataclass
 from typing import Literal
 
-#: repeated: runs and stops of half an hour in turn; stop: a run, then a stop as long; run: one run without a stop;
-#: room: the spindle is stopped while the room changes
+#: repeated: alternating runs and stops of half an hour; stop: a run, then a stop of the same length; run: one run
+#: without a stop; room: the spindle is stopped while the room temperature changes
 Kind = Literal["repeated", "stop", "run", "room"]
 
 
@@ -15,12 +15,12 @@ class Trial:
     Parameters
     ----------
     kind : {'repeated', 'stop', 'run', 'room'}
-        repeated: short runs and stops in turn; stop: a run, then a stop as long; run: a run without a stop; room: the
-        spindle is stopped while the temperature of the room changes.
+        repeated: short alternating runs and stops; stop: a run, then a stop of the same length; run: a run without a
+        stop; room: the spindle is stopped while the temperature of the room changes.
     speed : float
         Spindle speed [1/min].
     steps : tuple of (float, float)
-        Speed [1/min] and duration [s], one after the other; the first is the stop before the start.
+        Speed [1/min] and duration [s] of consecutive steps; the first is the stop before the start.
     """
 
     kind: Kind
@@ -29,12 +29,12 @@ class Trial:
 
     @property
     def duration(self) -> float:
-        """All of it [s]."""
+        """Total duration [s]."""
         return sum(duration for _, duration in self.steps)
 
     @property
     def words(self) -> str:
-        """Description of the test in words."""
+        """Description of the test as text."""
         _, (_, longest), *_ = self.steps
         if self.kind == "room":
             return f"spindle is stopped {longest / 3600:g} h, the room changes"

@@ -1,9 +1,9 @@
 """Averages over a stated time and their uncertainty: no single noisy row determines the result of a curve.
 
-How the noise is found: the scatter of second differences from row to row, robustly, is what is independent from row
-to row; that of third differences of means over `WINDOW` is what of it is left in a mean, however neighbouring rows hang
-together. The larger of the two counts. Noise that lasts for much longer than `WINDOW` cannot be told from a drift, and
-counts as one.
+Estimation of the noise: the robust scatter of second differences between rows gives the noise that is independent from
+row to row; the scatter of third differences of means over `WINDOW` gives the noise left in a mean, whatever the
+correlation of neighbouring rows. The larger of the two is used. Noise with a correlation time much longer than `WINDOW`
+cannot be distinguished from a drift, and counts as drift.
 """
 
 from collections.abc import Sequence
@@ -16,17 +16,17 @@ from scipy.stats import t as student
 
 FloatArray = NDArray[np.float64]
 
-#: time over which is averaged [s]
+#: averaging time [s]
 WINDOW = 600.0
-#: a shorter stretch is averaged over this share of its length, so that enough means are left to compare
+#: shorter curves are averaged over this fraction of their length, so that enough means are left for comparison
 SHARE = 1.0 / 8.0
-#: chance that a curve of noise alone is said to move
+#: probability that a curve of pure noise is reported as moving
 RISK = 0.01
 #: coverage factor of an expanded uncertainty (GUM)
 K = 2.0
-#: a single row so many times the noise away from those around it is an outlier
+#: a single row that differs from its neighbours by more than this multiple of the noise is an outlier
 OUTLIER = 8.0
-_MEANS = 6  # fewer tell nothing of their own scatter
+_MEANS = 6  # fewer means give no estimate of their scatter
 
 
 @dataclass(frozen=True)
@@ -42,10 +42,10 @@ class Noise:
     resolution : float
         Smallest difference between two values; averaging does not get below its standard uncertainty.
     window : float
-        Time over which is averaged [s].
+        Averaging time [s].
     moves : bool
-        The means of the last third beside those of the first, or any two means, differ by more than their noise would
-        make them by chance (`RISK`; Student's t, Bonferroni over all pairs).
+        The means of the first and the last third, or any two means, differ by more than their noise would explain
+        (`RISK`; Student's t, Bonferroni over all pairs).
     """
 
     sigma: float
@@ -62,7 +62,7 @@ class Noise:
 
 @dataclass(frozen=True)
 class Zero:
-    """The state that a curve is counted from.
+    """Reference state of a curve.
 
     Parameters
     ----------
@@ -79,14 +79,14 @@ class Zero:
 
 @dataclass(frozen=True, eq=False)
 class AveragedCurve:
-    """A curve as averaged, counted from its zero.
+    """An averaged curve relative to its zero.
 
     Parameters
     ----------
     values : ndarray of shape (n_rows,)
-        Averaged, minus the zero; 0 in the first row; nan where missing [unit of the curve].
+        Averages minus the zero; 0 in the first row; nan where missing [unit of the curve].
     u : ndarray of shape (n_rows,)
-        Standard uncertainty of the averages, without that of the zero.
+        Standard uncertainty of the averages, without the contribution of the zero.
     zero : Zero
     noise : Noise
     """
@@ -98,17 +98,17 @@ class AveragedCurve:
 
 
 def window_of(duration: float) -> float:
-    """Return the time over which a stretch of `duration` [s] is averaged [s]."""
+    """Return the averaging time for a curve of a given duration [s]."""
     return min(WINDOW, SHARE * duration)
 
 
 def scatter(values: FloatArray) -> float:
-    """Return the standard deviation from row to row, whatever the course: that of second differences, robustly.
+    """Return the standard deviation from row to row, independent of the trend: robust, from second differences.
 
     Parameters
     ----------
     values : ndarray of shape (n_rows,)
-        nan where missing; at least three there.
+        nan where missing.
 
     Returns
     -------
@@ -122,12 +122,12 @@ def scatter(values: FloatArray) -> float:
 
 
 def replace_outliers(values: FloatArray) -> FloatArray:
-    """Return values of a curve without bends, with single outliers replaced by values from the neighbouring rows.
+    """Return values of a smooth curve, with single outliers replaced by values from the neighbouring rows.
 
     Parameters
     ----------
     values : ndarray of shape (n_rows,)
-        nan where missing, and passed over.
+        nan where missing; such rows are ignored.
 
     Returns
     -------
@@ -138,7 +138,7 @@ def replace_outliers(values: FloatArray) -> FloatArray:
     if len(y) < 8:
         return values
     limit = OUTLIER * scatter(y)
-    # a median over five rows leaves a monotone curve as it is
+    # a median over five rows leaves a monotonic curve unchanged
     calm = median_filter(y, size=5, mode="nearest")
     y = np.where(np.abs(y - calm) > limit, calm, y)
     ahead = 2.0 * y[-2] - y[-3]
@@ -149,7 +149,7 @@ def replace_outliers(values: FloatArray) -> FloatArray:
 
 
 def noise_of(time: FloatArray, values: FloatArray, stop: int | None = None) -> Noise:
-    """Find the noise of a curve, and whether it moves beyond it.
+    """Estimate the noise of a curve, and detect whether it moves beyond the noise.
 
     Parameters
     ----------
@@ -158,12 +158,12 @@ def noise_of(time: FloatArray, values: FloatArray, stop: int | None = None) -> N
     values : ndarray of shape (n_rows,)
         nan where missing.
     stop : int, optional
-        Row in which the drives stop: a bend of the curve, which is no noise.
+        Row in which the drives stop: a bend of the curve, which is not noise.
 
     Returns
     -------
     Noise
-        It does not move if there are fewer than three values.
+        With fewer than three values, `moves` is False.
     """
     there = np.isfinite(values)
     t, y = time[there], values[there]
@@ -171,7 +171,7 @@ def noise_of(time: FloatArray, values: FloatArray, stop: int | None = None) -> N
         return Noise(sigma=float("nan"), inflation=1.0, resolution=0.0, window=WINDOW, moves=False)
     sigma, window = scatter(y), window_of(float(t[-1] - t[0]))
     steps = np.diff(np.unique(y))
-    # rounding of the arithmetic is no resolution
+    # rounding errors of the arithmetic are not a resolution
     steps = steps[steps > 1e-9 * max(1.0, float(np.abs(y).max()))]
     resolution = float(steps.min()) if steps.size else 0.0
     bend = len(y) if stop is None else int(there[: stop + 1].sum())
@@ -193,15 +193,15 @@ def noise_of(time: FloatArray, values: FloatArray, stop: int | None = None) -> N
 
 
 def _means(t: FloatArray, y: FloatArray, window: float) -> tuple[FloatArray, FloatArray]:
-    """Return means over one window after the other, and of how many rows each is."""
+    """Return means over consecutive windows, and the number of rows of each."""
     _, block, rows = np.unique(np.floor((t - t[0]) / window), return_inverse=True, return_counts=True)
     return np.bincount(block, y) / rows, rows.astype(np.float64)
 
 
 def _scatter_of_means(parts: Sequence[FloatArray]) -> float:
-    """Return the standard deviation of means by their third differences, robustly; 0 if they are too few.
+    """Return the robust standard deviation of means from their third differences; 0 if there are too few.
 
-    Of long series those of means that lie apart are taken: means next to each other may still hang together.
+    In long series, means at a distance are compared, because neighbouring means may still be correlated.
     """
     differences = []
     for means in parts:
@@ -212,13 +212,13 @@ def _scatter_of_means(parts: Sequence[FloatArray]) -> float:
 
 
 def _moves(means: FloatArray, white: float, rows: int, own: float) -> bool:
-    """Return whether means move: the last third compared with the first, or any two, beyond their standard errors."""
+    """Return whether means differ, last third from first third or any two, beyond their standard errors."""
     third = max(1, len(means) // 3)
     rise = abs(float(means[-third:].mean() - means[:third].mean())) / np.sqrt(2.0 / third)
     span = float(np.ptp(means)) / np.sqrt(2.0)
     pairs = max(len(means) * (len(means) - 1), 2)
     for found, risk in ((rise, RISK / 4.0), (span, RISK / 2.0 / pairs)):
-        # what the noise is known from: so many differences, robustly
+        # degrees of freedom of the noise: number of differences in its robust estimate
         errors = ((white, rows / 4.0), (own, len(means) / 4.0))
         if found > max(1e-9, *(u * float(student.isf(risk, max(2.0, df))) for u, df in errors)):
             return True
@@ -226,15 +226,15 @@ def _moves(means: FloatArray, white: float, rows: int, own: float) -> bool:
 
 
 def zero_of(time: FloatArray, values: FloatArray, noise: Noise, *, rests: bool = True) -> Zero:
-    """Return the state at the last of some rows, from the rows in the window before it.
+    """Return the state at the last of the rows given, from the rows in the window before it.
 
     Parameters
     ----------
     time, values : ndarray of shape (n_rows,)
-        Up to the row in which the test begins; nan where missing.
+        Rows up to the one in which the test begins; nan where missing.
     noise : Noise
     rests : bool
-        The machine has been at rest all the time, so that the mean gives its state; else a straight line is fitted.
+        The machine has been at rest all the time, so that the mean is its state; otherwise a straight line is fitted.
 
     Returns
     -------
@@ -254,23 +254,23 @@ def zero_of(time: FloatArray, values: FloatArray, noise: Noise, *, rests: bool =
 def average_test(
     time: FloatArray, values: FloatArray, start: int, stop: int, *, rests: bool, smooth: bool = False
 ) -> AveragedCurve:
-    """Average the curve of a test, on both sides of the row in which the drives stop, and count it from its zero.
+    """Average the curve of a test, separately before and after the drives stop, and subtract its zero.
 
     Parameters
     ----------
     time, values : ndarray of shape (n_rows,)
-        With the rows before the test; nan where missing.
+        Including the rows before the test; nan where missing.
     start, stop : int
-        Rows in which the drives start and stop; `stop` is the last one if they do not.
+        Rows in which the drives start and stop; `stop` is the last row if they do not stop.
     rests : bool
         The machine has rested in all rows before `start`.
     smooth : bool
-        Nothing happens in the row `start`: the zero comes from the rows after it.
+        The curve has no bend in the row `start`: the zero is taken from the rows after it.
 
     Returns
     -------
     AveragedCurve
-        From `start` on.
+        The curve from `start` on.
     """
     parts = (slice(None, start + 1), slice(start + 1, stop + 1), slice(stop + 1, None))
     clean = np.concatenate([replace_outliers(values[part]) for part in parts])
@@ -281,7 +281,7 @@ def average_test(
     else:
         zero = zero_of(time[: start + 1], clean[: start + 1], noise, rests=rests)
     there = np.flatnonzero(np.isfinite(y))
-    if not zero.rows and there.size:  # no value at the start of the test: the first one
+    if not zero.rows and there.size:  # without a value at the start of the test, use the first value
         zero = Zero(float(y[there[0]]), float(noise.of_mean(1.0)), 1)
     run, run_u = average_curve(t[: stop - start + 1], y[: stop - start + 1], noise)
     rest, rest_u = average_curve(t[stop - start :], y[stop - start :], noise)
@@ -293,11 +293,11 @@ def average_test(
 
 
 def average_curve(time: FloatArray, values: FloatArray, noise: Noise) -> tuple[FloatArray, FloatArray]:
-    """Average a curve that begins in its first row and continues smoothly to its last one.
+    """Average a curve that is smooth from its first to its last row.
 
-    A row is the mean over the window around it. Towards the first row, in which the drives start or stop, the window
-    narrows, so that what came before is not mixed in; towards the last one it stays where it is, and a straight line
-    through it is followed.
+    The average at a row is the mean over the window around it. Towards the first row, in which the drives start or
+    stop, the window narrows, so that earlier values are not mixed in; near the last row, a straight line is fitted to
+    the last window.
 
     Parameters
     ----------
@@ -308,7 +308,7 @@ def average_curve(time: FloatArray, values: FloatArray, noise: Noise) -> tuple[F
     Returns
     -------
     averaged : ndarray of shape (n_rows,)
-        nan where `values` is.
+        nan where `values` is nan.
     u : ndarray of shape (n_rows,)
         Standard uncertainty.
     """
@@ -327,16 +327,16 @@ def average_curve(time: FloatArray, values: FloatArray, noise: Noise) -> tuple[F
     near = t >= t[-1] - noise.window - 1e-6
     if near.sum() >= 4 and not near.all():
         mean[end], error[end] = _line(t[near], y[near], noise, t[end])
-    else:  # too few rows for a line: the rows themselves
+    else:  # too few rows for a line: use the rows themselves
         mean[end], error[end] = y[end], noise.of_mean(1.0)
     out[there], u[there] = mean, error
     return out, u
 
 
 def _line(t: FloatArray, y: FloatArray, noise: Noise, at: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the straight line through some rows, and its standard uncertainty, at other times."""
+    """Return the straight line through the rows given, and its standard uncertainty, at other times."""
     centre, away = t.mean(), at - t.mean()
     spread = float(((t - centre) ** 2).sum())
     slope = float(((t - centre) * (y - y.mean())).sum() / spread)
-    # as many rows as a mean of the same uncertainty would have
+    # converted to the number of rows of a mean with the same uncertainty
     return y.mean() + slope * away, noise.of_mean(1.0 / (1.0 / len(t) + away**2 / spread))

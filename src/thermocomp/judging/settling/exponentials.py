@@ -1,4 +1,4 @@
-"""One or two exponentials through a curve that settles, by least squares."""
+"""Least-squares fit of one or two exponentials to a settling curve."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ class Exponential:
     amplitude, tau : float
         [unit of the channel], [s].
     amplitude_error, tau_error : float
-        Their standard errors.
+        Standard errors of the two.
     """
 
     amplitude: float
@@ -40,7 +40,7 @@ class ExponentialFit:
     start : float
         Value at the start [unit].
     terms : tuple of Exponential
-        The faster first.
+        The faster one first.
     r_squared : float
     rms : float
         RMS of the residual [unit].
@@ -60,35 +60,34 @@ class ExponentialFit:
 
     @property
     def final(self) -> float:
-        """Value it tends to [unit]."""
+        """Final value that the curve approaches [unit]."""
         return self.start + sum(e.amplitude for e in self.terms)
 
     @property
     def reliable(self) -> bool:
-        """True if no time constant is longer than the phase, and none less sure than half of itself."""
+        """True if no time constant exceeds the duration, and no standard error exceeds half its time constant."""
         return all(e.tau <= self.duration and e.tau_error <= 0.5 * e.tau for e in self.terms)
 
 
 def fit(t: FloatArray, y: FloatArray) -> tuple[ExponentialFit | None, ExponentialFit | None]:
     """Fit one and two exponentials by least squares.
 
-    Time constants are sought between the shortest interval and ten times the duration; amplitudes follow from them
-    (they are linear), so that the search has one or two unknowns and cannot get lost. Standard errors count the
-    residual as so many independent rows as its autocorrelation leaves: neighbouring rows of a drift are almost the
-    same.
+    Time constants are sought between the shortest interval and ten times the duration; the amplitudes are linear and
+    follow from them, so that the search has one or two unknowns only and is robust. Standard errors are based on the
+    effective sample size of the residual, given its autocorrelation: neighbouring rows of a drift are almost equal.
 
     Parameters
     ----------
     t : ndarray of shape (n_rows,)
-        Since the start, rising [s].
+        Time since the start, in ascending order [s].
     y : ndarray of shape (n_rows,)
 
     Returns
     -------
     one : ExponentialFit or None
     two : ExponentialFit or None
-        None if the second exponential is not called for: BIC does not fall by it, or the two time constants are nearer
-        than a factor of two, or an amplitude is below twice its standard error.
+        None if the second exponential is not justified: it does not lower the BIC, or the two time constants differ by
+        less than a factor of two, or an amplitude is below twice its standard error.
     """
     bounds = (float(np.log(np.diff(t).min())), float(np.log(10.0 * t[-1])))
     grid = np.linspace(*bounds, 16)
@@ -109,7 +108,7 @@ def fit(t: FloatArray, y: FloatArray) -> tuple[ExponentialFit | None, Exponentia
 def _least_squares(
     t: FloatArray, y: FloatArray, starts: list[tuple[float, ...]], bounds: tuple[float, float]
 ) -> ExponentialFit | None:
-    """Fit as many exponentials as a start has logarithms of time constants."""
+    """Fit exponentials; each start has one logarithm of a time constant per exponential."""
     k = len(starts[0])
     if len(y) < 2 * k + 3:
         return None
@@ -124,7 +123,7 @@ def _least_squares(
     design = np.column_stack([np.ones(len(t)), 1.0 - decay])
     level, *amplitudes = np.linalg.lstsq(design, y, rcond=None)[0]
     left = y - design @ [level, *amplitudes]
-    # rows that depend on each other count for fewer: the sum of squares is shared among the independent ones
+    # correlated rows: the sum of squares is divided by the effective degrees of freedom
     variance = float(left @ left) / max(effective_sample_size(left) - 2 * k - 1, 1.0)
     jacobian = np.column_stack([design, -np.array(amplitudes) * decay * t[:, None] / tau**2])
     size = np.linalg.norm(jacobian, axis=0)

@@ -1,8 +1,8 @@
-"""Time constants: how fast each channel settles after the drives start or stop.
+"""Time constants: settling of each channel after the drives start or stop.
 
-Three answers to one question, so that they check each other: the times to 63 % and 90 % are read from the curve itself,
-without a model; then one and two exponentials are fitted. None of it is prescribed by ISO 230-3: all symbols are ours.
-The curve is averaged over minutes first (`thermocomp.judging.settling.averaging`): no single row decides anything.
+Three results that check each other: the times to 63 % and 90 % are read from the curve itself, without a model; then
+one and two exponentials are fitted. None of this is prescribed by ISO 230-3: all symbols are specific to thermocomp.
+The curve is first averaged over minutes (`thermocomp.judging.settling.averaging`): no single row is decisive.
 """
 
 import math
@@ -22,15 +22,15 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 Kind = Literal["warm-up", "cool-down"]
-#: a shorter stop does not end a warm-up (the speed spectrum of a spindle test has some), a shorter run starts none [s]
+#: shorter stops (a spindle test with a speed spectrum has some) do not end a warm-up, shorter runs do not start one [s]
 INTERRUPTION = 1200.0
-#: a curve is settled if it stays this near to its last value over the last quarter, as a share of its whole change
+#: tolerance about the last value over the last quarter of a settled curve, as a fraction of its whole change
 SETTLED = 0.05
-#: a channel has to change by so many times its standard uncertainty before its times are told
+#: minimum change of a channel, as a multiple of its standard uncertainty, for times to be reported
 CLEAR = 10.0
-#: a curve overshoots if it goes beyond its last value by more than this share of its whole change: the band of t90
+#: an overshooting curve exceeds its last value by more than this fraction of its whole change: the band of t90
 OVERSHOOT = 0.1
-_ROWS = 8  # fewer are not fitted
+_ROWS = 8  # minimum number of rows for a fit
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Phase:
     ----------
     kind : {'warm-up', 'cool-down'}
     number : int
-        Number among those of its kind, from 1.
+        Number among the phases of its kind (1-based).
     start, end : int
         Row of the initial state, and last row.
     """
@@ -54,37 +54,37 @@ class Phase:
 
 @dataclass(frozen=True)
 class Settling:
-    """Transition of a channel between two states in a phase; without the later values it has too few rows.
+    """Transition of a channel between two states in a phase; with too few rows, the values below keep their defaults.
 
     Parameters
     ----------
     channel, unit : str
     phase : Phase
     change : float
-        Value at the end minus that at the start, both averaged [unit].
+        Value at the end minus value at the start, both averaged [unit].
     uncertainty : float
         Uncertainty of `change`, expanded (k = 2) [unit].
     noise : float
         Standard deviation from row to row [unit].
     moves : bool
-        Its averages differ by more than their noise; see `thermocomp.judging.settling.averaging.Noise`.
+        The averages differ by more than their noise; see `thermocomp.judging.settling.averaging.Noise`.
     clear : bool
-        They differ by at least `CLEAR` times the standard uncertainty of `change`; if not, there is no time to be read
-        and nothing is fitted.
+        They differ by at least `CLEAR` times the standard uncertainty of `change`; otherwise no times are read and
+        nothing is fitted.
     returns : bool
-        It ends nearer to its start than to its extreme: there is no one time that describes it.
+        It ends closer to its start than to its extreme: no single time describes it.
     overshoots : bool
-        It goes beyond its last value by more than a tenth of its change, and then settles back: when it first passed
-        90 % says nothing of when it settled, so that no times are told.
+        It exceeds its last value by more than a tenth of its change, and then settles back: the time at which 90 %
+        are first reached is then not a settling time, so no times are reported.
     settled : bool
-        Over the last quarter of the phase it stays within `SETTLED` of its change from its last value, and a straight
-        line through it rises by no more; noise is allowed for. An exponential is settled by this rule from 3.3 time
-        constants on, 4 % before its final value.
+        Over the last quarter of the phase it stays within `SETTLED` of its change about its last value, and a straight
+        line through it rises by no more; noise is allowed for. By this rule an exponential is settled after 3.3 time
+        constants, 4 % before its final value.
     t63, t90 : float
-        When 63.2 % and 90 % of the change were first reached, since the start [s]. Of the change up to the end: if the
-        channel has not settled, the true ones are later; nan if it is not clear, returns or overshoots.
+        Times since the start at which 63.2 % and 90 % of the change up to the end were first reached [s]; if the
+        channel has not settled, the true times are longer. nan if it is not clear, returns or overshoots.
     one, two : ExponentialFit or None
-        None if it could not be fitted; `two` also if a second exponential is not called for.
+        None if it could not be fitted; `two` also if a second exponential is not justified.
     """
 
     channel: str
@@ -118,9 +118,9 @@ class Settling:
 
 
 def find_driven_rows(recording: Recording) -> BoolArray | None:
-    """Return the rows in which the spindle turns or an axis moves, (n_rows,); None if nothing was recorded of it.
+    """Return the rows in which the spindle turns or an axis moves, (n_rows,); None if neither was recorded.
 
-    On is: above 2 % of the highest speed or feed. A row without a value counts as the one before it.
+    The threshold is 2 % of the highest speed or feed. A row without a value counts as the one before it.
     """
     channels = (*recording.of_quantity("spindle_speed"), *recording.of_quantity("feed"))
     if not channels:
@@ -138,19 +138,20 @@ def find_driven_rows(recording: Recording) -> BoolArray | None:
 def find_phases(recording: Recording, interruption: float = INTERRUPTION) -> tuple[Phase, ...]:
     """Split a recording into warm-ups and cool-downs.
 
-    A row tells what led to it: a phase begins in the row before the drives start or stop. What comes before the first
-    start belongs to no phase. Shorter stops than `interruption` do not end a warm-up, shorter runs do not start one.
+    A row describes the interval before it: a phase begins in the row before the drives start or stop. Rows before the
+    first start belong to no phase. Stops shorter than `interruption` do not end a warm-up, shorter runs do not start
+    one.
 
     Parameters
     ----------
     recording : Recording
     interruption : float
-        [s]
+        Shortest stop or run that counts [s].
 
     Returns
     -------
     tuple of Phase
-        Empty if the drives never run, or nothing was recorded of them.
+        Empty if the drives never run, or were not recorded.
     """
     on = find_driven_rows(recording)
     if on is None or not on.any():
@@ -176,20 +177,20 @@ def find_phases(recording: Recording, interruption: float = INTERRUPTION) -> tup
 def time_constants(
     recording: Recording, phases: tuple[Phase, ...] | None = None, leave_out: Collection[str] = ()
 ) -> tuple[Settling, ...]:
-    """Read and fit the time constants of every temperature, displacement and angle in every phase.
+    """Determine the time constants of every temperature, displacement and angle in every phase.
 
     Parameters
     ----------
     recording : Recording
     phases : tuple of Phase, optional
-        Those of `find_phases` if not given.
+        Default: the result of `find_phases`.
     leave_out : collection of str
-        Channels that are not asked for.
+        Channels to be omitted.
 
     Returns
     -------
     tuple of Settling
-        Phase by phase, channel by channel.
+        Ordered by phase, then by channel.
     """
     phases = find_phases(recording) if phases is None else phases
     channels = [
@@ -200,7 +201,7 @@ def time_constants(
     values = recording.values(channels)
     found = []
     for number, p in enumerate(phases):
-        # the phase before may have left the machine moving; before the first one it has rested
+        # the machine may still move after the previous phase; before the first one it has rested
         earliest = phases[number - 1].start if number else 0
         begin = earliest + int(np.searchsorted(recording.time[earliest : p.start], recording.time[p.start] - WINDOW))
         rows, lead = slice(begin, p.end + 1), p.start - begin
@@ -219,14 +220,14 @@ def settle(
     lead: int = 0,
     rests: bool = True,
 ) -> Settling:
-    """Read and fit the time constants of one channel in one phase.
+    """Determine the time constants of one channel in one phase.
 
     Parameters
     ----------
     time : ndarray of shape (n_rows,)
         [s]
     values : ndarray of shape (n_rows,)
-        nan where missing; such rows are passed over.
+        nan where missing; such rows are ignored.
     channel, unit : str
     phase : Phase
     lead : int
@@ -275,12 +276,12 @@ def settle(
 
 
 def _rests(t: FloatArray, y: FloatArray, curve: FloatArray, limit: float, noise: Noise) -> bool:
-    """Return whether a curve neither leaves its last value nor creeps on, by more than a limit."""
+    """Return whether a curve stays within a limit of its last value and its trend does not exceed the limit."""
     if len(t) < 2:
         return False
     rise = float(np.polyfit(t - t.mean(), y, 1)[0] * (t[-1] - t[0]))
     creeps = abs(rise) > max(limit, np.sqrt(12.0) * K * float(noise.of_mean(len(t))))
-    # the line at the end is twice as unsure as a mean
+    # a line has twice the uncertainty of a mean at its end
     width = limit + 3.0 * np.sqrt(5.0) * float(noise.of_mean(np.mean(np.abs(t - t[-1]) <= noise.window) * len(t)))
     return bool(not creeps and np.abs(curve - curve[-1]).max() <= width)
 

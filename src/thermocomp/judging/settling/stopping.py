@@ -1,9 +1,9 @@
-"""When a running test may stop: the steady state is predicted, with its uncertainty.
+"""Stopping of a running test: prediction of the steady state and its uncertainty.
 
-The best exponentials through a curve that has not settled say a final value, and by their standard errors seem sure of
-it; others fit nearly as well and end elsewhere. So all pairs of time constants are tried, and each counts by how well
-it fits (its likelihood, with as many independent rows as the residual leaves): mean and spread of their final values
-are what is known of the steady state.
+The best exponentials through a curve that has not settled give a final value with a small standard error; others fit
+nearly as well and end elsewhere. Therefore all pairs of time constants are tried and weighted by the quality of their
+fit (likelihood, with the effective sample size of the residual): the mean and the spread of their final values are the
+estimate of the steady state.
 """
 
 from collections.abc import Sequence
@@ -22,13 +22,13 @@ from thermocomp.recordings.recording import Recording
 
 FloatArray = NDArray[np.float64]
 
-#: expanded uncertainty of the steady state with which a phase may end: this share of the largest change ...
+#: expanded uncertainty of the steady state at which a phase may end: this fraction of the largest change ...
 SHARE = 0.1
-#: ... but no less than this [um]
+#: ... but at least this [um]
 LEAST = 1.0
-#: of a machine under its spindle's heat; slower is the room [s]
+#: largest time constant of a machine heated by its spindle [s]; slower changes are due to the room
 SLOWEST = 6 * 3600.0
-#: fewer rows, or a shorter time, say nothing [s]
+#: minimum number of rows, and minimum duration, for an estimate [s]
 ROWS, SHORTEST = 10, 1800.0
 _TAUS = 18
 K = 2.0
@@ -41,13 +41,13 @@ class SteadyState:
     Parameters
     ----------
     final : float
-        Value it tends to, counted from the start of the phase [unit].
+        Value that it approaches, relative to the start of the phase [unit].
     uncertainty : float
-        Expanded uncertainty of that (k = 2) [unit]; inf where too little was recorded.
+        Expanded uncertainty of the final value (k = 2) [unit]; inf if too little was recorded.
     change : float
-        Last value, counted from the start of the phase [unit].
+        Last value, relative to the start of the phase [unit].
     largest : float
-        The largest change so far, in absolute value [unit].
+        Largest change so far, in absolute value [unit].
     """
 
     final: float
@@ -57,23 +57,23 @@ class SteadyState:
 
     @property
     def limit(self) -> float:
-        """Uncertainty that is enough [unit]."""
+        """Largest sufficient uncertainty [unit]."""
         return max(SHARE * max(self.largest, abs(self.final)), LEAST)
 
     @property
     def known(self) -> bool:
-        """It is known well enough."""
+        """True if the steady state is known with sufficient accuracy."""
         return self.uncertainty <= self.limit
 
 
 @dataclass(frozen=True)
 class Running:
-    """Whether the phase of a running test may end.
+    """Decision whether the phase of a running test may end.
 
     Parameters
     ----------
     phase : Phase
-        The last one: a warm-up or a cool-down.
+        Last phase of the test: a warm-up or a cool-down.
     seconds : float
         Duration so far [s].
     states : tuple of (str, SteadyState)
@@ -86,11 +86,11 @@ class Running:
 
     @property
     def may_stop(self) -> bool:
-        """The steady state of all targets is known."""
+        """True if the steady state of all targets is known."""
         return all(state.known for _, state in self.states)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it for a program: what ``--json`` prints."""
+        """Return all results as a dict, as printed by ``--json``."""
         return {
             "phase": self.phase.kind,
             "hours": self.seconds / 3600,
@@ -119,7 +119,7 @@ def foretell(time: FloatArray, values: FloatArray) -> SteadyState:
     Parameters
     ----------
     time : ndarray of shape (n_rows,)
-        Since the start of the phase, rising [s].
+        Time since the start of the phase, in ascending order [s].
     values : ndarray of shape (n_rows,)
         nan where missing.
 
@@ -135,7 +135,7 @@ def foretell(time: FloatArray, values: FloatArray) -> SteadyState:
     change, largest = float(y[-1]), float(np.abs(y).max())
     if len(y) < ROWS or t[-1] - t[0] < SHORTEST:
         return SteadyState(float("nan"), float("inf"), change, largest)
-    if len(t) > 400:  # neighbouring rows say the same: means of blocks are as good
+    if len(t) > 400:  # neighbouring rows are almost equal: means of blocks are as good
         block = np.arange(len(t)) * 400 // len(t)
         count = np.bincount(block)
         t, y = np.bincount(block, t) / count, np.bincount(block, y) / count
@@ -155,7 +155,7 @@ def foretell(time: FloatArray, values: FloatArray) -> SteadyState:
     likelihood = np.exp(-0.5 * n * np.log(np.maximum(squares, floor) / floor))
     likelihood /= likelihood.sum()
     final = float(likelihood @ finals)
-    own = np.array(errors) * len(t) / n * floor / max(len(t) - 5.0, 1.0)  # rows that depend on each other count less
+    own = np.array(errors) * len(t) / n * floor / max(len(t) - 5.0, 1.0)  # correlated rows count less
     variance = float(likelihood @ ((np.array(finals) - final) ** 2 + own))
     return SteadyState(final, K * float(np.sqrt(variance)), change, largest)
 
@@ -168,7 +168,7 @@ def judge_running(recording: Recording, targets: Sequence[str]) -> Running:
     recording : Recording
         Recording of the test, up to now.
     targets : sequence of str
-        Displacements.
+        Names of displacement channels.
 
     Returns
     -------
@@ -177,7 +177,7 @@ def judge_running(recording: Recording, targets: Sequence[str]) -> Running:
     Raises
     ------
     InputError
-        The spindle has not started, nothing was recorded of it, or there is no such channel.
+        The spindle has not started or was not recorded, or there is no such channel.
     """
     phases = find_phases(recording, SPLITS)
     if not phases:

@@ -1,4 +1,4 @@
-"""Common part of connections: status, and time of its last change."""
+"""Common part of connections: the status and the time of its last change."""
 
 import time
 from dataclasses import dataclass, field
@@ -19,6 +19,6 @@ class Connection:
     now: LinkStatus = field(default=LinkStatus("closed"))
 
     def to(self, state: Literal["closed", "connecting", "connected", "failed"], reason: str = "") -> None:
-        """Set the status from now on."""
+        """Set the status; the time is recorded if the status differs from the previous one."""
         if (self.now.state, self.now.reason) != (state, reason):
             self.now = LinkStatus(state, reason, time.time())

@@ -1,4 +1,4 @@
-"""Readings and corrections as JSON messages: bounded, and nothing is guessed at."""
+"""Readings and corrections as JSON messages: bounded in size and validated strictly."""
 
 import json
 import math
@@ -11,15 +11,15 @@ from thermocomp.core.reading import Measurement, Reading
 from thermocomp.core.shown import escape, explain_unfit
 from thermocomp.core.strictjson import parse_json
 
-#: bytes of a message, and values in it, at most
+#: maximum size [bytes] and number of values of a message
 MOST_BYTES, MOST_VALUES = 65_536, 1_000
-#: numbers of a measurement, and what they are if it does not say; it has to say the first
+#: numbers of a measurement and their defaults; the first is mandatory
 _NUMBERS = {"measured_um": None, "repeatability_um": 0.5, "position_mm": 0.0}
-#: no tool point is further off [um]
+#: maximum deviation of a tool point [um]
 _FAR = 1e5
 _LINES = str.maketrans("\t\r\n", "   ")
 _KNOWN = {"time", "id", "target", "under_correction", *_NUMBERS}
-#: characters of an id
+#: maximum length of an id [characters]
 _LONG = 200
 
 
@@ -29,18 +29,18 @@ def read_message(payload: bytes | str, arrived: float, names: Mapping[str, str])
     Parameters
     ----------
     payload : bytes or str
-        JSON: values by channel, such as ``{"t1_C": 21.3, "spindle_rpm": 4000}``; with ``time`` (s since 1970) when
-        it was taken. What is not a number is missing.
+        JSON: values by channel, such as ``{"t1_C": 21.3, "spindle_rpm": 4000}``, optionally with ``time`` (s since
+        1970), the time of sampling. A value that is not a number counts as missing.
     arrived : float
-        Present time of the clock [s]: used if the message has none.
+        Present time of the clock [s], used if the message has no time.
     names : mapping of str to str
-        Channel by the name in the message, for those that are called otherwise there.
+        Channel by the name in the message, for names that differ.
 
     Raises
     ------
     ReadingError
-        It is too large, no JSON, no table, or has text that is not text: invalid UTF-8, half a surrogate pair, control
-        characters, names that are too long.
+        Message too large, not JSON or not a table, or invalid text: not UTF-8, an unpaired surrogate, control
+        characters, or a name that is too long.
     """
     content = _table(payload, '{"t1_C": 21.3}')
     if len(content) > MOST_VALUES:
@@ -58,16 +58,16 @@ def read_measurement(payload: bytes | str, arrived: float) -> Measurement:
     Parameters
     ----------
     payload : bytes or str
-        JSON: ``{"target": "z_um", "measured_um": 3.2, "under_correction": true}``; with ``repeatability_um``,
-        ``position_mm``, ``time`` (s since 1970) and ``id`` (text or a whole number) if they are known. The id or the
-        time tells it from others, without them its content.
+        JSON: ``{"target": "z_um", "measured_um": 3.2, "under_correction": true}``; optionally with
+        ``repeatability_um``, ``position_mm``, ``time`` (s since 1970) and ``id`` (text or a whole number). A
+        measurement is identified by its id or time, or by its content if it has neither.
     arrived : float
-        Present time of the clock [s]: used if the message has none.
+        Present time of the clock [s], used if the message has no time.
 
     Raises
     ------
     ReadingError
-        It is too large, no JSON, or not such a table: whether it was measured under the correction has to be in it.
+        Message too large, not JSON, or not such a table; ``under_correction`` is mandatory.
     """
     example = '{"id": "17", "target": "z_um", "measured_um": 3.2, "under_correction": true}'
     content = _table(payload, example)
@@ -124,7 +124,7 @@ def _table(payload: bytes | str, example: str) -> dict[str, Any]:
 
 
 def _is_text(value: str) -> bool:
-    """Return whether a value, which may have lines, has nothing else that cannot be printed."""
+    """Return whether a value is printable apart from tabs and line breaks."""
     return value.translate(_LINES).isprintable()
 
 

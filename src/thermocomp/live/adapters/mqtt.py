@@ -1,4 +1,4 @@
-"""MQTT: readings in, corrections out, as plain JSON."""
+"""MQTT: incoming readings and outgoing corrections as plain JSON."""
 
 import asyncio
 import time
@@ -19,7 +19,7 @@ from thermocomp.live.adapters.messages import read_message, write_message
 
 @dataclass(kw_only=True)
 class Broker:
-    """Address of a broker, and its topics.
+    """Address of a broker, and a topic on it.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class Broker:
         """Close the connection; idempotent."""
         client, self._client = self._client, None
         if client is not None:
-            with suppress(aiomqtt.MqttError, OSError, TimeoutError):  # it was lost before
+            with suppress(aiomqtt.MqttError, OSError, TimeoutError):  # connection lost earlier
                 await client.__aexit__(None, None, None)
         self._connection.to("closed")
 
@@ -83,13 +83,13 @@ class MqttSource(Broker):
     """
 
     names: dict[str, str] = field(default_factory=dict)
-    refused: int = field(default=0, init=False)  #: messages that were none
+    refused: int = field(default=0, init=False)  #: number of invalid messages
     last_refusal: str = field(default="", init=False)
 
     async def readings(self) -> AsyncIterator[Reading]:
-        """Return readings as they come, until the broker is lost.
+        """Return readings as they arrive, until the connection to the broker is lost.
 
-        A message that the broker kept from before counts only if it says when it was taken.
+        A message retained by the broker is used only if it contains its time of sampling.
         """
         client = self._connected()
         try:

@@ -11,7 +11,7 @@ from thermocomp.core.exceptions import SettingError
 from thermocomp.core.ports import Sink, Source
 
 Names = dict[str, str]
-#: bytes of a topic, as MQTT counts them; characters of a host name, and of what stands between two dots
+#: maximum length of a topic [bytes in MQTT], of a host name and of one label of it [characters]
 _TOPIC, _HOST, _LABEL = 65_535, 253, 63
 
 
@@ -40,7 +40,7 @@ class OnBroker:
             raise SettingError(f"port = {self.port}: expected a port from 1 to 65535")
 
     def hears(self, other: "OnBroker") -> bool:
-        """Return whether messages published to another's topic come back on this one, judged by the names."""
+        """Return whether messages published to the topic of `other` are received on this topic, judged by the names."""
         levels, topic = self.topic.split("/"), other.topic.split("/")
         levels = levels[2:] if levels[0] == "$share" else levels
         fits = all(level in ("+", "#", found) for level, found in zip(levels, topic, strict=False))
@@ -58,9 +58,9 @@ class MqttIn(OnBroker):
         As for `OnBroker`.
     kind : {'mqtt'}
     names : dict of str to str
-        Channel by the name in the message, for those that are called otherwise there.
+        Channel by the name in the message, for names that differ.
     virtual : bool
-        It is a virtual machine that talks there, and may run faster than the world (`Config.speed`).
+        The publisher is a virtual machine, which may run faster than real time (`Config.speed`).
     """
 
     kind: Literal["mqtt"]
@@ -72,8 +72,8 @@ class MqttIn(OnBroker):
         if twice := [name for name, count in Counter(self.names.values()).items() if count > 1]:
             raise SettingError(f"names: several values for {', '.join(sorted(twice))}: expected one for each channel")
 
-    def open(self, folder: Path, speed: float) -> Source:  # noqa: ARG002 - of a section
-        """Make the source."""
+    def open(self, folder: Path, speed: float) -> Source:  # noqa: ARG002 - part of the interface
+        """Create the source; it connects later."""
         from thermocomp.live.adapters.mqtt import MqttSource
 
         return MqttSource(topic=self.topic, host=self.host, port=self.port, names=dict(self.names))
@@ -107,8 +107,8 @@ class MqttOut(OnBroker):
     published: ClassVar[bool] = True
     kind: Literal["mqtt"]
 
-    def open(self, folder: Path) -> Sink:  # noqa: ARG002 - of a section
-        """Make the sink."""
+    def open(self, folder: Path) -> Sink:  # noqa: ARG002 - part of the interface
+        """Create the sink; it connects later."""
         from thermocomp.live.adapters.mqtt import MqttSink
 
         return MqttSink(topic=self.topic, host=self.host, port=self.port)
@@ -121,7 +121,7 @@ def explain_topic(topic: str, *, published: bool) -> str:
     ----------
     topic : str
     published : bool
-        It is published to, so that wildcards have no meaning.
+        Topic for publishing, where wildcards are not allowed.
     """
     return next(_faults_of_topic(topic, published=published), "")
 

@@ -26,7 +26,7 @@ from thermocomp.virtual.protocolfile import read_protocol
 
 @dataclass(kw_only=True)
 class Played:
-    """Rows that are played back, each at its time.
+    """Rows played back at their times.
 
     Parameters
     ----------
@@ -37,17 +37,17 @@ class Played:
     speed: float = 1.0
     _connection: Connection = field(default_factory=Connection, init=False, repr=False)
     _rows: Iterator[tuple[float, dict[str, float]]] | None = field(default=None, init=False, repr=False)
-    _at: float = field(default=-math.inf, init=False, repr=False)  #: row that was played last [s]
+    _at: float = field(default=-math.inf, init=False, repr=False)  #: time of the row played last [s]
     _broken: ThermocompError | None = field(default=None, init=False, repr=False)
     _begun: float = field(default=math.nan, init=False, repr=False)  #: clock at which the row of time 0 was due [s]
 
     def _open(self) -> Iterator[tuple[float, dict[str, float]]]:
         raise NotImplementedError
 
-    async def connect(self, timeout: float) -> None:  # noqa: ARG002 - of the port
-        """Begin with the first row, or continue after the last that was played."""
+    async def connect(self, timeout: float) -> None:  # noqa: ARG002 - part of the interface
+        """Start with the first row, or continue after the row played last."""
         self._connection.to("connecting")
-        if self._broken is not None:  # what cannot be read once cannot be read later, and it is not played again
+        if self._broken is not None:  # an unreadable recording stays unreadable, and is not played again
             self._connection.to("failed", str(self._broken))
             raise self._broken
         if self._rows is None:
@@ -59,7 +59,7 @@ class Played:
         self._connection.to("connected")
 
     async def readings(self) -> AsyncIterator[Reading]:
-        """Return rows when they are due, until the last."""
+        """Return rows when they are due, up to the last one."""
         if self._rows is None:
             raise ThermocompError("not connected")
         while (row := self._next()) is not None:
@@ -71,7 +71,7 @@ class Played:
         self._connection.to("closed", "played to its end")
 
     def _next(self) -> tuple[float, dict[str, float]] | None:
-        """Return the next row; None behind the last."""
+        """Return the next row; None after the last one."""
         assert self._rows is not None
         try:
             return next(self._rows, None)
@@ -85,7 +85,7 @@ class Played:
         return self._connection.now
 
     async def close(self) -> None:
-        """Stop; a second time does nothing."""
+        """Stop; idempotent."""
         self._connection.to("closed")
 
 
@@ -111,13 +111,13 @@ class SimulatedSource(Played):
     Parameters
     ----------
     experiment : Experiment
-        Experiment to run; all its tests, one after the other.
+        Experiment to run; all its tests in sequence.
     seed : int
     """
 
     experiment: Experiment
     seed: int = 0
-    #: displacements without noise of the row that was played last: what a probe would find [um]
+    #: noise-free displacements of the row played last, as an ideal probe would measure them [um]
     truth: dict[str, float] = field(default_factory=dict, init=False)
 
     def _open(self) -> Iterator[tuple[float, dict[str, float]]]:
@@ -139,7 +139,7 @@ class SimulatedSource(Played):
 
 @dataclass(kw_only=True)
 class FileSink:
-    """The corrections in force, in a file that is replaced each time: whole, whoever reads it when.
+    """The corrections in force as a file that is replaced atomically each time.
 
     Parameters
     ----------
@@ -149,8 +149,8 @@ class FileSink:
     path: Path
     _connection: Connection = field(default_factory=Connection, init=False, repr=False)
 
-    async def connect(self, timeout: float) -> None:  # noqa: ARG002 - of the port
-        """See whether its folder is there."""
+    async def connect(self, timeout: float) -> None:  # noqa: ARG002 - part of the interface
+        """Check that the folder of the file exists."""
         if not self.path.parent.is_dir():
             reason = f"{self.path}: there is no folder {self.path.parent}"
             self._connection.to("failed", reason)
@@ -182,12 +182,12 @@ class FileSink:
         return self._connection.now
 
     async def close(self) -> None:
-        """Leave the file as it is."""
+        """Close the connection; the file is left as it is."""
         self._connection.to("closed")
 
 
 def read_rows(path: Path) -> Generator[tuple[float, dict[str, float]], None, None]:
-    """Return time [s] and values by channel of a recording in thermocomp's own CSV, row by row as they are read.
+    """Return time [s] and values by channel of a recording in thermocomp's own CSV, read row by row.
 
     Parameters
     ----------
@@ -196,14 +196,14 @@ def read_rows(path: Path) -> Generator[tuple[float, dict[str, float]], None, Non
     Raises
     ------
     InputError
-        It cannot be read, has no times, or names that are none; while rows are read: a line is not text.
+        File unreadable, without times, or with invalid column names; while rows are read: a line is not UTF-8 text.
     """
     try:
         file = path.open("rb")
     except OSError as e:
         raise InputError(f"{path}: cannot be read: {e.strerror or e}") from e
     rows = _rows_of(path, file)
-    next(rows)  # the heading
+    next(rows)  # consume the heading, so that faults in it are raised here
     return rows
 
 
@@ -212,7 +212,7 @@ def _rows_of(path: Path, file: BinaryIO) -> Generator[tuple[float, dict[str, flo
 
     def lines() -> Iterator[str]:
         nonlocal line
-        for line, content in enumerate(file, start=1):  # noqa: B007 - told if it cannot be read
+        for line, content in enumerate(file, start=1):  # noqa: B007 - reported if a line cannot be read
             if not content.startswith(b"#"):
                 yield content.decode("utf-8")
 
@@ -248,7 +248,7 @@ def find_experiment(name: str, folder: Path) -> Experiment:
     Raises
     ------
     InputError
-        There is none, or it cannot be used.
+        Experiment missing or invalid.
     """
     if name.endswith(".toml"):
         return read_protocol(folder / name)

@@ -1,4 +1,4 @@
-"""Measurements of the tool point while the machine runs: from MQTT, and of the virtual machine."""
+"""Measurements of the tool point while the machine runs: from MQTT or from the virtual machine."""
 
 import asyncio
 import random
@@ -19,13 +19,13 @@ from thermocomp.live.adapters.plain import SimulatedSource
 
 @dataclass(kw_only=True)
 class MqttProbe(Broker):
-    """Measurements from a topic; one that the broker kept from before is not taken twice: it is not taken."""
+    """Measurements from a topic; messages retained by the broker are ignored, so that none is used twice."""
 
-    refused: int = field(default=0, init=False)  #: messages that were none
+    refused: int = field(default=0, init=False)  #: number of invalid messages
     last_refusal: str = field(default="", init=False)
 
     async def measurements(self) -> AsyncIterator[Measurement]:
-        """Return measurements as they come, until the broker is lost."""
+        """Return measurements as they arrive, until the connection to the broker is lost."""
         client = self._connected()
         try:
             await client.subscribe(self.topic, qos=1)
@@ -43,14 +43,14 @@ class MqttProbe(Broker):
 
 @dataclass(kw_only=True)
 class SimulatedProbe:
-    """A probe in the virtual machine: it finds the deviation, the correction is not in it.
+    """A probe in the virtual machine: it measures the uncompensated deviation.
 
     Parameters
     ----------
     machine : SimulatedSource
     targets : tuple of str
     every : float
-        Time of the machine between two probings [s].
+        Machine time between two probings [s].
     repeatability : float
         Standard deviation [um].
     """
@@ -61,12 +61,12 @@ class SimulatedProbe:
     repeatability: float
     _connection: Connection = field(default_factory=Connection, init=False, repr=False)
 
-    async def connect(self, timeout: float) -> None:  # noqa: ARG002 - of the port
-        """Connect at once."""
+    async def connect(self, timeout: float) -> None:  # noqa: ARG002 - part of the interface
+        """Set the status to connected."""
         self._connection.to("connected")
 
     async def measurements(self) -> AsyncIterator[Measurement]:
-        """Return a measurement of each target, whenever it is due."""
+        """Return a measurement of each target whenever one is due."""
         noise = random.Random(self.machine.seed)
         while True:
             await asyncio.sleep(self.every / self.machine.speed)
@@ -87,5 +87,5 @@ class SimulatedProbe:
         return self._connection.now
 
     async def close(self) -> None:
-        """Stop; a second time does nothing."""
+        """Stop; idempotent."""
         self._connection.to("closed")

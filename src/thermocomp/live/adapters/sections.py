@@ -1,7 +1,7 @@
-"""Sections of a configuration for what needs no network: the virtual machine, a recording, a file, LinuxCNC.
+"""Configuration sections of adapters without a network: virtual machine, recording, file, LinuxCNC.
 
-A section names what it makes: an entry point of ``thermocomp.sources`` or ``thermocomp.sinks`` leads from its ``kind``
-to its class. The adapter itself is imported when it is opened.
+The ``kind`` of a section is the name of an entry point of ``thermocomp.sources`` or ``thermocomp.sinks``, which names
+its class. The adapter itself is imported when it is opened.
 """
 
 from dataclasses import dataclass
@@ -15,33 +15,33 @@ Names = dict[str, str]
 
 
 class SourceSection(Protocol):
-    """A table ``[[sources]]``: a frozen dataclass with a literal ``kind`` and a default for what may be left out."""
+    """A table ``[[sources]]``: a frozen dataclass with a literal ``kind`` and defaults for optional keys."""
 
     @property
     def kind(self) -> str:
         """Name of the entry point."""
 
     def open(self, folder: Path, speed: float) -> Source:
-        """Make the source; it connects later.
+        """Create the source; it connects later.
 
         Parameters
         ----------
         folder : Path
-            Folder of the configuration: relative paths start from there.
+            Folder of the configuration: relative paths are resolved against it.
         speed : float
-            Seconds of the machine in a second of the world, for what is played back.
+            Machine time per unit of real time, for playback.
         """
 
 
 class SinkSection(Protocol):
-    """A table ``[[sinks]]``: a frozen dataclass with a literal ``kind`` and a default for what may be left out."""
+    """A table ``[[sinks]]``: a frozen dataclass with a literal ``kind`` and defaults for optional keys."""
 
     @property
     def kind(self) -> str:
         """Name of the entry point."""
 
     def open(self, folder: Path) -> Sink:
-        """Make the sink; it connects later."""
+        """Create the sink; it connects later."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,7 +66,7 @@ class SimulatedIn:
             raise SettingError(f"seed = {self.seed}: expected 0 or more")
 
     def open(self, folder: Path, speed: float) -> Source:
-        """Make the source."""
+        """Create the source; it connects later."""
         from thermocomp.live.adapters.plain import SimulatedSource, find_experiment
 
         return SimulatedSource(experiment=find_experiment(self.experiment, folder), seed=self.seed, speed=speed)
@@ -80,14 +80,14 @@ class ReplayIn:
     ----------
     kind : {'replay'}
     file : str
-        In thermocomp's own CSV.
+        File in thermocomp's own CSV.
     """
 
     kind: Literal["replay"]
     file: str
 
     def open(self, folder: Path, speed: float) -> Source:
-        """Make the source."""
+        """Create the source; it connects later."""
         from thermocomp.live.adapters.plain import ReplaySource
 
         return ReplaySource(path=folder / self.file, speed=speed)
@@ -101,7 +101,7 @@ class SimulatedProbing:
     ----------
     kind : {'simulated'}
     every : float
-        Time of the machine between two [s].
+        Machine time between two probings [s].
     repeatability : float
         Repeatability of the probe, standard deviation [um].
     """
@@ -141,7 +141,7 @@ class LinuxCncOut:
             raise SettingError(f'axes = {self.axes}: expected a linear axis for each target, such as {{z_um = "Z"}}')
 
     def open(self, folder: Path) -> Sink:
-        """Make the sink."""
+        """Create the sink; it connects later."""
         from thermocomp.live.adapters.linuxcnc.sink import LinuxCncSink
 
         return LinuxCncSink(path=folder / self.socket, axes=dict(self.axes))
@@ -155,14 +155,14 @@ class FileOut:
     ----------
     kind : {'file'}
     file : str
-        Replaced as a whole each time.
+        File to be replaced atomically each time.
     """
 
     kind: Literal["file"]
     file: str
 
     def open(self, folder: Path) -> Sink:
-        """Make the sink."""
+        """Create the sink; it connects later."""
         from thermocomp.live.adapters.plain import FileSink
 
         return FileSink(path=folder / self.file)

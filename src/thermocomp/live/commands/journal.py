@@ -117,7 +117,7 @@ def _show(reader: "JournalReader", last: int, *, as_json: bool) -> None:
 
 
 def told(stored: "StoredRun", reader: "JournalReader") -> tuple[str, str]:
-    """Return kind and text of a row in readable form."""
+    """Return kind and text of a row, formatted for display."""
     from thermocomp.live.journal.journalrows import (
         MeasurementRow,
         ReferenceRow,
@@ -154,5 +154,5 @@ def _stamp(time: float | None) -> str | None:
         return None
     try:
         return datetime.fromtimestamp(time, UTC).isoformat(timespec="seconds")
-    except (ValueError, OverflowError, OSError):  # a clock that was never set
+    except (ValueError, OverflowError, OSError):  # from a system clock that was never set
         return f"{time:.0f} s"

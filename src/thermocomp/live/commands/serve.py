@@ -113,7 +113,7 @@ async def _run(service: "Service", fades: bool, work: Sequence[Coroutine[Any, An
     fading: list[asyncio.Task[None]] = []
 
     def stop() -> None:
-        if not fades or fading:  # a second signal does not wait
+        if not fades or fading:  # a second stop request skips the fade
             task.cancel()
             return
         console.print("stopping: the corrections go to zero first; stop again not to wait for it")

@@ -1,7 +1,7 @@
-"""The journal of a live compensator: what was read, asked for and in force, kept over kills and full disks.
+"""Journal of a live compensator: readings, demands and corrections in force, resistant to kills and full disks.
 
-Rows wait in memory until `Journal.flush` puts them on the disk in one transaction; then they are confirmed. Whatever
-the disk does, nothing is raised: rows wait as long as there is room for them, and what is lost is counted.
+Rows wait in memory until `Journal.flush` writes them to the disk in one transaction; then they are confirmed. Disk
+faults raise nothing: rows wait while there is memory for them, and lost rows are counted.
 """
 
 import os
@@ -18,9 +18,9 @@ from thermocomp.core.exceptions import InputError, SettingError
 from thermocomp.live.journal.journalreader import APPLICATION, SCHEMA, VERSION, checksum, find_version, numbered, size
 from thermocomp.live.journal.journalrows import Row, StartRow, dumps, kind_of
 
-#: SQLite says of these files that they are none
+#: SQLite error codes of a file that is damaged or not a database
 _DAMAGED = {sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB}
-#: memory of a row that waits, beside its text
+#: memory of a waiting row in addition to its text [bytes]
 _OVERHEAD = 200
 _INSERT = "INSERT OR IGNORE INTO rows (run, seq, time, kind, content, crc) VALUES (?, ?, ?, ?, ?, ?)"
 
@@ -32,11 +32,11 @@ class JournalLimits:
     Parameters
     ----------
     size_bytes : int
-        A file that has become larger is followed by a new one.
+        Size above which a new file is started.
     files : int
-        Maximum number of files: the oldest is removed.
+        Maximum number of files; the oldest is removed.
     waiting_bytes : int
-        Memory of rows that wait for the disk; beyond it the oldest are lost.
+        Memory for rows waiting for the disk; beyond it the oldest rows are dropped.
     """
 
     size_bytes: int = 64 * 2**20
@@ -52,18 +52,18 @@ class JournalLimits:
 class JournalStatus(NamedTuple):
     """Status of a journal."""
 
-    file: Path | None  #: that is written; None: there is none at the moment
+    file: Path | None  #: file being written; None: none at present
     files: int
-    size_bytes: int  #: of all of them
-    confirmed: int  #: rows of this run that are on the disk
-    waiting: int  #: rows that are not yet
-    lost: int  #: rows for which there was no room
-    refused: int  #: rows with something that is no value
-    reason: str  #: why rows wait or were refused; empty if all is well
+    size_bytes: int  #: total size of all files
+    confirmed: int  #: number of rows of this run on the disk
+    waiting: int  #: number of rows not yet on the disk
+    lost: int  #: number of rows dropped for lack of memory
+    refused: int  #: number of invalid rows
+    reason: str  #: reason why rows wait or were refused; empty if there is none
 
 
 class Journal:
-    """A journal, opened to be written: see `open`.
+    """A journal opened for writing: see `open`.
 
     Parameters
     ----------
@@ -85,19 +85,20 @@ class Journal:
         self._odd = self._trouble = ""
         self._connection: sqlite3.Connection | None = None
         self._file: Path | None = None
-        self._sound: Path | None = None  #: was looked through already
+        self._sound: Path | None = None  #: file that has been checked already
         self._adding, self._writing = threading.Lock(), threading.Lock()
 
     @classmethod
     def open(cls, path: str | Path, limits: JournalLimits, start: StartRow) -> Self:
-        """Open a journal, existing or new; a failure of the disk is reported by `status`.
+        """Open a journal, existing or new; disk faults are reported by `status`.
 
-        A file that is damaged or no journal is kept as ``.refused``; one of a newer version stays as it is.
+        A damaged file, or one that is not a journal, is renamed to ``.refused``; one of a newer version is left
+        unchanged.
 
         Parameters
         ----------
         path : str or Path
-            Its files are numbered: ``live.db`` is ``live.000001.db`` and so on.
+            Path of the journal; its files are numbered: ``live.db`` becomes ``live.000001.db`` and so on.
         limits : JournalLimits
         start : StartRow
             Channels of the readings, and compensated targets.
@@ -105,17 +106,17 @@ class Journal:
         Raises
         ------
         InputError
-            `start` cannot be.
+            `start` is invalid.
         """
         journal = cls(Path(path), limits, start)
         journal.flush()
         return journal
 
     def add(self, row: Row) -> None:
-        """Let a row wait for the next `flush`; one that holds no values is counted, and nothing is raised."""
+        """Queue a row for the next `flush`; an invalid row is counted, and nothing is raised."""
         try:
             kind, text, time = kind_of(row), dumps(row, self._described), float(row.time)
-        except Exception as e:  # noqa: BLE001 - whatever is handed in, the service continues
+        except Exception as e:  # noqa: BLE001 - whatever the row, the service continues
             self._refused += 1
             self._odd = f"{type(row).__name__} refused: {e}"
             return
@@ -126,12 +127,12 @@ class Journal:
             self._shed()
 
     def flush(self) -> bool:
-        """Put all rows that wait on the disk, in one transaction; call it from any one thread.
+        """Write all waiting rows to the disk in one transaction; call it from a single thread.
 
         Returns
         -------
         bool
-            True: they are there, and outlast a kill and a loss of power. False: they wait on, see `status`.
+            True: written; the rows survive a kill and a power failure. False: still waiting, see `status`.
         """
         with self._writing:
             with self._adding:
@@ -175,7 +176,7 @@ class Journal:
         )
 
     def close(self) -> None:
-        """Flush, and give the file back; a second time does nothing."""
+        """Flush the journal and close its file; idempotent."""
         if self._connection is not None or self._waiting:
             self.flush()
         with self._writing:
@@ -213,7 +214,7 @@ class Journal:
         return found
 
     def _attach(self, path: Path) -> sqlite3.Connection | None:
-        """Return a file to continue with; None: it is of a newer version, or was set aside."""
+        """Return the connection to a file to be continued; None: of a newer version, or set aside."""
         connection = sqlite3.connect(path, timeout=0.2, isolation_level=None, check_same_thread=False)
         try:
             version = find_version(connection)
@@ -244,7 +245,7 @@ class Journal:
         return connection
 
     def _next(self) -> Path:
-        """Return the name of a file that never was."""
+        """Return a file name that has not been used before."""
         pattern = re.compile(rf"{re.escape(self.path.stem)}\.(\d{{6,}}){re.escape(self.path.suffix)}")
         taken = [int(m[1]) for p in self.path.parent.iterdir() if (m := pattern.match(p.name))]
         return self.path.with_name(f"{self.path.stem}.{max(taken, default=0) + 1:06d}{self.path.suffix}")
@@ -271,7 +272,7 @@ class Journal:
                 self._set_aside(where)
 
     def _set_aside(self, path: Path) -> None:
-        """Keep a file that is damaged under another name, with what belongs to it."""
+        """Rename a damaged file and its companion files."""
         refused = path.with_name(f"{path.name}.refused")
         self._odd = f"{path.name} is damaged or no journal: kept as {refused.name}, a new file is begun"
         for end in ("", "-wal"):
@@ -287,7 +288,7 @@ class Journal:
 
 
 class _Damaged(sqlite3.DatabaseError):
-    """A file is a database, but no sound journal."""
+    """A file is a database, but not a valid journal."""
 
 
 def _is_damage(error: Exception) -> bool:

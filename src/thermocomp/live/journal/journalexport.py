@@ -28,9 +28,9 @@ from thermocomp.recordings.recording import Recording
 FloatArray = NDArray[np.float64]
 _T = TypeVar("_T", Channel, TargetRow)
 _KINDS = ("reading", "confirmation", "measurement")
-#: a probing is put to the reading nearest to it, if that is not further away [s]
+#: maximum time between a probing and the reading that it is assigned to [s]
 NEAR = 60.0
-#: readings that are closer have one time [s]
+#: readings closer than this count as simultaneous [s]
 _AT_ONCE = 1e-5
 
 
@@ -38,12 +38,12 @@ class ExportedTarget(NamedTuple):
     """Data of a target."""
 
     name: str
-    measured: int  #: rows with a measurement
-    known: int  #: those of them whose uncompensated deviation is known
+    measured: int  #: number of rows with a measurement
+    known: int  #: number of these rows with a known uncompensated deviation
 
 
 class Exported(NamedTuple):
-    """A journal as a recording."""
+    """A journal converted to a recording."""
 
     recording: Recording
     targets: tuple[ExportedTarget, ...]
@@ -51,7 +51,7 @@ class Exported(NamedTuple):
 
 
 class _Confirmed:
-    """The corrections that the controller confirmed in one run for one target."""
+    """Corrections of one target confirmed by the controller in one run."""
 
     def __init__(self) -> None:
         self.time, self.numbers = array("d"), array("d")
@@ -70,34 +70,34 @@ class _Confirmed:
 
 
 class _Found(NamedTuple):
-    """The rows of a journal that matter, in the order of their times."""
+    """Relevant rows of a journal, in order of time."""
 
-    time: FloatArray  #: (n,) of the readings [s]
+    time: FloatArray  #: (n,) time of the readings [s]
     run: NDArray[np.int64]  #: (n,)
     values: FloatArray  #: (n, n_channels)
     confirmed: dict[tuple[int, str], _Confirmed]
     measured: list[tuple[int, MeasurementRow]]
-    overtaken: int  #: rows that were left out, because a clock was set back after them
+    overtaken: int  #: number of rows omitted because a clock was set back after them
 
 
 def export(reader: JournalReader, every: float = 0.0) -> Exported:
-    """Return the recording that a journal holds.
+    """Return the recording contained in a journal.
 
-    A target that was measured, by a displacement channel of its name or by probings, has three columns, here of
-    ``z_um``: ``z_residual_um``, what was measured; ``z_correction_um``, what the controller confirmed to be in force;
-    and ``z_um``, the uncompensated deviation that a model learns, empty where one of the two is not known. Nothing is
-    known while the controller compensates by itself, or may do so.
+    A target that was measured, by a displacement channel of its name or by probings, has three columns, here for
+    ``z_um``: ``z_residual_um``, the measured residual; ``z_correction_um``, the correction in force confirmed by the
+    controller; and ``z_um``, the uncompensated deviation for a model to learn, empty unless the other two are known.
+    The deviation is unknown while the controller compensates, or may compensate, by itself.
 
     Parameters
     ----------
     reader : JournalReader
     every : float
-        Minimum interval: of readings that follow closer, the first is used [s].
+        Minimum interval of the exported readings [s].
 
     Raises
     ------
     InputError
-        There is no reading, a row is damaged, or a channel or target was another thing in another run.
+        There is no reading, a row is damaged, or a channel or target is defined differently in two runs.
     """
     channels = _same([c for s in reader.starts.values() for c in s.channels])
     targets = _same([t for s in reader.starts.values() for t in s.targets])
@@ -116,7 +116,7 @@ def export(reader: JournalReader, every: float = 0.0) -> Exported:
         named = zip(beside(target.name), ("residual", "correction"), (residual, correction), strict=True)
         parts = [(Channel(name, quantity, "um"), values) for name, quantity, values in named]
         if target.quantity != "displacement":
-            parts = []  # what is known of an angle is the deviation alone
+            parts = []  # for an angle only the deviation is known
         if measured.any():
             parts.insert(0, (Channel(target.name, target.quantity, target.unit), deviation))
         else:
@@ -159,12 +159,12 @@ def export(reader: JournalReader, every: float = 0.0) -> Exported:
 def _stamp(time: float) -> str:
     try:
         return datetime.fromtimestamp(time, UTC).isoformat()
-    except (ValueError, OverflowError, OSError):  # a clock that was never set
+    except (ValueError, OverflowError, OSError):  # from a system clock that was never set
         return ""
 
 
 def _same(things: Sequence[_T]) -> list[_T]:
-    """Return each once; refuse two of a name that differ."""
+    """Return each item once; raise an error for different items of the same name."""
     found: dict[str, _T] = {}
     for thing in things:
         other = found.setdefault(thing.name, thing)
@@ -244,7 +244,7 @@ def _parted(
 
 
 def _in_force(m: MeasurementRow, start: StartRow, confirmed: _Confirmed) -> float:
-    """Return the correction in force at the place and time of a measurement [um]; nan if it is unknown."""
+    """Return the correction in force at the position and time of a measurement [um]; nan if unknown."""
     if start.own_compensation != "off":
         return float("nan")
     if m.in_force is not None:

@@ -1,4 +1,4 @@
-"""A journal as it is read: all its files together, row by row, each checked."""
+"""Reading of a journal: the rows of all its files, each row verified."""
 
 import math
 import re
@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from thermocomp.core.exceptions import InputError
 from thermocomp.live.journal.journalrows import KINDS, Row, StartRow, loads
 
-#: ``tcJl``, and of the tables
+#: application id ``tcJl``, and version of the tables
 APPLICATION, VERSION = 0x74634A6C, 1
 SCHEMA = """
 CREATE TABLE rows (
@@ -29,15 +29,15 @@ CREATE TABLE rows (
   UNIQUE (run, seq)
 )
 """
-#: kinds that do not come with every reading
+#: kinds of rows that are not written with every reading
 EVENTS = ("state", "reference", "measurement", "alarm", "update")
-#: a row that is so much earlier than one written before it was written after a clock was set back [s]
+#: a row earlier by more than this than one written before it indicates that a clock was set back [s]
 SET_BACK = 5.0
 _ROWS = "SELECT run, seq, time, kind, content, crc FROM rows"
 
 
 class StoredRun(NamedTuple):
-    """A row, and which one it is."""
+    """A row with its run and sequence number."""
 
     run: int
     seq: int
@@ -49,24 +49,24 @@ class Summary(NamedTuple):
 
     files: tuple[Path, ...]
     size_bytes: int
-    first: float | None  #: [s] since 1970; None: there is no row
+    first: float | None  #: [s] since 1970; None: there are no rows
     last: float | None
-    counts: dict[str, int]  #: rows by kind
-    lost: int  #: rows that are missing between others of their run
+    counts: dict[str, int]  #: number of rows by kind
+    lost: int  #: number of rows missing within their runs
 
 
 class JournalReader:
-    """A journal, opened to be read, also while a service writes into it.
+    """A journal opened for reading, also while a service writes to it.
 
     Parameters
     ----------
     path : str or Path
-        As the service was given it: all its files are read. Or one of its files, to be read alone.
+        Path given to the service, to read all files of the journal; or one of these files.
 
     Raises
     ------
     InputError
-        There is none, or a file is not a journal, damaged, or of a newer version.
+        Journal missing, or a file is not a journal, damaged, or of a newer version.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -74,14 +74,14 @@ class JournalReader:
         self.paths = tuple(numbered(given).values()) or ((given,) if given.is_file() else ())
         if not self.paths:
             raise InputError(f"{given}: there is no journal of that name; name the one in the service's configuration")
-        self.starts: dict[int, StartRow] = {}  #: by run
+        self.starts: dict[int, StartRow] = {}  #: start row by run
         for file, stored in self._each(f"{_ROWS} WHERE kind = 'start'"):
             start = self._row(file, *stored).row
             assert isinstance(start, StartRow)
             self.starts[stored[0]] = start
 
     def rows(self, kinds: Collection[str] = tuple(KINDS)) -> Iterator[StoredRun]:
-        """Return the rows of some kinds in the order of their times; the start of a run once.
+        """Return the rows of the given kinds in order of time; the start row of each run once.
 
         Parameters
         ----------
@@ -103,11 +103,11 @@ class JournalReader:
                     yield stored
 
     def overtaken(self) -> Callable[[StoredRun], bool]:
-        """Return a predicate: a row is at a time that was written again later, because a clock was set back.
+        """Return a predicate for rows whose time was written again later, because a clock was set back.
 
-        Then the later rows are right, and the earlier ones would stand among them.
+        The later rows are then valid; the earlier ones would be mixed with them.
         """
-        begins: list[tuple[int, int, float]] = []  # run, its row and time, wherever it goes back
+        begins: list[tuple[int, int, float]] = []  # run, row and time at which the clock went back
         last = -math.inf
         for _, (run, seq, time) in self._each("SELECT run, seq, time FROM rows WHERE seq > 0 ORDER BY id"):
             if time < last - SET_BACK:
@@ -127,7 +127,7 @@ class JournalReader:
         return told
 
     def latest(self, n: int, kinds: Collection[str] = EVENTS) -> list[StoredRun]:
-        """Return the rows of some kinds that were written last, oldest first.
+        """Return the most recently written rows of the given kinds, oldest first.
 
         Parameters
         ----------
@@ -193,14 +193,14 @@ _OTHERS = "and read the others"
 
 
 def numbered(path: Path) -> dict[int, Path]:
-    """Return the files of a journal by their numbers, the oldest first: ``live.db`` is ``live.000001.db`` ..."""
+    """Return the files of a journal by number, oldest first: ``live.db`` is ``live.000001.db`` ..."""
     pattern = re.compile(rf"{re.escape(path.stem)}\.(\d{{6,}}){re.escape(path.suffix)}")
     names = {p: pattern.fullmatch(p.name) for p in (path.parent.iterdir() if path.parent.is_dir() else ())}
     return dict(sorted((int(m[1]), p) for p, m in names.items() if m and p.is_file()))
 
 
 def size(path: Path) -> int:
-    """Return the bytes of a file of a journal, with what is not yet moved into it."""
+    """Return the size of a journal file including its write-ahead log [bytes]."""
     beside = (path, path.with_name(f"{path.name}-wal"))
     return sum(p.stat().st_size for p in beside if p.exists())
 
@@ -211,14 +211,14 @@ def checksum(run: int, seq: int, time: float, kind: str, text: str) -> int:
     Parameters
     ----------
     run, seq, time, kind, text
-        As the columns of `SCHEMA`.
+        See the columns of `SCHEMA`.
     """
-    # SQLite knows no -0.0
+    # SQLite does not store -0.0
     return zlib.crc32(f"{run} {seq} {time + 0.0!r} {kind} {text}".encode())
 
 
 def find_version(connection: sqlite3.Connection) -> int | None:
-    """Return the version of a journal; 0: nothing is in it yet; None: it is the database of something else."""
+    """Return the version of a journal; 0: empty database; None: another application's database."""
     (application,) = connection.execute("PRAGMA application_id").fetchone()
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     if application == APPLICATION:
@@ -229,7 +229,7 @@ def find_version(connection: sqlite3.Connection) -> int | None:
 
 @contextmanager
 def telling(path: Path) -> Iterator[None]:
-    """Turn an SQLite error about a file into an error that names the file."""
+    """Convert an SQLite error into an error that names the file."""
     try:
         yield
     except sqlite3.Error as e:
@@ -244,7 +244,7 @@ def telling(path: Path) -> Iterator[None]:
 
 @contextmanager
 def reading(path: Path) -> Iterator[sqlite3.Connection | None]:
-    """Open a file of a journal to be read; None: it was removed meanwhile, or nothing is in it yet.
+    """Open a journal file for reading; None: removed meanwhile, or still empty.
 
     Yields
     ------
@@ -253,9 +253,9 @@ def reading(path: Path) -> Iterator[sqlite3.Connection | None]:
     Raises
     ------
     InputError
-        It is not a journal, or of a newer version.
+        Not a journal, or of a newer version.
     """
-    # without leave to make files beside it, SQLite reads one that nobody writes into only if it is told so
+    # without permission to create files next to it, SQLite reads a file without a writer only as immutable
     how = "mode=ro" if path.with_name(f"{path.name}-wal").exists() else "mode=ro&immutable=1"
     if not path.exists():
         yield None

@@ -1,4 +1,4 @@
-"""Rows of a journal: fixed types, checked before they are written and when they are read."""
+"""Rows of a journal: fixed types, checked when written and when read."""
 
 import json
 import math
@@ -14,14 +14,14 @@ from thermocomp.core.machine import Channel
 from thermocomp.files.typed import decode, encode, want
 from thermocomp.runtime.state import Word
 
-#: whether the controller compensates for temperature by itself, beside thermocomp
+#: whether the controller has its own temperature compensation in addition to thermocomp
 Own = Literal["on", "off", "unknown"]
-#: what is measured at the machine
+#: type of a measurement at the machine
 Kind = Literal["probing", "work_offset", "tool_length"]
 
-#: no number is larger, no text longer; longer ones are cut
+#: maximum magnitude of a number and maximum length of a text; longer texts are cut
 LARGEST, LONGEST = 1e15, 2000
-#: channels and targets of one service
+#: maximum number of channels and targets of a service
 _MOST = 10_000
 
 
@@ -31,28 +31,28 @@ class TargetRow(NamedTuple):
     name: str
     quantity: str = "displacement"  #: or ``angle``
     unit: str = "um"
-    position: float = 0.0  #: where on the axis its displacement channel measures [mm]
+    position: float = 0.0  #: axis position at which its displacement channel measures [mm]
 
 
 class StartRow(NamedTuple):
-    """A run of the service: how the rows after it are to be read."""
+    """Start of a run of the service: defines how the following rows are read."""
 
     time: float  #: [s] since 1970
     targets: tuple[TargetRow, ...]
-    channels: tuple[Channel, ...]  #: what readings hold; one that is named as a target measures what is left of it
+    channels: tuple[Channel, ...]  #: channels of the readings; one named as a target measures its residual
     own_compensation: Own = "unknown"
-    confirm_within: float = 10.0  #: so long after a confirmation the correction in force counts as known [s]
+    confirm_within: float = 10.0  #: validity of a confirmed correction after its confirmation [s]
 
 
 class ReadingRow(NamedTuple):
-    """A reading; values that are no finite numbers, or of no channel, are left out."""
+    """A reading; values that are not finite or belong to no channel are omitted."""
 
     time: float
     values: Mapping[str, float]
 
 
 class DemandRow(NamedTuple):
-    """A correction that was asked for."""
+    """A demanded correction."""
 
     time: float
     target: str
@@ -68,7 +68,7 @@ class ConfirmationRow(NamedTuple):
 
 
 class StateRow(NamedTuple):
-    """Status of a target from now on."""
+    """Status of a target, valid from its time."""
 
     time: float
     target: str
@@ -77,7 +77,7 @@ class StateRow(NamedTuple):
 
 
 class ReferenceRow(NamedTuple):
-    """A target is re-zeroed from now on."""
+    """Re-zeroing of a target."""
 
     time: float
     target: str
@@ -86,23 +86,23 @@ class ReferenceRow(NamedTuple):
 
 
 class MeasurementRow(NamedTuple):
-    """A measurement at the machine, marked with what was in force while it was made.
+    """A measurement at the machine, with the correction in force at that time.
 
-    `value` is the position that should have been found less the one that the controller reports: how far the tool point
-    seems to be off. With a correction in force it depends on the frame of that report, see `measured_by`.
+    `value` is the expected position minus the one reported by the controller: the apparent deviation of the tool point.
+    With a correction in force it depends on whether the report includes the correction, see `measured_by`.
     """
 
     time: float
     target: str
     value: float  #: [um]
     kind: Kind
-    includes_offset: bool  #: the reported position includes the correction (LinuxCNC's #5063); False: not (#<_z>)
-    position: float = 0.0  #: where on the axis [mm]
-    in_force: Correction | None = None  #: as the controller confirmed; zero: made without; None: not told
+    includes_offset: bool  #: whether the reported position includes the correction (LinuxCNC's #5063), or not (#<_z>)
+    position: float = 0.0  #: axis position [mm]
+    in_force: Correction | None = None  #: confirmed by the controller; zero: none in force; None: unknown
 
     @property
     def compensated(self) -> bool | None:
-        """Whether a correction was in force; None if that is not known."""
+        """Whether a correction was in force; None if unknown."""
         return None if self.in_force is None else self.in_force.at(self.position) != 0.0
 
 
@@ -115,14 +115,14 @@ class AlarmRow(NamedTuple):
 
 
 class UpdateRow(NamedTuple):
-    """Change by a probing."""
+    """Change of a model by a probing."""
 
     time: float
     target: str
-    measured: float  #: the uncompensated deviation [um]
-    before: float  #: what was said of it before [um]
-    after: float  #: and after it [um]
-    refused: str  #: why nothing was learned; empty if it was
+    measured: float  #: uncompensated deviation [um]
+    before: float  #: prediction before the probing [um]
+    after: float  #: prediction after the probing [um]
+    refused: str  #: reason why the probing was not used; empty if it was
 
 
 Row = (
@@ -153,9 +153,9 @@ _NAMES = {kind: name for name, kind in KINDS.items()}
 def measured_by(row: MeasurementRow, start: StartRow, in_force: Correction | None = None) -> float | None:
     """Return the uncompensated deviation from a measurement [um].
 
-    At the place that is probed the tool point is where it should be: the motors stand off by minus the deviation. A
-    report that includes the correction tells that as it is; one without it tells what is left of the deviation under
-    the correction. So the correction is taken off once, in the second case, and never in the first.
+    At the probed position the tool point is on its nominal position: the motor positions are off by minus the
+    deviation. A reported position that includes the correction therefore gives the full deviation; one without it gives
+    the residual under the correction. So the correction is subtracted once in the second case, and never in the first.
 
     Parameters
     ----------
@@ -163,12 +163,12 @@ def measured_by(row: MeasurementRow, start: StartRow, in_force: Correction | Non
     start : StartRow
         Start row of its run.
     in_force : Correction, optional
-        Correction in force, where the row does not contain it.
+        Correction in force, if not contained in the row.
 
     Returns
     -------
     float or None
-        None if it cannot be determined: the controller compensates by itself, or the correction in force is unknown.
+        None if it cannot be determined: the controller has its own compensation, or the correction in force is unknown.
     """
     known = row.in_force if row.in_force is not None else in_force
     if start.own_compensation != "off":
@@ -178,16 +178,16 @@ def measured_by(row: MeasurementRow, start: StartRow, in_force: Correction | Non
     return None if known is None else uncompensated(row.value, known.at(row.position))
 
 
-# -- as text and back --------------------------------------------------------------------------------------------------
+# -- conversion to and from text ---------------------------------------------------------------------------------------
 
 
 def kind_of(row: Row) -> str:
-    """Return the name of a row's kind.
+    """Return the name of the kind of a row.
 
     Raises
     ------
     ValueError
-        It is no row.
+        `row` is not a row.
     """
     found = _NAMES.get(type(row))
     if found is None:
@@ -196,18 +196,18 @@ def kind_of(row: Row) -> str:
 
 
 def dumps(row: Row, start: StartRow) -> str:
-    """Return all of a row but its time as ASCII text.
+    """Return a row without its time as ASCII text.
 
     Parameters
     ----------
     row : Row
     start : StartRow
-        Start row of its run: readings are written in the order of its channels.
+        Start row of its run, which defines the order of the channels in readings.
 
     Raises
     ------
     ValueError
-        Something in it is not of its type, not finite or beyond all sense.
+        A field has a wrong type, is not finite, or exceeds the limits.
     """
     name = kind_of(row)
     to_number(row.time)
@@ -221,7 +221,7 @@ def dumps(row: Row, start: StartRow) -> str:
 
 
 def loads(kind: str, time: float, text: str, start: StartRow | None) -> Row:
-    """Return the row that `dumps` made a text of.
+    """Return the row encoded by `dumps`.
 
     Parameters
     ----------
@@ -234,7 +234,7 @@ def loads(kind: str, time: float, text: str, start: StartRow | None) -> Row:
     Raises
     ------
     ValueError
-        It is none.
+        `text` is not a valid row.
     """
     value = json.loads(text)
     want(kind in KINDS, kind, "kind", f"one of {', '.join(KINDS)}")
@@ -255,7 +255,7 @@ def loads(kind: str, time: float, text: str, start: StartRow | None) -> Row:
 
 
 def to_number(value: Any) -> float:
-    """Return a finite number of a sensible size, or raise `ValueError`."""
+    """Return a finite number within the limits, or raise `ValueError`."""
     number = isinstance(value, float | int | np.floating | np.integer) and not isinstance(value, bool)
     want(number and abs(value) <= LARGEST, value, "number", "a finite number")
     return float(value)
@@ -264,7 +264,7 @@ def to_number(value: Any) -> float:
 def _checked(value: Any) -> StartRow:
     try:
         start: StartRow = decode(StartRow, value, "start")
-    except InputError as e:  # a unit that does not measure the quantity
+    except InputError as e:  # a unit that does not fit the quantity
         raise ValueError(str(e)) from e
     for number in (start.time, *(t.position for t in start.targets)):
         to_number(number)
@@ -327,7 +327,7 @@ def _codec(hint: Any) -> _Codec:
     return plain, plain
 
 
-#: how each field behind the time is written and read, by kind
+#: functions that write and read each field after the time, by kind
 _CODECS = {
     name: tuple(_codec(get_type_hints(kind)[field]) for field in kind._fields[1:])
     for name, kind in KINDS.items()

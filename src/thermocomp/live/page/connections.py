@@ -1,4 +1,4 @@
-"""Connections to the page: bounded in number, and closed when they are idle or do not read what they asked for."""
+"""Connections to the page: limited in number, and closed if they are idle or their client does not read."""
 
 import asyncio
 import time
@@ -6,28 +6,28 @@ from typing import Any
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-#: connections at once, at most: at one more, an idle one is closed
+#: maximum number of simultaneous connections: one more closes an idle one
 MOST = 200
-#: a request is complete so long after the connection, or after the last answer, or the connection is closed [s]
+#: maximum time for a complete request after connecting or after the last answer [s]
 PATIENCE = 10.0
-#: an answer is read to its end for a moment within this time, or the connection is closed [s]
+#: maximum time during which part of an answer stays unread [s]
 STUCK = 10.0
 
 
 class Guarded(H11Protocol):
-    """An HTTP connection that can be closed for others; uvicorn makes one for each client.
+    """An HTTP connection that can be closed in favour of others; uvicorn creates one for each client.
 
-    uvicorn itself bounds only how long it waits between two requests: half a request may wait for ever there, an answer
-    that nobody reads too, and at its bound (``limit_concurrency``) idle connections keep everybody else out.
+    uvicorn itself limits only the idle time between two requests: an incomplete request may wait indefinitely, as may
+    an unread answer, and at its limit (``limit_concurrency``) idle connections lock out all other clients.
 
     Parameters
     ----------
     config, server_state, app_state, _loop
-        As for uvicorn.
+        See uvicorn.
     """
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Begin; at the bound another one goes, an idle one if there is one.
+        """Accept the connection; at the limit another one is closed, preferably an idle one.
 
         Parameters
         ----------
@@ -47,30 +47,30 @@ class Guarded(H11Protocol):
 
     @property
     def unsent(self) -> int:
-        """Bytes of an answer that the system does not take yet: it holds enough that was not read."""
+        """Number of answer bytes not accepted by the system, which already buffers unread data."""
         return self.transport.get_write_buffer_size()
 
     def drop(self) -> None:
-        """Close at once, without what was not sent."""
+        """Close immediately and discard unsent data."""
         self.connections.discard(self)
         self.transport.abort()
 
     def look(self, now: float) -> None:
-        """Close if it has been idle, or has not read, for too long; call it about once a second.
+        """Close the connection if it has been idle or not read for too long; to be called about once a second.
 
         Parameters
         ----------
         now : float
-            On the monotone clock [s].
+            Monotonic clock [s].
         """
         self._stuck = (self._stuck or now) if self.unsent else 0.0
         if (self._waits() and now - self._since > PATIENCE) or (self._stuck and now - self._stuck > STUCK):
             self.drop()
 
     def _waits(self) -> bool:
-        """Return whether the client must send something next: there is no request, or it is incomplete."""
+        """Return whether the client must send next: there is no request, or it is incomplete."""
         return self.cycle is None or self.cycle.response_complete or self.cycle.more_body
 
     def _rank(self) -> tuple[bool, bool, bool, float]:
-        """Return the sort key for precedence: idle before stuck before busy, never served before served, by age."""
+        """Return the sort key for closing: idle before stuck before busy, never served before served, oldest first."""
         return not self._waits(), not self.unsent, self._served, self._since

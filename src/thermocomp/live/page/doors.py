@@ -1,4 +1,4 @@
-"""Doors of the page: by which names it may be called, from which pages, and who may give orders."""
+"""Access control of the page: permitted host names, permitted origins, and authorisation of orders."""
 
 import contextlib
 import hmac
@@ -18,9 +18,9 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from thermocomp.core.shown import shorten
 
-#: wrong tokens within a minute that are answered as such
+#: number of wrong tokens per minute that are answered with 401
 MOST_WRONG = 5
-#: bytes of an order, at most
+#: maximum size of an order [bytes]
 MOST_BYTES = 2_000
 _HEADERS = {
     "Content-Security-Policy": "default-src 'self'; img-src 'self' data:; style-src 'self' 'unsafe-inline'; "
@@ -33,7 +33,7 @@ _HOST = re.compile(r"(\[[0-9A-Fa-f:.]+\]|[^\[\]:/?#@\\\s]+)(:[0-9]{1,5})?")
 
 
 class Json(JSONResponse):
-    """JSON in plain ASCII: any text can be encoded, whatever it is; a number that JSON has not got is null.
+    """JSON in plain ASCII, so that any text can be encoded; numbers that JSON lacks become null.
 
     Parameters
     ----------
@@ -44,12 +44,12 @@ class Json(JSONResponse):
     """
 
     def render(self, content: Any) -> bytes:
-        """Return it as bytes; see `write_json`."""
+        """Return the content as bytes; see `write_json`."""
         return write_json(content)
 
 
 def write_json(content: Any) -> bytes:
-    """Return JSON in plain ASCII, without numbers that JSON has not got.
+    """Return JSON in plain ASCII; numbers that JSON lacks become null.
 
     Parameters
     ----------
@@ -60,12 +60,12 @@ def write_json(content: Any) -> bytes:
 
 
 class Doorkeeper:
-    """Authorises orders by a token; wrong ones are slowed down, the right one never is.
+    """Authorises orders by a token; wrong tokens are rate-limited, the right one never is.
 
     Parameters
     ----------
     token : str
-        Empty: no commands are accepted.
+        Empty: no orders are accepted.
     """
 
     def __init__(self, token: str) -> None:
@@ -73,15 +73,15 @@ class Doorkeeper:
         self._wrong = deque[float](maxlen=MOST_WRONG)
 
     def check(self, given: str) -> None:
-        """Let an order pass, or raise.
+        """Raise unless an order is authorised.
 
-        Every token is compared: if wrong ones could close the door, whoever reaches the page could keep the operator
-        from holding the machine's correction. A token of 16 characters or more is not found by guessing.
+        Every token is compared: if wrong tokens could lock the page, anyone who can reach it could prevent the operator
+        from holding the machine's correction. A token of 16 characters or more cannot be guessed.
 
         Raises
         ------
         HTTPException
-            403 there is no token, 401 the token is wrong, 429 it is, as others were lately.
+            403: no token is configured; 401: the token is wrong; 429: wrong, and too many recent ones were, too.
         """
         if not self._token:
             raise HTTPException(403, "no token is configured: this page only shows ([page] token_file)")
@@ -90,13 +90,13 @@ class Doorkeeper:
         now = time.monotonic()
         if len(self._wrong) == self._wrong.maxlen and now - self._wrong[0] < 60.0:
             raise HTTPException(429, "too many wrong tokens: wait a minute", {"Retry-After": "60"})
-        if given:  # nothing was guessed
+        if given:  # an empty token is not a guess
             self._wrong.append(now)
         raise HTTPException(401, "the token is wrong", {"WWW-Authenticate": "Bearer"})
 
 
 class Door:
-    """Refuses requests under other names, from other pages, and large ones; an ASGI middleware.
+    """ASGI middleware that refuses requests for other host names, from other origins, or of excessive size.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ class Door:
         headers, server = request.headers, request.scope.get("server")
         if why := explain_host(headers.get("host", ""), self._names, server[0] if server else ""):
             return 400, why
-        # what only shows may be linked to; what answers or changes something is for this page alone
+        # pages that only display may be linked to; those that answer or change something are for this page alone
         shows = request.method in ("GET", "HEAD") and not request.url.path.startswith("/api/")
         if not shows and (why := explain_foreign(request)):
             return 403, why
@@ -140,19 +140,19 @@ class Door:
 
 
 def explain_host(header: str, names: Collection[str], server: str) -> str:
-    """Return the reason why a request must not be answered under a host name; empty if it may.
+    """Return the reason why a request under a host name must be refused; empty if it is permitted.
 
-    A page of another site whose name leads to this computer (DNS rebinding) carries that name. An address cannot be
-    made to lead elsewhere.
+    A page of another site whose name resolves to this computer (DNS rebinding) sends that name. An address cannot be
+    redirected in this way.
 
     Parameters
     ----------
     header : str
-        Host, as it was asked for: a name or an address, with or without a port.
+        Host header of the request: a name or an address, with or without a port.
     names : collection of str
-        That are allowed, in small letters.
+        Permitted names, in lower case.
     server : str
-        Address that the connection came in at.
+        Local address of the connection.
     """
     found = _HOST.fullmatch(header)
     name = found[1].lower().removesuffix(".") if found else ""
@@ -165,9 +165,9 @@ def explain_host(header: str, names: Collection[str], server: str) -> str:
 
 
 def explain_foreign(request: Request) -> str:
-    """Return the reason why a request comes from a page of another origin; empty if from this page or from no page.
+    """Return the reason why a request comes from a page of another origin; empty if it does not.
 
-    Browsers state the origin of the page with whatever may change something; programs state none.
+    Browsers state the origin of the page in requests that may change something; other programs state none.
 
     Parameters
     ----------
@@ -198,7 +198,7 @@ def _address(text: str) -> IPv4Address | IPv6Address | None:
 
 
 def _is_here(address: IPv4Address | IPv6Address) -> bool:
-    """Return whether an address is one of this computer's: only those can be listened at."""
+    """Return whether an address belongs to this computer: only those can be bound."""
     try:
         with socket.socket(socket.AF_INET if address.version == 4 else socket.AF_INET6, socket.SOCK_STREAM) as probe:
             probe.bind((str(address), 0))

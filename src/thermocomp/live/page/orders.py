@@ -1,4 +1,4 @@
-"""Orders by hand: run, hold, shadow, rezero, roll back; behind the token."""
+"""Manual orders: run, hold, shadow, rezero, roll back; authorised by the token."""
 
 from typing import Annotated, Literal
 
@@ -23,7 +23,7 @@ class PageOrder(BaseModel):
 
 
 def make_router(board: Board) -> APIRouter:
-    """Return ``/api/order``."""
+    """Return the router of ``/api/order``."""
     router, service = APIRouter(), board.service
 
     @router.post("/api/order", dependencies=board.orders_only())
@@ -34,7 +34,7 @@ def make_router(board: Board) -> APIRouter:
             raise HTTPException(404, f"no target is named {shorten(wanted.target, 80)}; there are {known}")
         try:
             why = give(service, wanted)
-        except InputError as e:  # not now, such as before the first reading
+        except InputError as e:  # not possible now, for example before the first reading
             why = str(e)
         if why:
             raise HTTPException(409, why)
@@ -49,7 +49,7 @@ def read_order(body: bytes) -> PageOrder:
     Raises
     ------
     HTTPException
-        It is no JSON in UTF-8 (400), or not such an order (422).
+        Not JSON in UTF-8 (400), or not such an order (422).
     """
     try:
         content = parse_json(body)
@@ -63,7 +63,7 @@ def read_order(body: bytes) -> PageOrder:
 
 
 def give(service: Service, wanted: PageOrder) -> str:
-    """Carry an order out; return why not, or the empty string.
+    """Carry out an order; return the reason if impossible, else an empty string.
 
     Parameters
     ----------

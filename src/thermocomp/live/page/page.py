@@ -1,4 +1,4 @@
-"""Web application of the page: an application of routers, each a separate page."""
+"""Web application of the page, composed of routers."""
 
 from collections.abc import Collection
 from pathlib import Path
@@ -25,13 +25,13 @@ def make_app(
     ----------
     service : Service
     token : str
-        Token required for commands; empty: none are accepted.
+        Token required for orders; empty: no orders are accepted.
     settled : float
         A drift below this in ten minutes counts as settled [um].
     hosts : tuple of str
         Host names of the page, in addition to ``localhost`` and the addresses of this computer.
     pages : collection of str
-        Pages of other packages, by their entry points of ``thermocomp.pages``; one that fails is reported and left out.
+        Pages of other packages, by their entry points of ``thermocomp.pages``; one that fails is reported and omitted.
     """
     app = FastAPI(title="thermocomp", docs_url=None, redoc_url=None, default_response_class=Json)
     app.add_middleware(Door, names=hosts)
@@ -49,7 +49,7 @@ def make_app(
         try:
             make: MakeRouter = load_plugin(entry)
             app.include_router(make(board))
-        except Exception as e:  # a page of another package must not end the service
+        except Exception as e:  # a page of another package must not terminate the service
             if own:
                 raise
             why = str(e) if isinstance(e, InputError) else f"{describe_plugin(entry)}: {type(e).__name__}: {e}"

@@ -1,4 +1,4 @@
-"""Interface of a page of the service: a router, found by an entry point of ``thermocomp.pages``."""
+"""Interface of a page of the service: a router named by an entry point of ``thermocomp.pages``."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,13 +17,13 @@ _FOLDER = Path(__file__).parent / "templates"
 
 @dataclass(frozen=True)
 class Board:
-    """Data that a page shows and commands that it may send.
+    """Data that a page shows and orders that it may give.
 
     Parameters
     ----------
     service : Service
     token : str
-        Token required for commands; empty: none are accepted.
+        Token required for orders; empty: no orders are accepted.
     settled : float
         A drift below this in ten minutes counts as settled [um].
     """
@@ -33,7 +33,7 @@ class Board:
     settled: float = 1.0
 
     def orders_only(self) -> list[params.Depends]:
-        """Return the ``dependencies`` of a route that changes something: the token is compared before it is called."""
+        """Return the ``dependencies`` of a route that changes something: the token is checked before the route runs."""
         door = Doorkeeper(self.token)
 
         def allowed(
@@ -44,7 +44,7 @@ class Board:
         return [Depends(allowed)]
 
 
-#: what an entry point of ``thermocomp.pages`` names
+#: function named by an entry point of ``thermocomp.pages``
 MakeRouter = Callable[[Board], APIRouter]
 
 

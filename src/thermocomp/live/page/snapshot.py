@@ -22,7 +22,7 @@ def snapshot(service: Service, settled: float) -> dict[str, Any]:
     Returns
     -------
     dict
-        Numbers that are not known are None.
+        The present state; unknown numbers are None.
     """
     said, now, tick = service.said, service.clock.now(), service.clock.tick()
     failed = said.failed if said else {}

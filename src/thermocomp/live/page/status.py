@@ -1,4 +1,4 @@
-"""Status of the service: the page, its JSON twin, the curves and the event stream."""
+"""Status of the service: the page, the same as JSON, the curves and the event stream."""
 
 import asyncio
 import time
@@ -13,14 +13,14 @@ from thermocomp.live.page.doors import Json, write_json
 from thermocomp.live.page.pages import Board, read_template
 from thermocomp.live.page.snapshot import curves, snapshot
 
-#: time between two messages to a page that is open [s]
+#: time between two messages to an open page [s]
 OFTEN = 0.5
-#: pages that are open at once, at most
+#: maximum number of pages open at once
 MOST_PAGES = 100
 
 
 class Streams:
-    """The event streams that are open: all send the same messages, each made once.
+    """Open event streams: all send the same messages, each created once.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class Streams:
         self._made, self._message = -OFTEN, b""
 
     async def messages(self, connection: Guarded | None) -> AsyncIterator[bytes]:
-        """Return messages until the client is gone; at the bound whoever reads least makes room, or the oldest."""
+        """Return messages until the client disconnects; at the limit the slowest reader, or the oldest, is closed."""
         if len(self._open) >= MOST_PAGES:
             last = max(self._open, key=lambda k: c.unsent if (c := self._open[k]) else 0)
             if (lost := self._open.pop(last)) is not None:
@@ -58,7 +58,7 @@ class Streams:
 
 
 def make_router(board: Board) -> APIRouter:
-    """Return ``/``, ``/api/state``, ``/api/curves`` and ``/api/events``."""
+    """Return the router of ``/``, ``/api/state``, ``/api/curves`` and ``/api/events``."""
     router, service, template = APIRouter(), board.service, read_template("live.html")
     streams = Streams(service, board.settled)
 

@@ -1,4 +1,4 @@
-"""The page's server, in the same loop as the service."""
+"""Web server of the page, in the event loop of the service."""
 
 import asyncio
 import contextlib
@@ -13,13 +13,13 @@ from fastapi import FastAPI
 from thermocomp.core.exceptions import InputError
 from thermocomp.live.page.connections import Guarded
 
-#: characters of a token, at least
+#: minimum length of a token [characters]
 SHORTEST = 16
-#: connections taken in at once: few, so that one is read before ``connections.MOST`` newer ones push it out
+#: connections accepted at once: few, so that each is read before ``connections.MOST`` newer ones displace it
 AT_ONCE = 16
-#: that the system lets wait for us: one for which there is no room tries again only after a second
+#: backlog of connections in the system: a client without a place retries only after a second
 WAITING = 1024
-#: bytes of an answer that the system takes ahead of a client that does not read
+#: bytes of an answer buffered by the system for a client that does not read
 AHEAD = 65_536
 _OTHERWISE = "choose another with --port, or 0 for any"
 
@@ -27,7 +27,7 @@ _OTHERWISE = "choose another with --port, or 0 for any"
 class _Server(uvicorn.Server):
     @contextlib.contextmanager
     def capture_signals(self) -> Generator[None, None, None]:
-        yield  # whoever runs the service listens to them
+        yield  # signals are handled by the caller
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets)
@@ -42,9 +42,9 @@ class _Server(uvicorn.Server):
         return await super().on_tick(counter)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        # what asyncio has accepted, and not yet made a connection of, would be left open when its server closes
+        # connections accepted by asyncio but not yet set up would stay open when its server closes
         for one in sockets or ():
-            with contextlib.suppress(NotImplementedError):  # Windows accepts in another way
+            with contextlib.suppress(NotImplementedError):  # Windows accepts connections in another way
                 asyncio.get_running_loop().remove_reader(one)
         await asyncio.sleep(0)
         await asyncio.sleep(0)
@@ -61,7 +61,7 @@ def read_token(path: Path) -> str:
     Raises
     ------
     InputError
-        It cannot be read, or is too short.
+        The file cannot be read, or the token is too short.
     """
     try:
         token = path.read_text(encoding="ascii").strip()
@@ -76,31 +76,31 @@ def read_token(path: Path) -> str:
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """Return a socket that listens.
+    """Return a listening socket.
 
     Parameters
     ----------
     host : str
         Name or address; ``0.0.0.0``: all IPv4 addresses of this computer, ``::``: all of IPv6 and IPv4.
     port : int
-        0: any that is free.
+        Port number; 0: any free port.
 
     Raises
     ------
     InputError
-        The port is in use, or there is no such host.
+        The port is in use, or the host does not exist.
     """
     bare = host.removeprefix("[").removesuffix("]")
     try:
         found = socket.getaddrinfo(bare, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
-        family, *_, address = min(found, key=lambda one: one[0] != socket.AF_INET)  # a name that has both: IPv4
+        family, *_, address = min(found, key=lambda one: one[0] != socket.AF_INET)  # prefer IPv4 for a name with both
         both = address[0] == "::" and socket.has_dualstack_ipv6()
         listening = socket.create_server(address, family=family, dualstack_ipv6=both)
-    except (OSError, ValueError) as e:  # a host that cannot be one is a ValueError
+    except (OSError, ValueError) as e:  # an invalid host name raises ValueError
         why = getattr(e, "strerror", None) or e
         do = "choose another host in [page]" if isinstance(e, socket.gaierror | ValueError) else _OTHERWISE
         raise InputError(f"page on {host}, port {port}: {why}; {do}") from e
-    # a client that does not read is found out the sooner, and takes the less memory
+    # a client that does not read is detected sooner and uses less memory
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, AHEAD)
     return listening
 
@@ -131,6 +131,6 @@ async def serve(app: FastAPI, listening: socket.socket) -> None:
             if server.started and not server.should_exit:
                 server.should_exit = True
                 await server.shutdown([listening])
-            for connection in list(server.server_state.connections):  # that were taken in meanwhile
+            for connection in list(server.server_state.connections):  # connections accepted meanwhile
                 connection.transport.abort()
             await asyncio.sleep(0)

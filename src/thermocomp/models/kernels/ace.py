@@ -1,4 +1,4 @@
-"""ACE on ranks: the sweeps; see `kernels.ranks` for the data structures."""
+"""ACE on ranks: compiled sweeps; see `kernels.ranks` for the data structures."""
 
 from typing import Any
 
@@ -6,8 +6,8 @@ import numpy as np
 
 from thermocomp.models.kernels.ranks import FloatArray, RankArray, compiled, dot, running_sums, smooth
 
-VANISHES = 1e-9  # a function of smaller norm (theta has norm 1) counts as zero
-MOMENTUM = 0.95  # greatest share of the last move that the acceleration repeats
+VANISHES = 1e-9  # a function with a smaller norm (theta has norm 1) counts as zero
+MOMENTUM = 0.95  # maximum momentum coefficient of the accelerated sweeps
 
 
 @compiled
@@ -22,7 +22,7 @@ def _begin(
     total: FloatArray,
     sums: FloatArray,
 ) -> bool:
-    """Start with phi_j = E[S|T_j] of the first variable whose does not vanish; return False if there is none."""
+    """Initialise phi_j = E[S|T_j] of the first variable with a non-zero result; return False if there is none."""
     n = len(start)
     for j in range(len(phi)):
         if groups[j] > 1:
@@ -50,7 +50,7 @@ def _sweep(
     sums: FloatArray,
     work: FloatArray,
 ) -> float:
-    """One sweep: theta from the sum of phi, then each phi from theta; return E[(theta - sum)^2], or nan."""
+    """Run one sweep: theta from the sum of phi, then each phi from theta; return E[(theta - sum)^2], or nan."""
     p, n = phi.shape
     residual[:] = 0.0
     running_sums(residual, total, order[p], sums)
@@ -88,9 +88,9 @@ def solve(
     Returns
     -------
     theta : ndarray of shape (n,)
-        By rank of S.
+        In the order of the ranks of S.
     phi : ndarray of shape (p, n)
-        Each by the rank of its variable.
+        Each phi in the order of the ranks of its variable.
     psi : float
     errors : ndarray of shape (n_sweeps,)
         E[(theta - sum phi)^2] after each sweep.
@@ -118,20 +118,20 @@ def solve(
 def converge(
     order: RankArray, bounds: RankArray, groups: Any, start: FloatArray, half: int, tolerance: float, max_sweeps: int
 ) -> tuple[FloatArray, FloatArray, float, FloatArray]:
-    """Sweep, with `triangle` for the boxcar, until a sweep moves the functions by `tolerance` at most.
+    """Sweep, with `triangle` instead of the boxcar, until a sweep changes the functions by at most `tolerance`.
 
-    The move is the root of the mean square over the rows, summed over all phi; theta has norm 1. Sweeps are
-    accelerated by momentum (Nesterov), which starts again whenever the move grows.
+    The change is the root of the mean square over the rows, summed over all phi; theta has norm 1. Sweeps are
+    accelerated by momentum (Nesterov), which restarts whenever the change increases.
 
     Returns
     -------
     theta, phi, psi, errors
-        As `solve`.
+        As in `solve`.
     """
     p, n = len(order) - 1, len(start)
     theta, residual = np.zeros(n), np.empty(n)
     sums, work = np.empty(n + 1), np.empty(n)
-    state, last = np.zeros((p + 1, n)), np.zeros((p + 1, n))  # all phi, and their sum by rank of S
+    state, last = np.zeros((p + 1, n)), np.zeros((p + 1, n))  # all phi, and their sum in rank order of S
     before = np.empty((p, n))
     phi, total = state[:p], state[p]
     errors = np.empty(max_sweeps)

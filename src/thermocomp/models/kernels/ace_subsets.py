@@ -1,4 +1,4 @@
-"""ACE of many subsets of the same variables at once, eight in the lanes of a register; see `kernels.ace`."""
+"""ACE of many subsets of the same variables, computed eight at a time in SIMD lanes; see `kernels.ace`."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ from thermocomp.models.kernels.ranks import FloatArray, RankArray, compiled, dot
 
 @compiled
 def _lane_boxcar(sums: FloatArray, half: int, bounds: RankArray, groups: Any, out: FloatArray) -> Any:
-    """As `boxcar` of `thermocomp.models.kernels.ranks` for all lanes, except that the mean stays in; return it."""
+    """Apply `boxcar` of `thermocomp.models.kernels.ranks` in all lanes; return the mean, which is not subtracted."""
     n = len(out)
     mean = splat(0.0)
     for i in range(min(half, n)):
@@ -36,7 +36,7 @@ def _lane_boxcar(sums: FloatArray, half: int, bounds: RankArray, groups: Any, ou
 
 @compiled
 def _lane_level(bounds: RankArray, groups: Any, out: FloatArray) -> None:
-    """Give tied ranks their mean."""
+    """Replace the values of tied ranks by their mean."""
     n = len(out)
     if groups < n:
         for g in range(groups):
@@ -52,7 +52,7 @@ def _lane_level(bounds: RankArray, groups: Any, out: FloatArray) -> None:
 
 @compiled
 def _lane_margins(sums: FloatArray, half: int) -> None:
-    """Continue with running sums, which have `half` rows to spare on either side, as if their numbers were mirrored."""
+    """Extend running sums by their `half` spare rows at either end, as if the underlying values were mirrored."""
     top = len(sums) - 1 - half
     zero = splat(0.0)
     whole = add(load(sums, top), load(sums, top))
@@ -63,9 +63,9 @@ def _lane_margins(sums: FloatArray, half: int) -> None:
 
 @compiled
 def _lane_twice(sums: FloatArray, again: FloatArray, half: int, bounds: RankArray, groups: Any) -> Any:
-    """As the first half of `triangle`: level, smooth once, and put the running sums of that into `again`.
+    """Run the first half of `triangle`: level, smooth once, and write the running sums of the result to `again`.
 
-    Return the mean, which mirrored boxcars keep.
+    Return the mean, which mirrored boxcars preserve.
     """
     n = len(sums) - 1 - 2 * half
     if groups < n:
@@ -90,7 +90,7 @@ def _lane_twice(sums: FloatArray, again: FloatArray, half: int, bounds: RankArra
 def _lane_smooth(
     sums: FloatArray, again: FloatArray, half: int, twice: bool, bounds: RankArray, groups: Any, out: FloatArray
 ) -> Any:
-    """As `smooth`, for all lanes, except that the mean stays in; return it."""
+    """Apply `smooth` in all lanes without subtracting the mean; return the mean."""
     if not twice:
         return _lane_boxcar(sums, half, bounds, groups, out)
     h = (half + 1) // 2
@@ -116,7 +116,7 @@ def _lane_theta(
     again: FloatArray,
     norm: FloatArray,
 ) -> None:
-    """Theta of the (extrapolated) sum of phi, normalised; a lane without any gets 0. `norm` is a row to write to."""
+    """Compute theta, normalised, from the (extrapolated) sum of phi; 0 where theta vanishes. `norm` is a work row."""
     n = len(theta)
     spare = (len(sums) - 1 - n) // 2
     store(sums, spare, splat(0.0))
@@ -146,7 +146,7 @@ def _lane_theta(
 
 @compiled
 def _lane_settle(phi: FloatArray, i: int, residual: FloatArray, at: Any, new: Any) -> Any:
-    """Put a new value into phi and take its step out of the residual; return the square of the step."""
+    """Store a new value of phi and subtract its step from the residual; return the square of the step."""
     step = subtract(new, load(phi, i))
     store(phi, i, new)
     store(residual, at, subtract(load(residual, at), step))
@@ -170,7 +170,7 @@ def _lane_phi(
     work: FloatArray,
     accelerate: bool,
 ) -> Any:
-    """Back-fit one phi in the lanes that have it; return the square of its move."""
+    """Back-fit one phi in the lanes that use it; return the square of its change."""
     n = len(phi)
     spare = (len(sums) - 1 - n) // 2
     store(sums, spare, splat(0.0))
@@ -188,7 +188,7 @@ def _lane_phi(
             running = add(running, add(load(residual, index[i]), load(phi, i)))
             store(sums, i + 1 + spare, running)
     mine, square = load(on, j), splat(0.0)
-    if accelerate and groups == n:  # the same as below, in one go
+    if accelerate and groups == n:  # same as below, in a single pass
         h = (half + 1) // 2
         mean, width = _lane_twice(sums, again, h, bounds, groups), splat(1.0 / (2 * h + 1))
         for i in range(n):
@@ -204,7 +204,7 @@ def _lane_phi(
 
 @compiled
 def _lane_sums(theta: FloatArray, residual: FloatArray, total: FloatArray, result: FloatArray) -> None:
-    """Renew the sum of phi; write the sums of residual^2, sum^2 and theta * sum to rows 1 to 3 of `result`."""
+    """Update the sum of phi; write the sums of residual^2, sum^2 and theta * sum to rows 1 to 3 of `result`."""
     error = norm = cross = splat(0.0)
     for i in range(len(theta)):
         left, ours = load(residual, i), load(theta, i)
@@ -231,7 +231,7 @@ def _take(
     on: FloatArray,
     accelerate: bool,
 ) -> bool:
-    """Begin a subset in lane `v`; return False if E[S|T] vanishes for all its variables."""
+    """Start a subset in lane `v`; return False if E[S|T] vanishes for all its variables."""
     p, n, _ = phi.shape
     begun = False
     for j in range(p):
@@ -254,7 +254,7 @@ def _take(
 def _first_phi(
     order: RankArray, bounds: RankArray, groups: Any, start: FloatArray, half: int, accelerate: bool
 ) -> FloatArray:
-    """Return E[S|T] of each variable, (p, n): 0 for a constant one."""
+    """Return E[S|T] of each variable, (p, n); 0 for a constant variable."""
     p, n = len(order) - 1, len(start)
     first = np.zeros((p, n))
     sums, zero = np.empty(n + 1), np.zeros(n)
@@ -267,7 +267,7 @@ def _first_phi(
 
 @compiled
 def _note_used(on: FloatArray, idle: NDArray[np.bool_], used: NDArray[np.bool_]) -> None:
-    """Note which variables any lane works on."""
+    """Set in `used` the variables that any active lane needs."""
     for j in range(len(used)):
         used[j] = False
         for v in range(LANES):
@@ -286,7 +286,7 @@ def _ended(
     accelerate: bool,
     tolerance: float,
 ) -> bool:
-    """Renew the momentum of lane `v` after a sweep; return whether its subset is done."""
+    """Update the momentum of lane `v` after a sweep; return whether its subset is finished."""
     now = np.sqrt(result[0, v] / n) if accelerate else result[1, v] / n
     if accelerate:
         age[v] = 0 if sweep == 1 or now > previous[v] else age[v] + 1
@@ -310,16 +310,16 @@ def correlations(
     accelerate: bool,
     subsets: NDArray[np.bool_],
 ) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Psi of many subsets of the variables, eight at a time.
+    """Compute psi of many subsets of the variables, eight at a time.
 
     Parameters
     ----------
     order, bounds, groups, start
-        From `rank`.
+        As returned by `rank`.
     accelerate : bool
-        False: the rule of `solve`; True: that of `converge`.
+        False: stopping rule of `solve`; True: stopping rule of `converge`.
     subsets : ndarray of bool of shape (n_subsets, p)
-        Neighbours should share most of their variables.
+        Consecutive subsets should share most of their variables.
 
     Returns
     -------
@@ -340,7 +340,7 @@ def correlations(
     idle = np.ones(LANES, np.bool_)
     queue = 0
     while True:
-        for v in range(LANES):  # a lane that is done takes the next subset
+        for v in range(LANES):  # a finished lane starts the next subset
             while idle[v] and queue < count:
                 holds[v] = queue
                 momentum[0, v] = 0.0  # the last sum is multiplied by this, then overwritten

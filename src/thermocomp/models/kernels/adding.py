@@ -1,7 +1,7 @@
 """Best subsets by adding columns, compiled: all sets up to a size, the last two columns entering in closed form.
 
-The products of the columns are swept of each column that enters. This loses digits where columns nearly depend on each
-other, so it only screens: what may be good enough, or cannot be judged, is computed by QR.
+Each column that enters is swept out of the cross products. This loses digits for nearly dependent columns, so the
+method only screens: candidates that may be good enough, or cannot be assessed reliably, are computed by QR.
 """
 
 import numpy as np
@@ -20,9 +20,9 @@ from thermocomp.models.kernels.subsets import (
 
 State = tuple[FloatArray, FloatArray, FloatArray, FloatArray, IntArray, IntArray]
 
-#: least share of a column's square that others may leave of it in the sweeps; below, QR decides
+#: smallest share of a column's square that may remain after the sweeps; below it, QR decides
 LEFT = 1e-8
-#: relative error allowed for in the screening
+#: relative error allowed for in screening
 SCREEN = 1e-6
 #: rounding error of a product of two columns of norm 1
 DIGITS = 1e-14
@@ -32,7 +32,7 @@ DIGITS = 1e-14
 def try_exactly(
     columns: FloatArray, least: FloatArray, lists: Lists, inside: ByteArray, chosen: IntArray, n: int
 ) -> None:
-    """Put the first `n` of `chosen` on the list if QR confirms them."""
+    """Add the first `n` of `chosen` to the list if QR confirms them."""
     value = exact(columns, least, chosen, n)
     if value < lists[3][n]:
         inside[:] = 0
@@ -45,9 +45,9 @@ def try_exactly(
 def left_by(
     columns: FloatArray, least: FloatArray, chosen: IntArray, n: int, G: FloatArray, D: FloatArray, h: FloatArray
 ) -> None:
-    """Compute from scratch what the first `n` of `chosen` leave of the columns, scaled to the norm 1: their products.
+    """Recompute the products of all columns after projecting out the first `n` of `chosen`, scaled to norm 1.
 
-    A column of which nothing is left gets products that make it useless.
+    A column without a remainder gets products that prevent its selection.
     """
     p = columns.shape[0] - 1
     some = np.empty((n + p + 1, columns.shape[1]))
@@ -67,14 +67,14 @@ def left_by(
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
-def add(  # noqa: PLR0912, PLR0915 - in one piece it is four times as fast
+def add(  # noqa: PLR0912, PLR0915 - a single function is four times as fast
     columns: FloatArray, least: FloatArray, state: State, lists: Lists, inside: ByteArray, size: int, budget: int
 ) -> int:
-    """Continue with the enumeration of all sets up to `size` until it is over or `budget` sets were looked at.
+    """Continue the enumeration of all sets up to `size` until it is complete or `budget` sets were examined.
 
-    Level d has d columns inside; ``numbers[1, d]`` is the next to enter there and ``numbers[2, d]`` the last; it is
-    over when level 0 has no more. ``sums[:, d]``: residual sum of squares; the one when the products were computed; the
-    error of the first. Return the number of sets.
+    Level d has d columns in the set; ``numbers[1, d]`` is the next column to enter and ``numbers[2, d]`` the last; the
+    enumeration is complete when level 0 has no more columns. ``sums[:, d]``: residual sum of squares; its value when
+    the products were last computed; error of the first value. Return the number of sets.
     """
     G, D, h, sums, chosen, numbers = state
     limit = lists[3]
@@ -100,14 +100,14 @@ def add(  # noqa: PLR0912, PLR0915 - in one piece it is four times as fast
         value = before - gain
         error += DIGITS * (gain / here + 2 * np.sqrt(gain * fresh / here))
         bare = not (here > LEFT and value > 1e3 * error)
-        if bare:  # too few digits, or it depends on those inside
+        if bare:  # too few digits, or the column depends on those in the set
             value = exact(columns, least, chosen, n)
             if value == np.inf:
                 continue
             fresh, error = value, 0.0
         if bare or value < limit[n] + doubt:
             try_exactly(columns, least, lists, inside, chosen, n)
-        if n < size - 1:  # sweep the others of it
+        if n < size - 1:  # sweep the column out of the others
             if bare:
                 left_by(columns, least, chosen, n, G[n], D[n], h[n])
             else:
@@ -123,7 +123,7 @@ def add(  # noqa: PLR0912, PLR0915 - in one piece it is four times as fast
             sums[0, n], sums[1, n], sums[2, n] = value, fresh, error
             numbers[1, n], numbers[2, n] = c + 1, p - 1
             d = n
-        elif n == size - 1:  # all that may enter together with it
+        elif n == size - 1:  # all columns that may enter together with this one
             looked += p - c - 1
             row, others = G[d, c], h[d]
             least_gain = before - limit[size] - doubt

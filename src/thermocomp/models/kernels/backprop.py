@@ -1,7 +1,7 @@
 """Backpropagation for a net with one hidden layer and sigmoids in both layers (Chen 1996, section 4; C-25, C-30).
 
-Every inner loop runs along a contiguous row of hidden nodes and writes one array, so that LLVM makes vector
-instructions of it; the exponential function is a polynomial for the same reason.
+Every inner loop runs along a contiguous row of hidden nodes and writes to a single array, so that LLVM can vectorise
+it; the exponential function is a polynomial for the same reason.
 """
 
 from typing import Any
@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 _LOG2E = 1.4426950408889634
-_LN2_HIGH = 6.93147180369123816490e-01  # ends in zeros: its product with a small whole number is exact
+_LN2_HIGH = 6.93147180369123816490e-01  # ends in zeros: its product with a small integer is exact
 _LN2_LOW = 1.90821492927058770002e-10
-_MAGIC = 6755399441055744.0  # 1.5 * 2**52: a sum with it is rounded to a whole number, which its last bits tell
+_MAGIC = 6755399441055744.0  # 1.5 * 2**52: adding it rounds to an integer, stored in the last bits
 
-_CONTRACT = {"contract"}  # a multiplication and a sum may become one instruction
-_SUMS = {"contract", "reassoc", "nsz"}  # and sums may be taken in another order: the last place may change, no more
+_CONTRACT = {"contract"}  # a multiplication and an addition may be fused
+_SUMS = {"contract", "reassoc", "nsz"}  # and sums may be reordered: only the last digit may change
 
 
 @intrinsic
@@ -38,7 +38,7 @@ def _double(_context: Any, _bits: Any) -> Any:
     return types.float64(types.int64), generate
 
 
-# error_model="numpy": a test for division by zero would keep the loop from being vectorised
+# error_model="numpy": a check for division by zero would prevent vectorisation
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=_CONTRACT)
 def sigmoid(net: FloatArray) -> None:
     """Replace each number x by 1 / (1 + exp(-x)), with a relative error below 5e-16; x is clipped to -700 .. 700."""
@@ -81,7 +81,7 @@ def _shuffle(order: NDArray[np.int64], state: np.uint64) -> np.uint64:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=_SUMS)
-def train(  # noqa: PLR0912, PLR0915 - in one piece it is a sixth faster
+def train(  # noqa: PLR0912, PLR0915 - a single function is a sixth faster
     weights: FloatArray,
     n_hidden: int,
     inputs: FloatArray,
@@ -95,35 +95,35 @@ def train(  # noqa: PLR0912, PLR0915 - in one piece it is a sixth faster
 ) -> FloatArray:
     """Descend along the gradient of half the squared error, in place.
 
-    A change is `momentum` times the previous change, plus the rate times minus the gradient: that of one pattern, or
-    the mean over all patterns if `batch`.
+    A change is `momentum` times the previous change minus the rate times the gradient, either of one pattern or, if
+    `batch`, the mean over all patterns.
 
     Parameters
     ----------
     weights : ndarray of shape ((n_inputs + 1) * n_hidden + n_outputs * n_hidden + n_outputs,)
-        First the hidden layer, (n_inputs + 1, n_hidden), row 0 being the thresholds; then the weights of the outputs,
-        (n_outputs, n_hidden); then their thresholds. Changed.
+        First the hidden layer, (n_inputs + 1, n_hidden), with the thresholds in row 0; then the weights of the outputs,
+        (n_outputs, n_hidden); then their thresholds. Modified in place.
     n_hidden : int
     inputs : ndarray of shape (n_patterns, n_inputs), C order
-        Scaled.
+        Scaled inputs.
     targets : ndarray of shape (n_patterns, n_outputs), C order
-        Scaled.
+        Scaled targets.
     rates : ndarray of shape (n_epochs,)
         Learning rate of each epoch.
     momentum : float
     batch : bool
-        True: the weights change once an epoch; False: after every pattern.
+        True: the weights change once per epoch; False: after every pattern.
     shuffled : bool
-        True: the patterns come in a new random order in every epoch.
+        True: the patterns are presented in a new random order in every epoch.
     seed : uint64
         Seed of that order.
     goal : float
-        Stop after the first epoch with a loss not above this.
+        Stop after the first epoch whose loss does not exceed this.
 
     Returns
     -------
     ndarray of shape (n_epochs run,)
-        Loss of each epoch: mean of the squared errors, each pattern's taken before the weights changed for it.
+        Loss of each epoch: mean squared error, each pattern evaluated before the weight update for it.
     """
     n_patterns, n_inputs = inputs.shape
     n_outputs = targets.shape[1]
@@ -132,13 +132,13 @@ def train(  # noqa: PLR0912, PLR0915 - in one piece it is a sixth faster
     first = weights[:split].reshape(n_inputs + 1, n_hidden)
     second = weights[split:end].reshape(n_outputs, n_hidden)
     threshold = weights[end:]
-    # where changes are added up: in the weights themselves, if none is remembered
+    # array in which changes accumulate: the weights themselves if no previous change is needed
     direct = not batch and momentum == 0.0
     change = weights if direct else np.zeros_like(weights)
     first_change = change[:split].reshape(n_inputs + 1, n_hidden)
     second_change = change[split:end].reshape(n_outputs, n_hidden)
     threshold_change = change[end:]
-    # a whole number of vector registers for the sigmoid: what is beyond n_hidden is not used
+    # a multiple of the vector width for the sigmoid; elements beyond n_hidden are unused
     hidden, slope = np.zeros(-(-n_hidden // 8) * 8), np.empty(n_hidden)
     out, delta = np.empty(n_outputs), np.empty(n_outputs)
     order = np.arange(n_patterns)
@@ -167,7 +167,7 @@ def train(  # noqa: PLR0912, PLR0915 - in one piece it is a sixth faster
                     net += second[k, j] * hidden[j]
                 out[k] = net
             sigmoid(out)
-            # backward: delta and slope are the rate times minus the derivatives by each NET
+            # backward: delta and slope are minus the rate times the derivatives with respect to NET
             for k in range(n_outputs):
                 error = targets[pattern, k] - out[k]
                 loss += error * error

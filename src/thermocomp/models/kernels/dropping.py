@@ -1,16 +1,17 @@
-"""Best subsets by dropping columns, compiled: branch and bound over what is left.
+"""Best subsets by dropping columns, compiled: branch and bound.
 
-Let the rows of W be those of the inverse of the triangle of a set S, restricted to the columns that may still leave
-("free"); M = W W' and b = W z. Column j leaves at the cost b[j]^2 / M[j, j], and with it M and b lose one rank. The row
-of M that a column needs to leave is built from the vectors of those that left before, so a node costs a few passes over
-one row. Where that would lose more digits than `GUARD` allows, W is computed again by Householder's QR.
+Let W be the inverse of the triangular factor of a set S, with only the rows of the columns that may still leave
+("free"); M = W W' and b = W z. Removing column j costs b[j]^2 / M[j, j], and M and b then lose one rank. The row of M
+required to remove a column is built from the vectors of the columns removed before, so a node costs a few passes over
+one row. Where that would lose more digits than `GUARD` allows, W is recomputed by Householder QR.
 
-The state is a tuple. ``work[:, d, :]`` holds at level d: 0 the vector of the column that left, 1 the diagonal of M,
-2 b, 3 the costs, 4 the costs in the order of the free columns, 5 the least diagonal that is good enough. ``moments[d]``
-and ``triangles[d]`` are M and the triangle (columns as rows, y last) where they were computed. ``orders``: 0 the free
-columns, the dearest first, 1 the places of the children, 2 the columns of the triangle. ``numbers``: 0 how many are
-free, 1 size of the set, 2 children left, 3 level where M was computed, 4 columns of the triangle there, 5 [0] the
-level, 6 [0] whether some columns nearly depend on others, 7 the column that left. ``rss``: that of the set.
+The state is a tuple. ``work[:, d, :]`` contains for level d: 0 the vector of the removed column, 1 the diagonal of M,
+2 b, 3 the costs, 4 the costs in the order of the free columns, 5 the smallest acceptable diagonal. ``moments[d]`` and
+``triangles[d]`` are M and the triangular factor (columns as rows, y last) at levels where they were computed.
+``orders``: 0 the free columns in descending order of cost, 1 the indices of the children, 2 the columns of the
+triangular factor. ``numbers``: 0 number of free columns, 1 size of the set, 2 number of remaining children, 3 level
+where M was computed, 4 number of columns of the triangular factor there, 5 [0] the level, 6 [0] whether some columns
+are nearly dependent, 7 the removed column. ``rss``: residual sum of squares of the set.
 """
 
 import numpy as np
@@ -29,13 +30,13 @@ from thermocomp.models.kernels.subsets import (
 
 State = tuple[FloatArray, FloatArray, FloatArray, IntArray, IntArray, FloatArray]
 
-#: least share of M[j, j] that may be left before W is computed again: five digits are lost at most
+#: smallest remaining share of M[j, j] before W is recomputed: at most five digits are lost
 GUARD = 1e-5
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
 def gather(state: State, source: int, inside: ByteArray, free: IntArray, n_free: int) -> tuple[FloatArray, int]:
-    """Return the triangle of those that stay for good, the free columns and y, and how many stay for good."""
+    """Return the triangular factor of the permanently retained columns, free columns and y, and the number retained."""
     _, _, triangles, orders, numbers, _ = state
     p = len(inside)
     had = numbers[4, source]
@@ -61,7 +62,7 @@ def gather(state: State, source: int, inside: ByteArray, free: IntArray, n_free:
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
 def renew(state: State, source: int, level: int, inside: ByteArray, free: IntArray, n_free: int) -> None:
-    """Compute W, M and b of the free columns from the triangle at level `source`, and note them at `level`."""
+    """Compute W, M and b of the free columns from the triangular factor at level `source`; store them at `level`."""
     work, moments, triangles, orders, numbers, _ = state
     p = len(inside)
     columns, kept = gather(state, source, inside, free, n_free)
@@ -76,7 +77,7 @@ def renew(state: State, source: int, level: int, inside: ByteArray, free: IntArr
     for r in range(m):
         triangles[level, p, r] = columns[kept + m, kept + r]
     numbers[4, level] = m
-    for i in range(m):  # row by row: each is then the exact one of a triangle that is wrong in the last places only
+    for i in range(m):  # by rows: each is then exact for a triangle with errors only in the last digits
         W[i, i] = 1.0 / columns[kept + i, kept + i]
         for c in range(i + 1, m):
             total = 0.0
@@ -107,7 +108,7 @@ def renew(state: State, source: int, level: int, inside: ByteArray, free: IntArr
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
 def begin(triangle: FloatArray, state: State, lists: Lists, inside: ByteArray, residual: float) -> None:
-    """Set up the node of all columns, with all its children."""
+    """Initialise the root node (all columns) with all its children."""
     work, _, triangles, orders, numbers, rss = state
     p = len(inside)
     for i in range(p):
@@ -137,12 +138,12 @@ def begin(triangle: FloatArray, state: State, lists: Lists, inside: ByteArray, r
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
-def drop(  # noqa: PLR0912, PLR0915 - in one piece it is a tenth faster
+def drop(  # noqa: PLR0912, PLR0915 - a single function is a tenth faster
     state: State, lists: Lists, inside: ByteArray, budget: int
 ) -> int:
-    """Continue with the search until it is over or `budget` nodes were visited; return their number.
+    """Continue the search until it is complete or `budget` nodes were visited; return their number.
 
-    The search is over when ``state`` says that level 0 has no children left, ``numbers[2, 0] == 0``, at level 0.
+    The search is complete when ``state`` is at level 0 and this level has no children left: ``numbers[2, 0] == 0``.
     """
     work, moments, _, orders, numbers, rss = state
     limit, bound = lists[3], lists[4]
@@ -225,7 +226,7 @@ def drop(  # noqa: PLR0912, PLR0915 - in one piece it is a tenth faster
                 q += x < allowed
             if lowest >= 0:
                 break
-            renew(state, base, d + 1, inside, parent[j + 1 : j + 1 + m], m)  # it says where its base is
+            renew(state, base, d + 1, inside, parent[j + 1 : j + 1 + m], m)  # sets the base of level d + 1
         if r + lowest < limit[n - 1]:
             for i in range(j + 1, j + 1 + m):
                 k = parent[i]
@@ -241,7 +242,7 @@ def drop(  # noqa: PLR0912, PLR0915 - in one piece it is a tenth faster
                 key[e], order[e] = key[e - 1], order[e - 1]
                 e -= 1
             key[e], order[e] = x, k
-        # The dearest stay for good while their leaving is beyond the bound of the smallest size still in reach.
+        # Retain the most costly columns permanently if their removal exceeds the bound of the smallest reachable size.
         first = 0
         while first < q - 1 and r + key[first] >= bound[max(n - q + first, 1)]:
             first += 1
@@ -252,7 +253,7 @@ def drop(  # noqa: PLR0912, PLR0915 - in one piece it is a tenth faster
         if first > 0:
             for i in range(q):
                 order[i], key[i] = order[first + i], key[first + i]
-        if inflated:  # those that nearly depend on others come first: once one is out, its digits are safe below
+        if inflated:  # nearly dependent columns come first: after one is removed, precision is safe below
             e = 0
             for i in range(q):
                 x, k = key[i], order[i]
@@ -273,7 +274,7 @@ def drop(  # noqa: PLR0912, PLR0915 - in one piece it is a tenth faster
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
 def pivot(A: FloatArray, k: int) -> None:
-    """Let column k in or out: symmetric Gauss-Jordan; those inside have a negative diagonal."""
+    """Sweep column k in or out: symmetric Gauss-Jordan; columns in the set have a negative diagonal."""
     d = A[k, k]
     row = A[k].copy()
     for i in range(len(A)):
@@ -287,9 +288,9 @@ def pivot(A: FloatArray, k: int) -> None:
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
 def list_good_sets(triangle: FloatArray, least: FloatArray, lists: Lists, inside: ByteArray, largest: int) -> None:  # noqa: PLR0912
-    """List good sets of every size: let the cheapest leave, then swap a pair for as long as that helps.
+    """List good sets of every size: remove the cheapest column, then swap pairs while that improves the set.
 
-    This works on products and has no guard: what it finds is taken at the value that QR gives.
+    This works on cross products without a precision guard; each set found is rated by its QR value.
     """
     p = len(inside)
     columns = np.ascontiguousarray(triangle.T)

@@ -1,7 +1,7 @@
-"""Eight numbers in one register, for numba: it turns none of our loops over eight into such instructions by itself.
+"""Vectors of eight numbers for numba, which does not vectorise our loops over eight on its own.
 
-`load` and `store` move a row of an array of shape (n, 8), C order; the others work on what was loaded, number by number
-and in double precision, so that each of the eight is what it would be alone. All are for compiled functions only.
+`load` and `store` move a row of an array of shape (n, 8), C order; the other functions work elementwise on loaded
+vectors in double precision, so that each lane has the same result as a scalar. For use in compiled functions only.
 """
 
 from collections.abc import Callable
@@ -17,7 +17,7 @@ _VECTOR = ir.VectorType(ir.DoubleType(), LANES)
 
 
 class _Lanes(types.Type):
-    """Type of eight numbers in a register."""
+    """Type of a vector of eight numbers."""
 
     def __init__(self) -> None:
         super().__init__(name="Lanes")

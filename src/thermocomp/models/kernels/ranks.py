@@ -1,9 +1,10 @@
-"""Ranks, and conditional expectations on them: sort once, then sliding means by running sums.
+"""Ranks, and conditional expectations on them: a single sort, then sliding means by running sums.
 
-Everything lives in ranks. Row ``j < p`` of `order` holds, for each rank of T_j, the rank of S of the same sample; row
-p holds the sample of each rank of S. `bounds` and `groups` hold where the tied values of each variable begin.
+All data are in rank order. Row ``j < p`` of `order` contains, for each rank of T_j, the rank of S of the same sample;
+row p contains the sample of each rank of S. `bounds` and `groups` give the first ranks of the groups of tied values of
+each variable and their number.
 
-numba does not notice when a function that another file calls is changed: delete ``__pycache__`` after an edit.
+numba does not detect changes to a function that is called from another file: delete ``__pycache__`` after an edit.
 """
 
 from typing import Any
@@ -20,7 +21,7 @@ compiled: Any = njit(cache=True, nogil=True)
 
 @compiled
 def _argsort(x: FloatArray, index: RankArray, keys: RankArray, bins: RankArray) -> None:
-    """Sort stably into `index`: one counting pass on a linear scale, then insertion within the bins."""
+    """Sort stably into `index`: one counting pass on a linear scale, then insertion sort within the bins."""
     n = len(x)
     low = high = x[0]
     for i in range(n):
@@ -35,7 +36,7 @@ def _argsort(x: FloatArray, index: RankArray, keys: RankArray, bins: RankArray) 
     bins[:] = 0
     for i in range(n):
         place = (x[i] - low) * scale
-        keys[i] = np.uint32(place) if place < size - 1 else np.uint32(size - 1)  # also where it is not a number
+        keys[i] = np.uint32(place) if place < size - 1 else np.uint32(size - 1)  # also catches nan
         bins[keys[i] + 1] += 1
     for k in range(size):
         bins[k + 1] += bins[k]
@@ -53,7 +54,7 @@ def _argsort(x: FloatArray, index: RankArray, keys: RankArray, bins: RankArray) 
             k -= 1
         index[k] = mine
         budget -= i - k
-        if budget < 0:  # a few far values have squeezed all others into a few bins
+        if budget < 0:  # outliers have squeezed most values into a few bins
             index[:] = np.argsort(x, kind="mergesort")
             return
 
@@ -71,11 +72,11 @@ def rank(columns: FloatArray) -> tuple[RankArray, RankArray, NDArray[np.int64], 
     -------
     order : ndarray of uint32 of shape (p + 1, n)
     bounds : ndarray of uint32 of shape (p + 1, n + 1)
-        Ranks at which the groups of equal values begin; the last is n.
+        Ranks at which the groups of equal values begin; the last value is n.
     groups : ndarray of int64 of shape (p + 1,)
         Number of groups.
     start : ndarray of shape (n,)
-        S by rank, of zero mean and unit variance.
+        S in rank order, with zero mean and unit variance.
     """
     m, n = columns.shape
     order = np.empty((m, n), np.uint32)
@@ -114,7 +115,7 @@ def rank(columns: FloatArray) -> tuple[RankArray, RankArray, NDArray[np.int64], 
         start[i] = columns[m - 1, order[m - 1, i]] - mean
         square += start[i] * start[i]
     if groups[m - 1] == 1:
-        start[:] = 0.0  # else its rounding would be taken for a signal
+        start[:] = 0.0  # otherwise rounding would be mistaken for a signal
     else:
         start /= np.sqrt(square / n)
     return order, bounds, groups, start
@@ -122,7 +123,7 @@ def rank(columns: FloatArray) -> tuple[RankArray, RankArray, NDArray[np.int64], 
 
 @compiled
 def running_sums(residual: FloatArray, phi: FloatArray, order: RankArray, sums: FloatArray) -> None:
-    """Fill `sums` with the running sums of residual + phi by rank, in four chains that do not wait for each other."""
+    """Fill `sums` with the running sums of residual + phi in rank order, in four independent chains."""
     n = len(phi)
     m = n // 4
     a = b = c = d = 0.0
@@ -150,7 +151,7 @@ def running_sums(residual: FloatArray, phi: FloatArray, order: RankArray, sums: 
 
 @compiled
 def boxcar(sums: FloatArray, half: int, bounds: RankArray, groups: Any, out: FloatArray) -> None:
-    """Mean of the 2 half + 1 ranks around each, cut at the ends, averaged over ties, minus the mean of all."""
+    """Compute the mean of the 2 half + 1 ranks around each rank, truncated at the ends, levelled over ties, centred."""
     n = len(out)
     for i in range(min(half, n)):
         top = min(i + half + 1, n)
@@ -166,7 +167,7 @@ def boxcar(sums: FloatArray, half: int, bounds: RankArray, groups: Any, out: Flo
 
 @compiled
 def _level(bounds: RankArray, groups: Any, out: FloatArray) -> None:
-    """Give tied ranks their mean."""
+    """Replace the values of tied ranks by their mean."""
     if groups == len(out):
         return
     for g in range(groups):
@@ -199,7 +200,7 @@ def _centre(out: FloatArray) -> None:
 
 @compiled
 def _mirrored(sums: FloatArray, half: int, out: FloatArray) -> None:
-    """Mean of the 2 half + 1 ranks around each, mirrored at the ends."""
+    """Compute the mean of the 2 half + 1 ranks around each rank, mirrored at the ends."""
     n = len(out)
     share = 1.0 / (2 * half + 1)
     for i in range(half):
@@ -212,10 +213,10 @@ def _mirrored(sums: FloatArray, half: int, out: FloatArray) -> None:
 
 @compiled
 def triangle(sums: FloatArray, half: int, bounds: RankArray, groups: Any, out: FloatArray) -> None:
-    """Two boxcars of half the width, mirrored at the ends, averaged over ties before and after, minus the mean of all.
+    """Apply two boxcars of half the width, mirrored at the ends; average over ties before and after; centre.
 
-    This is symmetric with eigenvalues from 0 to 1, so that sweeps have a limit and reach it. A boxcar has eigenvalues
-    down to -0.22: beyond five variables that rise together its equations are singular, and sweeps run away.
+    This operator is symmetric with eigenvalues from 0 to 1, so that sweeps converge. A boxcar has eigenvalues down to
+    -0.22: with more than five variables that increase together its equations are singular, and sweeps diverge.
     """
     if groups < len(out):
         for g in range(groups):
@@ -233,7 +234,7 @@ def triangle(sums: FloatArray, half: int, bounds: RankArray, groups: Any, out: F
 
 @compiled
 def smooth(sums: FloatArray, half: int, twice: bool, bounds: RankArray, groups: Any, out: FloatArray) -> None:
-    """Estimate E[z|x] by rank from the running sums of z, which may be overwritten."""
+    """Estimate E[z|x] in rank order from the running sums of z, which may be overwritten."""
     if twice:
         triangle(sums, half, bounds, groups, out)
     else:
@@ -242,7 +243,7 @@ def smooth(sums: FloatArray, half: int, twice: bool, bounds: RankArray, groups: 
 
 @compiled
 def dot(x: FloatArray, y: FloatArray) -> float:
-    """Return the sum of x * y, in four chains."""
+    """Return the sum of x * y, computed in four independent chains."""
     n = len(x)
     m = n // 4 * 4
     a = b = c = d = 0.0

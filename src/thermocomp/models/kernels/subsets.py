@@ -1,9 +1,9 @@
 """Common part of both searches for best subsets, compiled: the lists of good sets, and QR.
 
-They work on the triangle of the columns (scaled to the norm 1) and y. The lists are a tuple: residual sums of squares,
-rising, and the sets they belong to, per size; the least sum lost from each list; the limit below which a set of each
-size is of interest; the greatest limit of that size and above; how many sets are wanted; and the margin of
-`thermocomp.models.selection.subsetsearch.Problem`.
+They work on the triangular factor of the columns (scaled to norm 1) and y. The lists are a tuple of, for each size:
+residual sums of squares in ascending order; the corresponding sets; the smallest sum dropped from the list; the limit
+below which a set is of interest; the greatest limit of this or any larger size; the required number of sets; and, last,
+the margin of `thermocomp.models.selection.subsetsearch.Problem`.
 """
 
 import numpy as np
@@ -15,13 +15,13 @@ IntArray = NDArray[np.int64]
 ByteArray = NDArray[np.uint8]
 Lists = tuple[FloatArray, ByteArray, FloatArray, FloatArray, FloatArray, IntArray, FloatArray]
 
-#: products and sums may be rounded once instead of twice
+#: products and sums may be fused, with one rounding instead of two
 CONTRACT = {"contract"}
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
 def offer(lists: Lists, size: int, value: float, inside: ByteArray, a: int, b: int) -> None:
-    """Put the set `inside` without `a` and `b` on the list of its size; renew the limits."""
+    """Add the set `inside` without `a` and `b` to the list of its size; update the limits."""
     values, sets, lost, limit, bound, wanted, margin = lists
     last = values.shape[1] - 1
     if values[size, last] < np.inf:
@@ -53,7 +53,7 @@ def offer(lists: Lists, size: int, value: float, inside: ByteArray, a: int, b: i
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
 def householder(columns: FloatArray, n: int) -> None:
-    """Make the first `n` columns triangular, the others go with them; columns are stored as rows."""
+    """Triangularise the first `n` columns and transform the other columns alike; columns are stored as rows."""
     width, rows = columns.shape
     for k in range(min(n, rows)):
         x = columns[k]
@@ -79,7 +79,7 @@ def householder(columns: FloatArray, n: int) -> None:
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
 def exact(columns: FloatArray, least: FloatArray, chosen: IntArray, n: int) -> float:
-    """Return the residual sum of squares of the first `n` of `chosen` by QR; infinite if they are dependent."""
+    """Return the residual sum of squares of the first `n` of `chosen` by QR; inf if the columns are dependent."""
     p, rows = columns.shape[0] - 1, columns.shape[1]
     some = np.empty((n + 1, rows))
     for i in range(n):

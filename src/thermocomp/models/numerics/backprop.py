@@ -1,4 +1,4 @@
-"""Nets with one hidden layer trained by backpropagation (Chen 1996, section 4), and the scaling they need."""
+"""Nets with one hidden layer, trained by backpropagation (Chen 1996, section 4), and their scaling."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -11,7 +11,7 @@ from thermocomp.core.network import Affine, Perceptron
 
 FloatArray = NDArray[np.float64]
 
-#: range that inputs and targets are scaled to (C-28)
+#: range to which inputs and targets are scaled (C-28)
 LOW, HIGH = 0.1, 0.9
 #: bound of the initial weights (C-29)
 INITIAL = 0.3
@@ -20,7 +20,7 @@ INITIAL = 0.3
 def scaling_in(low: FloatArray, high: FloatArray) -> Affine:
     """Return the scaling of channels from their ranges to 0.1 .. 0.9 (C-28).
 
-    A channel whose range is nothing but rounding is constant: it becomes 0.5 for ever, so the net cannot react to it.
+    A channel whose range is only rounding is constant: it is always scaled to 0.5, so the net cannot react to it.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def scaling_in(low: FloatArray, high: FloatArray) -> Affine:
 
 
 def scaling_out(low: FloatArray, high: FloatArray) -> Affine:
-    """Return the scaling of channels from 0.1 .. 0.9 back to their ranges; a constant one gets its value.
+    """Return the scaling of channels from 0.1 .. 0.9 back to their ranges; a constant channel keeps its value.
 
     Parameters
     ----------
@@ -57,15 +57,15 @@ def constant(low: FloatArray, high: FloatArray) -> NDArray[np.bool_]:
 
 
 def learning_rates(n_epochs: int, start: float, end: float, schedule: str) -> FloatArray:
-    """Return the learning rate of each epoch; it falls at every epoch from `start` to `end`.
+    """Return the learning rate of each epoch, decreasing from `start` to `end`.
 
     Parameters
     ----------
     n_epochs : int
     start, end : float
-        Equal ones give a constant rate.
+        Equal values give a constant rate.
     schedule : {'geometric', 'harmonic'}
-        By the same factor at every epoch; or like 1 / (1 + c epoch), which is soon small and then falls slowly.
+        Decrease by the same factor in every epoch, or as 1 / (1 + c epoch), fast at first and slowly later.
 
     Returns
     -------
@@ -74,7 +74,7 @@ def learning_rates(n_epochs: int, start: float, end: float, schedule: str) -> Fl
     Raises
     ------
     InputError
-        Unless ``start >= end > 0`` and there is an epoch.
+        ``start >= end > 0`` does not hold, or there is no epoch.
     """
     if n_epochs < 1 or not 0 < end <= start < np.inf:
         raise InputError(
@@ -96,10 +96,9 @@ class TrainedNet:
     Parameters
     ----------
     net : Perceptron
-        From scaled inputs to scaled outputs.
+        Net from scaled inputs to scaled outputs.
     losses : ndarray of shape (n_epochs run,)
-        Mean of the squared errors in each epoch [scaled units]; each pattern's error is taken before the weights
-        change for it.
+        Mean squared error in each epoch [scaled units]; each pattern is evaluated before the weight update for it.
     """
 
     net: Perceptron
@@ -120,29 +119,29 @@ def train_net(
 ) -> TrainedNet:
     """Train a net with sigmoids in both layers by backpropagation (C-25 to C-30).
 
-    The interpreter is free while it runs, so nets can be trained in threads.
+    The function releases the interpreter lock (GIL), so that nets can be trained in threads.
 
     Parameters
     ----------
     inputs : ndarray of shape (n_patterns, n_inputs)
-        Scaled, see `scaling_in`.
+        Scaled inputs, see `scaling_in`.
     targets : ndarray of shape (n_patterns, n_outputs)
-        Scaled.
+        Scaled targets.
     n_hidden : int
         Number of hidden nodes.
     rng : numpy.random.Generator
-        Draws the initial weights and thresholds, uniform in -0.3 .. 0.3 (C-29), and what shuffles the patterns.
+        Generator of the initial weights and thresholds, uniform in -0.3 .. 0.3 (C-29), and of the shuffling seed.
     rates : ndarray of shape (n_epochs,)
         Learning rate of each epoch, see `learning_rates`.
     update : {'pattern', 'batch'}
-        Change the weights after every pattern; or once an epoch, by the mean over the patterns (C-30).
+        Change the weights after every pattern, or once per epoch by the mean over the patterns (C-30).
     order : {'shuffled', 'fixed'}
-        Patterns in a new random order in every epoch, or as they come. As they come, the rows of a drift test are
-        nearly the same for a long time, and a net that learns at a rate of 0.5 forgets the morning by the evening.
+        New random order of the patterns in every epoch, or the given order. In the given order, consecutive rows of a
+        drift test are nearly equal, and a net with a learning rate of 0.5 forgets the beginning of the test by its end.
     momentum : float
-        Part of the previous change that is added to the next one.
+        Share of the previous change that is added to the next one.
     goal : float
-        Stop after the first epoch with a loss not above this.
+        Stop after the first epoch whose loss does not exceed this.
 
     Returns
     -------
@@ -151,11 +150,11 @@ def train_net(
     Raises
     ------
     FitError
-        `inputs` and `targets` are no tables of equally many rows, or hold numbers that are not finite.
+        `inputs` and `targets` are not tables with the same number of rows, or contain non-finite numbers.
     InputError
         A setting is out of its range.
     """
-    from thermocomp.models.kernels import backprop  # numba takes long to import
+    from thermocomp.models.kernels import backprop  # numba is slow to import
 
     inputs, targets = (np.ascontiguousarray(a, dtype=np.float64) for a in (inputs, targets))
     if inputs.ndim != 2 or targets.ndim != 2 or not 0 < len(inputs) == len(targets) or targets.shape[1] == 0:

@@ -1,4 +1,4 @@
-"""The thermal cycles that a method chooses its settings by."""
+"""Folds of thermal cycles, by which a method chooses its settings."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -9,20 +9,20 @@ IntArray = NDArray[np.intp]
 
 
 def number_folds(cycle: ArrayLike | None, n_rows: int) -> tuple[IntArray, str]:
-    """Give every row its fold: the thermal cycle that is left out together with it.
+    """Assign each row to a fold: the thermal cycle with which it is left out.
 
     Parameters
     ----------
     cycle : array-like of int of shape (n_rows,), or None
-        Cycle of each row; -1 for rows that are not learned from.
+        Cycle of each row; -1 for rows that are not used for training.
     n_rows : int
 
     Returns
     -------
     folds : ndarray of int of shape (n_rows,)
-        0, 1, ... in the order of the cycles; one too short to judge a model on joins the one before. -1 stays.
+        0, 1, ... in the order of the cycles; a cycle too short for a separate fold joins the previous one. -1 remains.
     description : str
-        Left-out units, in words.
+        Left-out units as text.
     """
     if cycle is None:
         return np.arange(n_rows) * min(5, n_rows) // n_rows, "five stretches of equal length, left out in turn"
@@ -45,32 +45,31 @@ def number_folds(cycle: ArrayLike | None, n_rows: int) -> tuple[IntArray, str]:
     return folds, f"{number + 1} thermal cycles, left out in turn"
 
 
-#: of a thermal cycle, the least that is left out on its own
+#: smallest share of a thermal cycle that is left out separately
 _LEAST_PART = 0.1
-#: parts that are left out in turn, at most: more say little more
+#: maximum number of parts that are left out in turn: more add little information
 _MOST_PARTS = 16
 
 
 def halve(folds: IntArray, turning: NDArray[np.bool_]) -> tuple[IntArray, str]:
-    """Cut each fold in two, where its spindle comes to its last stop.
+    """Split each fold in two at the last stop of the spindle.
 
-    A model of drift is asked two things, how it warms up and how it cools down: what knows the one half of a cycle need
-    not know the other.
+    A drift model must predict both warm-up and cool-down: knowledge of one half of a cycle need not cover the other.
 
     Parameters
     ----------
     folds : ndarray of int of shape (n_rows,)
-        As `number_folds` gives them.
+        As returned by `number_folds`.
     turning : ndarray of bool of shape (n_rows,)
-        The spindle turns.
+        Whether the spindle turns.
 
     Returns
     -------
     parts : ndarray of int of shape (n_rows,)
-        0, 1, ...; -1 stays. A fold that does not end in a stop is cut in the middle of its rows. Of many folds none is
-        cut, and of very many several are one part.
+        0, 1, ...; -1 remains. A fold that does not end in a stop is split in the middle of its rows. With many folds
+        none is split, and with very many several folds form one part.
     description : str
-        Left-out units, in words.
+        Left-out units as text.
     """
     n_folds = int(folds.max()) + 1
     if 2 * n_folds > _MOST_PARTS:
@@ -84,5 +83,5 @@ def halve(folds: IntArray, turning: NDArray[np.bool_]) -> tuple[IntArray, str]:
         if not _LEAST_PART * rows.size <= stop <= (1 - _LEAST_PART) * rows.size:
             stop = rows.size // 2
         parts[rows[:stop]], parts[rows[stop:]] = 2 * k, 2 * k + 1
-    parts[folds >= 0] = np.unique(parts[folds >= 0], return_inverse=True)[1]  # of a fold of one row a half is empty
+    parts[folds >= 0] = np.unique(parts[folds >= 0], return_inverse=True)[1]  # half of a one-row fold is empty
     return parts, f"halves of {n_folds} thermal cycles (run, stop), left out in turn"

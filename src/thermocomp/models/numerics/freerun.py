@@ -1,4 +1,4 @@
-"""Free run of linear autoregressive models, and the coefficients that make its error smallest (output error)."""
+"""Free run of linear autoregressive models, and the coefficients that minimise its error (output error)."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -13,12 +13,12 @@ from thermocomp.models.numerics.ticks import TickedRun
 
 FloatArray = NDArray[np.float64]
 
-#: time constants a start is put together from, from the interval to the length of the data
+#: number of time constants combined in starting values, from the interval to the length of the data
 N_START = 7
-#: starts that are followed to the end
+#: number of starting values that are optimised
 FOLLOWED = 2
 _STEPS = 60
-_GAIN = 1e-8  # relative decrease of the squared error below which it is over
+_GAIN = 1e-8  # relative decrease of the squared error at which the optimisation ends
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,13 +59,13 @@ class Coefficients:
         )
 
     def settled(self, inputs: FloatArray) -> FloatArray:
-        """Return the deviation at which the free run comes to rest, the inputs staying as they are."""
+        """Return the deviation at which the free run settles with constant inputs."""
         value: FloatArray = (inputs @ self.b.sum(axis=0) + self.intercept) / (1.0 - self.a.sum())
         return value
 
 
 def _recursion(a: FloatArray, driven: FloatArray) -> FloatArray:
-    from scipy.signal import lfilter  # takes long to import
+    from scipy.signal import lfilter  # slow to import
 
     found: FloatArray = lfilter([1.0], np.concatenate([[1.0], -a]), driven, axis=0)
     return found
@@ -91,26 +91,26 @@ def output_error(
     """Find the coefficients with the smallest squared error in free run from a cold start.
 
     Least squares on one-step errors is biased by the noise of the probe, which enters through the past displacements
-    (E-P3); here only inputs enter. All poles are real and from 0 to `largest_root`: heat flow does not oscillate, and a
-    model that may do so learns to imitate the days of the ambient. The error is not convex: Levenberg-Marquardt follows
-    the best of several starts, all combinations of k (at most 3) of some time constants, for which b is linear least
-    squares. It first moves a_1 .. a_k freely, and only if the poles it ends with are not real, the poles themselves:
-    two poles that have met cannot be told apart any more, so that way alone gets stuck.
+    (E-P3); in free run only the inputs enter. All poles are real and between 0 and `largest_root`: heat flow does not
+    oscillate, and a model that can oscillate fits the daily cycle of the ambient temperature. The error is not convex:
+    Levenberg-Marquardt is run from the best of several starts, all combinations of k (at most 3) time constants, for
+    which b is linear least squares. It first varies a_1 .. a_k freely; only if the resulting poles are not real, it
+    varies the poles themselves. The poles alone are not sufficient, since two coinciding poles cannot separate again.
 
     Parameters
     ----------
     runs : sequence of TickedRun
     targets : sequence of ndarray of shape (n_ticks + 1,)
-        Displacement at each tick of each run; nan where not known.
+        Displacement at each tick of each run; nan where unknown.
     k, m : int
     intercept : bool
     largest_root : float
-        All poles stay below it.
+        Upper bound of all poles.
 
     Returns
     -------
     Coefficients or None
-        None if there are not more known ticks than coefficients.
+        None if the number of known ticks does not exceed the number of coefficients.
     """
     bound = _Problem(runs, targets, k, m, intercept, largest_root, by_poles=True)
     if sum(int(np.isfinite(y[1:]).sum()) for y in targets) <= bound.size:
@@ -130,7 +130,7 @@ def _least(ends: Iterable[tuple[FloatArray, float]]) -> FloatArray:
 
 
 class _Problem:
-    """Squared error of the free run as a function of theta = [a or poles, b lag by lag, intercept]."""
+    """Squared error of the free run as a function of theta = [a or poles, b by lag, intercept]."""
 
     def __init__(
         self,
@@ -159,7 +159,7 @@ class _Problem:
         return Coefficients(a, theta[k:until].reshape(-1, self._n_inputs).copy(), constant)
 
     def starts(self) -> list[FloatArray]:
-        """Return theta for combinations of poles from the interval to the length of the data."""
+        """Return theta for combinations of poles whose time constants range from the interval to the data length."""
         longest = max(len(r.drive) for r in self._runs)
         poles = np.exp(-1.0 / np.geomspace(1.0, max(longest / 3, 2.0), N_START))
         poles = poles[poles < self._largest]
@@ -167,7 +167,7 @@ class _Problem:
         return [self.best_for(np.array([*some, *[0.0] * (self._k - len(some))])) for some in chosen]
 
     def best_for(self, poles: FloatArray) -> FloatArray:
-        """Return theta for given poles; the rest is linear."""
+        """Return theta for given poles; the other parameters are linear."""
         table = self._driven(polynomial(poles))
         scale = np.linalg.norm(table, axis=0)
         scale[scale == 0] = 1.0
@@ -184,7 +184,7 @@ class _Problem:
         return np.asarray(self._y - free)
 
     def _driven(self, a: FloatArray) -> FloatArray:
-        """Return the derivative of the free run by b and intercept at the known ticks."""
+        """Return the derivative of the free run with respect to b and intercept at the known ticks."""
         parts = []
         for run, known in zip(self._runs, self._known, strict=True):
             later = run.drive.copy()
@@ -200,7 +200,7 @@ class _Problem:
         return np.concatenate(parts)
 
     def jacobian(self, theta: FloatArray) -> FloatArray:
-        """Return the derivative of the free run by theta at the known ticks, (n_known, size)."""
+        """Return the derivative of the free run with respect to theta at the known ticks, (n_known, size)."""
         c = self.split(theta)
         parts = []
         for run, known in zip(self._runs, self._known, strict=True):
@@ -214,7 +214,7 @@ class _Problem:
         return np.hstack([np.concatenate(parts), self._driven(c.a)])
 
     def descend(self, theta: FloatArray) -> tuple[FloatArray, float]:
-        """Follow Levenberg-Marquardt; poles are kept within bounds, no step leads to a free run that grows."""
+        """Minimise by Levenberg-Marquardt; poles are kept within bounds, and no step leads to a growing free run."""
         now = self.squares(theta)
         damping = 1e-3
         for _ in range(_STEPS):

@@ -11,18 +11,18 @@ from scipy.linalg import lapack
 FloatArray = NDArray[np.float64]
 
 _EPS = float(np.finfo(np.float64).eps)
-#: condition number from which a solution is refined
+#: condition number above which a solution is refined
 ILL = 1e8
 
 
 @dataclass(frozen=True)
 class Triangle:
-    """Triangular factor of the centred table [X y]: all that least squares on any subset of the columns needs.
+    """Triangular factor of the centred table [X y], sufficient for least squares on any subset of the columns.
 
     Parameters
     ----------
     factor : ndarray of shape (min(n_rows, n_columns + 1), n_columns + 1)
-        R of the QR factorisation; the last column is that of y.
+        R of the QR factorisation; the last column belongs to y.
     centre : ndarray of shape (n_columns + 1,)
         Offsets subtracted from the columns: their means, or zeros without an intercept.
     n_rows : int
@@ -35,7 +35,7 @@ class Triangle:
     intercept: bool
 
     def part(self, columns: Sequence[int]) -> "Triangle":
-        """Return the factor of [X[:, columns] y]; no longer triangular, but as good."""
+        """Return the factor of [X[:, columns] y]; it is no longer triangular, but equivalent."""
         which = [*columns, -1]
         return Triangle(self.factor[:, which], self.centre[which], self.n_rows, self.intercept)
 
@@ -51,21 +51,21 @@ class Triangle:
 
     @property
     def last_place(self) -> FloatArray:
-        """One unit in the last place of each column before it was centred, as a norm, shape (n_columns + 1,)."""
+        """Norm of one unit in the last place of each column before centring, shape (n_columns + 1,)."""
         return np.asarray(_EPS * np.hypot(self.norms, np.sqrt(self.n_rows) * self.centre))
 
     @property
     def noise(self) -> FloatArray:
         """Residual that rounding alone may cause in each column, shape (n_columns + 1,).
 
-        64 units in the last place, and one more for each column. A column of which not more is left, given the columns
-        before it, depends on them.
+        64 units in the last place, plus one for each column. A column depends on the columns before it if its remainder
+        does not exceed this.
         """
         return np.asarray((64 + self.factor.shape[1]) * self.last_place)
 
 
 def join_columns(X: FloatArray, y: FloatArray) -> FloatArray:
-    """Return [X y] in Fortran order, the work space of `triangle`."""
+    """Return [X y] in Fortran order, the workspace of `triangle`."""
     out = np.empty((X.shape[0], X.shape[1] + 1), order="F")
     out[:, :-1] = X
     out[:, -1] = y
@@ -78,9 +78,9 @@ def triangle(work: FloatArray, *, intercept: bool) -> Triangle:
     Parameters
     ----------
     work : ndarray of shape (n_rows, n_columns + 1), Fortran order
-        From `table`; destroyed.
+        Table from `join_columns`; overwritten.
     intercept : bool
-        Centre the columns first, which is the same as a column of ones in front of them.
+        Centre the columns first, which is equivalent to an additional column of ones.
 
     Returns
     -------
@@ -92,14 +92,14 @@ def triangle(work: FloatArray, *, intercept: bool) -> Triangle:
         centre = work.mean(axis=0)
         work -= centre
     small = min(n_rows, width)
-    block = min(max(width // 8, 4), 32, small)  # columns treated at once; fastest by trial from 10 to 325 columns
+    block = min(max(width // 8, 4), 32, small)  # columns per block; found fastest in tests from 10 to 325 columns
     factor = lapack.dgeqrt(block, work, overwrite_a=1)[0][:small]
     return Triangle(np.triu(factor), centre, n_rows, intercept)
 
 
 @dataclass(frozen=True)
 class Solution:
-    """Answer of `lstsq`.
+    """Result of `lstsq`.
 
     Parameters
     ----------
@@ -107,9 +107,9 @@ class Solution:
         Zero for dependent columns.
     intercept : float
     dependent : tuple of int
-        Columns left out because they depend on the constant and on the others.
+        Columns left out because they depend linearly on the constant and on the others.
     rank : int
-        Number of columns that were kept.
+        Number of columns kept.
     condition : float
         Condition number of the kept columns, centred and scaled to equal norms; 1 if there are none.
     residual : ndarray of shape (n_rows,)
@@ -130,17 +130,17 @@ def lstsq(X: FloatArray, y: FloatArray, *, intercept: bool = True) -> Solution:
     """Solve min ||y - intercept - X b|| with the full accuracy of the data.
 
     QR of the centred and scaled columns (Golub and Van Loan, Matrix Computations, 5.3): 13 correct digits for Longley's
-    problem, 9 for Wampler's first three and 7 for Filippelli's (NIST StRD), as good as statsmodels' QR. An
-    ill-conditioned problem is solved once more for its residual; without that its last digit depends on the processor.
+    problem, 9 for Wampler's first three and 7 for Filippelli's (NIST StRD), as accurate as QR in statsmodels. An
+    ill-conditioned problem is solved again for its residual; otherwise the last digit would depend on the processor.
 
-    Rule for a numerically rank-deficient X: QR with column pivoting takes the columns in the order of what they add;
-    a column of which no more is left than rounding explains (`Triangle.noise`) is dependent, gets the coefficient 0
-    and is told in `Solution.dependent`. A constant column depends on the intercept.
+    Rule for a numerically rank-deficient X: QR with column pivoting orders the columns by their contribution; a column
+    whose remainder does not exceed rounding (`Triangle.noise`) is dependent, has the coefficient 0 and is listed in
+    `Solution.dependent`. A constant column depends on the intercept.
 
     Parameters
     ----------
     X : ndarray of shape (n_rows, n_columns)
-        May have more columns than rows.
+        The number of columns may exceed the number of rows.
     y : ndarray of shape (n_rows,)
     intercept : bool
 
@@ -162,16 +162,16 @@ def lstsq(X: FloatArray, y: FloatArray, *, intercept: bool = True) -> Solution:
 
 
 def solve(X: FloatArray, y: FloatArray, tri: Triangle, *, columns: Sequence[int] | None = None) -> Solution:
-    """Solve as `lstsq` does, with a triangular factor that is there already.
+    """Solve as `lstsq` does, with an existing triangular factor.
 
     Parameters
     ----------
     X : ndarray of shape (n_rows, n_columns)
     y : ndarray of shape (n_rows,)
     tri : Triangle
-        Triangle of [X y].
+        Triangular factor of [X y].
     columns : sequence of int, optional
-        Fit these only: ``Solution.coefficients`` and ``Solution.dependent`` go by their order.
+        Columns to fit; ``Solution.coefficients`` and ``Solution.dependent`` follow their order.
 
     Returns
     -------
@@ -204,7 +204,7 @@ def solve(X: FloatArray, y: FloatArray, tri: Triangle, *, columns: Sequence[int]
 
 
 def _independent(factor: FloatArray, norms: FloatArray, noise: FloatArray) -> NDArray[np.intp]:
-    """Return the indices of the columns that add something to the others, in rising order."""
+    """Return the indices of linearly independent columns, in ascending order."""
     alive = np.flatnonzero(norms > noise)
     if alive.size == 0:
         return alive
@@ -216,13 +216,13 @@ def _independent(factor: FloatArray, norms: FloatArray, noise: FloatArray) -> ND
 def effective_sample_size(residual: FloatArray) -> float:
     """Return the number of independent rows equivalent to the rows of a time series (E-C12).
 
-    n / (1 + 2 sum of the autocorrelations), the sum taken over the lags before the first autocorrelation that is not
-    positive; at least 1 and at most n. Where several tests follow one another, the seams between them are ignored.
+    n / (1 + 2 sum of the autocorrelations), summed over the lags before the first autocorrelation that is not positive;
+    at least 1 and at most n. Boundaries between consecutive tests are ignored.
 
     Parameters
     ----------
     residual : ndarray of shape (n_rows,)
-        In the order of time.
+        Residual in chronological order.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Ridge regression from moments: sums of products of [features, 1, y] are all that it needs."""
+"""Ridge regression from moments: only sums of products of [features, 1, y] are required."""
 
 from collections.abc import Sequence
 
@@ -10,7 +10,7 @@ IntArray = NDArray[np.intp]
 
 
 def part(moments: FloatArray, columns: IntArray) -> FloatArray:
-    """Return the moments of some features, the constant and y."""
+    """Return the moments of selected features, the constant and y."""
     keep = np.append(columns, [len(moments) - 2, len(moments) - 1])
     return np.asarray(moments[np.ix_(keep, keep)])
 

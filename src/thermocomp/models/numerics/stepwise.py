@@ -1,8 +1,8 @@
 """Stepwise regression: one engine on a triangular factor, two rules.
 
-The data are factorised once (`thermocomp.models.numerics.leastsquares.triangle`); after that every step works on the
-small triangle. Columns enter by a Householder reflection and leave by Givens rotations, so all candidates are always
-orthogonal to the model by construction, however many steps are taken.
+The data are factorised once (`thermocomp.models.numerics.leastsquares.triangle`); every step then works on the small
+triangular factor. Columns enter by a Householder reflection and leave by Givens rotations, so all candidates remain
+orthogonal to the model by construction after any number of steps.
 """
 
 import math
@@ -20,21 +20,21 @@ from thermocomp.models.numerics.leastsquares import Triangle
 
 FloatArray = NDArray[np.float64]
 
-#: least share of a candidate's own norm that the model must leave of it, else it does not enter
+#: smallest share of a candidate's norm that the model must leave unexplained for the candidate to enter
 TOLERANCE = 1e-8
 _TINY = float(np.finfo(np.float64).tiny)
-_SAME = 1e-10  # gains closer than this are equal, and the first candidate is taken whatever the rounding
+_SAME = 1e-10  # gains closer than this count as equal, and the first candidate is chosen regardless of rounding
 
 
 class Rule(Protocol):
-    """When a term enters and when it leaves, as partial F."""
+    """Rule for entry and deletion of terms by partial F."""
 
     def enter_f(self, df: int) -> float:
-        """Return the least F that lets a term enter, `df` being the degrees of freedom left with it."""
+        """Return the smallest F for a term to enter; `df`: residual degrees of freedom with the term included."""
         ...
 
     def delete_f(self, df: int) -> float:
-        """Return the F below which a term is deleted, `df` being the degrees of freedom left with it."""
+        """Return the F below which a term is deleted; `df`: residual degrees of freedom with the term included."""
         ...
 
     def __str__(self) -> str: ...
@@ -44,20 +44,20 @@ class Rule(Protocol):
 class FThresholds:
     """Fixed thresholds on partial F (stepwise2017, section 3.2; T-03).
 
-    What they ask for depends on the number of rows: a first variable needs R2 >= F / (F + n - 2), so F = 100 means
-    .90 at n = 13 but .11 at n = 810 (E-T3).
+    Their effect depends on the number of rows: a first variable needs R2 >= F / (F + n - 2), so F = 100 requires .90 at
+    n = 13 but .11 at n = 810 (E-T3).
 
     Parameters
     ----------
     enter : float
-        F_E, to enter.
+        F_E, threshold to enter.
     delete : float
-        F_D, to stay; not above `enter`, else a term could enter and leave for ever (E-T4).
+        F_D, threshold to stay; at most `enter`, otherwise a term could enter and leave endlessly (E-T4).
 
     Raises
     ------
     InputError
-        Unless ``enter >= delete >= 0``.
+        ``enter >= delete >= 0`` does not hold.
     """
 
     enter: float = 100.0
@@ -84,21 +84,21 @@ class FThresholds:
 
 @dataclass(frozen=True)
 class AlphaThresholds:
-    """Significance levels, turned into thresholds on F at every step (Chen 1996, Fig. 2; C-15).
+    """Significance levels, converted to thresholds on F at every step (Chen 1996, Fig. 2; C-15).
 
-    Never compared as p-values: those underflow to zero on long recordings, and every candidate would be equal.
+    p-values are never compared: they underflow to zero on long recordings, and all candidates would be equal.
 
     Parameters
     ----------
     enter : float
         Alpha-to-enter.
     remove : float
-        Alpha-to-remove; not below `enter`.
+        Alpha-to-remove; at least `enter`.
 
     Raises
     ------
     InputError
-        Unless ``0 < enter <= remove <= 1``.
+        ``0 < enter <= remove <= 1`` does not hold.
     """
 
     enter: float = 0.001
@@ -112,11 +112,11 @@ class AlphaThresholds:
             )
 
     def enter_f(self, df: int) -> float:
-        """Return the F whose tail is alpha-to-enter, with 1 and `df` degrees of freedom."""
+        """Return the F whose tail probability is alpha-to-enter, with 1 and `df` degrees of freedom."""
         return f_of_alpha(self.enter, df)
 
     def delete_f(self, df: int) -> float:
-        """Return the F whose tail is alpha-to-remove, with 1 and `df` degrees of freedom."""
+        """Return the F whose tail probability is alpha-to-remove, with 1 and `df` degrees of freedom."""
         return f_of_alpha(self.remove, df)
 
     def __str__(self) -> str:
@@ -124,12 +124,12 @@ class AlphaThresholds:
 
 
 def f_of_alpha(alpha: float, df: int) -> float:
-    """Return the F with 1 and `df` degrees of freedom whose tail is `alpha`: the square of Student's t."""
+    """Return the F with 1 and `df` degrees of freedom whose tail probability is `alpha`: the square of Student's t."""
     return float(stdtrit(df, alpha / 2) ** 2)
 
 
 def alpha_of_f(f: float, df: int) -> float:
-    """Return the tail of F with 1 and `df` degrees of freedom; it underflows to 0 for large `f`."""
+    """Return the tail probability of F with 1 and `df` degrees of freedom; it underflows to 0 for large `f`."""
     return float(fdtrc(1, df, f))
 
 
@@ -144,23 +144,23 @@ def _bare(value: float) -> str:
 
 @dataclass(frozen=True)
 class StepwiseStep:
-    """One line of the log.
+    """One step of the selection, as logged.
 
     Parameters
     ----------
     number : int
-        From 1.
+        Number of the step (1-based).
     action : {'enter', 'remove'}
     index : int
         Index of the term among the candidates.
     term : str
-        Its name.
+        Name of the term.
     f : float
         Partial F of the term, in the model that contains it (T-02).
     df : int
-        Degrees of freedom left in that model.
+        Residual degrees of freedom of that model.
     alpha : float
-        Significance that corresponds to `f` if the rows were independent, which those of a time series are not (E-C12).
+        Significance that corresponds to `f` if the rows were independent; the rows of a time series are not (E-C12).
     r_squared : float
         R2 of the model after the step; uncentred if it has no intercept (E-C10).
     r_squared_step : float
@@ -190,10 +190,10 @@ class StepwiseSelection:
     Parameters
     ----------
     selected : tuple of int
-        Terms in the model, in rising order.
+        Terms in the model, in ascending order.
     steps : tuple of StepwiseStep
     cycled : bool
-        True if it was stopped because a model came up a second time.
+        True if the selection stopped because a model occurred for the second time.
     """
 
     selected: tuple[int, ...]
@@ -211,23 +211,23 @@ def stepwise(
 ) -> StepwiseSelection:
     """Select terms by partial F.
 
-    One action a step. If the worst term inside has an F below the threshold, it is deleted; else the candidate with
-    the greatest F enters, if that reaches the threshold; else it is over (T-04 to T-06). After each entering, the
-    terms inside are thus tested again until all hold.
+    Each step is one action. If the worst term in the model has an F below the threshold, it is deleted; otherwise the
+    candidate with the greatest F enters if it reaches the threshold; otherwise the selection ends (T-04 to T-06). After
+    each entry, the terms in the model are thus tested again until all stay.
 
-    Candidates that are constant, or of which the model leaves less than `tolerance` of their norm, do not enter.
-    Nothing enters any more once the residual is down to rounding or no degree of freedom would be left, so there may
-    be more candidates than rows.
+    Candidates that are constant, or whose remainder outside the span of the model is below `tolerance` times their
+    norm, do not enter. No candidate enters once the residual is reduced to rounding or no degree of freedom would
+    remain, so there may be more candidates than rows.
 
     Parameters
     ----------
     triangle : Triangle
-        Triangle of the candidates and y.
+        Triangular factor of the candidates and y.
     rule : Rule
     names : sequence of str
         Names of the candidates.
     needs : sequence of frozenset of int, optional
-        Per candidate, the candidates that must be in the model for it to enter, and must stay while it is in (C-21).
+        For each candidate, the candidates that must be in the model before it enters and as long as it stays (C-21).
     tolerance : float
 
     Returns
@@ -274,10 +274,10 @@ def stepwise(
 
 
 class _Tableau:
-    """The triangle, rotated such that the columns of the model are triangular in their order of entering.
+    """Triangular factor, rotated so that the columns of the model are triangular in their order of entry.
 
-    With k terms in the model, rows k and below hold what the model leaves of every other column, y being the last.
-    All columns have been scaled to the norm 1.
+    With k terms in the model, rows k and below contain the part of every other column (y last) that the model leaves
+    unexplained. All columns are scaled to norm 1.
     """
 
     def __init__(self, triangle: Triangle, tolerance: float) -> None:
@@ -285,7 +285,7 @@ class _Tableau:
         alive = norms > noise
         scale = np.where(alive, norms, 1.0)
         self._rows = np.ascontiguousarray(triangle.factor / scale)
-        # square of what must be left of a column; infinite for those that cannot enter
+        # required square of a column's remainder; infinite for columns that cannot enter
         self._least = np.where(alive, np.maximum(tolerance, noise / scale) ** 2, np.inf)
         self._least[-1] = (noise[-1] / scale[-1]) ** 2 if alive[-1] else np.inf
         self._now = self._least[:-1].copy()
@@ -295,11 +295,11 @@ class _Tableau:
 
     @property
     def df(self) -> int:
-        """Degrees of freedom that the model leaves."""
+        """Residual degrees of freedom of the model."""
         return self._free - len(self.active)
 
     def best(self, barred: Sequence[int] | None) -> tuple[int, float] | None:
-        """Return the candidate with the greatest F, and its F; `None` if no candidate may enter."""
+        """Return the candidate with the greatest F, and its F value; `None` if no candidate may enter."""
         if not self.sse > self._least[-1]:
             return None
         rest = self._rows[len(self.active) :]
@@ -312,12 +312,12 @@ class _Tableau:
         most = gain.max(initial=-1.0)
         if most < 0:
             return None
-        # F rises with the gain, so the greatest gain has the greatest F
+        # F increases with the gain, so the greatest gain has the greatest F
         index = int(np.argmax(gain >= most * (1 - _SAME)))
         return index, _ratio(float(gain[index]), max(self.sse - float(gain[index]), 0.0), self.df - 1)
 
     def worst(self, held: set[int] | None) -> tuple[int, float] | None:
-        """Return the term of the model with the smallest F, and its F; `None` if no term may leave."""
+        """Return the term of the model with the smallest F, and its F value; `None` if no term may leave."""
         k = len(self.active)
         if k == 0:
             return None
@@ -330,7 +330,7 @@ class _Tableau:
         return None if np.isinf(loss) else (self.active[place], _ratio(loss, self.sse, self.df))
 
     def enter(self, index: int) -> None:
-        """Add a column to the model: a Householder reflection of the rows below the model."""
+        """Add a column to the model by a Householder reflection of the rows below the model."""
         rest = self._rows[len(self.active) :]
         v = rest[:, index].copy()
         length = math.copysign(math.sqrt(v @ v), v[0])
@@ -342,7 +342,7 @@ class _Tableau:
         self._changed([*self.active, index])
 
     def remove(self, index: int) -> None:
-        """Remove a column from the model: Givens rotations make the others triangular again."""
+        """Remove a column from the model; Givens rotations restore the triangular form of the others."""
         place = self.active.index(index)
         active = [j for j in self.active if j != index]
         for row, column in enumerate(active[place:], start=place):

@@ -1,4 +1,4 @@
-"""Ridge regressions on random choices of features, and their average, by what each errs on what was left out."""
+"""Ridge regressions on random selections of features, and their average, weighted by errors on left-out parts."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -9,19 +9,19 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
 
-#: a structure's share is its root mean square error, the geometric mean over what was left out, to minus this power
+#: a structure's share is its RMS error (geometric mean over the left-out parts) raised to minus this power
 TRUST = 3.0
 
 
 @dataclass(frozen=True)
 class LagStructure:
-    """One choice of features, and how strongly each is shrunk.
+    """One selection of features with their ridge penalties.
 
     Parameters
     ----------
     columns : ndarray of int of shape (n_chosen,)
     strengths : ndarray of shape (n_chosen,)
-        In units of each feature's mean square.
+        Ridge penalties relative to each feature's mean square.
     """
 
     columns: IntArray
@@ -35,14 +35,14 @@ class Moments:
     Parameters
     ----------
     gram : ndarray of shape (n_parts, n_features, n_features)
-        Sums of products of the features with each other, by the part that is left out together.
+        Sums of products of the features with each other, for each part that is left out as a whole.
     cross : ndarray of shape (n_parts, n_features, n_targets)
-        Those of the features with what they predict.
+        Sums of products of the features with the targets.
     power : ndarray of shape (n_parts, n_targets)
-        Those of what they predict with itself.
+        Sums of squares of the targets.
     rows : ndarray of shape (n_parts,)
     noise : ndarray of shape (n_features, n_features)
-        Covariance of the features by the noise of the sensors in use.
+        Covariance of the features due to noise of the sensors in use.
     """
 
     gram: FloatArray
@@ -52,13 +52,13 @@ class Moments:
     noise: FloatArray
 
     def error(self, part: int, weights: FloatArray) -> FloatArray:
-        """Return the mean square error on a part of weights (..., n_features, n_targets), (..., n_targets)."""
+        """Return the mean square error, (..., n_targets), of weights (..., n_features, n_targets) on a part."""
         squares = ((self.gram[part] @ weights - 2 * self.cross[part]) * weights).sum(axis=-2) + self.power[part]
         return np.asarray(np.maximum(squares, 0.0) / self.rows[part])
 
 
 def average(moments: Moments, structures: Sequence[LagStructure]) -> tuple[FloatArray, FloatArray]:
-    """Return the weights of the features, averaged over structures, and what the average errs by on what was left out.
+    """Return the weights of the features, averaged over structures, and the error of the average on left-out parts.
 
     Parameters
     ----------
@@ -69,21 +69,21 @@ def average(moments: Moments, structures: Sequence[LagStructure]) -> tuple[Float
     -------
     weights : ndarray of shape (n_features, n_targets)
     errors : ndarray of shape (n_parts, n_targets)
-        Root mean square error on each part, left out; nan if there is one part.
+        Root mean square error on each left-out part; nan if there is only one part.
     """
     shares, errors = share_out(moments, structures)
     return (shares[:, None] * fit_each(moments, structures, range(len(moments.rows)))).sum(axis=0), errors
 
 
 def fit_each(moments: Moments, structures: Sequence[LagStructure], parts: Iterable[int]) -> FloatArray:
-    """Return the weights of the features in each structure, fitted to some of the parts.
+    """Return the weights of the features in each structure, fitted to the given parts.
 
     Parameters
     ----------
     moments : Moments
     structures : sequence of LagStructure
     parts : iterable of int
-        Without any, the weights are nan: nothing was learned.
+        Without any part, the weights are nan.
 
     Returns
     -------
@@ -99,14 +99,14 @@ def fit_each(moments: Moments, structures: Sequence[LagStructure], parts: Iterab
     of_size: dict[int, list[int]] = {}
     for k, structure in enumerate(structures):
         of_size.setdefault(len(structure.columns), []).append(k)
-    for size, places in of_size.items():  # as many small systems at once as there are of a size
+    for size, places in of_size.items():  # all small systems of the same size at once
         columns, every = np.array([structures[k].columns for k in places]), np.arange(size)
         systems = noisy.take(columns[:, :, None] * len(gram) + columns[:, None, :])
         squares = own[columns]
-        # a feature that is zero in all rows keeps the weight zero
+        # a feature that is zero in all rows keeps weight zero
         strengths = np.array([structures[k].strengths for k in places])
         systems[:, every, every] += np.where(squares > 0, strengths * squares, 1.0)
-        scale = 1.0 / np.sqrt(systems[:, every, every])  # powers of a speed may be of another size altogether
+        scale = 1.0 / np.sqrt(systems[:, every, every])  # powers of a speed may differ by orders of magnitude
         systems *= scale[:, :, None] * scale[:, None, :]
         solved = np.linalg.solve(systems, scale[:, :, None] * cross[columns])
         weights[np.array(places)[:, None], columns] = scale[:, :, None] * solved
@@ -116,7 +116,7 @@ def fit_each(moments: Moments, structures: Sequence[LagStructure], parts: Iterab
 def share_out(moments: Moments, structures: Sequence[LagStructure]) -> tuple[FloatArray, FloatArray]:
     """Return the shares of structures in their average, (n_structures, n_targets), and the errors as `average` does.
 
-    Each part is left out in turn. A structure's share is the less, the more it errs there, by `TRUST`.
+    Each part is left out in turn. The share of a structure decreases with its error on left-out parts, see `TRUST`.
     """
     n_parts, n_targets = len(moments.rows), moments.cross.shape[2]
     shares = np.full((len(structures), n_targets), 1 / len(structures))

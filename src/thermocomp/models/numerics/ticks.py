@@ -1,4 +1,4 @@
-"""Recordings on the clock of an autoregressive model, by the very rule of `thermocomp.core.autoregressive`."""
+"""Recordings on the clock of an autoregressive model, by the same rule as `thermocomp.core.autoregressive`."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -13,26 +13,26 @@ from thermocomp.core.exceptions import InputError
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
 
-#: a displacement between two rows is interpolated if they are not further apart than this many usual steps
+#: a displacement between two rows is interpolated if their distance is at most this many usual steps
 NEAR = 1.5
-#: more ticks than this in one recording are refused: the interval is a slip of the pen
+#: a recording with more ticks than this is rejected: the interval is probably a typing error
 MOST_TICKS = 50_000_000
 
 
 @dataclass(frozen=True, eq=False)
 class TickedRun:
-    """One test on the clock: without a break, from a cold start.
+    """One test on the clock, uninterrupted and from a cold start.
 
     Parameters
     ----------
     rows : slice
-        Its rows in the recording.
+        Rows of the test in the recording.
     count : ndarray of int of shape (n_rows,)
-        Ticks made up to each row; the first row is tick 0.
+        Number of ticks up to each row; the first row is tick 0.
     phase : ndarray of shape (n_rows,)
-        Time of each row since its last tick, as a share of the interval.
+        Time of each row since the last tick, as a share of the interval.
     since : ndarray of shape (n_rows, n_inputs)
-        Mean of the inputs since that tick; without meaning where `phase` is 0.
+        Mean of the inputs since the last tick; undefined where `phase` is 0.
     drive : ndarray of shape (n_ticks + 1, n_inputs)
         Mean of the inputs over the interval that ends at each tick; at tick 0, the first row.
     """
@@ -45,17 +45,17 @@ class TickedRun:
 
     @property
     def row_by_row(self) -> bool:
-        """True if every row is the next tick."""
+        """True if each row is exactly one tick after the previous row."""
         return self.since is self.drive
 
 
 def check_steps(dt: ArrayLike | None, n_rows: int) -> FloatArray:
-    """Check time steps [s]; without any, every row is a separate test.
+    """Check time steps [s]; if None, every row is a separate test.
 
     Raises
     ------
     InputError
-        Not one per row, or one is negative or not a number.
+        The number of steps differs from the number of rows, or a step is negative or nan.
     """
     if dt is None:
         return np.full(n_rows, np.inf)
@@ -72,13 +72,13 @@ def median_step(dt: FloatArray) -> float:
 
 
 def put_on_clock(inputs: FloatArray, dt: FloatArray, interval: float) -> list[TickedRun]:
-    """Put a recording on the clock.
+    """Resample a recording to the clock.
 
     Parameters
     ----------
     inputs : ndarray of shape (n_rows, n_inputs)
     dt : ndarray of shape (n_rows,)
-        Time since the previous row [s]; inf starts a new test, as the first row always does.
+        Time since the previous row [s]; inf marks the start of a test, as is always assumed for the first row.
     interval : float
         [s]
 
@@ -110,7 +110,7 @@ def _run(inputs: FloatArray, dt: FloatArray, rows: slice, h: float) -> TickedRun
     if not phase.any() and (np.diff(count) == 1).all():  # one row per tick
         return TickedRun(rows=rows, count=count, phase=phase, since=u, drive=u)
     total = np.cumsum(step[:, None] * u, axis=0)
-    at = np.searchsorted(count, np.arange(count[-1] + 1))  # row that makes each tick; it may come later
+    at = np.searchsorted(count, np.arange(count[-1] + 1))  # first row at or after each tick
     late = (time[at] - np.arange(count[-1] + 1) * h)[:, None]
     until = total[at] - late * u[at]
     until[0] = 0.0
@@ -122,7 +122,7 @@ def _run(inputs: FloatArray, dt: FloatArray, rows: slice, h: float) -> TickedRun
 def displacements(
     runs: Sequence[TickedRun], y: FloatArray, dt: FloatArray, known: NDArray[np.bool_], h: float
 ) -> list[FloatArray]:
-    """Return the displacement at each tick, interpolated between the rows around it; nan where it is not known.
+    """Return the displacement at each tick, interpolated between adjacent rows; nan where unknown.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def displacements(
     Returns
     -------
     list of ndarray of shape (n_ticks + 1,)
-        Per test.
+        One array per test.
     """
     near = NEAR * median_step(dt)
     found = []
@@ -161,14 +161,14 @@ def displacements(
 def interpolate_at_rows(
     run: TickedRun, ticked: FloatArray, ahead: Callable[[IntArray, FloatArray], FloatArray]
 ) -> FloatArray:
-    """Return the deviation at the rows of a test from that at its ticks.
+    """Return the deviation at the rows of a test from the deviation at its ticks.
 
     Parameters
     ----------
     run : TickedRun
     ticked : ndarray of shape (n_ticks + 1,)
     ahead : callable
-        Gives the tick after some ticks, if the inputs continued as given: ``ahead(ticks, inputs)``.
+        Predicts the tick that follows each of the given ticks with the given inputs: ``ahead(ticks, inputs)``.
 
     Returns
     -------
@@ -192,10 +192,10 @@ def regressors(own: FloatArray, drive: FloatArray, ticks: IntArray, k: int, m: i
     own : ndarray of shape (n_ticks,)
     drive : ndarray of shape (n_ticks, n_inputs)
     ticks : ndarray of int of shape (n_wanted,)
-        t.
+        Ticks t.
     k, m : int
     now : ndarray of shape (n_wanted, n_inputs)
-        The inputs at t.
+        Inputs at t.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Collinearity of variables, and the correlation of each with the error (Hwang, section 3.2.3)."""
+"""Collinearity of variables, and correlation of each with the error (Hwang, section 3.2.3)."""
 
 from dataclasses import dataclass
 
@@ -10,37 +10,37 @@ from thermocomp.core.exceptions import FitError
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-#: a channel that moves by no more than this share of its size is constant: rounding can do that
+#: a channel that varies by no more than this share of its magnitude is constant: rounding may cause such a variation
 ROUNDING = 64 * float(np.finfo(np.float64).eps)
 
 
 @dataclass(frozen=True)
 class Spectrum:
-    """Eigenvalues of X'X, the columns as they are: neither centred nor scaled.
+    """Eigenvalues of X'X with unmodified columns, neither centred nor scaled.
 
-    Hwang's Eq. 7 has p + 1 of them, his Table 3 only p: the column of ones was left out, and is here (E-H6).
+    Hwang's Eq. 7 has p + 1 of them, but Table 3 only p: Hwang omitted the column of ones, as is done here (E-H6).
 
     Parameters
     ----------
     eigenvalues : tuple of float
-        Decreasing [degC^2]; 0 for values indistinguishable from 0.
+        Eigenvalues in descending order [degC^2]; 0 if indistinguishable from 0.
     """
 
     eigenvalues: tuple[float, ...]
 
     @property
     def smallest(self) -> float:
-        """Smallest eigenvalue [degC^2]; nan without any."""
+        """Smallest eigenvalue [degC^2]; nan if there are none."""
         return self.eigenvalues[-1] if self.eigenvalues else float("nan")
 
     @property
     def sum_inverse(self) -> float:
-        """Sum of 1/eigenvalue [1/degC^2]; times sigma^2 the sum of the coefficients' variances (Eq. 7, H-14)."""
+        """Sum of 1/eigenvalue [1/degC^2]; multiplied by sigma^2: sum of the coefficient variances (Eq. 7, H-14)."""
         return sum(1 / v if v > 0 else float("inf") for v in self.eigenvalues)
 
     @property
     def condition_number(self) -> float:
-        """Largest over smallest eigenvalue (H-16); nan without any."""
+        """Ratio of the largest to the smallest eigenvalue (H-16); nan if there are none."""
         if not self.eigenvalues:
             return float("nan")
         return self.eigenvalues[0] / self.smallest if self.smallest > 0 else float("inf")
@@ -49,12 +49,12 @@ class Spectrum:
 def spectrum(X: FloatArray) -> Spectrum:
     """Return the eigenvalues of X'X.
 
-    They are squares of singular values, never computed from X'X itself: that would lose half the digits.
+    They are squared singular values, not computed from X'X itself, which would lose half the digits.
 
     Parameters
     ----------
     X : ndarray of shape (n_rows, n_columns)
-        Or any matrix with the same X'X, such as a triangular factor.
+        Table, or any matrix with the same X'X, such as a triangular factor.
 
     Returns
     -------
@@ -75,7 +75,7 @@ def find_varying(X: FloatArray, size: FloatArray | None = None) -> BoolArray:
     ----------
     X : ndarray of shape (n_rows, n_columns)
     size : ndarray of shape (n_columns,), optional
-        Greatest magnitude of the numbers X was computed from; of X itself if not given.
+        Greatest magnitude of the numbers from which X was computed; default: that of X itself.
 
     Returns
     -------
@@ -88,8 +88,8 @@ def find_varying(X: FloatArray, size: FloatArray | None = None) -> BoolArray:
 def correlation(X: FloatArray) -> FloatArray:
     """Return the correlation coefficients of the columns (Hwang, Eq. 1; H-02).
 
-    C_ij = Z_i' Z_j, Z being the column with its mean taken out and scaled to length 1, so C is Pearson's r. It is
-    rounded to 12 decimals: equal channels then have equal coefficients, whatever the order of summation.
+    C_ij = Z_i' Z_j, where Z is the column minus its mean, scaled to length 1, so C is Pearson's r. It is rounded to 12
+    decimals so that equal channels have equal coefficients, regardless of the order of summation.
 
     Parameters
     ----------
@@ -98,12 +98,12 @@ def correlation(X: FloatArray) -> FloatArray:
     Returns
     -------
     ndarray of shape (n_columns, n_columns)
-        Symmetric, ones in the diagonal.
+        Symmetric, with ones on the diagonal.
 
     Raises
     ------
     FitError
-        A column is constant: it has no correlation with anything.
+        A column is constant, so its correlation is undefined.
     """
     constant = np.flatnonzero(~find_varying(X))
     if constant.size:
@@ -126,7 +126,7 @@ def contributions(X: FloatArray, y: FloatArray) -> FloatArray:
     Returns
     -------
     ndarray of shape (n_columns,)
-        nan for a constant column, or if y is constant.
+        nan for a constant column, and for all columns if y is constant.
     """
     both = np.column_stack([X, y])
     moves = find_varying(both)

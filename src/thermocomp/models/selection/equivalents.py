@@ -1,7 +1,7 @@
-"""Sets of sensors that are as good as the best (Wessel et al. 2004, Appendix B; W-11, W-12).
+"""Sets of sensors that are equivalent to the best (Wessel et al. 2004, Appendix B; W-11, W-12).
 
-The maximal correlation psi of every set of sensors on every data set comes in; which sets are the best for every
-displacement, or nearly the same by the Wilcoxon test for paired samples, comes out.
+Input: the maximal correlation psi of every set of sensors on every data set. Result: the sets that are best for every
+displacement, or not significantly different from the best by the Wilcoxon test for paired samples.
 """
 
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ from thermocomp.core.exceptions import InputError
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-_DECIMALS = 12  # differences of psi are compared to so many: the rest is rounding
+_DECIMALS = 12  # decimals of psi differences that are compared; further digits are rounding errors
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,15 +26,15 @@ class Equivalents:
     Parameters
     ----------
     subsets : tuple of tuple of int
-        Sets of sensors.
+        Sets of sensors, as indices.
     summed : ndarray of shape (n_displacements, n_subsets)
         Psi summed over the data sets.
     best : tuple of int
-        Per displacement the set with the greatest sum, as index of `subsets`.
+        Set with the greatest sum for each displacement, as index of `subsets`.
     p_values : ndarray of shape (n_displacements, n_subsets)
-        P-values of the Wilcoxon test against the best.
+        P-values of the Wilcoxon test against the best set.
     equivalent : ndarray of bool of shape (n_displacements, n_subsets)
-        Not distinguishable from the best by the test.
+        Sets that the test cannot distinguish from the best.
     notes : tuple of str
         Limitations of the test with these data.
     """
@@ -48,11 +48,11 @@ class Equivalents:
 
     @property
     def common(self) -> tuple[tuple[int, ...], ...]:
-        """Sets that are equivalent to the best for every displacement; the choice among them is the user's (W-11)."""
+        """Sets equivalent to the best for every displacement, from which the user may choose (W-11)."""
         return tuple(self.subsets[k] for k in np.flatnonzero(self.equivalent.all(axis=0)))
 
     def table(self) -> tuple["SensorSet", ...]:
-        """Return a row per set: first those that are equivalent for most displacements, then by the sum of psi."""
+        """Return one row per set, sorted by the number of displacements with equivalence, then by the sum of psi."""
         total = self.summed.sum(axis=0)
         order = np.lexsort((-total, -self.equivalent.sum(axis=0)))
         return tuple(
@@ -74,9 +74,9 @@ class SensorSet:
     ----------
     subset : tuple of int
     summed, p_values : tuple of float
-        Per displacement.
+        One value per displacement.
     equivalent : tuple of int
-        Displacements for which the set is as good as the best.
+        Displacements for which the set is equivalent to the best.
     """
 
     subset: tuple[int, ...]
@@ -88,23 +88,24 @@ class SensorSet:
 def equivalents(
     psi: Sequence[ArrayLike], subsets: Sequence[Sequence[int]], *, level: float = 0.05, holm: bool = False
 ) -> Equivalents:
-    """Find the sets of sensors that are nearly as good as the best, for every displacement (W-11).
+    """Find the sets of sensors that are equivalent to the best, for every displacement (W-11).
 
-    For each displacement the best set has the greatest psi summed over the data sets; of equal sums the first. Another
-    set is equivalent if the two-sided Wilcoxon signed-rank test does not tell its psi from those of the best. To be not
-    told apart is no proof of being equal: with few data sets nothing is ever told apart, and a note says so.
+    For each displacement the best set has the greatest psi summed over the data sets; if several are equal, the first.
+    Another set is equivalent if the two-sided Wilcoxon signed-rank test does not distinguish its psi from that of the
+    best. A non-significant difference does not prove equality: with few data sets no difference is ever significant,
+    which a note then states.
 
     Parameters
     ----------
     psi : sequence of array-like of shape (n_subsets, n_tests)
-        One per displacement; the number of data sets may differ.
+        One array per displacement; the numbers of data sets may differ.
     subsets : sequence of sequence of int
-        The sets of sensors, in the order of the rows of `psi`.
+        Sets of sensors, in the order of the rows of `psi`.
     level : float
-        Significance level; the paper gives none (E-W6).
+        Significance level; the paper does not state one (E-W6).
     holm : bool
-        True: Holm's step-down correction for the number of sets that are compared with the best. Fewer sets are
-        rejected, so more remain.
+        True: apply Holm's step-down correction for the number of sets compared with the best. Fewer sets are rejected,
+        so more are equivalent.
 
     Returns
     -------
@@ -113,7 +114,7 @@ def equivalents(
     Raises
     ------
     InputError
-        The numbers do not fit together or are not finite, or the level is not between 0 and 1.
+        The arrays do not match or contain non-finite numbers, or the level is not between 0 and 1.
     """
     sets = tuple(tuple(s) for s in subsets)
     if not 0 < level < 1:
@@ -155,16 +156,16 @@ def equivalents(
 def signed_rank_p(differences: FloatArray) -> FloatArray:
     """Return the two-sided p values of Wilcoxon's signed-rank test, one per row.
 
-    Exact also with ties: under the null hypothesis every sign is equally likely, whatever the ranks, and the
-    distribution of the sum of the positive ranks follows by adding one pair after the other. `scipy.stats.wilcoxon`
-    does the same without ties; with ties it draws signs or takes the normal approximation, which for five pairs gives
-    0.04 where no p below 0.0625 exists. Differences of zero are left out before ranking (Wilcoxon's own rule); if none
-    is left, p = 1.
+    The p values are exact even with ties: under the null hypothesis every sign is equally likely for any ranks, and the
+    distribution of the sum of positive ranks is built by adding one pair at a time. `scipy.stats.wilcoxon` does the
+    same without ties; with ties it draws signs at random or uses the normal approximation, which for five pairs gives
+    0.04 although no p below 0.0625 exists. Zero differences are removed before ranking (Wilcoxon's original rule); if
+    none remain, p = 1.
 
     Parameters
     ----------
     differences : ndarray of shape (n_rows, n_pairs)
-        Rounded to 12 decimals before they are compared.
+        Paired differences; they are rounded to 12 decimals before comparison.
 
     Returns
     -------
@@ -172,7 +173,7 @@ def signed_rank_p(differences: FloatArray) -> FloatArray:
     """
     rounded = np.round(differences, _DECIMALS)
     size, zero = np.abs(rounded), rounded == 0
-    # zeros have the lowest ranks; what is left of the others' ranks is as if they were not there. Twice: half ranks
+    # zeros have the lowest ranks, so their number is subtracted from the other ranks; doubled because of half ranks
     ranks = 2 * np.asarray(rankdata(size, axis=1)) - 2 * zero.sum(axis=1, keepdims=True)
     doubled = np.where(zero, 0, np.rint(ranks)).astype(np.intp)
     positive = (doubled * (rounded > 0)).sum(axis=1)

@@ -1,8 +1,8 @@
 """Exhaustive searches by the residual mean square: all subsets, and all combinations of one member of each group.
 
-Hwang, sections 2.3 and 2.4 (H-05 to H-07). Columns are told by their indices. All is done on the small triangular
-factor (`thermocomp.models.numerics.leastsquares.triangle`), never on a Gram matrix: sensors that nearly repeat each
-other are what the method is about.
+Hwang, sections 2.3 and 2.4 (H-05 to H-07). Columns are identified by their indices. All computations use the small
+triangular factor (`thermocomp.models.numerics.leastsquares.triangle`), never a Gram matrix, because the method is
+intended for nearly collinear sensors.
 """
 
 import math
@@ -17,11 +17,11 @@ from thermocomp.models.numerics.leastsquares import Triangle
 
 FloatArray = NDArray[np.float64]
 
-#: most subsets (or combinations) that are searched
+#: maximum number of subsets (or combinations) that are searched
 LIMIT = 2**20
-#: sums of squares that differ by a smaller share are equal, and the first is taken whatever the rounding
+#: sums of squares that differ by a smaller share count as equal, and the first is chosen regardless of rounding
 SAME = 1e-10
-_BATCH = 2**12  # candidates worked on at once: bounds the memory
+_BATCH = 2**12  # candidates processed at once: bounds the memory
 
 
 @dataclass(frozen=True)
@@ -41,16 +41,16 @@ class Subset:
 
 @dataclass(frozen=True)
 class Search:
-    """Outcome of a search.
+    """Result of a search.
 
     Parameters
     ----------
     best : Subset
-        With the smallest MSE_p.
+        Set with the smallest MSE_p.
     curve : tuple of Subset
-        The best of each number of variables 1, 2, ... (Fig. 4), as far as a degree of freedom is left.
+        Best set for each number of variables 1, 2, ... (Fig. 4) that leaves a degree of freedom.
     count : int
-        Number of sets looked at.
+        Number of sets examined.
     """
 
     best: Subset
@@ -59,19 +59,19 @@ class Search:
 
 
 def search_subsets(tri: Triangle, columns: Sequence[int], *, limit: int = LIMIT) -> Search:
-    """Find the subset with the smallest MSE_p among all subsets that are not empty (Hwang, Eq. 5; H-05, H-07).
+    """Find the subset with the smallest MSE_p among all non-empty subsets (Hwang, Eq. 5; H-05, H-07).
 
-    Of equally good subsets the smaller is taken, then the one with the earlier columns. Exact, and not slower for
-    sensors that repeat each other: one that adds nothing but rounding leaves the sum of squares as it is.
+    Of equally good subsets the smaller one is chosen, then the one with the earlier columns. The search is exact and
+    not slower for collinear sensors: a sensor that adds only rounding leaves the sum of squares unchanged.
 
     Parameters
     ----------
     tri : Triangle
-        Triangle of [X y].
+        Triangular factor of [X y].
     columns : sequence of int
-        Candidates, in the order of preference.
+        Candidates, in order of preference.
     limit : int
-        Most subsets that are searched.
+        Maximum number of subsets.
 
     Returns
     -------
@@ -80,7 +80,7 @@ def search_subsets(tri: Triangle, columns: Sequence[int], *, limit: int = LIMIT)
     Raises
     ------
     FitError
-        More subsets than `limit`, or no degree of freedom left.
+        The number of subsets exceeds `limit`, or no degree of freedom remains.
     """
     g = len(columns)
     count = 2**g - 1
@@ -91,7 +91,7 @@ def search_subsets(tri: Triangle, columns: Sequence[int], *, limit: int = LIMIT)
         )
     free = _free(tri, 1)
     squares = _squares(tri, [(c,) for c in columns], skip=True)
-    sizes = g - np.bitwise_count(np.arange(2**g))  # a one stands for a column that is left out
+    sizes = g - np.bitwise_count(np.arange(2**g))  # a bit of 1 denotes an omitted column
     curve = []
     for p in range(1, min(g, free - 1) + 1):
         mine = np.flatnonzero(sizes == p)
@@ -110,21 +110,21 @@ def search_members(tri: Triangle, groups: Sequence[Sequence[int]], *, limit: int
     Parameters
     ----------
     tri : Triangle
-        Triangle of [X y].
+        Triangular factor of [X y].
     groups : sequence of sequence of int
-        Those that take part.
+        Participating groups.
     limit : int
-        Most combinations that are searched.
+        Maximum number of combinations.
 
     Returns
     -------
     Search
-        Its curve holds the best combination alone.
+        Its curve contains only the best combination.
 
     Raises
     ------
     FitError
-        More combinations than `limit`, or no degree of freedom left.
+        The number of combinations exceeds `limit`, or no degree of freedom remains.
     """
     count = math.prod(len(g) for g in groups)
     if count > limit:
@@ -142,7 +142,7 @@ def search_members(tri: Triangle, groups: Sequence[Sequence[int]], *, limit: int
 
 
 def _free(tri: Triangle, needed: int) -> int:
-    """Return the rows less the constant; refuse if `needed` variables leave no degree of freedom."""
+    """Return the number of rows minus the constant; raise if `needed` variables leave no degree of freedom."""
     free = tri.n_rows - int(tri.intercept)
     if free <= needed:
         raise FitError(
@@ -152,15 +152,15 @@ def _free(tri: Triangle, needed: int) -> int:
 
 
 def _first(values: FloatArray) -> int:
-    """Return the first place of the smallest value, but for rounding."""
+    """Return the first index of the smallest value, within rounding."""
     return int(np.argmax(values <= values.min() * (1 + SAME)))
 
 
 def _squares(tri: Triangle, levels: Sequence[Sequence[int]], *, skip: bool) -> FloatArray:
-    """Return the residual sum of squares for one column of each level, or `skip`, the last choice, none of it.
+    """Return the residual sums of squares for one column of each level, or with `skip` optionally none (last choice).
 
-    Shape (n_choices of level 0 * n_choices of level 1 * ...,), the last level varying fastest; 0 for what cannot be
-    told from rounding.
+    Shape (n_choices of level 0 * n_choices of level 1 * ...,), with the last level varying fastest; 0 for values that
+    are indistinguishable from rounding.
     """
     columns = [c for level in levels for c in level]
     least = tri.noise[columns] ** 2
@@ -171,9 +171,10 @@ def _squares(tri: Triangle, levels: Sequence[Sequence[int]], *, skip: bool) -> F
 
 
 def _deflated(left: FloatArray, sizes: Sequence[int], least: FloatArray, skip: bool) -> FloatArray:
-    """Choose a column of the first level and take it out of those of later levels and of y (modified Gram-Schmidt).
+    """Project each column of the first level out of the later levels and of y (modified Gram-Schmidt).
 
-    `left`, of shape (n_choices_so_far, n_rows, n_columns + 1), is what earlier choices left of the columns and of y.
+    `left`, of shape (n_choices_so_far, n_rows, n_columns + 1), contains the remainders of the columns and of y after
+    the earlier choices.
     """
     if not sizes:
         return np.asarray(np.einsum("sm,sm->s", left[:, :, -1], left[:, :, -1]))

@@ -1,7 +1,7 @@
-"""Sensors by correlation grouping and successive regression (Hwang, Lee, Yang; H-01 to H-07).
+"""Sensor selection by correlation grouping and successive regression (Hwang, Lee, Yang; H-01 to H-07).
 
-Fig. 1 of the paper: groups of temperatures that behave alike -> one representative of each group -> the groups that
-take part in the model -> the best member of each. Columns are told by their indices.
+Fig. 1 of the paper: groups of similar temperatures -> one representative of each group -> groups that participate in
+the model -> best member of each. Columns are identified by their indices.
 """
 
 from collections.abc import Sequence
@@ -25,29 +25,29 @@ Groups = tuple[tuple[int, ...], ...]
 def group(correlation: FloatArray, threshold: float, *, absolute: bool = False) -> Groups:
     """Group variables by their correlation (Hwang, section 2.1; H-03).
 
-    The two variables with the smallest correlation are the seeds of two groups; each of the others joins a seed if its
-    correlation with it is above the threshold. Then the same with what is left, until nothing is. The paper leaves open
-    some cases; the rules here are:
+    The two variables with the smallest correlation are the seeds of two groups; each other variable joins a seed if its
+    correlation with the seed is above the threshold. This is repeated with the remaining variables until none remain.
+    Rules for cases that the paper leaves open:
 
     - above the threshold for both seeds: the larger correlation decides (E-H3); if equal, the first seed;
-    - seeds that are themselves above the threshold: then so is every pair that is left, and all of it is one group.
-      (Two groups that are as close as that would contradict the threshold, and no threshold would give one group.)
-    - one variable left: a group of its own;
-    - several pairs with the smallest correlation: the first, by the lower index, then by the higher.
+    - seeds whose own correlation is above the threshold: then all remaining pairs are, and all remaining variables form
+      one group. (Two groups as close as these would contradict the threshold, and no threshold would yield one group.)
+    - one remaining variable: a separate group;
+    - several pairs with the smallest correlation: the first by the lower index, then by the higher.
 
-    Groups come in the order of their seeds, two and two as in the paper's Table 1, where only the order within a pair
-    is not known: here the lower index is first. Within a group the seed is first (both, if all is one group), then the
-    others in rising order.
+    Groups are ordered by their seeds, in pairs as in the paper's Table 1; the paper does not define the order within a
+    pair: here the lower index is first. Within a group the seed is first (both seeds if all variables form one group),
+    followed by the others in ascending order.
 
     Parameters
     ----------
     correlation : ndarray of shape (n_variables, n_variables)
-        Symmetric.
+        Symmetric matrix.
     threshold : float
-        From -1 to 1. The paper does not give its own (E-H1).
+        From -1 to 1. The paper does not state its value (E-H1).
     absolute : bool
-        Go by the magnitude of the correlation, for two sensors that move against each other are not thermally far; the
-        paper goes by the signed one (E-H2).
+        True: use the magnitude of the correlation, since two sensors with opposite changes are not thermally distant;
+        the paper uses the signed correlation (E-H2).
 
     Returns
     -------
@@ -56,7 +56,7 @@ def group(correlation: FloatArray, threshold: float, *, absolute: bool = False) 
     Raises
     ------
     InputError
-        A threshold beyond -1 to 1, or not a correlation matrix.
+        The threshold is outside -1 to 1, or the matrix is not a correlation matrix.
     """
     close = _checked(correlation, absolute)
     if not -1 <= threshold <= 1:
@@ -84,12 +84,12 @@ def group(correlation: FloatArray, threshold: float, *, absolute: bool = False) 
 
 @dataclass(frozen=True)
 class Interval:
-    """Thresholds that give the same groups.
+    """Range of thresholds that give the same groups.
 
     Parameters
     ----------
     low, high : float
-        low <= threshold < high; the last interval includes its end, 1.
+        low <= threshold < high; the last interval includes its upper end, 1.
     groups : tuple of tuple of int
     """
 
@@ -99,9 +99,10 @@ class Interval:
 
 
 def intervals(correlation: FloatArray, *, absolute: bool = False) -> tuple[Interval, ...]:
-    """Return all groupings there are, with the thresholds that give them (E-H1).
+    """Return all possible groupings, with the corresponding thresholds (E-H1).
 
-    A threshold is only ever compared with correlations, so the groups change nowhere else, and the intervals are exact.
+    Thresholds are only compared with correlations, so the groups change at correlations only, and the intervals are
+    exact.
 
     Parameters
     ----------
@@ -112,7 +113,7 @@ def intervals(correlation: FloatArray, *, absolute: bool = False) -> tuple[Inter
     Returns
     -------
     tuple of Interval
-        Rising, without gaps, from -1 (or 0, if `absolute`) to 1.
+        In ascending order, without gaps, from -1 (or 0, if `absolute`) to 1.
     """
     close = _checked(correlation, absolute)
     start = 0.0 if absolute else -1.0
@@ -128,14 +129,14 @@ def intervals(correlation: FloatArray, *, absolute: bool = False) -> tuple[Inter
 
 
 def interval_of(groups: Sequence[Sequence[int]], found: Sequence[Interval]) -> Interval | None:
-    """Return the interval of thresholds that gives certain groups, whatever their order; None if none does.
+    """Return the interval of thresholds for the given groups, in any order; None if there is none.
 
     Parameters
     ----------
     groups : sequence of sequence of int
-        Such as those of the paper's Table 1.
+        Groups to find, such as those of the paper's Table 1.
     found : sequence of Interval
-        From `intervals`.
+        Result of `intervals`.
 
     Returns
     -------
@@ -158,27 +159,27 @@ def _checked(correlation: FloatArray, absolute: bool) -> FloatArray:
 def representatives(tri: Triangle, groups: Groups) -> tuple[int, ...]:
     """Choose one variable of each group by successive regression (Hwang, Eq. 2; H-04).
 
-    The variable that explains most of the error represents its group; then, of the other groups, the one that explains
-    most of what that left; and so on. As printed, only the first regression has a constant (E-H9), none has one if
-    `tri` has no intercept. Of equally good variables the first is taken.
+    The variable that explains most of the error represents its group; then, of the other groups, the variable that
+    explains most of the residual; and so on. As printed in the paper, only the first regression has a constant (E-H9);
+    none has one if `tri` has no intercept. Of equally good variables the first is chosen.
 
     Parameters
     ----------
     tri : Triangle
-        Triangle of [X y].
+        Triangular factor of [X y].
     groups : tuple of tuple of int
-        Columns of X.
+        Groups as columns of X.
 
     Returns
     -------
     tuple of int
-        In the order of the regressions.
+        Representatives in the order of the regressions.
     """
     images = uncentre(tri)
     rounding = float(tri.noise[-1]) ** 2
     home = {column: number for number, members in enumerate(groups) for column in members}
     residual = images[:, -1].copy()
-    residual[0] = 0.0  # what the constant of the first line takes
+    residual[0] = 0.0  # part explained by the constant of the first regression
     found: list[int] = []
     open_groups = set(range(len(groups)))
     while open_groups:
@@ -197,11 +198,11 @@ def representatives(tri: Triangle, groups: Groups) -> tuple[int, ...]:
 
 
 def uncentre(tri: Triangle) -> FloatArray:
-    """Return a small matrix with the same products as [X y] before it was centred; row 0 holds the means."""
+    """Return a small matrix with the same cross products as the uncentred [X y]; row 0 contains the means."""
     return np.vstack([np.sqrt(tri.n_rows) * tri.centre, tri.factor])
 
 
-# -- the whole way -----------------------------------------------------------------------------------------------------
+# -- complete method ---------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -214,11 +215,11 @@ class Grouped:
     representatives : tuple of int
         In the order of the successive regression.
     subsets : Search
-        Among the representatives.
+        Search among the representatives.
     participating : tuple of int
-        Groups that take part in the model, as indices of `groups`, in rising order.
+        Groups that participate in the model, as indices of `groups`, in ascending order.
     members : Search
-        Among the combinations of members of these groups.
+        Search among the combinations of members of these groups.
     """
 
     groups: Groups
@@ -229,21 +230,21 @@ class Grouped:
 
     @property
     def selected(self) -> tuple[int, ...]:
-        """Columns in the model, in rising order."""
+        """Columns in the model, in ascending order."""
         return tuple(sorted(self.members.best.columns))
 
 
 def choose(tri: Triangle, groups: Groups, *, limit: int = LIMIT) -> Grouped:
-    """Go from groups to the best variables (Hwang, Fig. 1; H-04 to H-06).
+    """Select the best variables from groups (Hwang, Fig. 1; H-04 to H-06).
 
     Parameters
     ----------
     tri : Triangle
-        Triangle of [X y].
+        Triangular factor of [X y].
     groups : tuple of tuple of int
-        From `group`.
+        Result of `group`.
     limit : int
-        Most subsets, and most combinations, that are searched.
+        Maximum number of subsets, and of combinations.
 
     Returns
     -------
@@ -252,7 +253,7 @@ def choose(tri: Triangle, groups: Groups, *, limit: int = LIMIT) -> Grouped:
     Raises
     ------
     FitError
-        Too much to search, or too few rows.
+        The search is too large, or there are too few rows.
     """
     chosen = representatives(tri, groups)
     subsets = search_subsets(tri, chosen, limit=limit)
@@ -269,11 +270,11 @@ class Swept:
     ----------
     interval : Interval
     choice : Grouped or None
-        None where nothing could be chosen.
+        None if no set could be chosen.
     spectrum : Spectrum or None
         Spectrum of the chosen variables.
     failure : str
-        Reason why no set could be chosen, such as too much to search; empty if one was.
+        Reason why no set could be chosen, such as too large a search; otherwise empty.
     """
 
     interval: Interval
@@ -283,23 +284,23 @@ class Swept:
 
 
 def sweep(temperatures: FloatArray, tri: Triangle, *, absolute: bool = False, limit: int = 2**14) -> tuple[Swept, ...]:
-    """Go through all thresholds there are (E-H1).
+    """Apply the method for all possible thresholds (E-H1).
 
     Parameters
     ----------
     temperatures : ndarray of shape (n_rows, n_columns)
-        Temperatures to group; none of them constant.
+        Temperatures to group; none may be constant.
     tri : Triangle
-        Triangle of [X y], X being the regressors: the temperatures, or their differences from a reference.
+        Triangular factor of [X y], where X are the regressors: the temperatures, or their differences from a reference.
     absolute : bool
         As in `group`.
     limit : int
-        Most subsets, and most combinations, that are searched at a threshold.
+        Maximum number of subsets, and of combinations, for each threshold.
 
     Returns
     -------
     tuple of Swept
-        By rising threshold.
+        In order of ascending threshold.
     """
     images = uncentre(tri)
     found = []

@@ -1,4 +1,4 @@
-"""Maximal correlation of every small set of temperatures with every displacement of every test."""
+"""Maximal correlation of small sets of temperatures with every displacement of every test."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from thermocomp.core.exceptions import FitError, InputError
 
 FloatArray = NDArray[np.float64]
-#: does work elsewhere: takes a function and what it is called with in turn, gives what comes of each
+#: distributes work: receives a function and a sequence of arguments, yields the result for each
 Share = Callable[[Callable[[Any], FloatArray], Sequence[Any]], Iterable[FloatArray]]
 
 
@@ -39,7 +39,7 @@ class MaximalCorrelations:
     Parameters
     ----------
     psi : ndarray of shape (n_displacements, n_subsets, n_tests)
-        Psi; nan for models that were not reached before the work was stopped.
+        Psi; nan for models that were not computed before the work was stopped.
     subsets : tuple of tuple of int
         Indices of the temperatures.
     tests : tuple of str
@@ -53,9 +53,9 @@ class MaximalCorrelations:
     complete: bool
 
     def least_size(self, level: float) -> int | None:
-        """Return the number of temperatures from which on a subset reaches `level` on average, everywhere (W-12).
+        """Return the smallest number of temperatures with which a subset reaches `level` on average, everywhere (W-12).
 
-        None if no number does. For the paper `level` is 0.99, and the answer three.
+        None if no number does. For the paper `level` is 0.99, and the result is three.
         """
         sizes = np.array([len(s) for s in self.subsets])
         means = np.nanmean(self.psi, axis=2)
@@ -66,7 +66,7 @@ class MaximalCorrelations:
 
 
 def subsets_up_to(n_temperatures: int, size: int | None = None) -> tuple[tuple[int, ...], ...]:
-    """Return all subsets with 1 to `size` members, small ones first: 511 of nine, 129 of them up to three (W-10)."""
+    """Return all subsets of 1 to `size` members in order of size, for example 129 of nine up to size three (W-10)."""
     largest = n_temperatures if size is None else min(size, n_temperatures)
     return tuple(s for k in range(1, largest + 1) for s in combinations(range(n_temperatures), k))
 
@@ -85,27 +85,27 @@ def maximal_correlations(
 ) -> MaximalCorrelations:
     """Compute the maximal correlation of every subset, for every test and displacement (W-10, W-12).
 
-    The transformations are those of `thermocomp.models.ace.ACE`, with its `converged`. Stopped by the keyboard, it
-    returns what is done.
+    The transformations are those of `thermocomp.models.ace.ACE` with its option `converged`. After a keyboard
+    interrupt, the results computed so far are returned.
 
     Parameters
     ----------
     tests : sequence of DataSet
     subsets : sequence of sequence of int, optional
-        Indices of the temperatures; all subsets up to three if not given.
+        Indices of the temperatures; default: all subsets of up to three.
     half_window : int
-        N: the boxcar holds 2N + 1 ranks.
+        N: the boxcar contains 2N + 1 ranks.
     converged : bool
-        True: sweep until the functions converge; False: with the paper's boxcar, until the error fails to decrease.
+        True: sweep until the functions converge. False: use the paper's boxcar until the error fails to decrease.
     tolerance : float, optional
-        Root mean square by which a sweep may still move the functions, summed over all; the error then falls by about
-        its square a sweep. With 1e-3, taken if not given, Psi is mostly within 1e-4 of its limit. With the paper's
-        rule: the decrease of the error that counts as a failure, 0 if not given.
+        Root mean square change of the functions in a sweep, summed over all, at which sweeps end; the error then
+        decreases by about its square per sweep. With 1e-3, the default, Psi is mostly within 1e-4 of its limit. With
+        the paper's rule: the decrease of the error that counts as a failure; default 0.
     max_sweeps : int
     jobs : int
-        Threads; -1 takes all cores.
+        Number of threads; -1 for all cores.
     share : callable, optional
-        Does the work in place of them.
+        Function that distributes the work, instead of threads.
     progress : callable
         Called with a line of text after each displacement of each test.
 
@@ -116,7 +116,7 @@ def maximal_correlations(
     Raises
     ------
     FitError
-        A test has fewer rows than the boxcar, or a value that is not a number.
+        A test has fewer rows than the boxcar, or contains a non-finite value.
     InputError
         Tests differ in their channels, or a setting is out of its range.
     """
@@ -134,7 +134,7 @@ def maximal_correlations(
     n_temperatures, n_displacements = shapes.pop()
     chosen = subsets_up_to(n_temperatures, 3) if subsets is None else tuple(tuple(s) for s in subsets)
     members = _membership(chosen, n_temperatures)
-    # neighbours in this order share most of their members, which the kernel likes
+    # consecutive subsets in this order share most of their members, which the kernel requires for speed
     order = np.lexsort(members.T)
     if tolerance is None:
         tolerance = 1e-3 if converged else 0.0
@@ -184,7 +184,7 @@ def _membership(subsets: Sequence[tuple[int, ...]], n_temperatures: int) -> NDAr
 def _psi(
     piece: tuple[FloatArray, FloatArray, NDArray[np.bool_], int, float, int, bool],
 ) -> FloatArray:
-    from thermocomp.models.kernels import ace_subsets, ranks  # numba takes its time
+    from thermocomp.models.kernels import ace_subsets, ranks  # numba is slow to import
 
     T, S, members, half_window, tolerance, max_sweeps, converged = piece
     ranked = ranks.rank(np.ascontiguousarray(np.vstack([T.T, S])))

@@ -1,4 +1,4 @@
-"""Orders k and m of an autoregressive model: final prediction error, AIC, BIC; all orders from one triangle."""
+"""Orders k and m of an autoregressive model by FPE, AIC or BIC; all orders from one triangular factor."""
 
 import math
 from collections.abc import Sequence
@@ -21,23 +21,23 @@ Criterion = Literal["fpe", "aic", "bic"]
 
 @dataclass(frozen=True)
 class Order:
-    """One line of the table of orders.
+    """One row of the table of orders.
 
     Parameters
     ----------
     k, m : int
-        Past deviations, and past values of each input in addition to the present one.
+        Number of past deviations, and of past values of each input in addition to the present one.
     n_parameters, n_rows : int
-        d, the intercept included and inputs that depend on others left out, and N.
+        d, including the intercept and excluding dependent inputs, and N.
     sse : float
-        Sum of squared one-step errors; not below what rounding may leave.
+        Sum of squared one-step errors; at least the effect of rounding.
     fpe, aic, bic : float
         See `final_prediction_error`; AIC = N ln(SSE/N) + 2 d, BIC = N ln(SSE/N) + d ln N.
     largest_root : float
-        Largest modulus of the roots of the polynomial in dz; 1 or more runs away in free run. inf if the coefficients
-        cannot be told because the columns depend on each other.
+        Largest modulus of the roots of the polynomial in dz; with 1 or more, the free run diverges. inf if the
+        coefficients are undetermined because the columns are dependent.
     admissible : bool
-        The free run decays, and within the time that was asked for.
+        Whether the free run decays fast enough.
     """
 
     k: int
@@ -62,7 +62,7 @@ def final_prediction_error(sse: float, n: int, d: int) -> float:
     n : int
         Number of rows, N.
     d : int
-        Number of parameters; inf is given unless d < N.
+        Number of parameters; the result is inf unless d < N.
 
     Returns
     -------
@@ -74,19 +74,20 @@ def final_prediction_error(sse: float, n: int, d: int) -> float:
 def compute_orders(
     tri: Triangle, n_inputs: int, ks: Sequence[int], ms: Sequence[int], largest_root: float = 1.0
 ) -> tuple[Order, ...]:
-    """Compute all orders from the triangle of the greatest one, on the same rows, so that they can be compared.
+    """Compute all orders from the triangular factor of the greatest one, on the same rows, so that they are comparable.
 
-    For each m the small triangle is made again with the inputs first; its last column then holds the SSE of every k.
+    For each m, the small triangular factor is recomputed with the inputs first; its last column then gives the SSE of
+    every k.
 
     Parameters
     ----------
     tri : Triangle
-        Triangle of dz(t-1) .. dz(t-K), all inputs at t, all inputs at t-1, .. at t-M, and dz(t).
+        Triangular factor of dz(t-1) .. dz(t-K), all inputs at t, all inputs at t-1, .. at t-M, and dz(t).
     n_inputs : int
     ks, ms : sequence of int
-        Orders requested; K and M are the greatest of them.
+        Orders requested; K and M are their maxima.
     largest_root : float
-        An order is admissible if all roots are smaller.
+        Orders are admissible if all roots are smaller than this.
 
     Returns
     -------
@@ -126,7 +127,7 @@ def compute_orders(
 
 
 def coefficients(tri: Triangle, columns: Sequence[int]) -> tuple[FloatArray, float]:
-    """Solve for some of the columns; those that depend on others get 0.
+    """Solve for selected columns; dependent columns get the coefficient 0.
 
     Parameters
     ----------
@@ -147,7 +148,7 @@ def coefficients(tri: Triangle, columns: Sequence[int]) -> tuple[FloatArray, flo
 
 
 def _independent(tri: Triangle) -> NDArray[np.intp]:
-    """Return the columns that add something to the others; the rest would take directions of dz away."""
+    """Return the linearly independent columns; dependent ones would remove directions of dz."""
     norms, noise = tri.norms[:-1], tri.noise[:-1]
     alive = np.flatnonzero(norms > noise)
     if not alive.size:
@@ -166,6 +167,6 @@ def _largest_root(R: FloatArray, head: FloatArray, noise: FloatArray) -> float:
 
 
 def best(orders: Sequence[Order], criterion: Criterion) -> Order | None:
-    """Return the admissible order with the smallest criterion, the one with fewer parameters on a tie."""
+    """Return the admissible order with the smallest criterion; of equal ones, that with fewer parameters."""
     able = [o for o in orders if o.admissible]
     return min(able, key=lambda o: (getattr(o, criterion), o.n_parameters), default=None)

@@ -1,4 +1,4 @@
-"""Few sensors for `averaged`: what its answer loses when the sensors left out are made up from those that stay."""
+"""Few sensors for `averaged`: loss of accuracy when omitted sensors are estimated from the remaining ones."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,24 +11,24 @@ from thermocomp.models.pacedfeatures import PacedFeatures
 
 FloatArray = NDArray[np.float64]
 
-#: structures that tell how a set of sensors errs on what was left out; the ranking of sets needs fewer than a model
+#: structures for the errors of sensor sets on left-out parts; ranking sets requires fewer than a model
 _STRUCTURES = 30
 
 
 @dataclass(frozen=True, eq=False)
 class SensorSets:
-    """One set of temperatures for each number of them, for several targets at once.
+    """One set of temperatures for each set size, for several targets at once.
 
     Parameters
     ----------
     sets : tuple of tuple of int
-        Sets of 1, 2, ... temperatures, as indices into ``PacedFeatures.temperatures``; the last holds all.
+        Sets of 1, 2, ... temperatures, as indices into ``PacedFeatures.temperatures``; the last set contains all.
     error : ndarray of shape (n_sets, n_targets)
-        Mean root mean square error on what was left out [unit of the target].
+        Mean of the root mean square errors on the left-out parts [unit of the target].
     loss : ndarray of shape (n_sets, n_targets)
-        Root mean square of what the answer with all temperatures loses [unit of the target].
+        RMS change of the output compared with all temperatures [unit of the target].
     answer : StandInAnswer
-        With all temperatures.
+        Output with all temperatures.
     """
 
     sets: tuple[tuple[int, ...], ...]
@@ -39,20 +39,20 @@ class SensorSets:
 
 @dataclass(frozen=True, eq=False)
 class StandIns:
-    """Substitutes of temperatures; a kept one is predicted from the other kept ones, as if its sensor failed.
+    """Substitutes for temperatures; a kept one is predicted from the other kept ones, as if its sensor had failed.
 
     Parameters
     ----------
     single : tuple of int
-        Best single substitute of each temperature; itself where there is no other.
+        Best single substitute for each temperature; the temperature itself if there is no other.
     single_residual : ndarray of shape (n_temperatures,)
-        Root mean square of the residual of each with it [degC]; inf where there is no other.
+        Root mean square residual of each temperature with this substitute [degC]; inf if there is no other.
     weights : ndarray of shape (n_temperatures, n_temperatures)
         Column j: weights of the kept temperatures in the substitute of temperature j.
     residual : ndarray of shape (n_temperatures,)
-        Root mean square of the residual of each with it [degC].
+        Root mean square residual of each temperature with these weights [degC].
     loss : ndarray of shape (n_temperatures, n_targets)
-        Loss of accuracy of the model with all temperatures if that one alone is substituted [unit of the target].
+        Loss of accuracy of the model with all temperatures if only this one is substituted [unit of the target].
     """
 
     single: tuple[int, ...]
@@ -64,16 +64,16 @@ class StandIns:
 
 @dataclass(frozen=True, eq=False)
 class StandInAnswer:
-    """Output of a model with all temperatures, for them and their lags.
+    """Contribution of the temperatures and their lags to the output of a model with all temperatures.
 
     Parameters
     ----------
     copies : ndarray of shape (n_copies, n_temperatures, n_targets)
-        Weights of the temperatures, and of their lags, lag by lag.
+        Weights of the temperatures and of their lags, lag by lag.
     gram : ndarray of shape (n_copies * n_temperatures, n_copies * n_temperatures)
         Mean products of these features [degC^2].
     noise : float
-        Standard deviation of the temperatures in use [degC].
+        Standard deviation of the temperature noise in use [degC].
     """
 
     copies: FloatArray
@@ -86,15 +86,15 @@ class StandInAnswer:
         return self.gram[: self.copies.shape[1], : self.copies.shape[1]]
 
     def lose(self, made: FloatArray) -> FloatArray:
-        """Return the root mean square that the answer loses if temperatures are made up, by `make_up`, (n_targets,)."""
+        """Return the RMS change of the output with temperatures estimated by a matrix of `make_up`, (n_targets,)."""
         missed = np.eye(len(made)) - made
         lost = np.concatenate([missed @ copy for copy in self.copies])
         return _root((lost * (self.gram @ lost)).sum(axis=0))
 
     def stand_ins(self, kept: Sequence[int]) -> StandIns:
-        """Return the substitutes of each temperature: by one other sensor, and by those that are kept."""
+        """Return the substitutes for each temperature: by a single other sensor, and by the kept sensors."""
         gram, everything = self.temperatures, range(self.copies.shape[1])
-        pairs = np.full(gram.shape, np.inf)  # what one leaves of another
+        pairs = np.full(gram.shape, np.inf)  # residual of one predicted by another
         for k in everything:
             others = [j for j in everything if j != k]
             pairs[others, k] = _left(gram, make_up(gram, [k], self.noise))[others]
@@ -116,12 +116,12 @@ class StandInAnswer:
 def reduce_sensors(
     features: PacedFeatures, moments: Moments, noise: float, most: int, *, structures: int, random_state: int = 0
 ) -> SensorSets:
-    """Remove temperatures one after the other, each time the one with the smallest loss.
+    """Remove temperatures one at a time, each time the one with the smallest loss.
 
-    Errors on what was left out alone are too few to choose by: the set that errs least there is the luckiest. So the
-    model with all temperatures is asked as well. Each temperature left out is made up from those that stay (linear,
-    with noise in use), and what the model's answer loses by that is added to the error. From many temperatures the
-    first go by the loss alone.
+    The errors on left-out parts alone are too few for a selection: the set with the smallest error would be best by
+    chance. Therefore the model with all temperatures is used as well: each removed temperature is estimated from the
+    remaining ones (linear, with noise in use), and the resulting change of the model's output is added to the error.
+    With many temperatures, the first ones are removed by this change alone.
 
     Parameters
     ----------
@@ -129,11 +129,11 @@ def reduce_sensors(
     moments : Moments
         Moments of all targets.
     noise : float
-        Standard deviation of the temperatures in use [degC].
+        Standard deviation of the temperature noise in use [degC].
     most : int
-        Largest set, in addition to that of all.
+        Size of the largest set, in addition to the set of all.
     structures : int
-        Structures of the model with all temperatures.
+        Number of structures of the model with all temperatures.
     random_state : int
 
     Returns
@@ -159,7 +159,7 @@ def reduce_sensors(
     kept, found = everything, [everything]
     while len(kept) > 1:
         smaller = [[k for k in kept if k != out] for out in kept]
-        # where nothing can be left out, there is no error to know
+        # if all parts are needed for training, no error can be determined
         costs = [lose(s).mean() + (np.nan_to_num(err(s).mean()) if len(kept) <= 2 * most else 0.0) for s in smaller]
         kept = smaller[int(np.argmin(costs))]
         if len(kept) <= most:
@@ -169,21 +169,21 @@ def reduce_sensors(
 
 
 def make_up(gram: FloatArray, kept: Sequence[int], noise: float) -> FloatArray:
-    """Return the matrix that makes all temperatures from some of them, (n_temperatures, n_temperatures).
+    """Return the matrix that estimates all temperatures from selected ones, (n_temperatures, n_temperatures).
 
     Parameters
     ----------
     gram : ndarray of shape (n_temperatures, n_temperatures)
         Mean products of the temperatures [degC^2].
     kept : sequence of int
-        Those that are known.
+        Known temperatures.
     noise : float
-        Standard deviation of their readings in use [degC].
+        Standard deviation of the noise of their readings in use [degC].
 
     Returns
     -------
     ndarray
-        Column j holds the weights that make temperature j; of one that is known, 1 for itself.
+        Column j contains the weights for temperature j; a known temperature has weight 1 for itself.
     """
     known = list(kept)
     made = np.zeros_like(gram)
@@ -195,7 +195,7 @@ def make_up(gram: FloatArray, kept: Sequence[int], noise: float) -> FloatArray:
 
 
 def _left(gram: FloatArray, made: FloatArray) -> FloatArray:
-    """Return the root mean square of what is left of each temperature that is made up, (n_temperatures,) [degC]."""
+    """Return the RMS residual of each estimated temperature, (n_temperatures,) [degC]."""
     missed = np.eye(len(gram)) - made
     return _root((missed * (gram @ missed)).sum(axis=0))
 

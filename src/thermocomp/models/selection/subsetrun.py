@@ -1,4 +1,4 @@
-"""A run of the searches of `best_subsets`: threads, clock, and the guarantees when it has ended."""
+"""Execution of the searches of `best_subsets`: threads, time limit, and guarantees of the result."""
 
 import signal
 import threading
@@ -20,7 +20,7 @@ Stop = Literal["", "nodes", "seconds", "interrupted"]
 
 
 class SearchResult:
-    """A search that has ended, one way or the other.
+    """A search that has ended, complete or stopped.
 
     Parameters
     ----------
@@ -38,12 +38,12 @@ class SearchResult:
         self._open = np.full(len(limit), np.inf)
 
     def sets(self, size: int) -> list[tuple[int, ...]]:
-        """Return the sets of a size that may be the best: those within the margin, and at least those asked for."""
+        """Return the sets of a size that may be the best: all within the margin, and at least the number requested."""
         found = self._merged(size)
         return [c for i, (v, c) in enumerate(found) if v < self.limit[size] or i < self.n_best]
 
     def safe(self, size: int) -> tuple[float, bool]:
-        """Return the sum of squares that all other sets of a size reach, and whether none was lost below the margin."""
+        """Return a lower bound of the sums of all other sets of a size, and whether none was lost below the margin."""
         found = self._merged(size)
         if not found:
             return self.problem.full_rss, False
@@ -66,7 +66,7 @@ class SearchResult:
         return sorted((v, c) for c, v in found.items())
 
     def leave_open(self, least: FloatArray) -> None:
-        """Note what was not looked at."""
+        """Record the lower bound of the sets that were not examined."""
         self._open = np.minimum(self._open, least)
 
 
@@ -80,14 +80,14 @@ def run(
     seconds: float | None,
     progress: Callable[[str], None] | None,
 ) -> SearchResult:
-    """Search.
+    """Run the search.
 
     Parameters
     ----------
     problem : Problem
     route : {'dropping', 'adding'}
     sizes, n_best, jobs : int
-        Largest size, sets requested of each, threads.
+        Largest size, number of sets requested of each size, number of threads.
     nodes : int or None
         Stop after about this number of sets.
     seconds : float or None
@@ -111,13 +111,13 @@ def run(
         part.start(0, 0)
     if route == "dropping":
         result.parts.append(Swapping(problem, sizes, n_best, limit, bound))
-    # dropping begins with the cheap branches at the end, which find good sets; so does adding with those at the begin
+    # dropping starts with the cheap branches at the end, which contain good sets; adding with those at the beginning
     turns = list(range(n_tasks)) if route == "dropping" else list(range(n_tasks))[::-1]
     watch = _Watch(result, nodes, seconds, progress)
 
     def work(part: Search) -> None:
         while turns and not result.stopped:
-            task = turns.pop()  # one at a time: the interpreter's lock sees to it
+            task = turns.pop()  # one at a time, ensured by the GIL
             part.start(task, task + 1)
             watch.through(part)
 
@@ -129,7 +129,7 @@ def run(
                 turns.clear()
                 result.parts[0].start(0, n_tasks)
                 watch.through(result.parts[0])
-    except KeyboardInterrupt:  # before the search could take it, or from `progress`
+    except KeyboardInterrupt:  # before the handler was installed, or from `progress`
         result.stopped = "interrupted"
     for part in result.parts:
         result.leave_open(part.open_from())
@@ -150,7 +150,7 @@ class _Watch:
         self.began = self.said = time.monotonic()
 
     def through(self, part: Search) -> None:
-        """Look at the sets of the branches that a part has taken, until there are no more or it is stopped."""
+        """Examine the sets of the branches assigned to a part until none are left or the search is stopped."""
         result = self.result
         chunk = part.chunk if self.nodes is None else min(part.chunk, self.nodes)
         while not result.stopped and (done := part.go_on(chunk)):
@@ -167,7 +167,7 @@ class _Watch:
 
 @contextmanager
 def _interrupts(result: SearchResult) -> Iterator[None]:
-    """Let the keyboard stop a search: raised, an interrupt may get lost in a callback of the threads that search."""
+    """Let Ctrl+C stop a search by a flag: a raised interrupt may get lost in a callback of the search threads."""
     ours = threading.current_thread() is threading.main_thread()
     if not ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield

@@ -1,4 +1,4 @@
-"""Exact best subset regression: the best set of every size, with a certificate, or "not proven"."""
+"""Exact best subset regression: the best set of every size, with a certificate of optimality or "not proven"."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -14,24 +14,24 @@ from thermocomp.models.selection.subsetsearch import Problem
 
 FloatArray = NDArray[np.float64]
 
-_SAME = 1e-12  # relative difference of two sums of squares that is nothing but rounding, beside the noise of y
+_SAME = 1e-12  # relative difference of two sums of squares due to rounding alone, in addition to the noise of y
 
 
 @dataclass(frozen=True)
 class Subset:
-    """A set of columns and how well it fits.
+    """A set of columns and its goodness of fit.
 
     Parameters
     ----------
     columns : tuple of int
-        In rising order.
+        In ascending order.
     rss : float
-        Residual sum of squares, by a fresh QR of the original data [unit of y squared].
+        Residual sum of squares from a new QR of the original data [unit of y squared].
     proven : bool
-        True: no other set of this size (but those ranked before it) has so small a sum, rounding considered.
+        True: no other set of this size (except those ranked before it) has such a small sum, considering rounding.
     bound : float
-        No other set of this size (but those ranked before it) can have a smaller sum than this, which is below `rss`
-        where nothing is proven.
+        Lower bound of the sums of all other sets of this size (except those ranked before it); less than `rss` if not
+        proven.
     """
 
     columns: tuple[int, ...]
@@ -42,18 +42,18 @@ class Subset:
 
 @dataclass(frozen=True)
 class Subsets:
-    """Answer of `best_subsets`.
+    """Result of `best_subsets`.
 
     Parameters
     ----------
     ranked : tuple of tuple of Subset
-        Per size from 1 on, the best first; empty if none was found before the search was stopped.
+        Sets for each size from 1, the best first; empty if none was found before the search was stopped.
     n_columns : int
         Number of columns of X.
     left_out : tuple of int
-        Columns that were not searched: constant ones, and copies of a column before (up to a factor and a shift).
+        Columns not searched: constant columns, and copies of an earlier column (up to a factor and an offset).
     rank : int
-        Rank of the others; there are no larger sets.
+        Rank of the other columns; no larger sets exist.
     total : float
         Sum of squares of y, about its mean if there is an intercept.
     full_rss : float
@@ -63,9 +63,9 @@ class Subsets:
     route : {'dropping', 'adding'}
         Search method.
     nodes : int
-        Sets looked at.
+        Number of sets examined.
     possible : float
-        Sets there are, of the sizes asked for.
+        Number of possible sets of the requested sizes.
     stopped : {'', 'nodes', 'seconds', 'interrupted'}
         Reason why the search ended early.
     """
@@ -85,7 +85,7 @@ class Subsets:
 
     @property
     def best(self) -> tuple[Subset, ...]:
-        """The best set of every size that was found, in rising order of size."""
+        """Best set of every size for which one was found, in ascending order of size."""
         return tuple(sets[0] for sets in self.ranked if sets)
 
     @property
@@ -114,22 +114,23 @@ def best_subsets(
 ) -> Subsets:
     """Find the best set of columns of every size, by residual sum of squares.
 
-    Two routes. *Dropping*, for all sizes: branch and bound over the sets that are left when columns leave the full one
-    (Furnival and Wilson 1974; Gatu and Kontoghiorghes 2006), the dearest kept first, pruned by the best sum known for
-    each size. *Adding*, for small sizes of many columns: all sets, the last two columns entering in closed form. The
-    cheaper one is taken.
+    There are two search methods. *Dropping*, for all sizes: branch and bound over the sets that remain when columns are
+    removed from the full set (Furnival and Wilson 1974; Gatu and Kontoghiorghes 2006); the most costly columns are kept
+    first, and branches are pruned by the best known sum for each size. *Adding*, for small sizes of many columns: all
+    sets, with the last two columns entering in closed form. The cheaper method is chosen.
 
-    Rounding: the searches prune with a margin, the most by which rounding can have moved a residual norm, in the search
-    and in the factorisation: for each column what rounding leaves of it (`Triangle.noise`) times its coefficient in the
-    full model and the most by which this can differ in a set as good as the best. All sets within the margin are kept
-    and refitted by a fresh QR of the original data, in extended precision where that matters; that decides. A set is
-    proven if the search came to its end, no set within the margin was lost, and one unit in the last place of every
-    number cannot make another as good.
+    Rounding: the searches prune with a margin, the maximum change of a residual norm by rounding, both in the search
+    and in the factorisation: the sum over the columns of their rounding remainder (`Triangle.noise`) times the
+    coefficient in the full model plus its maximum difference in a set as good as the best. All sets within the margin
+    are kept and refitted by a new QR of the original data, in extended precision where necessary; this decides. A set
+    is proven if the search was completed, no set within the margin was lost, and a change of one unit in the last place
+    of every number cannot make another set as good.
 
-    Constant columns are left out, and so are columns that are a copy of one before (up to a factor and a shift) as far
-    as rounding lets see. Unless such a copy is equal to the last bit, nothing is proven: it might have been better.
-    Where the others still depend on each other, as they do if there are more than rows, only *adding* is possible, sets
-    whose columns depend are no sets of their size, and `max_size` must be given unless there are few.
+    Constant columns and copies of an earlier column (up to a factor and an offset, within rounding) are left out.
+    Unless such a copy is identical to the last bit, nothing is proven, since it might have been better. If the
+    remaining columns are still dependent, as is always the case with more columns than rows, only *adding* is possible,
+    sets with dependent columns do not count as sets of their size, and `max_size` must be given unless there are few
+    columns.
 
     Parameters
     ----------
@@ -137,31 +138,31 @@ def best_subsets(
     y : ndarray of shape (n_rows,)
     intercept : bool
     max_size : int, optional
-        Up to this size only.
+        Largest size that is searched.
     n_best : int
-        Number of sets of every size.
+        Number of sets to find for each size.
     jobs : int
-        Threads.
+        Number of threads.
     nodes : int, optional
         Stop after about this number of sets.
     seconds : float, optional
         Time limit, approximate [s].
     route : {'dropping', 'adding'}, optional
-        Do not choose.
+        Search method; default: the cheaper one.
     progress : callable, optional
         Called about once a second with a line of text.
 
     Returns
     -------
     Subsets
-        After a stop (also by KeyboardInterrupt): the best sets so far, and what is proven of them.
+        After a stop (also by KeyboardInterrupt): the best sets so far, each proven or not.
 
     Raises
     ------
     FitError
-        No column is left to search.
+        No column remains to be searched.
     InputError
-        A setting makes no sense, or the sets cannot be searched that way.
+        A setting is out of range, or the method is not applicable to the columns.
     """
     if n_best < 1 or jobs < 1 or (max_size is not None and max_size < 1):
         raise InputError(f"n_best {n_best}, jobs {jobs}, max_size {max_size}: expected at least 1")
@@ -173,7 +174,7 @@ def best_subsets(
     p = len(kept)
     most = min(max_size or problem.rank, problem.rank)
     possible = sum(math.comb(p, s) for s in range(1, most + 1))
-    adding = possible * 1.5e-9  # [s], as is the next line; both by trial
+    adding = possible * 1.5e-9  # [s], as in the next line; both found by measurement
     way: Route = route or ("adding" if problem.rank < p or adding < 2.5e-7 * 2 ** (0.47 * p) else "dropping")
     if problem.rank < p and (way == "dropping" or (max_size is None and adding > 10)):
         raise InputError(
@@ -188,7 +189,7 @@ def best_subsets(
             some = X[:, where]
             fresh = triangle(join_columns(some, y), intercept=intercept)
             found = solve(some, y, fresh)
-            # what one unit in the last place of every number can do to the residual
+            # effect on the residual of one unit in the last place of every number
             blur = float(fresh.last_place[:-1] @ np.abs(found.coefficients)) + problem.y_noise
             fitted.append((found.rss, where, blur))
         beyond, complete = search.safe(size) if len(fitted) < math.comb(p, size) else (math.inf, True)
@@ -212,9 +213,9 @@ def best_subsets(
 def _certified(
     fitted: Sequence[tuple[float, tuple[int, ...], float]], n_best: int, beyond: float, complete: bool
 ) -> tuple[Subset, ...]:
-    """Rank the refitted sets; the others have a sum of at least `beyond`, which is firm if the list is `complete`.
+    """Rank the refitted sets; other sets have sums of at least `beyond`, which is reliable if the list is `complete`.
 
-    The data are known to their last place only, so sums that this can move past each other are not told apart.
+    The data are exact only to their last place, so sums whose order this could change are not distinguished.
     """
     found = []
     for i, (rss, columns, blur) in enumerate(fitted[:n_best]):
@@ -225,17 +226,17 @@ def _certified(
         proven = bool(complete and apart)
         bound = rss if proven else max(min(rss, others) - _moved(rss, blur), 0.0)
         found.append(Subset(columns, rss, proven, float(bound)))
-    # a later rank is only known if the ones before are
+    # a rank is only proven if all earlier ranks are
     return tuple(replace(s, proven=all(t.proven for t in found[: i + 1])) for i, s in enumerate(found))
 
 
 def _moved(rss: float, blur: float) -> float:
-    """Return the most by which a change of the residual of norm `blur` moves a residual sum of squares."""
+    """Return the maximum change of a residual sum of squares if the residual changes by a vector of norm `blur`."""
     return 2 * blur * math.sqrt(rss) + blur**2
 
 
 def _distinct(X: FloatArray, tri: Triangle) -> tuple[list[int], bool]:
-    """Return the columns that are neither constant nor a copy of one before, and whether all copies are exact."""
+    """Return the columns that are neither constant nor a copy of an earlier one, and whether all copies are exact."""
     norms, noise = tri.norms[:-1], tri.noise[:-1]
     alive = np.flatnonzero(norms > noise)
     unit = tri.factor[:, alive] / norms[alive]

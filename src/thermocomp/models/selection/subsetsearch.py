@@ -1,4 +1,4 @@
-"""The two searches of `best_subsets`: what is searched, the margins for rounding, and one thread's part of it."""
+"""The two searches of `best_subsets`: search problem, margins for rounding, and the part of one thread."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -13,10 +13,10 @@ from thermocomp.models.numerics.leastsquares import Triangle
 
 FloatArray = NDArray[np.float64]
 
-_SPARE = 7  # sets kept per size beyond those asked for: those that rounding could make the best
-_MOST = 0.05  # margins beyond this share of a sum of squares are cut, and nothing is proven: bounds the work
-_SEARCH = 1e-9  # relative error of a sum of squares that the searches themselves may make: see GUARD and LEFT
-_LANES = 8  # numbers in a register
+_SPARE = 7  # additional sets kept per size: those that rounding could make the best
+_MOST = 0.05  # larger margins, as a share of a sum of squares, are cut and nothing is proven: bounds the work
+_SEARCH = 1e-9  # relative error of a sum of squares due to the searches themselves: see GUARD and LEFT
+_LANES = 8  # SIMD width
 
 
 @dataclass(frozen=True)
@@ -26,16 +26,16 @@ class Problem:
     Parameters
     ----------
     triangle : ndarray of shape (n, p + 1)
-        Triangular factor of the columns, scaled to the norm 1, and of y.
+        Triangular factor of the columns, scaled to norm 1, and of y.
     least : ndarray of shape (p,)
-        Norm that rounding alone may leave of each column.
+        Norm of the remainder of each column that rounding alone may cause.
     rank : int
     full_rss : float
         Residual sum of squares on all columns.
     margin : ndarray of shape (4,)
-        Of a residual norm: a constant, a factor of the root of (rss - full_rss); `full_rss`; most, as a share.
+        For a residual norm: a constant; a factor of the root of (rss - full_rss); `full_rss`; the maximum share.
     y_noise : float
-        Norm that rounding alone may leave of y.
+        Norm of the remainder of y that rounding alone may cause.
     """
 
     triangle: FloatArray
@@ -47,7 +47,7 @@ class Problem:
 
     @classmethod
     def of(cls, tri: Triangle, columns: Sequence[int]) -> "Problem":
-        """Select some columns of a triangle."""
+        """Create the problem for selected columns of a triangular factor."""
         p = len(columns)
         which = [*columns, -1]
         norms, noise = tri.norms[which], tri.noise[which]
@@ -72,18 +72,18 @@ class Problem:
             some = both[:, order[:rank]]
             head = np.linalg.qr(some)[0].T @ both[:, -1]
             full = max(float(both[:, -1] @ both[:, -1] - head @ head), 0.0)
-            # the sets that QR does not look into leave the root of LEFT of each column: coefficients up to its inverse
+            # sets without QR have column remainders of at least the root of LEFT: coefficients up to its inverse
             constant, slope = y_noise + float(least.max()) * 1e4 * size, 0.0
         margin = np.array([constant + 1e-12 * size, slope + _SEARCH, full, _MOST])
         return cls(both, least, rank, full, margin, y_noise)
 
     def error(self, rss: float) -> float:
-        """Return the most by which rounding can have moved the residual norm of a set as good as `rss`."""
+        """Return the maximum effect of rounding on the residual norm of a set as good as `rss`."""
         return float(self.margin[0] + self.margin[1] * np.sqrt(max(rss - self.full_rss, 0.0)))
 
 
 class Search(ABC):
-    """One thread's part of a search: what it works on, and the best sets it found.
+    """One thread's part of a search: its working data, and the best sets it found.
 
     Parameters
     ----------
@@ -91,14 +91,14 @@ class Search(ABC):
     sizes : int
         Largest size searched.
     n_best : int
-        Sets requested of each size.
+        Number of sets requested of each size.
     limit : ndarray of shape (p + 1,)
-        Sum of squares from which on a set is of no interest, per size; shared by all threads and falling.
+        Sum of squares above which a set is of no interest, per size; shared by all threads, decreasing.
     bound : ndarray of shape (p + 1,)
-        The same for whole branches.
+        The same limit for whole branches.
     """
 
-    chunk = 200_000  # sets between two looks at the clock: well below 0.1 s
+    chunk = 200_000  # sets between two checks of the clock: well below 0.1 s
 
     def __init__(self, problem: Problem, sizes: int, n_best: int, limit: FloatArray, bound: FloatArray) -> None:
         self.problem = problem
@@ -118,15 +118,15 @@ class Search(ABC):
 
     @abstractmethod
     def start(self, first: int, last: int) -> None:
-        """Add the branches from the `first` to before the `last` of the root."""
+        """Set the branches of the root to search, from `first` up to but excluding `last`."""
 
     @abstractmethod
     def go_on(self, budget: int) -> int:
-        """Look at about `budget` sets and return how many it was; 0 if there are no more."""
+        """Examine about `budget` sets and return their number; 0 if there are no more."""
 
     @abstractmethod
     def open_from(self) -> FloatArray:
-        """Return the least sum of squares that the sets of each size not looked at can have, shape (p + 1,)."""
+        """Return a lower bound of the sums of squares of the unexamined sets of each size, shape (p + 1,)."""
 
     def columns(self, flags: NDArray[np.uint8]) -> tuple[int, ...]:
         """Return the columns of a set."""
@@ -134,7 +134,7 @@ class Search(ABC):
 
 
 class Swapping(Search):
-    """Good initial sets; it ends at once."""
+    """Good initial sets; the search ends immediately."""
 
     def __init__(self, problem: Problem, sizes: int, n_best: int, limit: FloatArray, bound: FloatArray) -> None:
         super().__init__(problem, sizes, n_best, limit, bound)
@@ -150,7 +150,7 @@ class Swapping(Search):
         return 0
 
     def open_from(self) -> FloatArray:
-        """Return the least sum of the sets not looked at, per size."""
+        """Return a lower bound of the sums of the unexamined sets, per size."""
         return np.full(len(self.inside) + 1, np.inf)
 
 
@@ -180,21 +180,21 @@ class Dropping(Search):
         self.tasks = p - 1
 
     def start(self, first: int, last: int) -> None:
-        """Start with branches of the root."""
+        """Start with the given branches of the root."""
         self._orders[1, 0, : last - first] = range(first, last)
         self._numbers[2, 0] = last - first
 
     def go_on(self, budget: int) -> int:
-        """Look at about `budget` sets."""
+        """Examine about `budget` sets."""
         return int(self._drop(self._state, self.lists, self.inside, budget))
 
     def open_from(self) -> FloatArray:
-        """Return the least sum of the sets not looked at, per size."""
+        """Return a lower bound of the sums of the unexamined sets, per size."""
         least = np.full(len(self.inside) + 1, np.inf)
         many, sizes, left = self._numbers[:3]
         for d in range(int(self._numbers[5, 0]) + 1):
             for j in self._orders[1, d, : left[d]]:
-                high = int(sizes[d]) - 1  # of the branch; itself it has been looked at
+                high = int(sizes[d]) - 1  # of the branch; its own set has been examined
                 low = max(high - (int(many[d]) - 1 - int(j)), 1)
                 least[low:high] = np.minimum(least[low:high], self._rss[d] + self._work[4, d, j])
         return least
@@ -212,7 +212,7 @@ class Adding(Search):
         p = len(self.inside)
         self._order = _promising(problem, sizes)
         self._columns = np.ascontiguousarray(problem.triangle[:, [*self._order, -1]].T)
-        # where all columns together are independent, so are those of every set
+        # if all columns together are independent, the columns of every set are
         self._least = problem.least[self._order] if problem.rank < p else np.zeros(p)
         levels = max(sizes - 1, 1)
         self._numbers = np.zeros((3, levels), dtype=np.int64)
@@ -225,15 +225,15 @@ class Adding(Search):
         self.tasks = p
 
     def start(self, first: int, last: int) -> None:
-        """Start with branches of the root."""
+        """Start with the given branches of the root."""
         self._numbers[1:, 0] = first, last - 1
 
     def go_on(self, budget: int) -> int:
-        """Look at about `budget` sets."""
+        """Examine about `budget` sets."""
         return int(self._add(self._columns, self._least, self._state, self.lists, self.inside, self._sizes, budget))
 
     def open_from(self) -> FloatArray:
-        """Return the least sum of the sets not looked at, per size."""
+        """Return a lower bound of the sums of the unexamined sets, per size."""
         over = self._numbers[0, 0] == 0 and self._numbers[1, 0] > self._numbers[2, 0]
         return np.full(len(self.inside) + 1, np.inf if over else self.problem.full_rss)
 
@@ -243,10 +243,10 @@ class Adding(Search):
 
 
 def _promising(problem: Problem, sizes: int) -> list[int]:
-    """Return the columns by forward selection, so that good sets come first; before them those that nearly coincide.
+    """Return the columns in the order of forward selection, to find good sets early, but nearly equal columns first.
 
-    Of two that nearly coincide, the second leaves hardly anything once the first is inside: that must not happen in the
-    last two columns, which enter in closed form.
+    Of two nearly equal columns, the second has almost no remainder once the first is in the set; this must not occur
+    among the last two columns, which enter in closed form.
     """
     rest = problem.triangle[:, :-1].copy()
     y = problem.triangle[:, -1].copy()

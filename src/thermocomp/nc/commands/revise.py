@@ -21,7 +21,7 @@ from thermocomp.nc.revision.prepare import prepare_job
 from thermocomp.nc.rewrite.course import Bound
 from thermocomp.report.layout import Column, Layout
 
-#: lines from which on the time that one takes can be told
+#: minimum number of lines for which a time per line is reported
 MANY = 1000
 
 
@@ -88,7 +88,7 @@ def revise(
     """
     job, notes = prepare_job(program, drifting, output, starting, way, controller, timing, date, overwrite=overwrite)
     loudness.tell(f"read {job.program}")
-    # a pipe gets its lines on stderr, whatever stdout is for
+    # piped output: progress goes to stderr, whatever stdout is used for
     done = revise_program(job, partial(show_share, hidden=json and sys.stderr.isatty()))
     if json:
         print_json(outcome.content(job, done, notes))

@@ -1,4 +1,4 @@
-"""The programs in one file of a Fanuc, their line numbers, and their loops."""
+"""Programs in a Fanuc file, with their line numbers and loops."""
 
 import re
 from collections.abc import Sequence
@@ -10,19 +10,19 @@ _NUMBER = re.compile(r"[ \t]*[O:][ \t]*([0-9]+)", re.IGNORECASE)
 _LABEL = re.compile(r"[ \t]*/?[ \t]*N[ \t]*([0-9]+)", re.IGNORECASE)
 _COMMENT = re.compile(r"\([^()]*\)")
 _END = re.compile(r"END([0-9]+)")
-#: a P of M98 that has more digits than that may be how often and which program
+#: a P of M98 with more digits may contain both repeat count and program number
 FOUR = 10_000
 
 
 class Program:
-    """One program: its lines from its O number on, up to the next one.
+    """One program: its lines from its O number up to the next O number.
 
     Parameters
     ----------
     texts : sequence of str
         All lines of the file.
     start, stop : int
-        Indices of its first line, and one past its last.
+        Index of the first line, and index after the last line.
     """
 
     def __init__(self, texts: Sequence[str], start: int, stop: int) -> None:
@@ -33,19 +33,19 @@ class Program:
         self._closing: dict[tuple[int, int], int] = {}
 
     def label(self, number: int, line: int, who: str) -> int:
-        """Return the index of the line with a line number.
+        """Return the index of the line with a given N number.
 
         Parameters
         ----------
         number : int
         line : int
-            Line that asks, and what stands there, for the message.
+            Number of the requesting line, and text of the request, for the message.
         who : str
 
         Raises
         ------
         ProgramError
-            There is none, or more than one.
+            No line, or more than one, has the number.
         """
         if self._labels is None:
             self._labels = {}
@@ -61,12 +61,12 @@ class Program:
         return places[0]
 
     def closing(self, begin: int, loop: int) -> int:
-        """Return the index of the END of a loop that begins at an index.
+        """Return the index of the END of a loop whose DO is at a given index.
 
         Raises
         ------
         ProgramError
-            There is none.
+            The loop has no END.
         """
         if (begin, loop) in self._closing:
             return self._closing[begin, loop]
@@ -81,7 +81,7 @@ class Program:
 
 
 class File:
-    """All programs of a file; the first one is the one that is run.
+    """All programs of a file; the first one is run.
 
     Parameters
     ----------
@@ -103,12 +103,12 @@ class File:
             self._programs.setdefault(number, []).append(own)
 
     def find(self, number: int, line: int, who: str) -> Program:
-        """Return a program by its number.
+        """Return the program with a given number.
 
         Raises
         ------
         ProgramError
-            It is not in the file, or stands there twice.
+            The program is missing in the file, or present twice.
         """
         found = self._programs.get(number, [])
         if len(found) == 1:
@@ -123,20 +123,20 @@ class File:
         )
 
     def called(self, number: int, line: int, *, told: bool) -> tuple[Program, int]:
-        """Return the program that M98 P calls, and the number of repeats: the P of some controls contains both.
+        """Return the program called by M98 P and the number of repeats, which the P of some controls contains.
 
         Parameters
         ----------
         number : int
-            P.
+            Value of P.
         line : int
         told : bool
-            L or K says how often.
+            L or K gives the number of repeats.
 
         Raises
         ------
         ProgramError
-            See `find`; or P can be read in two ways.
+            As for `find`; or P is ambiguous.
         """
         times, last = divmod(number, FOUR)
         who = f"M98 P{number}"
@@ -151,5 +151,5 @@ class File:
 
 
 def squeeze(text: str) -> str:
-    """Return a text without blanks, in upper case."""
+    """Return a text without whitespace, in upper case."""
     return "".join(text.split()).upper()

@@ -1,6 +1,6 @@
-"""Writes subprograms, macros, loops and branches of a Fanuc's program out: what comes out is plain lines.
+"""Expansion of subprograms, macros, loops and branches of a Fanuc program into plain lines.
 
-Everything that depends on what is stored in the control, and not in the file, is refused with its line.
+Programs that depend on values stored in the control, and not in the file, are refused with line and reason.
 """
 
 import math
@@ -17,28 +17,28 @@ from thermocomp.nc.parser.expressions import Key
 from thermocomp.nc.parser.line import Assignment, Line, Word
 from thermocomp.nc.parser.tokens import read_line
 
-#: lines beyond those of the file that are written at most, and run at most: in all, and without one that moves an axis;
-#: a line that is run takes some 10 us, so that all of them are reached within seconds
+#: limits, in lines beyond those of the file: lines written, lines run, and lines run without axis motion;
+#: running a line takes about 10 us, so each limit is reached within seconds
 MOST: Final = 220_000
 MOST_STEPS: Final = 1_000_000
 MOST_IDLE: Final = 200_000
-#: lines that are run in which the loop is looked for that does not end
+#: number of most recent lines in which an endless loop is searched for
 _RECENT: Final = 20_000
-#: calls inside each other
+#: maximum nesting depth of calls
 DEEPEST: Final = 4
 
-# a line without any of this is plain
+# a line without any of these is plain
 _MAY_ACT = re.compile(r"[#\[O:%]|M[ \t]*[0-9 \t]*[02789]|G[ \t0]*(65|2[ \t]*[01])|GO|IF|WH|DO|END", re.IGNORECASE)
 _IF = re.compile(r"IF(?P<condition>\[.*\])(?:GOTO(?P<goto>[0-9]+|[#\[].*)|THEN(?P<then>#.*))")
 _LOOP = re.compile(r"(?:WH(?:ILE)?(?P<condition>\[.*\]))?DO(?P<loop>[123])")
 _END = re.compile(r"END(?P<loop>[123])")
 _GOTO = re.compile(r"GO(?:TO)?(?P<goto>[0-9]+|[#\[].*)")
-#: a line that is written moves no axis without an axis word, nor where a dwell, an offset or a rotation takes it
+#: a written line moves no axis if it has no axis word, or if a dwell, offset or rotation code uses the axis words
 _AXIS = re.compile(r"[XYZABC]", re.IGNORECASE)
 _STILL = re.compile(r"G[ \t]*0*(?:4|10|52|68|92)(?![0-9.])", re.IGNORECASE)
 _COMMENT = re.compile(r"\([^()]*\)?")
 _SET = re.compile(r"(#.*?)=(.*)")
-#: letters whose numbers count, and have no point
+#: letters whose values are whole numbers without a decimal point
 _COUNTS: Final = frozenset("GMTHDSLNOP")
 _ENDED: Final = -1
 _BACK: Final = 0
@@ -47,43 +47,43 @@ Lines = Generator[tuple[str, int], None, int]
 
 
 def unroll(lines: Iterable[str], setup: Setup) -> Iterator[tuple[str, int]]:
-    """Write a program out.
+    """Expand a program into plain lines.
 
-    M98 and M97 with what they call in the same file, M99, G65 with arguments, variables, ``IF``, ``GOTO``, ``WHILE``.
-    A line that needs none of it comes out as it stands, and so does the whole of a program without them.
+    Expanded are M98 and M97 with the called programs of the same file, M99, G65 with arguments, variables, ``IF``,
+    ``GOTO`` and ``WHILE``. Lines without these, and whole programs without these, are unchanged.
 
     Parameters
     ----------
     lines : iterable of str
-        With their endings; the first program of the file is run.
+        Lines with their endings; the first program of the file is run.
     setup : Setup
 
     Yields
     ------
     str
-        A plain line with its ending.
+        Plain line with its ending.
     int
-        Line it comes from, from 1.
+        Number of its source line (1-based).
 
     Raises
     ------
     ProgramError
-        Something is not in the file, not certain, or never ends.
+        A program or line is missing in the file, a value is uncertain, or a loop never ends.
     """
     return _Unroller(list(lines), setup).lines()
 
 
 @dataclass(slots=True)
 class _Frame:
-    """A program that is being run."""
+    """State of a program that is being run."""
 
     program: Program
     variables: Variables
     depth: int
-    place: int  #: index of the line that comes next
+    place: int  #: index of the next line
     called: bool
-    loops: list[tuple[int, int, int]] = field(default_factory=list)  #: number, index of DO and of END
-    #: by the line that was gone back to: changes of variables before, and the loops it was in
+    loops: list[tuple[int, int, int]] = field(default_factory=list)  #: number of the loop, indices of DO and END
+    #: by target line of a backward jump: number of variable changes so far, and the active loops
     seen: dict[int, tuple[int, list[tuple[int, int, int]]]] = field(default_factory=dict)
 
 
@@ -94,21 +94,21 @@ class _Unroller:
         self._setup = setup
         self._inch = bool(setup.inch)
         self._written = self._steps = self._moved = 0
-        self._passes: dict[int, tuple[int, int]] = {}  # by the line that was gone back to: how often, and when last
+        self._passes: dict[int, tuple[int, int]] = {}  # by target line of a backward jump: passes, last step
         self._acted = False
         self._read_lines: dict[int, Line | None] = {}
 
     def lines(self) -> Iterator[tuple[str, int]]:
         main = _Frame(self._file.main, Variables(), 0, 0, called=False)
         yield from self._run(main)
-        # behind the end: the programs that were called are not needed any more
+        # after the end: the called programs are no longer needed
         for i in range(main.place, len(self._texts)):
             text = self._texts[i]
             if not self._acted or text.strip() == "%":
                 yield text, i + 1
 
     def _run(self, frame: _Frame) -> Lines:
-        """Run a program from its place on; return the line number to continue with, 0 for none, or that all ended."""
+        """Run a program from its current line; return the line number to continue with, 0 for none, -1 if all ended."""
         began = False
         program, texts = frame.program, self._texts
         while frame.place < program.stop:
@@ -122,7 +122,7 @@ class _Unroller:
                 yield self._out(text, i + 1)
                 continue
             if line.demarcation and began and not frame.called:
-                frame.place = i  # the end of the file
+                frame.place = i  # end of the file
                 return _ENDED
             acts = bool(line.words or line.assignments or line.flow or line.label)
             began = began or acts or line.demarcation
@@ -139,14 +139,14 @@ class _Unroller:
         return _ENDED
 
     def _read(self, index: int) -> Line | None:
-        """Return a line that may act; None: it is plain."""
+        """Return a line that may have an effect; None if it is plain."""
         if index not in self._read_lines:
             text = self._texts[index]
             self._read_lines[index] = read_line(text, index + 1, "fanuc") if _MAY_ACT.search(text) else None
         return self._read_lines[index]
 
     def _line(self, frame: _Frame, line: Line) -> Generator[tuple[str, int], None, int | None]:
-        """Run one line; return None if the program continues behind it."""
+        """Run one line; return None if the program continues after it."""
         if line.flow or line.assignments:
             self._refuse_optional(line)
             self._acted = True
@@ -181,7 +181,7 @@ class _Unroller:
     # -- calls -------------------------------------------------------------------------------------------------------
 
     def _call(self, frame: _Frame, line: Line, code: int) -> Generator[tuple[str, int], None, int | None]:
-        """M98 and M97."""
+        """Run M98 or M97."""
         number = self._count(frame, line, "P", 0)
         told = [letter for letter in "LK" if any(w.letter == letter for w in line.words)]
         if not number or len(told) > 1:
@@ -198,7 +198,7 @@ class _Unroller:
         return (yield from self._repeat(frame, line, program, place, times, None))
 
     def _macro(self, frame: _Frame, line: Line) -> Generator[tuple[str, int], None, int | None]:
-        """G65."""
+        """Run G65."""
         self._refuse_optional(line)
         self._acted = True
         number, times = self._count(frame, line, "P", 0), self._count(frame, line, "L", 1)
@@ -292,7 +292,7 @@ class _Unroller:
             self._go_back(frame)
 
     def _go_back(self, frame: _Frame) -> None:
-        """Register that the program continues at an earlier line; refuse a pass that equals the previous one."""
+        """Record a jump to an earlier line; refuse a pass that equals the previous one."""
         place, state = frame.place, (frame.variables.changes, list(frame.loops))
         self._passes[place] = self._passes.get(place, (0, 0))[0] + 1, self._steps
         if frame.seen.get(place) == state:
@@ -306,7 +306,7 @@ class _Unroller:
     # -- words -------------------------------------------------------------------------------------------------------
 
     def _plain(self, frame: _Frame, line: Line, taken: str) -> str | None:
-        """Return a line with numbers for its variables and without what calls; None if nothing is left."""
+        """Return a line with variables replaced by numbers and call words removed; None if nothing is left."""
         text, kept = line.text, 0
         arc = any(w.letter in "IJ" or (w.letter == "G" and w.number in (2.0, 3.0)) for w in line.words)
         for word in line.words:
@@ -336,7 +336,7 @@ class _Unroller:
             if abs(value - round(value)) > 1e-6:
                 raise ProgramError(line.number, f"{word.letter} must be a whole number; found {value:g}")
             return f"{word.letter}{round(value)}"
-        # the control rounds what a variable puts into a word to its least increment
+        # the control rounds the value of a variable in a word to the least increment
         decimals = max(0, round(-math.log10(self._setup.least))) + self._inch
         rounded = math.copysign(math.floor(abs(value) * 10**decimals + 0.5 + 1e-6) / 10**decimals, value)
         digits = f"{rounded + 0.0:.{decimals}f}".rstrip("0")
@@ -376,7 +376,7 @@ class _Unroller:
         return text, line
 
     def _endless(self, line: int, what: str) -> ProgramError:
-        """Return the error of a loop without end: of those that run, the outermost makes the fewest passes."""
+        """Return the error for an endless loop: the outermost active loop, which has the fewest passes."""
         running = [
             (n, place + 1) for place, (n, last) in self._passes.items() if n > 1 and self._steps - last < _RECENT
         ]

@@ -1,4 +1,4 @@
-"""The variables of Fanuc's custom macro B: what is certain of them, level by level."""
+"""Variables of Fanuc custom macro B with known values, by call level."""
 
 import re
 from collections.abc import Mapping
@@ -8,12 +8,12 @@ from thermocomp.core.exceptions import InputError, ProgramError
 from thermocomp.nc.parser.expressions import Key, Parameters, evaluate
 from thermocomp.nc.parser.line import Assignment, Line, Word
 
-#: G65: the local variable that each letter sets (argument specification I)
+#: G65: local variable set by each letter (argument specification I)
 ARGUMENTS: Final = {
     **{"A": 1, "B": 2, "C": 3, "I": 4, "J": 5, "K": 6, "D": 7, "E": 8, "F": 9, "H": 11, "M": 13, "Q": 17},
     **{"R": 18, "S": 19, "T": 20, "U": 21, "V": 22, "W": 23, "X": 24, "Y": 25, "Z": 26},
 }
-#: letters whose arguments count whole units without a point
+#: letters whose arguments without a decimal point are whole numbers
 _WHOLE: Final = frozenset("DEFHMST")
 _LOCAL: Final = range(1, 34)
 _COMMON: Final = range(100, 200)
@@ -22,27 +22,27 @@ _ALONE = re.compile(r"[-+]?#([0-9]+)")
 
 
 class Variables:
-    """The variables as one level of calls sees them.
+    """Variables as seen at one call level.
 
     Parameters
     ----------
     values : mapping of int to float, optional
-        Those that are known.
+        Known values.
     macro : bool
-        The level was called by G65: its local variables are empty unless it has set them.
+        The level was called by G65: local variables not set by it are empty.
     """
 
     def __init__(self, values: Mapping[Key, float] | None = None, *, macro: bool = False) -> None:
         self._parameters = Parameters("fanuc", values)
         self.macro = macro
-        self.changes = 0  #: how often a variable has got another value
+        self.changes = 0  #: number of changes of a variable's value
 
     def called(self, arguments: Mapping[Key, float]) -> "Variables":
-        """Return the variables of a macro that is called from here."""
+        """Return the variables of a macro called from this level."""
         return Variables({**self._common(), **arguments}, macro=True)
 
     def returned(self, inner: "Variables") -> None:
-        """Adopt the common variables of a macro that has ended."""
+        """Adopt the common variables of a macro that has returned."""
         own: dict[Key, float] = {key: self._parameters[key] for key in _LOCAL if key in self._parameters}
         common = inner._common()
         self.changes += common != self._common()
@@ -57,7 +57,7 @@ class Variables:
         Raises
         ------
         ProgramError
-            Its value is not certain, or the variable is stored in the control beyond the program.
+            The value is uncertain, or the variable is stored in the control after the end of the program.
         """
         try:
             key = self._parameters.key(assignment.target)
@@ -81,17 +81,17 @@ class Variables:
         Parameters
         ----------
         line : int
-            It stands in.
+            Line that contains the expression.
         text : str
         what : str
-            It is, for the error.
+            Description of the value, for the error message.
         word : bool
             See `thermocomp.nc.parser.expressions.evaluate`.
 
         Raises
         ------
         ProgramError
-            It is not certain.
+            The value is uncertain.
         """
         try:
             return evaluate(text, self._parameters, word=word)
@@ -99,7 +99,7 @@ class Variables:
             raise ProgramError(line, f"{what}: {error}") from None
 
     def holds(self, line: int, condition: str) -> bool:
-        """Return whether a condition holds, such as ``[#1LT10]`` or ``[#1EQ#0]``."""
+        """Return whether a condition is true, such as ``[#1LT10]`` or ``[#1EQ#0]``."""
         found = _EMPTY.fullmatch(condition)
         if found:
             return self._empty(int(found.group(1)), line) == (found.group(2) == "EQ")
@@ -128,7 +128,7 @@ def squeezed_is_empty(value: str) -> bool:
 def arguments(
     line: Line, variables: Variables, integers: Literal["whole", "least", "refuse"], least: float
 ) -> dict[Key, float]:
-    """Return the local variables that the words of a G65 set.
+    """Return the local variables set by the words of a G65 line.
 
     Parameters
     ----------
@@ -138,12 +138,12 @@ def arguments(
     integers : {'whole', 'least', 'refuse'}
         Meaning of a length without a decimal point.
     least : float
-        In the unit in force.
+        Least input increment, in the unit in force.
 
     Raises
     ------
     ProgramError
-        A letter that is no argument, I J K in another order, a length without a decimal point.
+        A letter is not an argument, I J K are in another order, or a length has no decimal point.
     """
     found: dict[Key, float] = {}
     order = [word.letter for word in line.words if word.letter in "IJK"]

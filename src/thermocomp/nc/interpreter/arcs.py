@@ -1,38 +1,38 @@
-"""Centres and lengths of arcs, with LinuxCNC's tolerances."""
+"""Centres and lengths of arcs, with the tolerances of LinuxCNC."""
 
 import math
 from typing import Final
 
 from thermocomp.nc.interpreter.block import PLANES, Arc, Point
 
-#: the letters of the centre
+#: letters of the centre coordinates, by plane; the third is the axis perpendicular to the plane
 CENTRE: Final = {17: ("I", "J", "K"), 18: ("K", "I", "J"), 19: ("J", "K", "I")}
 
-# Found by trying G2 in LinuxCNC 2.9: the radius at the end may differ from that at the start by 0.1 % of the radius or
-# by this much, whatever is more [mm], and never by 100 times this much.
+# Measured with G2 in LinuxCNC 2.9: the radii at start and end may differ by 0.1 % of the radius or by this value [mm],
+# whichever is greater, but never by more than 100 times this value.
 _SPIRAL: Final = {False: 0.02 * math.sqrt(2.0), True: 0.002 * math.sqrt(2.0) * 25.4}
 _RELATIVE: Final = 0.001
-#: smaller radii are none, and half the way may be longer than R by so much [mm]
+#: minimum radius; also the tolerance by which half the chord may exceed R [mm]
 _SMALLEST: Final = 0.00127
-#: an arc that turns through less ends where it starts: a full circle [rad]
+#: an arc of a smaller angle ends at its start point: a full circle [rad]
 _FULL: Final = 1e-6
 
 Flat = tuple[float, float]
 
 
 class ArcError(Exception):
-    """The arc is impossible; the text contains the reason."""
+    """Impossible arc; the text contains the reason."""
 
 
 def check_centre(start: Flat, end: Flat, centre: Flat, inch: bool) -> None:
-    """Refuse arcs whose radii at start and end [mm] differ as the interpreter does.
+    """Refuse arcs whose radii at start and end [mm] differ by more than the interpreter allows.
 
     Parameters
     ----------
     start, end, centre : tuple of float
-        In the arc's plane [mm].
+        In the plane of the arc [mm].
     inch : bool
-        Its tolerance is another one in inches.
+        Units are inches, for which the tolerance differs.
 
     Raises
     ------
@@ -54,9 +54,9 @@ def centre_of_radius(start: Flat, end: Flat, radius: float, clockwise: bool) -> 
     Parameters
     ----------
     start, end : tuple of float
-        In the arc's plane [mm].
+        In the plane of the arc [mm].
     radius : float
-        A negative one takes the longer way [mm].
+        Radius; negative for the longer arc [mm].
     clockwise : bool
 
     Raises
@@ -70,14 +70,14 @@ def centre_of_radius(start: Flat, end: Flat, radius: float, clockwise: bool) -> 
     if half - size > _SMALLEST:
         raise ArcError(f"R{size:g} mm is too small: start and end are {chord:g} mm apart")
     height = math.sqrt(max(size * size - half * half, 0.0))
-    # the centre of the shorter clockwise arc is to the right of the way from start to end
+    # the centre of the shorter clockwise arc is to the right of the direction from start to end
     side = height if clockwise == (radius > 0.0) else -height
     x, y = (end[0] - start[0]) / chord, (end[1] - start[1]) / chord
     return ((start[0] + end[0]) / 2.0 + y * side, (start[1] + end[1]) / 2.0 - x * side)
 
 
 def sweep(arc: Arc, start: Point, end: Point) -> float:
-    """Return the angle that an arc turns through, in its own sense [rad]; start and end in machine coordinates."""
+    """Return the angle of an arc in its direction of rotation [rad]; start and end in machine coordinates."""
     first, second, _ = PLANES[arc.plane]
     begin = math.atan2(start[second] - arc.centre[1], start[first] - arc.centre[0])
     finish = math.atan2(end[second] - arc.centre[1], end[first] - arc.centre[0])

@@ -1,4 +1,4 @@
-"""Effect of a line of an NC program on the machine: the state it runs in, and its moves."""
+"""Effect of a line of an NC program on the machine: modal state and moves."""
 
 from dataclasses import dataclass, field
 from typing import Final, Literal, NamedTuple
@@ -8,15 +8,15 @@ from thermocomp.nc.parser.line import Line, Word
 Point = tuple[float, float, float]
 Known = tuple[bool, bool, bool]
 
-#: what a block does to the position: ``none`` nothing; ``line`` G0, G1, G33; ``arc`` G2, G3; ``cycle`` G73, G81 ...;
-#: ``machine`` a move in machine coordinates (G53); ``home`` G28, G30; ``set`` the place gets another name: G92, G10
-#: L20, L10, L11; ``curve`` G5, G5.1; ``probe`` G38
+#: effect of a block on the position: ``none``; ``line`` G0, G1, G33; ``arc`` G2, G3; ``cycle`` G73, G81 ...;
+#: ``machine`` a move in machine coordinates (G53); ``home`` G28, G30; ``set`` redefines the coordinates of the
+#: current position: G92, G10 L20, L10, L11; ``curve`` G5, G5.1; ``probe`` G38
 Kind = Literal["none", "line", "arc", "cycle", "machine", "home", "set", "curve", "probe"]
 
 
 @dataclass(frozen=True, slots=True)
 class Modal:
-    """The modal state a block runs in, its own words included.
+    """Modal state in which a block runs, including the words of the block.
 
     Parameters
     ----------
@@ -25,39 +25,39 @@ class Modal:
     plane : {17, 18, 19}
         Plane of arcs and cycles.
     inch : bool
-        G20.
+        G20 (inches) is in force.
     absolute : bool
-        G90; False in G91.
+        G90 is in force; False in G91.
     arc_absolute : bool
         G90.1: centres of arcs are absolute.
     feed_mode : {93, 94, 95}
     cutter : bool
         G41 or G42: cutter radius compensation is on.
     diameter : bool
-        G7: words of X are diameters.
+        G7: X words are diameters.
     system : int
         Work coordinate system: 1 is G54, 6 G59, 7 to 9 G59.1 to G59.3; 100 + p is G54.1 Pp.
     system_told : bool
-        The program has said which; else it is taken for G54.
+        The program specifies the system; otherwise G54 is assumed.
     rotation : float
         Rotation of the program coordinates about Z, stored or by G68 [deg].
     rotation_told : bool
-        Program or setup say it; else one that is stored in the controller may be in force.
+        Program or setup specify the rotation; otherwise a rotation stored in the controller may be in force.
     origin_told : bool
-        Program or setup say where the work coordinate system begins.
+        Program or setup specify the origin of the work coordinate system.
     untold_tool : int or None
-        Tool whose length is in force, and neither program nor setup say it; -1: of a tool that is not known either.
+        Number of the tool whose length is in force but not given by program or setup; -1: the tool is unknown, too.
     turned : bool
         G68 is in force.
     retract : {98, 99}
     retract_stated : bool
-        The program has said which; else it is what the controller happens to stand at.
+        The program specifies G98 or G99; otherwise the current mode of the controller applies.
     blend : float or None
-        G64 P: how far the path may leave the corners [mm]; 0 without P, None in G61 and G61.1 (exact).
+        G64 P: maximum deviation of the path at corners [mm]; 0 without P, None in G61 and G61.1 (exact).
     naive : float
-        G64 Q, or P without it: how far points may be off a line that replaces their lines [mm]; 0: none is replaced.
+        G64 Q, or P without Q: maximum distance of points from a line that replaces several lines [mm]; 0: no merging.
     exact_stop : bool
-        G61.1, or G61 of a Fanuc: the axes stop at the end of every move.
+        G61.1, or G61 on Fanuc controls: the axes stop at the end of every move.
     """
 
     motion: str = ""
@@ -82,7 +82,7 @@ class Modal:
     exact_stop: bool = False
 
 
-#: plane -> its two axes and the one across
+#: plane -> its two axes and the perpendicular axis
 PLANES: Final = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
 
 
@@ -90,7 +90,7 @@ class Arc(NamedTuple):
     """Centre, plane and direction of an arc move."""
 
     plane: int  #: 17, 18, 19
-    centre: tuple[float, float]  #: in the plane's own axes (17: X Y, 18: Z X, 19: Y Z), machine coordinates [mm]
+    centre: tuple[float, float]  #: in the axes of the plane (17: X Y, 18: Z X, 19: Y Z), machine coordinates [mm]
     clockwise: bool
     turns: int  #: at least 1: the arc ends in its first turn
 
@@ -103,14 +103,14 @@ class Move:
     ----------
     rapid : bool
     start, end : tuple of float
-        Machine coordinates [mm], work and tool offsets as far as they are known.
+        Machine coordinates [mm], including work and tool offsets if known.
     arc : Arc or None
     feed : float
-        Along the path [mm/min], 0 for rapids and inverse time; degrees per minute if only rotary axes move.
+        Feed rate along the path [mm/min]; 0 for rapids and inverse time; degrees per minute if only rotary axes move.
     seconds : float or None
-        Duration, where the program gives it (G93) or the spindle does (G95, G33, taps).
+        Duration, if given by the program (G93) or by the spindle (G95, G33, taps).
     rotary : float
-        Way of the rotary axes [deg].
+        Travel of the rotary axes [deg].
     """
 
     rapid: bool
@@ -139,29 +139,29 @@ class Block:
     values : dict of str to float
         Their values, expressions evaluated, in the program's units.
     start, end : tuple of float
-        Position of the tool before and after it, in the coordinates an absolute word would have at that time [mm].
+        Position of the tool before and after the line, as an absolute word would specify it at that time [mm].
     known : tuple of bool
         Per axis: `end` is certain, and was reached in work coordinates: an absolute word of that axis with the value of
-        `end` would not move it. False at the start of the program, after G53, G28, G30, M6 and stops, after a
-        change of the coordinate system or of the tool length that the file does not tell, and after an optional line
-        that moved it.
+        `end` would not move it. False at the start of the program, after G53, G28, G30, M6 and stops, after a change
+        of the coordinate system or of the tool length with values not in the file, and after an optional line that
+        moved the axis.
     moves : list of Move
     feed : float
         F in force, in mm per minute, mm per turn or 1/min, according to ``modal.feed_mode``.
     speed : float
-        Spindle speed, its turning on M3, M4, M5 included; 0 while it stands, negative in M4 [1/min].
+        Spindle speed, including M3, M4, M5 of the line; 0 while the spindle is stopped, negative in M4 [1/min].
     pause : float
         Dwell [s].
     tool_change : int or None
-        Number of the tool that M6 puts in; -1 unknown.
+        Number of the tool loaded by M6; -1 if unknown.
     turned : dict of str to float
-        Rotary axes that are not at 0, and where they are [deg]; nan: they have got another zero.
+        Rotary axes that are not at 0, with their positions [deg]; nan: their zero has been changed.
     stops : bool
-        M0, M1, M60: the operator decides how long, and may move the axes.
+        M0, M1, M60: the operator decides on the duration, and may move the axes.
     ends : bool
-        M2, M30 or the closing ``%``: nothing after it is run.
+        M2, M30 or the closing ``%``: nothing after the line is run.
     sticky : dict of str to float
-        In a cycle: R, Z, Q, P ... in force, in the program's units.
+        In a cycle: values of R, Z, Q, P ... in force, in the program's units.
     """
 
     line: Line
@@ -193,34 +193,34 @@ class Setup:
     controller : {'linuxcnc', 'fanuc'}
         Controller whose NC dialect the program uses.
     inch : bool or None
-        Unit in force when the program starts; None: unknown, and the program has to say it before the first length.
+        Unit in force when the program starts; None: unknown, the program must specify the unit before the first length.
     startup : str
         Codes in force when the program starts, from `thermocomp.nc.interpreter.startup.tidy`.
     speed : float
         Spindle speed S in force when the program starts [1/min]; 0: none.
     offsets : dict of int to tuple of float
-        Origins of work coordinate systems, X Y Z [mm]; those that are not there are taken as 0. They tell about where
-        the machine is, but are never certain: only what the program itself sets keeps an axis known.
+        Origins of work coordinate systems, X Y Z [mm]; missing ones are taken as 0. They give the approximate position
+        of the machine, but are never certain: an axis remains known only by what the program itself sets.
     tools : dict of int to float
-        Lengths of the tools [mm]; the same holds for them.
+        Lengths of the tools [mm]; used in the same way as `offsets`.
     home : tuple of float or None
         Position approached by G28, in machine coordinates [mm]; None: not given.
     rotations : dict of int to float
-        Rotations of work coordinate systems about Z that are stored in the controller [deg], as far as they are stated.
+        Rotations of work coordinate systems about Z that are stored in the controller [deg], if given.
     no_shift : bool
-        It is stated that no G92 or G52 is in force when the program starts.
+        The user states that no G92 or G52 is in force when the program starts.
     rotary : dict of str to {'head', 'table'}
-        Part that the rotary axes A, B, C turn, as far as given: the spindle or the workpiece.
+        Part rotated by each rotary axis A, B, C, if given: the spindle (head) or the workpiece (table).
     integers : {'whole', 'least', 'refuse'}
-        What a length without a decimal point is: whole millimetres or inches, the least increment, or a reason to
-        refuse.
+        Meaning of a length without a decimal point: whole millimetres or inches, the least increment, or refusal of
+        the program.
     least : float
         Least input increment [mm], for `integers` 'least'.
     skip_optional : bool
         Block delete is on: lines that begin with ``/`` are not run.
     harmless : frozenset of int
-        M codes of the machine's maker or user that move no axis and leave the spindle as it is; known codes keep their
-        meaning.
+        M codes defined by the machine builder or user that move no axis and do not change the spindle; known codes keep
+        their meaning.
     """
 
     controller: Literal["linuxcnc", "fanuc"] = "linuxcnc"

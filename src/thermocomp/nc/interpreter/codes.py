@@ -1,6 +1,6 @@
-"""The G and M codes: modal group, what they do, and why some are refused, for LinuxCNC and Fanuc.
+"""G and M codes of LinuxCNC and Fanuc: modal groups, effects, and reasons for refusal.
 
-Everything that is not in these tables is unknown, and a program with it is refused.
+Codes that are not in these tables are unknown, and programs that use them are refused.
 """
 
 from collections.abc import Iterable
@@ -8,17 +8,17 @@ from typing import Final, Literal, NamedTuple
 
 Controller = Literal["linuxcnc", "fanuc"]
 
-#: cycles that drill, bore or tap one hole after the other
+#: cycles that drill, bore or tap successive holes
 CYCLES: Final = frozenset({"G73", "G74", "G81", "G82", "G83", "G84", "G85", "G86", "G87", "G88", "G89"})
-#: codes outside the motion group that take the axis words of their line for themselves
+#: codes outside the motion group that use the axis words of their line
 TAKES_AXES: Final = frozenset({"G10", "G28", "G30", "G52", "G92"})
 AXES: Final = ("X", "Y", "Z")
 #: the operator decides when the program continues
 STOPS: Final = frozenset({"M0", "M1", "M60"})
 ROTARY: Final = frozenset("ABC")
-#: words whose value is a length when they stand with a motion, an offset or a cycle
+#: words whose value is a length in a line with a motion, an offset or a cycle
 LENGTHS: Final = frozenset("XYZIJKRQ")
-#: letters that every line may have
+#: letters allowed in every line
 FREE: Final = frozenset("XYZABCFST")
 
 
@@ -28,7 +28,7 @@ class Code(NamedTuple):
     name: str  #: such as ``G38.2``
     group: str
     does: str
-    refused: str = ""  #: why, and what to do; empty if it is supported
+    refused: str = ""  #: reason and remedy; empty if the code is supported
 
 
 _EXPAND = "--expand lets the interpreter unroll it"
@@ -127,7 +127,7 @@ _LINUXCNC_G: Final = (
 _NO_SCALING = "scaling is not supported; write the scaled coordinates"
 _NO_MIRROR = "mirroring is not supported; write the mirrored coordinates"
 _NO_POLAR = "polar coordinates are not supported; write X and Y"
-#: a Haas's codes for the first of them
+#: Haas codes of the first additional systems
 HAAS_SYSTEMS: Final = {f"G{109 + n}": n for n in range(1, 21)}
 #: codes of the additional work coordinate systems
 ADDITIONAL_SYSTEMS: Final = frozenset({"G54.1", "G154", *HAAS_SYSTEMS})
@@ -230,7 +230,7 @@ def _by_number(codes: tuple[Code, ...]) -> dict[float, Code]:
     return {float(code.name[1:]): code for code in codes}
 
 
-#: by controller, and by the number that stands in the program
+#: G codes by controller and by number as in the program
 G_CODES: Final[dict[Controller, dict[float, Code]]] = {
     "linuxcnc": _by_number(_COMMON_G + _LINUXCNC_G),
     "fanuc": _by_number(_COMMON_G + _FANUC_G),
@@ -242,7 +242,7 @@ M_CODES: Final[dict[Controller, dict[float, Code]]] = {
 
 _ARCS: Final = frozenset({"G2", "G3"})
 
-#: by letter, the codes that can use it; a letter that nobody uses is a mistake, and the program is refused
+#: by letter, the codes that can use it; a letter used by no code is an error, and the program is refused
 USED_BY: Final[dict[Controller, dict[str, frozenset[str]]]] = {
     "linuxcnc": {
         "D": frozenset({"G41", "G42", "G41.1", "G42.1"}),
@@ -272,7 +272,7 @@ USED_BY: Final[dict[Controller, dict[str, frozenset[str]]]] = {
     },
 }
 
-#: letters that are refused whatever stands with them
+#: letters that are refused in every line
 REFUSED_LETTERS: Final[dict[str, str]] = {
     "U": "the axes U V W are not supported; write a dwell as G4 P, or on a Fanuc as G4 X",
     "V": "the axes U V W are not supported",
@@ -290,7 +290,7 @@ def find_code(letter: str, number: float, controller: Controller) -> Code | None
     ----------
     letter : {'G', 'M'}
     number : float
-        As it stands in the program, such as 38.2.
+        Number as written in the program, such as 38.2.
     controller : {'linuxcnc', 'fanuc'}
     """
     table = (G_CODES if letter == "G" else M_CODES)[controller]
@@ -303,17 +303,17 @@ _USERS_OF_P: Final = (
 
 
 def find_owner_of_p(words: Iterable[tuple[str, float]]) -> str:
-    """Return the code that a P belongs to: the last before it that can have one, or else the first behind it.
+    """Return the code that a P belongs to: the last preceding one that can have a P, else the first following one.
 
     Parameters
     ----------
     words : iterable of tuple
-        Letter and number of the words of a line, in their order.
+        Letters and numbers of the words of a line, in order.
 
     Returns
     -------
     str
-        Empty if the line has no P, or no such code.
+        Code; empty if the line has no P, or no code that can have one.
     """
     owner, there = "", False
     for letter, number in words:

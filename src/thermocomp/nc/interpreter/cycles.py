@@ -1,4 +1,4 @@
-"""The moves of canned cycles, as LinuxCNC makes them."""
+"""Moves of canned cycles, as in LinuxCNC."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -6,26 +6,26 @@ from typing import Final, NamedTuple
 
 from thermocomp.nc.interpreter.block import PLANES, Point
 
-#: how far chip breaking and peck drilling stay off the ground [inch]
+#: clearance above the previous depth in chip breaking and peck drilling [inch]
 BACK_OFF: Final = 0.01
-#: levels nearer than that are equal but for the arithmetic
+#: levels that differ by less are equal except for rounding
 ROUNDING: Final = 1e-9
-#: more holes or pecks than this are a mistake in the program
+#: more holes or pecks than this indicate an error in the program
 MOST: Final = 100_000
 
 
 class CycleError(Exception):
-    """The cycle is impossible; the text contains the reason."""
+    """Impossible cycle; the text contains the reason."""
 
 
 class CycleMove(NamedTuple):
     """A move of a cycle."""
 
     rapid: bool
-    place: Point  #: program coordinates and program units
+    place: Point  #: program coordinates, in program units
 
 
-#: words that a cycle needs the first time, and keeps
+#: words that are required in the first line of a cycle and stay in force
 KEPT: Final = {
     "G73": "RQ",
     "G74": "R",
@@ -38,7 +38,7 @@ KEPT: Final = {
     "G87": "RIJK",
     "G89": "RP",
 }
-#: tapping: P is a dwell that may be left out
+#: tapping: P is an optional dwell
 _TAPS: Final = ("G74", "G84")
 
 
@@ -50,22 +50,22 @@ class CannedCycle:
     ----------
     code : str
     plane : {17, 18, 19}
-        Drilling goes across it.
+        Plane perpendicular to the drilling direction.
     absolute : bool
     to_r : bool
-        G99: back to R only.
+        G99: retract to R only.
     inch : bool
     start : tuple of float
         Position of the tool, in program coordinates and units, like all other values.
     named : dict of str to float
         Axis words of the line.
     sticky : dict of str to float
-        R, Q, P, I, J, K and the depth (by its axis) in force, those of the line included.
+        R, Q, P, I, J, K and the depth (by its axis) in force, including the words of the line.
     level : float
-        Position of the tool across the plane at the start of the cycle, to which G98 returns.
+        Position of the tool perpendicular to the plane at the start of the cycle, to which G98 returns.
     repeats : int
     direct : bool
-        From R to the next hole it goes at R, also in G98 (Fanuc).
+        The tool moves from R to the next hole at level R, also in G98 (Fanuc).
     """
 
     code: str
@@ -81,7 +81,7 @@ class CannedCycle:
     direct: bool = False
 
     def steps(self) -> Iterator[CycleMove]:
-        """Yield the moves; their number does not change if the whole cycle is shifted a little.
+        """Yield the moves; their number does not change if the whole cycle is slightly shifted.
 
         Raises
         ------
@@ -119,7 +119,7 @@ class CannedCycle:
             height = back
 
     def _at(self, a: float, b: float, c: float) -> Point:
-        """Return a point from its coordinates in the plane and across it."""
+        """Return a point from its coordinates in the plane and perpendicular to it."""
         if self.plane == 17:
             return (a, b, c)
         return (b, c, a) if self.plane == 18 else (c, a, b)
@@ -155,5 +155,5 @@ class CannedCycle:
 
 
 def pause(code: str, sticky: dict[str, float]) -> float:
-    """Return the dwell at the bottom of one hole, as the word P has it."""
+    """Return the dwell at the bottom of one hole, in the units of the word P."""
     return sticky.get("P", 0.0) if "P" in KEPT[code] or code in _TAPS else 0.0

@@ -1,11 +1,12 @@
-"""Judges from a whole program whether it is LinuxCNC's or a Fanuc's, and asks where its words leave that open.
+"""Detection of the dialect of a whole program (LinuxCNC or Fanuc); ambiguous programs are refused.
 
-A *sign* is what one of the two refuses: it is certain. A *hint* is a habit of LinuxCNC's users: text behind ``;``
-(posts for a Fanuc end lines with a bare one), a comment that acts in LinuxCNC or names it, arcs in several lines that
-close only if lengths without a point are whole ones. It decides on such lengths and a few words more (`_USUAL`). Both
-count before the program ends: behind M2, M30 or a closing ``%`` LinuxCNC reads nothing, but a Fanuc may. All words that
-both take and read in different ways (`thermocomp.nc.interpreter.openwords`) are asked for, unless there is a
-sign of LinuxCNC.
+A *sign* is something that one of the two controls refuses: it is conclusive. A *hint* is a habit of LinuxCNC users:
+text after ``;`` (programs for Fanuc controls end lines with a bare one), a comment that LinuxCNC executes or that
+names LinuxCNC, arcs in several lines that close only if lengths without a decimal point are whole units. It decides
+the meaning of such lengths and of a few other words (`_USUAL`). Signs and hints count before the end of the program:
+LinuxCNC reads nothing after M2, M30 or a closing ``%``, but a Fanuc may. All words that both accept but interpret
+differently (`thermocomp.nc.interpreter.openwords`) are refused for clarification, unless there is a sign of
+LinuxCNC.
 """
 
 import re
@@ -21,7 +22,7 @@ from thermocomp.nc.parser.tokens import read_line
 
 Whose = Literal["linuxcnc", "fanuc"]
 
-# most lines of a long program: nothing but moves, in which no more than a length without a point can be open
+# most lines of a long program: moves only, in which nothing but a length without a decimal point can be ambiguous
 _PLAIN = re.compile(
     r"[ \t]*(?:N[0-9]+[ \t]*)?(?:G0?([0-3])(?![0-9.])[ \t]*)?(?:[XYZIJKABCRFS][-+]?[0-9.]+[ \t]*)*[\r\n]*",
     re.IGNORECASE,
@@ -29,7 +30,7 @@ _PLAIN = re.compile(
 _BARE_FEED = re.compile(r"F[-+]?0*[1-9][0-9]*(?![0-9.])", re.IGNORECASE).search
 _BARE = re.compile(r"[XYZIJKABCR][-+]?0*[1-9][0-9]*(?![0-9.])", re.IGNORECASE).search
 
-# all others, without comments and blanks, in upper case, with {} for brackets
+# all other lines, without comments and blanks, in upper case, with {} for brackets
 _COMMENT = re.compile(r"\([^()]*\)?")
 _ACTIVE = re.compile(r"\([ \t]*(?:MSG|DEBUG|PRINT|LOG|LOGOPEN|PROBEOPEN)[ \t]*,|LINUXCNC")
 _MARKS = ("\ufeff", "ï»¿")
@@ -41,13 +42,13 @@ _O_WORD = re.compile(
 )
 _NUMBER_ALONE = re.compile(r"[O:][0-9]+")
 _PROGRAM_NUMBER = re.compile(r"[O:][0-9]+|O?<[^<>]*>$")
-# behind other words of its line, or the % that begins a tape; X1O5 is a slip of the pen
+# after other words of the line, or the % that begins a tape; X1O5 is a typing error
 _NUMBER_BEHIND = re.compile(r"(?:[ \t%]|[GMN][0-9.]+)[O:][ \t]*[0-9]+(?![0-9]*[ \t]*\.)")
 _FANUC_FLOW = re.compile(r"IF\{\}(?:GOTO|THEN)|GO(?:TO)?[0-9#{]|WH(?:ILE)?\{\}DO[0-9]|DO[0-9#]|END[0-9]")
 _FANUC_OUTPUT = re.compile(r"DPRNT|BPRNT|POPEN|PCLOS|SETVN")
 _FANUC_CORNER = re.compile(r",[RCA]")
 _ASSIGNED = re.compile(r"#[#0-9]*(?:<[^<>]*>|\{\})?=")
-_OPERATOR = re.compile(r"[0-9.}][-+*/]")  # between operands without a bracket around them
+_OPERATOR = re.compile(r"[0-9.}][-+*/]")  # between operands that are not enclosed in brackets
 _WORD = re.compile(
     r"([A-Z@^])([-+]*(?:[0-9]+\.?[0-9]*|\.[0-9]+)|[-+]*#[#0-9]*(?:\{\}|<[^<>]*>)?|[-+]*[A-Z]*\{\}(?:/\{\})?)"
 )
@@ -55,11 +56,11 @@ _WORDS = re.compile(f"(?:{_WORD.pattern})+")
 
 _FANUC_G: Final = G_CODES["fanuc"].keys() - G_CODES["linuxcnc"].keys()
 _FANUC_M: Final = M_CODES["fanuc"].keys() - M_CODES["linuxcnc"].keys()
-#: no code of a Fanuc or a Haas, whatever its options; others of LinuxCNC are (G7, G28.1, G33, G43.1, M60 ...)
+#: not codes of a Fanuc or Haas, whatever its options; other LinuxCNC codes can be (G7, G28.1, G33, G43.1, M60 ...)
 _LINUXCNC_G: Final = frozenset((5.2, 5.3, 33.1, 38.2, 38.3, 38.4, 38.5, 59.1, 59.2, 59.3, 90.1, 91.1, 92.2, 92.3))
-#: kinds of open words that a hint decides
+#: kinds of ambiguous words that a hint resolves
 _USUAL: Final = ("length", "feed", "g41", "g43", "exact", "radius", "state", "behind")
-#: kinds of open words that are named
+#: maximum number of kinds of ambiguous words listed in the error message
 _NAMED: Final = 5
 
 _BEGINS = "the beginning of a Fanuc's or Haas's program"
@@ -68,29 +69,29 @@ _BEHIND = "is a comment for LinuxCNC, and the next block for a Fanuc: remove it,
 
 
 class Place(NamedTuple):
-    """Something in a program."""
+    """Item found in a program."""
 
     line: int
-    text: str  #: as it is written
-    what: str  #: what it is, or how it is read
+    text: str  #: text as written
+    what: str  #: description of the item, or its interpretations
 
 
 @dataclass
 class Judgement:
-    """Signs of the dialect of a program.
+    """Evidence of the dialect of a program.
 
     Parameters
     ----------
     linuxcnc, fanuc : Place or None
-        The first sign of each.
+        First sign of each control.
     hint : Place or None
-        Hint of LinuxCNC.
+        First hint of LinuxCNC.
     open : dict of str to Place
-        The first word of each kind that is read in two ways: its readings, and what to write instead.
+        First ambiguous word of each kind: its interpretations, and what to write instead.
     count : dict of str to int
-        Number of lines with one.
+        Number of lines with an ambiguous word of each kind.
     fault : Place or None
-        The first such word on a line that neither can read, and why: a slip of the pen has made it.
+        First ambiguous word on a line that neither control can read, and the reason: it is due to a typing error.
     """
 
     linuxcnc: Place | None = None
@@ -102,22 +103,22 @@ class Judgement:
 
 
 def check_dialect(lines: Iterable[str], *, whole: bool = False, startup: str = "") -> None:
-    """Raise an error if the dialect of a program is not specified, and it need not be LinuxCNC's.
+    """Raise an error if the dialect of a program is not specified and may be other than LinuxCNC.
 
     Parameters
     ----------
     lines : iterable of str
         The whole program.
     whole : bool
-        It is stated what a length without a decimal point is.
+        The meaning of a length without a decimal point is specified.
     startup : str
-        Codes that are stated to be in force at the start.
+        Codes specified to be in force at the start.
 
     Raises
     ------
     ProgramError
-        It is a Fanuc's; or both a Fanuc's and LinuxCNC's; or it has words that the two read in different ways: the
-        lines, the words and the readings.
+        The program is for a Fanuc; or has signs of both Fanuc and LinuxCNC; or has words that the two interpret
+        differently: the message gives the lines, words and interpretations.
     """
     found = judge_dialect(lines, whole=whole, startup=startup)
     mine, other = found.linuxcnc, found.fanuc
@@ -153,7 +154,7 @@ def check_dialect(lines: Iterable[str], *, whole: bool = False, startup: str = "
 
 
 def judge_dialect(lines: Iterable[str], *, whole: bool = False, startup: str = "") -> Judgement:
-    """Return the signs of the dialect in a whole program; see `check_dialect`."""
+    """Return the evidence of the dialect in a whole program; see `check_dialect`."""
     scan = _Scan(InForce(whole))
     words = _WORD.findall(_squeeze(startup.upper()))
     scan.force.take(
@@ -175,7 +176,7 @@ def judge_dialect(lines: Iterable[str], *, whole: bool = False, startup: str = "
 
 
 class _Scan:
-    """Goes through a program, and keeps what is in force."""
+    """Scan of a program that tracks its modal state."""
 
     def __init__(self, force: InForce) -> None:
         self.found = Judgement()
@@ -185,7 +186,7 @@ class _Scan:
         self._whole = self._text = self._code = ""
 
     def pass_plain(self, text: str) -> bool:
-        """Return whether a line has nothing to judge, and take in how it moves."""
+        """Return whether a line needs no examination, and update the motion in force."""
         found = _PLAIN(text)
         if found is None:
             return False
@@ -243,7 +244,7 @@ class _Scan:
 
     def _block(self, text: str) -> None:
         head = _HEAD.match(text)
-        assert head is not None  # all of it may be missing
+        assert head is not None  # all parts of it are optional
         body = text[head.end() :]
         if _O_WORD.match(body):
             self._sign("linuxcnc", "an O-word, which only LinuxCNC has")
@@ -293,7 +294,7 @@ class _Scan:
                 self._ask(kind, text.replace("{}", "[..]"), readings)
             if self.force.mixed > 1:
                 self._hint("an arc that closes only if lengths without a decimal point are in whole units")
-        # an end behind "/" may be skipped
+        # an end after "/" may be skipped
         self._ended = self._ended or (runs and not {2.0, 30.0}.isdisjoint(line.m))
 
     def _signs(self, line: LineWords) -> None:
@@ -309,7 +310,7 @@ class _Scan:
         if 33.0 in g and "K" not in values:
             theirs.append("G33 without K")
         moves = not values.keys().isdisjoint("XYIJ")
-        if 5.0 in g:  # smooths the path of the one, and is a spline of the other, as is G5.1
+        if 5.0 in g:  # path smoothing in a Fanuc and a spline in LinuxCNC, as is G5.1
             theirs += ["G5 without X and Y"] * (not moves and not values.keys().isdisjoint("PQ"))
             own += ["G5 with X, Y, P and Q"] * (moves and values.keys() >= {"P", "Q"})
         if 5.1 in g:

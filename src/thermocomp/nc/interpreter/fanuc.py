@@ -1,4 +1,4 @@
-"""Codes specific to a Fanuc: G80 with words, G0 with G28, G68, and cycles that its models read differently."""
+"""Codes specific to Fanuc controls: G80 with words, G0 with G28, G68, and cycles that depend on the model."""
 
 from typing import Final
 
@@ -9,20 +9,20 @@ from thermocomp.nc.interpreter.words import BlockWords
 
 _PLANE_LETTERS: Final = frozenset("XY")
 _STRAIGHT: Final = ("G0", "G1")
-#: modal groups and codes that its manuals forbid while G68 is in force
+#: modal groups and codes that the manuals forbid while G68 is in force
 _NOT_TURNED: Final = frozenset({"plane", "system", "units"})
 _ONCE_NOT_TURNED: Final = frozenset({"G10", "G28", "G30", "G52", "G53", "G92", "G92.1"})
-#: nearer places are the same [mm]
+#: positions closer than this are equal [mm]
 _SAME: Final = 1e-6
 
 
 def motion_beside_g80(state: InterpreterState, words: BlockWords) -> str:
-    """Return the motion of the axis words on a line with G80 only: that in force before the cycle.
+    """Return the motion for axis words on a line with G80 only: the motion in force before the cycle.
 
     Raises
     ------
     ProgramError
-        It is no straight one.
+        That motion is not linear.
     """
     modal = state.modal.motion
     before = state.under if modal in CYCLES else modal
@@ -40,14 +40,14 @@ def put_in_force(state: InterpreterState, motion: str) -> None:
 
 
 def check_codes(state: InterpreterState, words: BlockWords, code: str) -> None:
-    """Refuse what controls of this kind read in several ways, before anything of the line takes effect.
+    """Refuse codes that Fanuc controls interpret differently, before any part of the line takes effect.
 
     Parameters
     ----------
     state : InterpreterState
     words : BlockWords
     code : str
-        The motion that the line makes.
+        Motion code of the line.
 
     Raises
     ------
@@ -80,13 +80,13 @@ def check_codes(state: InterpreterState, words: BlockWords, code: str) -> None:
 
 
 def rotate(state: InterpreterState, words: BlockWords) -> None:
-    """G68 X Y R and G69: turn the program's X and Y about a place of theirs.
+    """Run G68 X Y R or G69: rotate X and Y of the program about a point in program coordinates.
 
     Raises
     ------
     ProgramError
-        The plane is not XY; centre or angle are not told, or in G91, where they depend on where the tool stands or on
-        settings of the control.
+        The plane is not XY; centre or angle are missing, or specified in G91, where they depend on the position of the
+        tool or on settings of the control.
     """
     modal, offsets = state.modal, state.offsets
     if words.groups["rotation"] == "G69":
@@ -124,15 +124,15 @@ def _turned(state: InterpreterState, code: str) -> None:
 
 
 def check_place(state: InterpreterState, words: BlockWords, code: str) -> None:
-    """Refuse the first move of X or Y behind G68 or G69 that does not name both: from where it goes is not certain.
+    """Refuse the first X or Y move after G68 or G69 unless it names both axes: its start point is uncertain.
 
     Parameters
     ----------
     state : InterpreterState
-        Something has been turned, and X and Y have not been named since.
+        A rotation has been changed, and X and Y have not been named since.
     words : BlockWords
     code : str
-        The motion that the line makes.
+        Motion code of the line.
 
     Raises
     ------
@@ -153,7 +153,7 @@ def check_place(state: InterpreterState, words: BlockWords, code: str) -> None:
 
 
 def check_dwell(words: BlockWords) -> None:
-    """Refuse a dwell in P with a decimal point: it counts seconds for a Haas, and a Fanuc does not take it."""
+    """Refuse a dwell in P with a decimal point: a Haas reads seconds, and a Fanuc rejects it."""
     word = words.words.get("P")
     if word is not None and word.number is not None and "." in word.value:
         seconds = f"G4 X{word.value.strip()} for seconds, or " if words.groups.get("once") == "G4" else ""
@@ -164,12 +164,12 @@ def check_dwell(words: BlockWords) -> None:
 
 
 def dwell_of_x(state: InterpreterState, words: BlockWords) -> float:
-    """Return the time of G4 X [s].
+    """Return the dwell time of G4 X [s].
 
     Raises
     ------
     ProgramError
-        It has no decimal point, and what it counts then is not said.
+        X has no decimal point, and the meaning of such a number is not specified.
     """
     word = words.words["X"]
     if word.number is None or "." in word.value or not word.number:
@@ -183,12 +183,12 @@ def dwell_of_x(state: InterpreterState, words: BlockWords) -> float:
 
 
 def drills(state: InterpreterState, words: BlockWords) -> bool:
-    """Return whether a line of a cycle drills: with K0 or L0 it stores its words only.
+    """Return whether a line of a cycle drills: with K0 or L0 it only stores its words.
 
     Raises
     ------
     ProgramError
-        K0 or L0 beside X or Y of another place, to which some controls go; R above the level of the cycle.
+        K0 or L0 with an X or Y of another position, to which some controls move; R above the initial level.
     """
     _check_level(state, words)
     if not any(words.values.get(letter) == 0.0 for letter in "KL"):
@@ -204,7 +204,7 @@ def drills(state: InterpreterState, words: BlockWords) -> bool:
 
 
 def _check_level(state: InterpreterState, words: BlockWords) -> None:
-    """Refuse a cycle whose R is above its initial level: when the tool moves up to it depends on the control."""
+    """Refuse a cycle whose R is above its initial level: the control determines when the tool moves up to R."""
     plane, level = state.sticky["R"] * state.scale, state.level or 0.0
     above = plane - level if state.modal.absolute else plane
     sure = state.level_known or not state.modal.absolute

@@ -1,4 +1,4 @@
-"""Modal state of a program and the words of a line, as far as they decide the dialect of the program."""
+"""Modal state of a program and words of a line, as far as relevant for detecting the dialect."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -7,7 +7,7 @@ from thermocomp.nc.interpreter.codes import CYCLES, USED_BY
 
 DRILLS: Final = frozenset(float(code[1:]) for code in CYCLES)
 MOTIONS: Final = (0.0, 1.0, 2.0, 3.0, 33.0, *sorted(DRILLS))
-#: they take the axis words of their line for themselves
+#: codes that use the axis words of their line
 TAKES_AXES: Final = frozenset((4.0, 10.0, 28.0, 30.0, 52.0, 53.0, 92.0))
 ARCS: Final = (2.0, 3.0)
 ARC_WORDS: Final = "XYZIJKR"
@@ -23,11 +23,11 @@ class LineWords:
     code : str
         The line without comments, in upper case.
     g, m : list of float
-        Numbers of its codes; -1 of those that are computed.
+        Numbers of the codes; -1 for computed ones.
     computed : str
-        The first of these; empty if there is none.
+        First computed code; empty if there is none.
     values : dict of str to str
-        All others, as they are written.
+        All other words, as written.
     p_of : str
         The code that P belongs to; empty if there is none.
     """
@@ -52,26 +52,26 @@ class InForce:
     Parameters
     ----------
     whole : bool
-        It is stated what a length without a decimal point is.
+        The meaning of a length without a decimal point is specified.
     retract : bool
-        It is stated whether G98 or G99 is in force.
+        G98 or G99 is specified.
     motion : float
-        Its G code; -1 before the first one.
+        G code of the motion in force; -1 before the first one.
     begins : bool
-        The line has put it in force.
+        The motion was put in force by the current line.
     absolute : bool
     across : bool
-        Holes are drilled in another plane than XY (G18, G19).
+        Holes are drilled in a plane other than XY (G18, G19).
     kept : bool or None
-        State of `absolute` when the cycle's words were written; None if they are not.
+        Value of `absolute` when the words of the cycle were written; None if none were written.
     unit : str
-        With a blank before it; empty if it is not known.
+        Unit, preceded by a blank; empty if unknown.
     per_turn : bool
-        The feed counts per turn (G95).
+        The feed is per revolution (G95).
     mixed : int
-        Arcs that have lengths with points and without: they close only if the latter are whole.
+        Number of arcs with lengths both with and without decimal points: they close only if the latter are whole units.
     drilled, changed, milled, lathe : bool
-        There has been a cycle for holes, an M6, a word of Y, a code of lathes.
+        The program has a drilling cycle, an M6, a Y word, a code of lathes.
     """
 
     whole: bool
@@ -91,17 +91,17 @@ class InForce:
 
     @property
     def mill(self) -> bool:
-        """Whether it is no lathe."""
+        """Whether the machine is not a lathe."""
         return self.milled and not self.lathe
 
     def takes_p(self, line: LineWords) -> bool:
-        """Return whether a P may belong to the motion of a line, which has been taken in."""
+        """Return whether a P may belong to the motion of a line, after `take` has processed the line."""
         moves = not line.values.keys().isdisjoint(ARC_WORDS)
         return moves and self.motion in (*ARCS, *DRILLS) and TAKES_AXES.isdisjoint(line.g)
 
     @property
     def feed(self) -> bool:
-        """Whether a feed without a point is read in two ways."""
+        """Whether a feed without a decimal point is ambiguous."""
         return not self.whole and (self.per_turn or self.unit == " in")
 
     def take(self, line: LineWords) -> None:
@@ -132,7 +132,7 @@ class InForce:
 
 
 def read_number(value: str) -> float:
-    """Return the value of a plain number; -1 of all else."""
+    """Return the value of a plain number; -1 otherwise."""
     try:
         return float(value)
     except ValueError:

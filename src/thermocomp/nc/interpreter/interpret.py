@@ -1,7 +1,7 @@
-"""Follows a program as the controller would: line after line, what state it runs in and what moves it makes.
+"""Interpretation of a program, line by line: modal state and resulting moves, as in the controller.
 
-The order of execution within a line, the tolerances and the moves of cycles are LinuxCNC's; the tests compare every
-move with its interpreter. What cannot be followed for certain is refused with line and reason.
+The order of execution within a line, the tolerances and the moves of cycles follow LinuxCNC; the tests compare
+every move with its interpreter. Programs that cannot be interpreted with certainty are refused with line and reason.
 """
 
 from collections.abc import Iterable, Iterator
@@ -26,7 +26,7 @@ _CURVES: Final = frozenset({"G5", "G5.1"})
 
 
 def follow_program(lines: Iterable[Line], setup: Setup) -> Iterator[Block]:
-    """Follow a program.
+    """Interpret a program.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def follow_program(lines: Iterable[Line], setup: Setup) -> Iterator[Block]:
     Raises
     ------
     ProgramError
-        A line cannot be followed for certain; its reason says what was found and what to do.
+        A line cannot be interpreted with certainty; the message states what was found and what to do.
     """
     step = Follower(setup).step
     for line in lines:
@@ -50,7 +50,7 @@ def follow_program(lines: Iterable[Line], setup: Setup) -> Iterator[Block]:
 
 
 class Follower:
-    """A controller that goes through a program.
+    """Controller model that runs a program.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ class Follower:
             return self._idle(line)
         if line.demarcation:
             return self._percent(line)
-        if not self._began:  # what stands before the first % of a Fanuc program is a leader
+        if not self._began:  # text before the first % of a Fanuc program is a leader
             acts = line.words or line.assignments or line.flow if self.state.fanuc else line.text.strip()
             self._began = bool(acts)
         if line.optional and self._setup.skip_optional:
@@ -126,7 +126,7 @@ class Follower:
         return self._idle(line)
 
     def _optional(self, words: BlockWords) -> Block:
-        """Run a line that the operator may skip: then nothing after it may depend on it."""
+        """Run a line that the operator may skip: refuse it if later lines depend on it."""
         before, motion = self._summary(), self.state.modal.motion
         block = self._run(words)
         after = self._summary()
@@ -153,7 +153,7 @@ class Follower:
         return block
 
     def _check_motion(self, words: BlockWords, otherwise: str) -> None:
-        """Refuse a line that is run by a motion code of an optional line."""
+        """Refuse a line whose motion code comes from an optional line."""
         told, force = words.groups.get("motion"), self.state.modal.motion
         if told is None and force != otherwise and self._motion(words):
             raise words.error(
@@ -165,7 +165,7 @@ class Follower:
 
     def _summary(self) -> dict[str, object]:
         state = self.state
-        # whoever needs a motion code or a feed after optional lines has to state the one; the other tells the time only
+        # lines that need a motion code or a feed after optional lines must state the code; the feed only affects time
         plain = state.modal.motion in _STATED_ANEW and not state.fanuc
         return {
             "modal codes": replace(state.modal, motion="") if plain else state.modal,
@@ -223,7 +223,7 @@ class Follower:
         return block
 
     def _after(self, groups: dict[str, str], block: Block, code: str, before: str) -> None:
-        """Put the motion code in force that holds behind the line; `before` was in force before it."""
+        """Put in force the motion code that holds after the line; `before` was in force before it."""
         state = self.state
         block.modal = state.modal
         if groups.get("motion") == "G80":
@@ -231,22 +231,22 @@ class Follower:
             state.level = None
             if not state.fanuc:
                 state.moves_by("")
-            elif state.modal.motion in CYCLES:  # these are a group of their own there
+            elif state.modal.motion in CYCLES:  # a separate modal group in Fanuc controls
                 state.moves_by(state.under)
             block.modal = state.modal
         elif code in _CURVES:
             state.moves_by("")
-        elif code == "G31":  # holds for its line only
+        elif code == "G31":  # non-modal
             state.moves_by(before)
 
     def _motion(self, words: BlockWords) -> str:
-        """Return the motion code that this line runs; empty if it makes no move."""
+        """Return the motion code that this line runs; empty if there is no move."""
         groups, values = words.groups, words.values
         told = groups.get("motion")
         once = groups.get("once")
         turns = groups.get("rotation") == "G68"
         smoothed = "high speed" in groups and not _AXIS_LETTERS.isdisjoint(values)
-        if smoothed and (told or any(values.get(letter) for letter in _AXIS_LETTERS)):  # zeros state which are smoothed
+        if smoothed and (told or any(values.get(letter) for letter in _AXIS_LETTERS)):  # zeros select the axes
             raise words.error(
                 "axis words and a code that smooths the path are on one line; put the code on a separate line"
             )
@@ -276,19 +276,19 @@ class Follower:
         return fanuc.motion_beside_g80(self.state, words)
 
     def _beside(self, words: BlockWords, told: str | None, other: str) -> None:
-        """Process a motion code next to another one that uses the axis words."""
+        """Process a motion code together with another code that uses the axis words."""
         if told in ("G0", "G1") and self.state.fanuc and other in ("G28", "G30", "G68"):
             fanuc.put_in_force(self.state, told)
         elif told not in (None, "G80"):
             raise words.error(f"{told} with {other}: both would use the axis words; put them on separate lines")
 
     def _turns(self, words: BlockWords) -> bool:
-        """Whether the line is an arc without axis words: a full circle."""
+        """Return whether the line is an arc without axis words: a full circle."""
         force = self.state.modal.motion
         return force in ("G2", "G3") and not words.values.keys().isdisjoint("IJK") and "once" not in words.groups
 
     def _once(self, words: BlockWords, block: Block, once: str) -> None:
-        """Do the code that holds for this line only; G53 belongs to the motion."""
+        """Run a non-modal code, except G53, which belongs to the motion."""
         state, values = self.state, words.values
         if once == "G4":
             if "P" in values:

@@ -1,4 +1,4 @@
-"""Settings of a line before any motion: units, feed, spindle, tool, modal codes, in LinuxCNC's order."""
+"""Settings that precede any motion of a line, in LinuxCNC's order: units, feed, spindle, tool, modal codes."""
 
 from typing import Final
 
@@ -13,17 +13,17 @@ from thermocomp.nc.interpreter.words import BlockWords
 _MODAL_GROUPS: Final = frozenset(
     {"plane", "units", "cutter", "distance", "arc distance", "diameter", "retract", "path", "feed mode"}
 )
-#: LinuxCNC refuses them under cutter compensation
+#: groups that LinuxCNC refuses during cutter compensation
 _NOT_UNDER_CUTTER: Final = frozenset({"tool length", "system", "path", "retract", "tool", "io", "override"})
 
 
 def lengths(state: InterpreterState, words: BlockWords) -> None:
-    """Give lengths without a decimal point the value they have at this control."""
+    """Convert lengths without a decimal point as this control interprets them."""
     if words.groups.get("once") == "G4":
         return
     setup, inch, groups = state.setup, state.modal.inch, words.groups
     motion = groups.get("motion", state.modal.motion)
-    none = ""  # letters that count here: K repeats a Fanuc's cycle, Q is a number but in cycles, splines and G64
+    none = ""  # counts: K repeats a Fanuc cycle, Q is a number except in cycles, splines and G64
     if "high speed" in groups:
         none = "QR"
     elif not (motion in CYCLES or motion == "G5" or "path" in groups):
@@ -63,7 +63,7 @@ def _unit_needed(state: InterpreterState, words: BlockWords) -> None:
 
 
 def speeds(state: InterpreterState, words: BlockWords, inch: bool) -> None:
-    """F, S and T."""
+    """Process F, S and T."""
     values = words.values
     if "F" in values:
         word = values["F"]
@@ -84,12 +84,12 @@ def speeds(state: InterpreterState, words: BlockWords, inch: bool) -> None:
 
 
 def lathe(words: BlockWords, sign: str) -> ProgramError:
-    """Return the error of a lathe program, and what shows that it is one."""
+    """Return the error for a lathe program, with the sign by which it was recognised."""
     return words.error(f"{sign}: a lathe program: X is a diameter, G99 is feed per turn there; not supported")
 
 
 def apply_modal_codes(state: InterpreterState, words: BlockWords, block: Block) -> None:
-    """Do everything but nonmodal codes and motion, in the order of LinuxCNC."""
+    """Apply all codes except non-modal codes and motion, in the order of LinuxCNC."""
     groups = words.groups
     inch = state.modal.inch
     if state.modal.cutter and not state.fanuc:
@@ -124,7 +124,7 @@ def apply_modal_codes(state: InterpreterState, words: BlockWords, block: Block) 
 
 
 def _unit_of_feed(state: InterpreterState, words: BlockWords) -> None:
-    """LinuxCNC reads F before G20 and G21 of the same line."""
+    """Refuse F with G20 or G21 where LinuxCNC reads F before the change of units."""
     code = words.groups["units"]
     if not (state.unit_told or state.fanuc or state.modal.feed_mode == 93) and words.values.get("F"):
         raise words.error(
@@ -148,13 +148,13 @@ def _check_cutter(state: InterpreterState, words: BlockWords) -> None:
 
 
 def _machine_codes(state: InterpreterState, words: BlockWords, block: Block) -> None:
-    """M codes, but for stops."""
+    """Process M codes except stops."""
     groups, values = words.groups, words.values
     tool = groups.get("tool")
     if tool == "M6":
         block.tool_change = state.tool = state.selected
         state.turning = 0
-        # macros, remapped codes and settings of the machine move axes to the changer
+        # macros, remapped codes and machine settings may move axes to the tool changer
         state.known, state.level_known = (False, False, False), False
         state.lathe = None
     elif tool == "M61":
@@ -173,7 +173,7 @@ def _machine_codes(state: InterpreterState, words: BlockWords, block: Block) -> 
     elif spindle is not None:
         state.turning = 0
     if groups.get("io") == "M66" and values.get("L"):
-        block.stops = True  # it waits for an input, nobody knows how long
+        block.stops = True  # waits for an input, for an unknown time
 
 
 def _modal_codes(state: InterpreterState, words: BlockWords) -> None:
@@ -188,10 +188,10 @@ def _modal_codes(state: InterpreterState, words: BlockWords) -> None:
         fields["diameter"] = groups["diameter"] == "G7"
     if "cutter" in groups:
         fields["cutter"] = on = groups["cutter"] != "G40"
-        if state.modal.cutter and not on:  # the tool stays beside the programmed path
+        if state.modal.cutter and not on:  # the tool remains offset from the programmed path
             state.known = mark_axes(state.known, dict.fromkeys(PLANES[state.modal.plane][:2]), to=False)
     if "path" in groups:
-        # Fanuc's likes smooth the path in G61.1 and stop in G61
+        # Fanuc-type controls smooth the path in G61.1 and stop in G61
         exact = groups["path"] == "G61" or (groups["path"] == "G61.1" and not state.fanuc)
         blend = 0.0 if exact else words.values.get("P", 0.0) * state.scale
         naive = words.values.get("Q", 0.0) * state.scale if blend and "Q" in words.values else blend

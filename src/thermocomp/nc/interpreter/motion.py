@@ -1,4 +1,4 @@
-"""Moves: straight ones, arcs, cycles, home, machine coordinates, threads, probing, splines."""
+"""Moves: linear moves, arcs, cycles, home, machine coordinates, threads, probing, splines."""
 
 from thermocomp.nc.interpreter import fanuc
 from thermocomp.nc.interpreter.arcs import CENTRE, ArcError, Flat, centre_of_radius, check_centre
@@ -9,15 +9,15 @@ from thermocomp.nc.interpreter.offsets import mark_axes, replace_coordinates
 from thermocomp.nc.interpreter.state import InterpreterState
 from thermocomp.nc.interpreter.words import BlockWords
 
-#: LinuxCNC refuses these under cutter compensation, which this follower does not compute
+#: reason for refusal by LinuxCNC during cutter compensation, which is not computed here
 _NOT_COMPENSATED = "is not allowed during cutter compensation; write G40 before"
 
-#: levels nearer than that are the same [mm]
+#: levels closer than this are equal [mm]
 _SAME_LEVEL = 1e-4
 
 
 def straight(state: InterpreterState, words: BlockWords, block: Block) -> None:
-    """G0 and G1."""
+    """Run G0 or G1."""
     values = words.values
     rotary = state.turn(words) if "A" in values or "B" in values or "C" in values else 0.0
     if not rotary and not ("X" in values or "Y" in values or "Z" in values or "A" in values):
@@ -38,7 +38,7 @@ def straight(state: InterpreterState, words: BlockWords, block: Block) -> None:
 
 
 def in_machine(state: InterpreterState, words: BlockWords, block: Block) -> None:
-    """G53: the words are machine coordinates."""
+    """Run G53: the words are machine coordinates."""
     if not state.modal.absolute:
         raise words.error("G53 is not allowed in G91; write G90 before")
     if state.modal.cutter:
@@ -63,18 +63,18 @@ def in_machine(state: InterpreterState, words: BlockWords, block: Block) -> None
 
 
 def _doubt(state: InterpreterState, axes: dict[int, float]) -> Known:
-    """Return the axes that are still known after machine coordinates of some axes were reached."""
+    """Return which axes are still known after a move to machine coordinates of some axes."""
     known = mark_axes(state.known, axes, to=False)
     turned = state.offsets.rotation and (0 in axes or 1 in axes)
     return (False, False, known[2]) if turned else known
 
 
 def home(state: InterpreterState, words: BlockWords, block: Block) -> None:
-    """G28 and G30: by way of the point in the words; only the axes in the words go home, all if there are none."""
+    """Run G28 or G30: via the point in the words; only the axes in the words move home, all if there are none."""
     code = words.groups["once"]
     if state.modal.cutter:
         raise words.error(f"{code} {_NOT_COMPENSATED}")
-    turns = not ROTARY.isdisjoint(words.values)  # whether it is there already or not
+    turns = not ROTARY.isdisjoint(words.values)  # whether already there or not
     rotary = state.turn(words)
     named = state.axis_values(words)
     if not named and not turns and state.fanuc:
@@ -95,7 +95,7 @@ def home(state: InterpreterState, words: BlockWords, block: Block) -> None:
 
 
 def arc(state: InterpreterState, words: BlockWords, block: Block) -> None:
-    """G2 and G3."""
+    """Run G2 or G3."""
     modal, values, scale = state.modal, words.values, state.scale
     first, second, _ = PLANES[modal.plane]
     letters = CENTRE[modal.plane]
@@ -141,7 +141,7 @@ def _centre(state: InterpreterState, words: BlockWords, begin: Flat) -> Flat:
 
 
 def in_step(state: InterpreterState, words: BlockWords, block: Block) -> None:
-    """G33 and G33.1: in step with the spindle; G33.1 comes back to where it started."""
+    """Run G33 or G33.1, synchronised with the spindle; G33.1 returns to its start."""
     code = state.modal.motion
     if "K" not in words.values:
         raise words.error(f"{code} needs K, the distance per turn")
@@ -164,7 +164,7 @@ def in_step(state: InterpreterState, words: BlockWords, block: Block) -> None:
 
 
 def probe(state: InterpreterState, words: BlockWords, block: Block) -> None:
-    """G38 and G31: the end of the move is unknown; the target is used as the end."""
+    """Run G38 or G31: the end of the move is unknown; the target is used as the end."""
     code = state.modal.motion
     if state.modal.cutter:
         raise words.error(f"{code} {_NOT_COMPENSATED}")
@@ -182,9 +182,9 @@ def probe(state: InterpreterState, words: BlockWords, block: Block) -> None:
 
 
 def curve(state: InterpreterState, words: BlockWords, block: Block) -> None:
-    """G5 and G5.1; the move is recorded as the straight line from start to end."""
+    """Run G5 or G5.1; the move is recorded as the straight line from start to end."""
     code, values = state.modal.motion, words.values
-    if code not in ("G5", "G5.1"):  # whoever adds a code to the table has to say what it does
+    if code not in ("G5", "G5.1"):  # codes added to the table must be handled here
         raise words.error(f"{code} is known but not implemented; please report this")
     if state.modal.plane != 17 or {"Z", "A", "B", "C"} & values.keys():
         raise words.error(f"{code} is for X and Y in G17 only")
@@ -204,14 +204,14 @@ def curve(state: InterpreterState, words: BlockWords, block: Block) -> None:
 
 
 def cycle(state: InterpreterState, words: BlockWords, block: Block, again: bool) -> None:
-    """G73 to G89.
+    """Run a canned cycle, G73 to G89.
 
     Parameters
     ----------
     state : InterpreterState
     words : BlockWords
     block : Block
-        Gets the moves.
+        Receives the moves.
     again : bool
         The same cycle was in force before this line.
     """
@@ -270,7 +270,7 @@ def cycle(state: InterpreterState, words: BlockWords, block: Block, again: bool)
 
 
 def _keep_words(state: InterpreterState, words: BlockWords, again: bool, axes: dict[str, float], letter: str) -> None:
-    """Note the words of a cycle that hold for the holes after it as well."""
+    """Store the words of a cycle that also hold for the following holes."""
     values, code = words.values, state.modal.motion
     kept = {c: values[c] for c in "RQPIJK" if c in values and (c != "K" or not state.fanuc)}
     depth = {letter: axes[letter]} if letter in axes else {}
@@ -281,12 +281,12 @@ def _keep_words(state: InterpreterState, words: BlockWords, again: bool, axes: d
     if code in ("G73", "G83") and state.sticky["Q"] <= 0.0:
         raise words.error(f"Q of {code} must be above 0")
     if code in ("G74", "G84") and not state.fanuc:
-        state.sticky.setdefault("P", state.last_dwell)  # that of the cycle before, in LinuxCNC
+        state.sticky.setdefault("P", state.last_dwell)  # P of the previous cycle, in LinuxCNC
     state.last_dwell = state.sticky.get("P", state.last_dwell)
 
 
 def _turn_for_a_tap(state: InterpreterState, words: BlockWords, block: Block) -> None:
-    """On a Fanuc the tapping cycles start the spindle themselves."""
+    """Start the spindle: on a Fanuc the tapping cycles do so themselves."""
     code = state.modal.motion
     if state.fanuc and code in ("G74", "G84") and not state.turning:
         if state.spindle is None:
@@ -295,7 +295,7 @@ def _turn_for_a_tap(state: InterpreterState, words: BlockWords, block: Block) ->
 
 
 def _ends_certainly(state: InterpreterState) -> bool:
-    """Whether the level at which a cycle ends is known: R by G99, or that at which it began, or both are the same."""
+    """Return whether the level at the end of a cycle is known: R by G99, or the initial level, or both are equal."""
     modal = state.modal
     if modal.retract_stated and modal.retract == 99 and modal.absolute:
         return True
@@ -333,5 +333,5 @@ def _may_drill(state: InterpreterState, words: BlockWords) -> None:
 
 
 def dwell_seconds(state: InterpreterState, p: float) -> float:
-    """Return the time of a dwell: P counts seconds in LinuxCNC, milliseconds in Fanuc."""
+    """Return the time of a dwell [s]: P is in seconds in LinuxCNC, in milliseconds in Fanuc."""
     return p / 1000.0 if state.fanuc else p

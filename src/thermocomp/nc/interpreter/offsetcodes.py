@@ -1,4 +1,4 @@
-"""Codes that change offsets: work coordinate systems, G10, G52, G92, tool lengths. The tool stays where it is."""
+"""Codes that change offsets without moving the tool: work coordinate systems, G10, G52, G92, tool lengths."""
 
 from thermocomp.nc.interpreter.block import Block, Known, Point
 from thermocomp.nc.interpreter.codes import HAAS_SYSTEMS, ROTARY
@@ -11,7 +11,7 @@ _LENGTH_CERTAIN: Known = (True, True, True)
 
 
 def select_system(state: InterpreterState, words: BlockWords) -> None:
-    """G54 to G59.3, Fanuc's G54.1 P, a Haas's G154 P and G110 to G129."""
+    """Run G54 to G59.3, Fanuc G54.1 P, or Haas G154 P and G110 to G129."""
     code = words.groups["system"]
     if code in ("G54.1", "G154"):
         number = words.whole("P", least=1)
@@ -25,7 +25,7 @@ def select_system(state: InterpreterState, words: BlockWords) -> None:
 
 
 def tool_length(state: InterpreterState, words: BlockWords) -> None:
-    """G43, G43.1, G43.2, G49."""
+    """Run G43, G43.1, G43.2 or G49."""
     code = words.groups["tool length"]
     offsets = state.offsets
     if state.length_inch not in (None, state.modal.inch) and not state.fanuc:
@@ -57,7 +57,7 @@ def tool_length(state: InterpreterState, words: BlockWords) -> None:
 
 
 def _put_words(state: InterpreterState, words: BlockWords) -> Point:
-    """G43.1: the words are the offset; axes without a word keep theirs."""
+    """Return the offset of G43.1: its words; axes without a word keep their offset."""
     x, y, z = (state.axis_values(words).get(i, old) for i, old in enumerate(state.offsets.tool))
     return (x, y, z)
 
@@ -75,7 +75,7 @@ def _length_number(state: InterpreterState, words: BlockWords, code: str) -> int
 
 
 def local(state: InterpreterState, words: BlockWords, block: Block) -> None:
-    """G92 and G52, and what takes them back."""
+    """Run G92 or G52, or a code that cancels or restores them."""
     code = words.groups["once"]
     offsets = state.offsets
     values = state.axis_values(words)
@@ -100,13 +100,13 @@ def local(state: InterpreterState, words: BlockWords, block: Block) -> None:
         still = offsets.restore_shift()
     elif code in ("G92.1", "G92.2"):
         still = offsets.drop_shift(keep=code == "G92.2")
-    else:  # whoever adds a code to the table has to say what it does
+    else:  # codes added to the table must be handled here
         raise words.error(f"{code} is known but not implemented; please report this")
     state.renamed(still)
 
 
 def g10(state: InterpreterState, words: BlockWords, block: Block) -> None:
-    """G10: origins and tool lengths."""
+    """Run G10: set origins or tool lengths."""
     kind = words.whole("L")
     number = words.whole("P")
     if kind not in (2, 20) and (state.fanuc or kind not in (1, 10, 11)):
@@ -156,7 +156,7 @@ def _origin(state: InterpreterState, words: BlockWords, block: Block, kind: int,
 
 
 def _length(state: InterpreterState, words: BlockWords, block: Block, kind: int, number: int) -> None:
-    """G10 L1, L10, L11: a tool's length in the table; G43 has to come before it is used."""
+    """Run G10 L1, L10 or L11: set a tool length in the table; it takes effect with the next G43."""
     values = words.values
     if {"X", "Y", "A", "B", "C"} & values.keys():
         raise words.error(f"G10 L{kind} with X, Y or a rotary axis is not supported; Z and R are")

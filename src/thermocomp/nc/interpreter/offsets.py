@@ -1,7 +1,7 @@
-"""Program coordinates and machine coordinates, and what a program does to the offsets between them.
+"""Program and machine coordinates, and the offsets between them.
 
 Machine = origin of the work coordinate system + rotation about Z of (program + G92 or G52) + tool offset, in mm, as
-LinuxCNC has it; there G92 and G52 share one store.
+in LinuxCNC, where G92 and G52 use the same stored offset.
 """
 
 import math
@@ -13,14 +13,14 @@ _ZERO: Point = (0.0, 0.0, 0.0)
 _NEVER: Known = (False, False, False)
 _ALL: Known = (True, True, True)
 
-#: LinuxCNC: the last work coordinate system, G59.3
+#: LinuxCNC: number of the last work coordinate system, G59.3
 LAST = 9
-#: Fanuc: the external offset, added to all work coordinate systems
+#: Fanuc: number of the external offset, which is added to all work coordinate systems
 EXTERNAL = 0
 
 
 def combine_known(a: Known, b: Known) -> Known:
-    """Return per axis whether both hold."""
+    """Return, per axis, whether both are known."""
     return (a[0] and b[0], a[1] and b[1], a[2] and b[2])
 
 
@@ -31,17 +31,17 @@ def replace_coordinates(point: Point, values: Mapping[int, float]) -> Point:
 
 
 def mark_axes(known: Known, axes: Mapping[int, object], to: bool) -> Known:
-    """Return `known` with some axes set."""
+    """Return `known` with the value of some axes replaced."""
     x, y, z = (to if i in axes else known[i] for i in range(3))
     return (x, y, z)
 
 
 class Offsets:
-    """The offsets in force, and per axis whether they are certain.
+    """Offsets in force, and whether they are certain, per axis.
 
-    An offset that stood at the controller before the program started is not, nor is what the setup says of it; what the
-    program states is. After a change, a program coordinate is only known if the offset was certain before it and after
-    it.
+    Offsets in force before the program starts are uncertain, even if given in the setup; offsets set by the program
+    are certain. After a change, a program coordinate is only known if the offset was certain both before and after the
+    change.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class Offsets:
 
     def __init__(self, setup: Setup) -> None:
         self.system = 1
-        #: the program has said which system is in force; until then it is taken for G54
+        #: the program specifies the system in force; until then G54 is assumed
         self.named = False
         self.origins: dict[int, Point] = dict(setup.offsets)
         self.rotations: dict[int, float] = dict(setup.rotations)
@@ -65,14 +65,14 @@ class Offsets:
         self._update()
 
     def _update(self) -> None:
-        """Work out what conversions need, which are many, when the offsets change, which is rare."""
+        """Precompute the terms of the frequent coordinate conversions after an offset has changed."""
         origin = self.origins.get(self.system, _ZERO)
         external = self.origins.get(EXTERNAL, _ZERO)
         self.rotation = self.rotations.get(self.system, 0.0)
         turned = math.radians(self.rotation)
         self._cos, self._sin = math.cos(turned), math.sin(turned)
         x, y, z = (origin[i] + external[i] + self.tool[i] for i in range(3))
-        if self._turn is not None:  # within the system: its centre stays where it was without it
+        if self._turn is not None:  # rotation within the system: its centre keeps its unrotated position
             a, b, angle = self._turn
             x, y = x + a * self._cos - b * self._sin, y + a * self._sin + b * self._cos
             self.rotation += angle
@@ -80,14 +80,14 @@ class Offsets:
             self._cos, self._sin = math.cos(turned), math.sin(turned)
             x, y = x - a * self._cos + b * self._sin, y - a * self._sin - b * self._cos
         self._base = (x, y, z)
-        #: what is added to program coordinates; None while they are rotated
+        #: total added to program coordinates; None while they are rotated
         self.sum: Point | None = None
         if not self.rotation:
             self.sum = (x + self.shift[0], y + self.shift[1], z + self.shift[2])
 
     @property
     def certain(self) -> Known:
-        """Per axis, whether machine coordinates are known from program coordinates."""
+        """Whether machine coordinates are known from program coordinates, per axis."""
         origin = self._certain_origins.get(self.system, _NEVER) if self.named else _NEVER
         return combine_known(origin, combine_known(self._certain_shift, self.certain_tool))
 
@@ -98,16 +98,16 @@ class Offsets:
 
     @property
     def rotation_told(self) -> bool:
-        """Whether program or setup state how the system in force is turned."""
+        """Whether program or setup specify the rotation of the system in force."""
         alike = len({self.rotations.get(system, math.nan) for system in range(1, LAST + 1)}) == 1
         return self.system in self.rotations and (self.named or alike)
 
     def state(self) -> tuple[object, ...]:
-        """Return all values that show whether something has changed."""
+        """Return all values that can change, for comparison."""
         return (self._turn, self.system, dict(self.origins), dict(self.rotations), self.shift, self._kept, self.tool)
 
     def machine(self, place: Point) -> Point:
-        """Return the machine coordinates of a place in program coordinates [mm]."""
+        """Return the machine coordinates of a point in program coordinates [mm]."""
         x, y, z = place
         if self.sum is not None:
             a, b, c = self.sum
@@ -123,25 +123,25 @@ class Offsets:
         return (x - self.shift[0], y - self.shift[1], z - self.shift[2])
 
     def turn(self, centre: tuple[float, float] | None, angle: float = 0.0) -> None:
-        """G68: turn X and Y of the program about a place in program coordinates [mm, deg]; None: G69."""
+        """Run G68: rotate X and Y of the program about a point in program coordinates [mm, deg]; None: G69."""
         self._turn = None if centre is None else (centre[0] + self.shift[0], centre[1] + self.shift[1], angle)
         self._update()
 
     def select(self, system: int) -> Known:
-        """G54 and its like; returns per axis whether a known program coordinate still is."""
+        """Run G54 and similar codes; return, per axis, whether a known program coordinate remains known."""
         if system == self.system and self.named:
             return _ALL
         before, turned = self._certain_origins.get(self.system, _NEVER), self.rotation
         still = combine_known(before, self._certain_origins.get(system, _NEVER)) if self.named else _NEVER
         self.system, self.named = system, True
         self._update()
-        # where the coordinates turn, X and Y depend on each other
+        # with rotated coordinates, X and Y depend on each other
         return (False, False, still[2]) if turned != self.rotation else still
 
     def set_origin(
         self, system: int, values: Mapping[int, float], rotation: float | None = None, add: bool = False
     ) -> None:
-        """G10 L2: set the origin of a system.
+        """Run G10 L2: set the origin of a system.
 
         Parameters
         ----------
@@ -149,9 +149,9 @@ class Offsets:
         values : mapping of int to float
             By axis [mm].
         rotation : float or None
-            [deg]; None: as it is.
+            Rotation [deg]; None: unchanged.
         add : bool
-            Shift it instead.
+            Add the values to the present origin.
         """
         old = self.origins.get(system, _ZERO)
         if add:
@@ -167,7 +167,7 @@ class Offsets:
         self._update()
 
     def name_origin(self, system: int, point: Point, values: Mapping[int, float], known: Known) -> None:
-        """G10 L20: set the origin of a system so that a point of the machine gets these program coordinates in it.
+        """Run G10 L20: set the origin of a system so that a machine point has the given program coordinates in it.
 
         Parameters
         ----------
@@ -177,7 +177,7 @@ class Offsets:
         values : mapping of int to float
             Program coordinates, by axis [mm].
         known : tuple of bool
-            Per axis: `point` is certain.
+            Whether `point` is certain, per axis.
         """
         own = self.system
         certain = combine_known(known, self.certain)
@@ -197,20 +197,20 @@ class Offsets:
         self._update()
 
     def name_place(self, place: Point, values: Mapping[int, float], known: Known) -> None:
-        """G92: shift the coordinates so that a place in program coordinates gets these ones."""
+        """Run G92: shift the coordinates so that a point in program coordinates has the given coordinates."""
         told = combine_known(self._certain_shift, known)
         self._certain_shift = mark_axes(self._certain_shift, {i: v for i, v in values.items() if not told[i]}, to=False)
         self._set_shift(replace_coordinates(self.shift, {i: self.shift[i] + place[i] - v for i, v in values.items()}))
 
     def set_shift(self, values: Mapping[int, float]) -> Known:
-        """G52; returns per axis whether a known program coordinate still is."""
+        """Run G52; return, per axis, whether a known program coordinate remains known."""
         still = tuple(c or i not in values for i, c in enumerate(self._certain_shift))
         self._certain_shift = mark_axes(self._certain_shift, values, to=True)
         self._set_shift(replace_coordinates(self.shift, values))
         return still  # type: ignore[return-value]
 
     def drop_shift(self, keep: bool) -> Known:
-        """G92.1, and G92.2 that keeps the values for G92.3; returns whether program coordinates are still known."""
+        """Run G92.1, or G92.2, which keeps the values for G92.3; return whether program coordinates remain known."""
         kept, still = self._kept, self._certain_shift
         self._set_shift(_ZERO)
         self._kept = kept if keep else _ZERO
@@ -218,7 +218,7 @@ class Offsets:
         return still
 
     def restore_shift(self) -> Known:
-        """G92.3; returns whether program coordinates are still known, which they are not."""
+        """Run G92.3; return that program coordinates are no longer known."""
         self._set_shift(self._kept)
         self._certain_shift = _NEVER
         return _NEVER
@@ -228,7 +228,7 @@ class Offsets:
         self._update()
 
     def set_tool(self, tool: Point, certain: Known) -> Known:
-        """G43 and its like; returns per axis whether a known program coordinate still is."""
+        """Run G43 and similar codes; return, per axis, whether a known program coordinate remains known."""
         still = combine_known(self.certain_tool, certain)
         self.tool, self.certain_tool = tool, certain
         self._update()

@@ -1,4 +1,4 @@
-"""Words that LinuxCNC and a Fanuc both take and read in different ways, so that time, drift or correction differ."""
+"""Words that LinuxCNC and Fanuc controls both accept but interpret differently in time, drift or correction."""
 
 import re
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ from thermocomp.nc.interpreter.inforce import (
 )
 
 _DWELLS: Final = (74.0, 82.0, 84.0, 86.0, 89.0)
-#: LinuxCNC does not begin them without P
+#: cycles that LinuxCNC does not start without P
 _WANT_P: Final = (82.0, 86.0, 89.0)
 _TAPS: Final = (74.0, 84.0)
 _PECKS: Final = (73.0, 83.0)
@@ -39,7 +39,7 @@ _OTHER = "is a different cycle in LinuxCNC and in a Fanuc: replace it by its mov
 _TILTED = "sets the tool length offset to its words in LinuxCNC, and applies the length along a tilted tool in a Fanuc"
 _NORMAL = "takes the cutter diameter from D in LinuxCNC, and turns an axis along the path in a Fanuc (normal direction)"
 _STORES = "stores the tool position in LinuxCNC, and moves in a Fanuc (to a floating reference point)"
-#: codes that are open wherever they are: the kind, and the readings
+#: codes that are ambiguous wherever they occur: kind, and interpretations
 _OPEN_CODES: Final = {
     **dict.fromkeys((52.0, 92.0, 92.1), ("shift", _SHIFT)),
     **dict.fromkeys((*_OTHER_CYCLES, *_LATHE_CYCLES), ("other cycle", _OTHER)),
@@ -61,7 +61,7 @@ _G10 = (
     "force) than in a Fanuc (L10 to L13: tool offsets; L20: G54.1; P0: the external offset): write G10 L2 P1 to P6, in "
     "G90 and without R"
 )
-#: LinuxCNC's, and of a Fanuc's machine what its maker has made of them: M48 and M49, too, which most make the same of
+#: M codes of LinuxCNC that are machine-specific on a Fanuc; M48 and M49, too, although most builders agree on them
 _MAKERS_M: Final = {
     n: code.does for n, code in M_CODES["linuxcnc"].items() if n not in M_CODES["fanuc"] or n in (48.0, 49.0)
 }
@@ -72,21 +72,21 @@ _CALL = "is read by LinuxCNC from separate files, and by a Fanuc from its memory
 
 
 class OpenWord(NamedTuple):
-    """A word that is read in two ways."""
+    """Word with two interpretations."""
 
     kind: str
     text: str
-    readings: str  #: and what to write instead
+    readings: str  #: interpretations, and what to write instead
 
 
 def list_open_words(line: LineWords, force: InForce) -> Iterator[OpenWord]:
-    """Yield the words of a line that are read in two ways.
+    """Yield the ambiguous words of a line.
 
     Parameters
     ----------
     line : LineWords
     force : InForce
-        With the codes of the line.
+        Modal state, including the codes of the line.
     """
     codes, values = set(line.g), line.values
     if 4.0 in codes:
@@ -96,7 +96,7 @@ def list_open_words(line: LineWords, force: InForce) -> Iterator[OpenWord]:
     if line.p_of in ("G8", "G54") and (user := line.linuxcncs_user_of_p()):
         what = f"belongs to {user} in LinuxCNC, and may belong to {line.p_of} in a Fanuc: put the two on separate lines"
         yield OpenWord("whose P", f"P{values['P']}", what)
-    if line.g == [8.0]:  # a Fanuc wants it in a block of its own
+    if line.g == [8.0]:  # a Fanuc expects G8 in a separate block
         yield OpenWord("radius", "G8", "makes X a radius in LinuxCNC, and looks ahead in a Fanuc, where it has P")
     yield from _open_machine(line)
     if 10.0 in codes and not _sets_origin(values, force):
@@ -159,7 +159,7 @@ def _open_radius(side: str, number: str | None) -> Iterator[OpenWord]:
 
 
 def _open_machine(line: LineWords) -> Iterator[OpenWord]:
-    """Yield the M codes with machine-specific functions on a Fanuc's machine."""
+    """Yield the M codes with machine-specific functions on a Fanuc."""
     for number in line.m:
         if number in _MAKERS_M:
             what = f"belongs to LinuxCNC: {_MAKERS_M[number]}; on a Fanuc or Haas the machine builder defines"
@@ -193,7 +193,7 @@ def _open_expressions(line: LineWords) -> Iterator[OpenWord]:
 
 
 def _open_lathe(codes: set[float], values: dict[str, str], force: InForce) -> Iterator[OpenWord]:
-    """Yield what a Fanuc's lathe reads in another way; the whole program shows whether it is one (`DOUBTS`)."""
+    """Yield words that a Fanuc lathe interprets differently; the whole program decides if it is a lathe (`DOUBTS`)."""
     if 99.0 in codes or (98.0 in codes and force.per_turn):
         code = "G99" if 99.0 in codes else "G98"
         what = "without cycles is feed per turn (G99) or minute (G98) on a Fanuc's lathe: write G95 or G94 instead"
@@ -207,22 +207,22 @@ def _open_lathe(codes: set[float], values: dict[str, str], force: InForce) -> It
         yield OpenWord("turning", cycle, what)
 
 
-#: kinds of open words that are none after all if the whole program shows this
+#: kinds of words that are not ambiguous if the whole program has this property
 DOUBTS: Final = {"feed mode": "drilled", "tool": "changed", "turning": "mill"}
 
 
 def _picks_offset(value: str) -> bool:
-    """Return whether a T may name a tool and its offset, as on a Fanuc's lathe."""
+    """Return whether a T may specify a tool and its offset, as on a Fanuc lathe."""
     return value.isdigit() and len(value) in (3, 4)
 
 
 def _is_bare(value: str) -> bool:
-    """Return whether a word has a number without a point, other than 0."""
+    """Return whether a word has a nonzero number without a decimal point."""
     return _BARE(value) is not None
 
 
 def _sets_origin(values: dict[str, str], force: InForce) -> bool:
-    """Return whether G10 sets the origin of G54 to G59, as it does in both."""
+    """Return whether G10 sets the origin of G54 to G59, as in both controls."""
     return (
         read_number(values.get("L", "")) == 2.0
         and 1.0 <= read_number(values.get("P", "")) <= 6.0
@@ -269,7 +269,7 @@ def _open_cycle(codes: set[float], values: dict[str, str], force: InForce) -> It
 
 
 def _open_lengths(codes: set[float], values: dict[str, str], force: InForce) -> Iterator[OpenWord]:
-    """Yield the first length without a point, and count the arcs that show what such lengths are."""
+    """Yield the first length without a decimal point, and count the arcs that show the meaning of such lengths."""
     drills = force.motion in DRILLS
     bare = {letter: value for letter, value in values.items() if _is_bare(value)}
     if force.motion in ARCS and not bare.keys().isdisjoint(ARC_WORDS):
@@ -290,7 +290,7 @@ def _open_lengths(codes: set[float], values: dict[str, str], force: InForce) -> 
 
 
 def _counts(value: str | None) -> bool:
-    """Return whether a dwell may be in seconds or milliseconds: a fraction is in seconds for all who take it."""
+    """Return whether a dwell may be in seconds or milliseconds: all controls read fractions as seconds."""
     return value is not None and (number := read_number(value)) != 0.0 and number % 1.0 == 0.0
 
 

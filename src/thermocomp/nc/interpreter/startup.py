@@ -1,4 +1,4 @@
-"""Codes in force when a program starts, which it need not contain, and which no program end resets."""
+"""Startup codes: in force when a program starts, whether or not it contains them, and not reset by its end."""
 
 from typing import Final
 
@@ -17,7 +17,7 @@ def tidy(text: str, controller: Controller) -> str:
     Raises
     ------
     InputError
-        There is something else among them, or two that exclude each other.
+        The text contains other codes, or two that exclude each other.
     """
     line = read_line(text, 1, controller)
     rest = line.assignments or line.comment or line.label or line.flow or line.demarcation or line.optional
@@ -37,14 +37,14 @@ def tidy(text: str, controller: Controller) -> str:
 
 
 def modal(setup: Setup) -> Modal:
-    """Return the modal state at the start of a program; of a path that is not stated ``G64`` without a tolerance."""
+    """Return the modal state at the start of a program; default of an unspecified path: ``G64`` without tolerance."""
     words = read_line(setup.startup, 1, setup.controller).words
     path, retract = _of(words, _PATHS), _of(words, _RETRACTS)
     lengths = {w.letter: w.number or 0.0 for w in words if w.letter in "PQ"}
     blend = lengths.get("P", 0.0)
     return Modal(
         inch=bool(setup.inch),
-        # where nothing is stated LinuxCNC's interpreter begins with G99, Fanuc with G98
+        # defaults: LinuxCNC's interpreter starts with G99, Fanuc with G98
         retract=int(retract[0][1:]) if retract else 98 if setup.controller == "fanuc" else 99,
         retract_stated=bool(retract),
         blend=None if path and path != ["G64"] else blend,
@@ -54,7 +54,7 @@ def modal(setup: Setup) -> Modal:
 
 
 def complete_codes(setup: Setup) -> str:
-    """Return the startup codes for an interpreter, with those that `modal` takes where nothing is stated."""
+    """Return the startup codes for an interpreter, including the defaults of `modal`."""
     words = read_line(setup.startup, 1, setup.controller).words
     path = "" if _of(words, _PATHS) else "G64"
     retract = "" if _of(words, _RETRACTS) else f"G{modal(setup).retract}"

@@ -16,7 +16,7 @@ _TRUE: Known = (True, True, True)
 
 
 class InterpreterState:
-    """Position of the tool, and everything set by words and codes.
+    """Position of the tool, and state set by words and codes.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class InterpreterState:
         self.machine: Point = (0.0, 0.0, 0.0)
         self.known: Known = (False, False, False)
         self.rotary: dict[str, float] = dict.fromkeys(ROTARY, 0.0)
-        self.rezeroed: set[str] = set()  # rotary axes that have got another zero
+        self.rezeroed: set[str] = set()  # rotary axes whose zero has been changed
         self.turned: dict[str, float] = {}
         self.feed = 0.0
         self.feed_word = 0.0
@@ -43,10 +43,10 @@ class InterpreterState:
         self.turning = 0
         self.selected = -1
         self.tool = -1
-        self.lathe: str | None = ""  # Fanuc: a T word that may be a lathe's; None: M6 has come
-        self.under = ""  # Fanuc: the motion that G80 brings back
-        self.turned_anew = ""  # Fanuc: G68 or G69, and X and Y have not been named since
-        self.lengths: dict[int, float] = {}  # that the program has set
+        self.lathe: str | None = ""  # Fanuc: a T word that may be for a lathe; None: an M6 has occurred
+        self.under = ""  # Fanuc: motion that G80 restores
+        self.turned_anew = ""  # Fanuc: G68 or G69, while X and Y have not been named since
+        self.lengths: dict[int, float] = {}  # set by the program
         self.doubtful: dict[int, float] = dict(setup.tools)
         self.shifted_by = ""
         self.length_number: int | None = None
@@ -66,14 +66,14 @@ class InterpreterState:
         return self.turning * (self.spindle or 0.0)
 
     def changed(self, **fields: object) -> None:
-        """Adopt new modal fields."""
+        """Change fields of the modal state."""
         modal = replace(self.modal, **fields)  # type: ignore[arg-type]
         if modal != self.modal:
             self.modal = modal
             self._variants = {modal.motion: modal}
 
     def moves_by(self, motion: str) -> None:
-        """Put a motion code in force; snapshots of before are used again."""
+        """Put a motion code in force; modal states of earlier motions are reused."""
         if motion == self.modal.motion:
             return
         if motion in CYCLES and self.modal.motion not in CYCLES:
@@ -85,7 +85,7 @@ class InterpreterState:
         self.modal = known
 
     def placed(self) -> None:
-        """Adopt the known values of the coordinates in force."""
+        """Copy the state of the offsets to the modal state."""
         offsets = self.offsets
         self.changed(
             system=offsets.system,
@@ -97,7 +97,7 @@ class InterpreterState:
         )
 
     def axis_values(self, words: BlockWords) -> dict[int, float]:
-        """Return the line's X Y Z by axis [mm]; X as a radius."""
+        """Return X Y Z of the line by axis [mm]; X as a radius."""
         values, scale = words.values, self.scale
         found = {i: values[letter] * scale for i, letter in enumerate("XYZ") if letter in values}
         if self.modal.diameter and 0 in found:
@@ -105,7 +105,7 @@ class InterpreterState:
         return found
 
     def goal(self, words: BlockWords) -> tuple[Point, Known]:
-        """Return the target of the axis words in program coordinates [mm], and which of it is known."""
+        """Return the target of the axis words in program coordinates [mm], and which coordinates are known."""
         values, scale, modal = words.values, self.scale, self.modal
         x, y, z = self.place
         if modal.absolute:
@@ -129,12 +129,12 @@ class InterpreterState:
         return (x, y, z), self.known
 
     def turned_to(self) -> None:
-        """Note which rotary axes are not at 0 [deg]; nan: they have got another zero."""
+        """Record which rotary axes are not at 0 [deg]; nan: their zero has been changed."""
         at = self.rotary | dict.fromkeys(self.rezeroed, math.nan)
         self.turned = {letter: angle for letter, angle in at.items() if angle % 360.0}
 
     def turn(self, words: BlockWords) -> float:
-        """Move the rotary axes; return how far they go [deg]."""
+        """Move the rotary axes; return their travel [deg]."""
         way = 0.0
         for letter in ROTARY & words.values.keys():
             value = words.values[letter]
@@ -146,18 +146,18 @@ class InterpreterState:
         return way
 
     def reach(self, place: Point, known: Known) -> None:
-        """Be at a place in program coordinates."""
+        """Set the position, in program coordinates."""
         self.place, self.known = place, known
         self.machine = self.offsets.machine(place)
 
     def renamed(self, still: Known) -> None:
-        """Keep the tool position under new offsets; coordinates stay known as given by `still`."""
+        """Keep the tool position under new offsets; known coordinates remain so where `still` is True."""
         self.place = self.offsets.program(self.machine)
         a, b, c = self.known
         self.known = (a and still[0], b and still[1], c and still[2])
 
     def cut(self, words: BlockWords, start: Point, end: Point, arc: Arc | None = None, rotary: float = 0.0) -> Move:
-        """Return a move in feed.
+        """Return a move at feed rate.
 
         Parameters
         ----------
@@ -166,12 +166,12 @@ class InterpreterState:
             Machine coordinates [mm].
         arc : Arc or None
         rotary : float
-            Way of the rotary axes [deg].
+            Travel of the rotary axes [deg].
 
         Raises
         ------
         ProgramError
-            No feed; G93 without F on the line; G95 while the spindle is stopped.
+            No feed is set; G93 without F on the line; G95 while the spindle is stopped.
         """
         mode, feed = self.modal.feed_mode, self.feed
         if mode == 93:
@@ -189,7 +189,7 @@ class InterpreterState:
     def per_turn(
         self, words: BlockWords, start: Point, end: Point, pitch: float, arc: Arc | None = None, rotary: float = 0.0
     ) -> Move:
-        """Return a move that goes with the turns of the spindle.
+        """Return a move with feed per revolution of the spindle.
 
         Parameters
         ----------
@@ -197,10 +197,10 @@ class InterpreterState:
         start, end : tuple of float
             Machine coordinates [mm].
         pitch : float
-            Way per turn [mm], or degrees.
+            Travel per revolution [mm], or degrees.
         arc : Arc or None
         rotary : float
-            Way of the rotary axes [deg].
+            Travel of the rotary axes [deg].
         """
         feed = pitch * abs(self.speed)
         if not feed:

@@ -1,4 +1,4 @@
-"""Words of a line: its codes by modal group, and the values of its words, each checked by itself."""
+"""Words of a line: codes by modal group, and values, each checked on its own."""
 
 from dataclasses import dataclass
 
@@ -8,24 +8,24 @@ from thermocomp.nc.interpreter.codes import FREE, REFUSED_LETTERS, USED_BY, Code
 from thermocomp.nc.parser.expressions import Parameters, evaluate
 from thermocomp.nc.parser.line import Line, Word
 
-#: LinuxCNC takes no more M codes on a line
+#: maximum number of M codes on a line in LinuxCNC
 _MOST_M = 4
 
 
 @dataclass(slots=True)
 class BlockWords:
-    """A line's words.
+    """Words of a line.
 
     Parameters
     ----------
     line : Line
     codes : tuple of str
-        In the order they stand.
+        Codes in the order of the line.
     groups : dict of str to str
-        The code of each modal group; G80 beside another motion code is left out.
+        Code of each modal group, without G80 if another motion code is present.
     words : dict of str to Word
     values : dict of str to float
-        In program units.
+        Values in program units.
     """
 
     line: Line
@@ -35,11 +35,11 @@ class BlockWords:
     values: dict[str, float]
 
     def error(self, reason: str) -> ProgramError:
-        """Return the error of this line."""
+        """Return an error for this line."""
         return ProgramError(self.line.number, reason)
 
     def whole(self, letter: str, least: int = 0) -> int | None:
-        """Return the value of a word that counts; None if the line does not have it."""
+        """Return the value of a whole-number word; None if the line has no such word."""
         value = self.values.get(letter)
         if value is None:
             return None
@@ -50,13 +50,13 @@ class BlockWords:
 
 
 class Reader:
-    """Makes words of lines.
+    """Converter from lines to `BlockWords`.
 
     Parameters
     ----------
     setup : Setup
     parameters : Parameters
-        The parameters the program sets and uses.
+        Parameters that the program sets and uses.
     """
 
     def __init__(self, setup: Setup, parameters: Parameters) -> None:
@@ -72,7 +72,7 @@ class Reader:
         Raises
         ------
         ProgramError
-            Unknown and refused codes, two codes of one group, letters that stand twice, values that cannot be
+            The line has unknown or refused codes, two codes of one group, repeated letters, or values that cannot be
             evaluated.
         """
         words: dict[str, Word] = {}
@@ -103,7 +103,7 @@ class Reader:
         return found
 
     def check_letters(self, words: BlockWords, motion: str) -> None:
-        """Refuse letters that no code of the line uses; `motion` is the motion that it makes."""
+        """Refuse letters that no code of the line uses; `motion` is the motion code of the line."""
         for letter in words.values.keys() - FREE:
             if letter in REFUSED_LETTERS:
                 raise words.error(f"{letter}: {REFUSED_LETTERS[letter]}")
@@ -114,7 +114,7 @@ class Reader:
                 raise words.error(self._unused(words, letter))
 
     def _unused(self, words: BlockWords, letter: str) -> str:
-        """Return the message that no code of a line uses a letter, and the control that has such a code."""
+        """Return the message that no code of a line uses a letter, naming another control with such a code."""
         owner = ""
         if letter == "P":
             codes = iter(words.codes)

@@ -1,16 +1,16 @@
 """Run an NC program through LinuxCNC's interpreter and write its canonical calls to standard output, in blocks.
 
-A script for Debian's ``/usr/bin/python3``, whose package linuxcnc-uspace brings the module `gcode`; it uses nothing of
-thermocomp but `_rs274_hooks.py`, `_rs274_kinds.py` and `_rs274_reading.py` beside it. `rs274process.py` starts it with
-the folders of jobs, which are run one after the other, each in a process of its own, and reads what it writes: a line
-with the names of the kinds (JSON), then blocks of two numbers (records, bytes of JSON), as many records, and a JSON
-list of what is no row of numbers: the first number of such a record is its place in the list. Behind each job stands a
-block without records and the code it ended with. A move stands in program coordinates [inch, deg]; before an arc a
-record tells of its centre.
+A script for Debian's ``/usr/bin/python3``, whose package linuxcnc-uspace provides the module `gcode`; from thermocomp
+it only uses `_rs274_hooks.py`, `_rs274_kinds.py` and `_rs274_reading.py` in the same folder. `rs274process.py` starts
+it with the folders of jobs, which run one after the other, each in a separate process, and reads the output: a line
+with the names of the kinds (JSON), then blocks, each with two numbers (number of records, bytes of JSON), the records,
+and a JSON list of all non-numeric data: the first number of such a record is its index in the list. After each job
+follows a block without records, with the exit code of the job. Moves are in program coordinates [inch, deg]; each arc
+is preceded by a record with its centre.
 
-The module tells of moves, offsets and comments only. Spindle, coolant, stops and the like are empty functions in it:
-the interpreter's entries for them are turned to functions of this script, and a missing one is an error. Lengths come
-in inches from the module whatever the program's unit is; but those of moves leave here in mm.
+The module only reports moves, offsets and comments. Its functions for spindle, coolant, stops and the like are empty:
+the interpreter's entries for them are redirected to functions of this script, and a missing one is an error. The
+module gives lengths in inches, whatever the unit of the program; lengths other than those of moves are output in mm.
 """
 
 import ctypes
@@ -30,14 +30,14 @@ from importlib.util import module_from_spec, spec_from_file_location
 from typing import Any, BinaryIO
 
 MM = 25.4
-#: records of a block
+#: number of records in a block
 BLOCK = 2048
-#: processor time after which a program that does nothing is refused [s]
+#: processor time after which a program without output is refused [s]
 MOST_IDLE = 20.0
 
 
 def load_sibling(name: str) -> Any:
-    """Return the module of a file next to this one; its folder is not on the module path."""
+    """Return the module of a file next to this one, whose folder is not on the module path."""
     spec = spec_from_file_location(name, __file__.replace("_rs274_child", name))
     assert spec is not None
     assert spec.loader is not None
@@ -57,24 +57,24 @@ RefusedError = reading.RefusedError
 
 
 class Canon:
-    """Receives the canonical calls of the interpreter."""
+    """Receiver of the canonical calls of the interpreter."""
 
     def __init__(self, out: BinaryIO) -> None:
         self.out = out
         self.records: list[bytes] = []
         self.more: list[Any] = []
         self.line = 0
-        self.begun = 0  # 1 after the mark in the job's start block, 2 after its last call, the tool length
+        self.begun = 0  # 1 after the mark in the start block of the job, 2 after its last call (tool length)
         self.metric = False
         self.interpreter = 0
-        self.place: tuple[float, ...] = (0.0,) * 9  # program coordinates where it stands [inch, deg]
+        self.place: tuple[float, ...] = (0.0,) * 9  # current position in program coordinates [inch, deg]
         self.offset: dict[str, tuple[float, ...]] = dict.fromkeys(("g5x", "g92", "length"), (0.0,) * 9)  # [inch, deg]
         self.angle = 0.0
         self.plane = 1
         self.feed = 0.0  # [mm/min]
         self.path = (3, 0.0, 0.0)  # G64; tolerances [mm]
         self.file = b""
-        self.files: dict[bytes, None] = {}  # that were opened
+        self.files: dict[bytes, None] = {}  # files opened so far
         self.hooks = load_sibling("_rs274_hooks").Hooks()
         self.linked = ctypes.PyDLL("librs274.so.0")
         self.sequence = self.linked._ZN6Interp15sequence_numberEv
@@ -84,10 +84,10 @@ class Canon:
         self.buffer = ctypes.create_string_buffer(512)
         self.alone = True  # no other file has been opened
         self.flushed = self.told = 0
-        self.last = 0.0  # processor time when a call was last seen [s]
+        self.last = 0.0  # processor time at the last observed call [s]
 
     def begin(self, job: dict[str, Any]) -> None:
-        """Set the context in which the program is run."""
+        """Set the context in which the program runs."""
         self.parameter_file = job["parameters"]
         self.delete = bool(job["block_delete"])
         self.tools: list[tuple[int, float, float]] = job["tools"]  # number, length, diameter
@@ -97,7 +97,7 @@ class Canon:
         self.reading = reading.ProgramReading(job["program"], home, job["folders"], job["lines"], self.reached)
 
     def connect(self, module: str) -> None:
-        """Turn the functions the module leaves empty to this object."""
+        """Redirect the empty functions of the module to this object."""
 
         def told(kind: str) -> Callable[..., None]:
             return lambda *numbers: self.tell(kind, *numbers)
@@ -110,7 +110,7 @@ class Canon:
         functions["fopen64"] = (self.opened, (P, TEXT, TEXT))
         functions["fgets"] = (self.line_read, (P, P, INT, P))
         functions[PYTHON] = (self.python, (INT, P, TEXT, P, B))
-        functions["_Z7COMMENTPKc"] = (self.commented, (None, TEXT))  # the module knows ASCII only
+        functions["_Z7COMMENTPKc"] = (self.commented, (None, TEXT))  # the module only handles ASCII
         functions["_Z7MESSAGEPc"] = (self.messaged, (None, TEXT))
         functions["_Z18CHANGE_TOOL_NUMBERi"] = (self.change_tool_number, (None, INT))
         functions["_Z9RIGID_TAPidddd"] = (self.tapped, (None, INT, D, D, D, D))
@@ -118,7 +118,7 @@ class Canon:
         functions["_Z16USE_LENGTH_UNITS11CANON_UNITS"] = (self.united, (None, INT))
         functions["_Z23SET_MOTION_CONTROL_MODE17CANON_MOTION_MODEd"] = (self.pathed, (None, INT, D))
         functions["_Z22SET_NAIVECAM_TOLERANCEd"] = (self.naive, (None, D))
-        # what the module answers is wrong once the unit, an offset or the mode has changed
+        # the values returned by the module are wrong after a change of the unit, an offset or the mode
         functions["_Z22GET_EXTERNAL_FEED_RATEv"] = (lambda: self.feed / self.unit(), (D,))
         functions["_Z32GET_EXTERNAL_MOTION_CONTROL_MODEv"] = (lambda: self.path[0], (INT,))
         functions["_Z37GET_EXTERNAL_MOTION_CONTROL_TOLERANCEv"] = (lambda: self.path[1] / self.unit(), (D,))
@@ -142,7 +142,7 @@ class Canon:
 
     # --- writing ---
     def where(self) -> None:
-        """Line and file of the block in execution."""
+        """Set line and file to those of the block being executed."""
         if self.interpreter:
             self.move_to(self.sequence(self.interpreter))
 
@@ -158,7 +158,7 @@ class Canon:
             self.extra("file", "" if own else name.decode("utf-8", "replace"))
 
     def reached(self) -> tuple[int, bool]:
-        """Return the line that was read last, and whether it is one of the program's own."""
+        """Return the number of the line read last, and whether it belongs to the program's own file."""
         if not self.interpreter:
             return 0, True
         if not self.alone:
@@ -172,10 +172,10 @@ class Canon:
         self.record(kind, *numbers)
 
     def act(self, *, moved: bool) -> None:
-        """Count a move, a dwell or the like; only what moves an axis shows that a loop is getting on."""
+        """Count a move, a dwell or the like; only motion of an axis shows progress of a loop."""
         if (reason := self.reading.count_call(moved=moved)) is None:
             return
-        # a line runs to its end whatever a call answers, which may take for ever: nothing but the process can end it
+        # a line runs to its end regardless of the return values, possibly endlessly: only ending the process stops it
         self.where()
         self.refuse(self.line, reason)
         self.flush()
@@ -217,13 +217,13 @@ class Canon:
     def unit(self) -> float:
         return 1.0 if self.metric else MM
 
-    # --- where it stands: program = unrotated(machine - origin - tool) - G92 ---
+    # --- position: program = unrotated(machine - origin - tool) - G92 ---
     def turned(self, values: tuple[float, ...], angle: float) -> list[float]:
         c, s = math.cos(angle), math.sin(angle)
         return [values[0] * c - values[1] * s, values[0] * s + values[1] * c, *values[2:]]
 
     def shifted(self, name: str, values: tuple[float, ...]) -> None:
-        """Apply an offset; the machine stays."""
+        """Apply an offset without moving the machine."""
         sums = [o + t for o, t in zip(self.offset["g5x"], self.offset["length"], strict=True)]
         machine = self.turned(tuple(p + g for p, g in zip(self.place, self.offset["g92"], strict=True)), self.angle)
         machine = [m + f for m, f in zip(machine, sums, strict=True)]
@@ -241,7 +241,7 @@ class Canon:
     def tool_length(self, axis: int) -> float:
         return self.offset["length"][axis] * (MM if self.metric and not 3 <= axis < 6 else 1.0)
 
-    # --- what the module leaves out ---
+    # --- calls that the module ignores ---
     def united(self, unit: int) -> None:
         self.unit_before(unit)
         self.metric = unit == 2
@@ -255,13 +255,13 @@ class Canon:
         self.tell("toolnumber", number)
 
     def tool_stored(self, place: int, number: int, pose: Any, front: float, back: float, size: float, to: int) -> None:
-        """G10 L1, L10, L11: M6 and G43 take the tool from here [mm]."""
+        """Store a tool (G10 L1, L10, L11) from which M6 and G43 read it [mm]."""
         if 0 < number <= len(self.tools):
             self.tools[number - 1] = (number, pose.values[2], size)
         self.tell("tooltable")
 
     def opened(self, name: bytes, mode: bytes) -> int:
-        """Note a file that is there, the program's own included."""
+        """Record a file that exists, including the program itself."""
         self.reading.check_file(name, write=not mode.startswith(b"r"))
         result: int = self.open_before(name, mode)
         if result and mode.startswith(b"r"):
@@ -276,7 +276,7 @@ class Canon:
         return result
 
     def python(self, this: int, code: bytes, result: int, as_file: bool) -> int:
-        """Run Python code of the interpreter's own, and none of a program."""
+        """Run Python code of the interpreter itself, and refuse that of a program."""
         if code == b"from interpreter import this":
             done: int = self.python_before(this, code, result, as_file)
             return done
@@ -314,7 +314,7 @@ class Canon:
         self.act(moved=True)
         self.extra("curve", [order, *points])
 
-    # --- what the module tells ---
+    # --- calls reported by the module ---
     def next_line(self, state: Any) -> None:
         if self.alone:
             self.line = state.sequence_number if self.begun == 2 else 0
@@ -380,7 +380,7 @@ class Canon:
         self.tell("plane", {1: 17, 2: 19, 3: 18}[plane])
 
     def set_feed_rate(self, feed: float) -> None:
-        # the module divides by 25.4 in G21 and does not in G20; a feed of rotary axes alone is no length
+        # the module divides by 25.4 in G21 but not in G20; a feed of rotary axes alone is not a length
         self.feed = feed * MM
         self.tell("feedrate", feed * MM, feed * (MM if self.metric else 1.0))
 
@@ -401,14 +401,14 @@ class Canon:
             self.text("comment", text)
 
     def message(self, text: str) -> None:
-        """Not used: it is turned to `messaged`."""
+        """Do nothing; the call is redirected to `messaged`."""
 
     def set_traverse_rate(self, rate: float) -> None:
-        """Not used by the programs' words."""
+        """Do nothing; no word of a program causes this call."""
 
-    # --- what the module asks ---
+    # --- queries of the module ---
     def check_abort(self) -> bool:
-        """Asked about once in a second."""
+        """Return whether to abort the program; called about once per second."""
         told, now = self.flushed + len(self.records), time.process_time()
         if told != self.told:
             self.told, self.last = told, now
@@ -419,8 +419,8 @@ class Canon:
         return self.hooks.failure is not None
 
     def get_tool(self, index: int) -> tuple[float, ...]:
-        """Of the tool at this place of the table: number, offsets (X to W), diameter, angles, orientation [mm]."""
-        index = index or self.spindle  # place 0 is the spindle
+        """Return the tool at a table index: number, offsets (X to W), diameter, angles, orientation [mm]."""
+        index = index or self.spindle  # index 0 is the spindle
         number, length, diameter = self.tools[index - 1] if 0 < index <= len(self.tools) else (0, 0.0, 0.0)
         return (number, 0.0, 0.0, length, *(0.0,) * 6, diameter, 0.0, 0.0, 0)
 
@@ -428,7 +428,7 @@ class Canon:
         return 1.0
 
     def get_external_length_units(self) -> float:
-        return 1.0  # of the machine per mm
+        return 1.0  # machine units per mm
 
     def get_axis_mask(self) -> int:
         return 0x1FF
@@ -439,11 +439,11 @@ class Canon:
 
 def run(job: dict[str, Any], canon: Canon, gcode: Any) -> None:
     """Run a job."""
-    ctypes.CDLL(None).prctl(1, 9)  # PR_SET_PDEATHSIG: it does not outlive the process that reads its end
+    ctypes.CDLL(None).prctl(1, 9)  # PR_SET_PDEATHSIG: end with the parent process
     resource.setrlimit(resource.RLIMIT_CPU, (job["seconds"], job["seconds"] + 1))
     os.environ["HOME"] = job["home"]
     os.environ["INI_FILE_NAME"] = job["ini"]
-    # T, M6 and G43 crash the interpreter unless the store of the tools is there: it is $HOME/.tool.mmap
+    # T, M6 and G43 crash the interpreter unless the tool store $HOME/.tool.mmap exists
     tools = ctypes.CDLL("libtooldata.so.0")
     tools._Z17tool_mmap_creatorPK13EMC_TOOL_STATi(None, 0)
     tools._Z13tooldata_initb(B(False))
@@ -451,7 +451,7 @@ def run(job: dict[str, Any], canon: Canon, gcode: Any) -> None:
     ctypes.c_int.in_dll(ctypes.CDLL(gcode.__file__), "_task").value = job["task"]
     canon.begin(job)
     result = 0
-    with suppress(KeyboardInterrupt):  # what `check_abort` makes of a failure
+    with suppress(KeyboardInterrupt):  # raised by the module if `check_abort` returns True
         result = gcode.parse(job["program"], canon, job["units"], job["start"])[0]
     failure = canon.hooks.failure
     if isinstance(failure, RefusedError):
@@ -469,7 +469,7 @@ def run(job: dict[str, Any], canon: Canon, gcode: Any) -> None:
 
 
 def main() -> None:
-    """Run the jobs of the folders that are named, each from the same fresh state of the interpreter's module."""
+    """Run the jobs in the given folders, each from the same fresh state of the interpreter module."""
     with os.fdopen(os.dup(1), "wb", buffering=1 << 18) as out:
         os.dup2(2, 1)  # (PRINT, ...) of a program goes to standard output
         os.environ["HOME"] = os.getcwd()  # noqa: PTH109

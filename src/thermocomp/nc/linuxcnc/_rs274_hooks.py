@@ -1,4 +1,4 @@
-"""Turns functions that a loaded C++ library calls to Python functions, by its global offset table (Linux, 64 bit).
+"""Redirection of calls in a loaded C++ library to Python functions, by its global offset table (Linux, 64 bit).
 
 Part of the script `_rs274_child.py`: standard library only.
 """
@@ -15,7 +15,7 @@ P = ctypes.c_void_p
 
 
 def slots(library: str, names: set[str]) -> dict[str, list[int]]:
-    """Return the addresses of the entries through which a loaded library calls functions of these mangled names."""
+    """Return the addresses of the entries through which a loaded library calls functions with these mangled names."""
     found = None
     for line in Path("/proc/self/maps").read_text(encoding="utf-8").splitlines():
         fields = line.split()
@@ -56,7 +56,7 @@ def slots(library: str, names: set[str]) -> dict[str, list[int]]:
 
 
 class Hooks:
-    """Turns calls of a loaded library to functions of this script."""
+    """Redirection of calls of a loaded library to functions of this script."""
 
     def __init__(self) -> None:
         self.kept: list[Any] = []  # ctypes does not keep a callback alive
@@ -65,7 +65,7 @@ class Hooks:
         self.protect.argtypes = (P, ctypes.c_size_t, ctypes.c_int)
 
     def turn(self, library: str, functions: dict[str, tuple[Callable[..., Any], tuple[Any, ...]]]) -> dict[str, Any]:
-        """Replace functions by mangled name with (function, types of result, arguments); return those before."""
+        """Replace functions by mangled name with (function, result and argument types); return the originals."""
         found = slots(library, set(functions))
         missing = sorted(set(functions) - set(found))
         if missing:
@@ -79,12 +79,12 @@ class Hooks:
                 if self.protect(page, mmap.PAGESIZE, 3):
                     raise OSError(ctypes.get_errno(), "mprotect")
                 slot = ctypes.c_void_p.from_address(address)
-                before[name] = ctypes.PYFUNCTYPE(*types)(slot.value or 0)  # keeps the interpreter lock
+                before[name] = ctypes.PYFUNCTYPE(*types)(slot.value or 0)  # holds the GIL
                 slot.value = ctypes.cast(callback, P).value
         return before
 
     def guarded(self, function: Callable[..., Any]) -> Callable[..., Any]:
-        """Keep the first error for the end: raised in a callback it would only be printed."""
+        """Wrap a function to store its first error: an error raised in a callback would only be printed."""
 
         def call(*numbers: Any) -> Any:
             try:

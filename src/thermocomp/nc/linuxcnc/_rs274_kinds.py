@@ -4,21 +4,21 @@ import ctypes
 import struct
 from typing import Any
 
-#: what runs comments (py, ...) and ;py,
+#: function that runs comments (py, ...) and ;py,
 PYTHON = "_ZN12PythonPlugin10run_stringEPKcRN5boost6python3api6objectEb"
-#: kind, how many numbers, line, numbers
+#: kind, count of numbers, line, numbers
 RECORD = struct.Struct("<HHi10d")
 
 INT, D, B, P, TEXT = ctypes.c_int, ctypes.c_double, ctypes.c_bool, ctypes.c_void_p, ctypes.c_char_p
 
 
 class Pose(ctypes.Structure):
-    """Offsets X Y Z A B C U V W."""
+    """Offsets in X Y Z A B C U V W."""
 
     _fields_ = (("values", D * 9),)
 
 
-#: canonical functions that are told with their numbers: mangled name -> kind, types
+#: canonical functions reported with their arguments: mangled name -> kind, types
 TOLD: dict[str, tuple[str, tuple[Any, ...]]] = {
     "_Z13SET_FEED_MODEii": ("feedmode", (INT, INT)),
     "_Z11SELECT_TOOLi": ("select", (INT,)),

@@ -1,4 +1,4 @@
-"""Reading by LinuxCNC's interpreter: no file outside the folders of the job, and nothing endless.
+"""Limits on LinuxCNC's interpreter: no file outside the folders of the job, and no endless loops.
 
 Part of the script `_rs274_child.py`: standard library only.
 """
@@ -9,42 +9,42 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable
 
-#: lines that are read beyond those of the program: without a move of an axis between them, and in all. A line takes
-#: 5 to 15 us, so that either is reached within seconds
+#: limits on the number of lines read, beyond those of the program: without motion of an axis, and in total. A line
+#: takes 5 to 15 us, so either limit is reached within seconds
 MOST_IDLE = 300_000
 MOST = 1_200_000
-#: processor time without a move [s], looked at every so many lines, once more lines have been read than the program
-#: has: a line that changes the tool or calls a file takes far more
+#: processor time without a move [s], checked every `LOOK` lines once more lines have been read than the program
+#: has: a line that changes the tool or calls a file takes much longer
 MOST_SECONDS = 5.0
 LOOK = 1024
-#: moves, dwells and the like of one line, as of a cycle with many repeats or pecks; and of all, beyond `CALLS` per line
+#: limits on moves, dwells and the like: per line (a cycle may have many repeats); in total, beyond `CALLS` per line
 MOST_OF_LINE = 100_000
 MOST_CALLS = 5_000_000
 CALLS = 20
-#: lines that are watched then, to find the loop; fewer where they are slow
+#: number of lines then recorded to find the loop; fewer if lines are slow
 WATCHED = 20_000
 WATCHED_SLOW = 4_000
 LOOP = re.compile(r"(?i)^[\s/N0-9.]*O.*[\]>0-9\s](WHILE|DO|REPEAT)\b")
 
 
 class RefusedError(Exception):
-    """The program needs something that is not permitted: the line, and the reason."""
+    """Operation of the program that is not permitted: line and reason."""
 
 
 class ProgramReading:
-    """Bounds what is read.
+    """Limits on the lines and files read by a program.
 
     Parameters
     ----------
     program : str
     home : str
-        Folder of the runs: all in it may be read and written.
+        Folder of the runs: all files in it may be read and written.
     folders : iterable of str
         Folders of the program and of its subprograms: files in them may be read.
     lines : int
         Number of lines of the program.
     where : callable
-        Gives the line in execution, and whether it is one of the program itself.
+        Returns the line being executed, and whether it belongs to the program itself.
     """
 
     def __init__(
@@ -55,15 +55,15 @@ class ProgramReading:
         self.folders = [os.path.realpath(folder) for folder in folders]
         self.where = where
         self.idle, self.most = lines + MOST_IDLE, lines + MOST
-        self.lines = self.moved = 0  # read, in all and when an axis moved last
+        self.lines = self.moved = 0  # lines read, in total and at the last axis motion
         self.own = lines + LOOK
-        self.looked, self.since, self.late = 0, time.process_time(), False  # line, time of the last look with a move
-        self.acted = self.calls = self.before = 0  # lines and calls before the one that does something; calls in all
+        self.looked, self.since, self.late = 0, time.process_time(), False  # line and time of last check after a move
+        self.acted = self.calls = self.before = 0  # lines and calls before the latest acting line; total calls
         self.most_calls = CALLS * lines + MOST_CALLS
         self.watched: list[tuple[int, bool]] = []
 
     def check_file(self, name: bytes, *, write: bool) -> None:
-        """Refuse a pipe, a device, and a file outside the folders, wherever its name, a link or ``..`` leads."""
+        """Refuse a pipe, a device, or a file outside the folders, resolving links and ``..``."""
         path = os.path.realpath(os.fsdecode(name))
         if os.path.exists(path) and not (os.path.isfile(path) or os.path.isdir(path)):  # noqa: PTH110, PTH112, PTH113
             raise RefusedError(
@@ -81,7 +81,7 @@ class ProgramReading:
         )
 
     def count_line(self) -> None:
-        """Count a line that is read; refuse a program whose loop does not end."""
+        """Count a line read; refuse a program with an endless loop."""
         self.lines += 1
         if not self.lines % LOOK:
             self.look_at_time()
@@ -101,7 +101,7 @@ class ProgramReading:
         )
 
     def look_at_time(self) -> None:
-        """See how long no axis has moved."""
+        """Update the time since the last axis motion."""
         now = time.process_time()
         if self.moved > self.looked:
             self.since = now
@@ -109,7 +109,7 @@ class ProgramReading:
         self.late = now - self.since > MOST_SECONDS
 
     def count_call(self, *, moved: bool) -> str | None:
-        """Count an action of a line, and whether an axis moves; return the reason if there are too many."""
+        """Count an action of a line, and note axis motion; return the reason for refusal if there are too many."""
         if moved:
             self.moved = self.lines
         if self.acted != self.lines:
@@ -122,8 +122,8 @@ class ProgramReading:
         return None
 
     def find_loop(self) -> int:
-        """Return the first line of the loop that contains the watched lines: the outermost one."""
-        # a line that was read last; the next one is about to be
+        """Return the first line of the outermost loop that contains the recorded lines."""
+        # the recorded line was read last; the next one is being read
         passes = Counter(line + 1 for line, own in self.watched if own)
         if not passes:
             return min(line for line, _ in self.watched) + 1

@@ -1,4 +1,4 @@
-"""Axes of a LinuxCNC configuration, and the names that its HAL files already use."""
+"""Axes of a LinuxCNC configuration, and the names in use in its HAL files."""
 
 import math
 import re
@@ -7,14 +7,14 @@ from pathlib import Path
 
 from thermocomp.core.exceptions import InputError
 
-#: HAL files that come with LinuxCNC
+#: folder of the HAL files included in LinuxCNC
 LIBRARY = Path("/usr/share/linuxcnc/hallib")
 _ARROWS = ("=>", "<=", "<=>")
 
 
 @dataclass(frozen=True)
 class Ini:
-    """An INI file of LinuxCNC, whose keys may occur several times.
+    """INI file of LinuxCNC, in which keys may occur several times.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class Ini:
         Raises
         ------
         InputError
-            There is none, and no default.
+            The key does not exist, and there is no default.
         """
         found = self.sections.get(section, {}).get(key)
         if found:
@@ -47,7 +47,7 @@ class Ini:
         return default
 
     def number(self, section: str, key: str, default: float | None = None) -> float:
-        """Return a value that is a number.
+        """Return a numeric value.
 
         Parameters
         ----------
@@ -57,7 +57,7 @@ class Ini:
         Raises
         ------
         InputError
-            There is none, or it is none.
+            The key does not exist, or its value is not a number.
         """
         text = self.get(section, key, None if default is None else str(default))
         try:
@@ -71,18 +71,18 @@ class Ini:
 
 @dataclass
 class HalFiles:
-    """Names that HAL files use, as far as they can be read: no Tcl, no conditions.
+    """Names used in HAL files, as far as they can be analysed: no Tcl, no conditions.
 
     Parameters
     ----------
     signals : dict of str to str
-        Signal by the pin that is on it.
+        Signal connected to each pin.
     pins : dict of str to list of str
-        Pins by signal, in the order in which they stand there.
+        Pins connected to each signal, in the order of the files.
     modules : dict of str to tuple of str, int, str
         File, line and arguments of ``loadrt``, by module.
     functions : list of str
-        In the order in which the servo thread calls them.
+        Functions in the order of the servo thread.
     unread : list of str
         Files that cannot be analysed.
     read : set of Path
@@ -107,7 +107,7 @@ def read_ini(path: Path) -> Ini:
     Raises
     ------
     InputError
-        It cannot be read.
+        The file cannot be read.
     """
     sections: dict[str, dict[str, list[str]]] = {}
     keys: dict[str, list[str]] = {}
@@ -122,24 +122,24 @@ def read_ini(path: Path) -> Ini:
             keys = sections.setdefault(line[1:-1].strip(), {})
             continue
         key, equals, value = line.partition("=")
-        if equals and key[0] not in "#;":  # LinuxCNC, too, takes no notice of the rest
+        if equals and key[0] not in "#;":  # LinuxCNC, too, ignores all other lines
             keys.setdefault(key.strip(), []).append(value.strip())
     return Ini(path, sections)
 
 
 def read_hal(ini: Ini, leave: str) -> HalFiles:
-    """Read the HAL files that an INI names.
+    """Read the HAL files named in an INI file.
 
     Parameters
     ----------
     ini : Ini
     leave : str
-        Name of the file that is ours.
+        Name of the HAL file of thermocomp, which is skipped.
 
     Raises
     ------
     InputError
-        One cannot be read.
+        A file cannot be read.
     """
     found, later = HalFiles(), HalFiles()
     for key, into in (("HALFILE", found), ("POSTGUI_HALFILE", later)):
@@ -151,7 +151,7 @@ def read_hal(ini: Ini, leave: str) -> HalFiles:
                 into.unread.append(name)
                 continue
             _read_one(path, ini, into)
-    found.signals = later.signals | found.signals  # a pin can be on one signal only, whoever puts it there
+    found.signals = later.signals | found.signals  # a pin is on one signal only, set by either group of files
     return found
 
 
@@ -192,7 +192,7 @@ def _read_one(path: Path, ini: Ini, found: HalFiles) -> None:
 
 
 def _filled(line: str, ini: Ini) -> str:
-    """Return a line with the values of the INI in the place of ``[SECTION]KEY`` and ``[SECTION](KEY)``."""
+    """Return a line with ``[SECTION]KEY`` and ``[SECTION](KEY)`` replaced by the values of the INI file."""
     return re.sub(r"\[(\w+)\](?:\((\w+)\)|(\w+))", lambda m: ini.get(m[1], m[2] or m[3], m[0]) if m[1] else m[0], line)
 
 

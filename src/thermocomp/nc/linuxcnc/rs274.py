@@ -1,7 +1,7 @@
 """Canonical calls of an NC program, as reported by LinuxCNC's interpreter.
 
-It is what judges every program that is written here, and what takes loops and parameters apart (see `expand`). It comes
-with Debian's package linuxcnc-uspace and needs neither a machine nor a display.
+The interpreter verifies every program written here, and expands loops and parameters (see `expand`). It is part of
+Debian's package linuxcnc-uspace and needs neither a machine nor a display.
 """
 
 import math
@@ -25,7 +25,7 @@ __all__ = [
 ]  # fmt: skip
 
 PACKAGE = "linuxcnc-uspace"
-#: Axes of a plane of arcs: first, second, and the one the helix goes along.
+#: Axes of a plane of arcs: first, second, and axis of the helix.
 PLANE_AXES = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
 
 Place = tuple[float, float, float, float, float, float, float, float, float]
@@ -34,12 +34,12 @@ ORIGIN: Place = (0.0,) * 9
 
 
 class ArcPath(NamedTuple):
-    """Direction and centre of an arc; the third coordinate of its centre is that of the arc's end."""
+    """Direction and centre of an arc; the third coordinate of the centre is that of the end of the arc."""
 
     plane: int  #: 17, 18, 19
     centre: tuple[float, float, float]  #: program coordinates [mm]
     machine_centre: tuple[float, float, float]  #: machine coordinates [mm]
-    turns: int  #: positive anticlockwise; 1: the arc ends in its first turn
+    turns: int  #: positive counterclockwise; 1: the arc ends in its first turn
 
 
 class Canonical(NamedTuple):
@@ -56,8 +56,8 @@ class Canonical(NamedTuple):
     """
 
     kind: str
-    line: int  #: of the file the block stands in, from 1
-    file: str  #: empty for the program itself, else the file of the subprogram
+    line: int  #: number of the line in the file of the block (1-based)
+    file: str  #: empty for the program itself, else name of the file of the subprogram
     program: Place = ORIGIN  #: end of a move in program coordinates, X to W [mm, deg]
     machine: Place = ORIGIN  #: end of a move in machine coordinates [mm, deg]
     arc: ArcPath | None = None
@@ -75,7 +75,7 @@ class ProgramFrame:
     origin, shift, length : tuple of float
         Offsets of the system, of G92, of the tool, X to W [mm, deg].
     rotation : float
-        About Z [deg].
+        Rotation about Z [deg].
     """
 
     def __init__(self) -> None:
@@ -87,11 +87,11 @@ class ProgramFrame:
     def _settle(self) -> None:
         self._cos, self._sin = math.cos(math.radians(self.rotation)), math.sin(math.radians(self.rotation))
         self._fixed = _nine(o + t for o, t in zip(self.origin, self.length, strict=True))
-        # without a rotation all offsets are one
+        # without a rotation, the sum of all offsets is sufficient
         self._sum = None if self.rotation else _nine(f + s for f, s in zip(self._fixed, self.shift, strict=True))
 
     def take(self, kind: str, values: tuple[float, ...]) -> None:
-        """Follow a canonical call; calls of other kinds change nothing."""
+        """Apply a canonical call; ignore calls of other kinds."""
         if kind == "g5x":
             self.system, self.origin = int(values[0]), _nine(values[1:])
         elif kind == "g92":
@@ -105,7 +105,7 @@ class ProgramFrame:
         self._settle()
 
     def machine(self, p: Place) -> Place:
-        """Machine coordinates of program coordinates."""
+        """Return the machine coordinates of a point in program coordinates."""
         if (o := self._sum) is not None:
             return (
                 p[0] + o[0], p[1] + o[1], p[2] + o[2], p[3] + o[3], p[4] + o[4],
@@ -116,7 +116,7 @@ class ProgramFrame:
         return _nine(a + b for a, b in zip(turned, self._fixed, strict=True))
 
     def machines(self, places: Places) -> Places:
-        """Machine coordinates of program coordinates, a row each."""
+        """Return the machine coordinates of points in program coordinates, one per row."""
         turned = places + self.shift
         if self.rotation:
             x, y = turned[:, 0].copy(), turned[:, 1].copy()
@@ -125,7 +125,7 @@ class ProgramFrame:
         return turned
 
     def program(self, p: Place) -> Place:
-        """Program coordinates of machine coordinates."""
+        """Return the program coordinates of a point in machine coordinates."""
         x, y, *more = (a - b for a, b in zip(p, self._fixed, strict=True))
         turned = (x * self._cos + y * self._sin, y * self._cos - x * self._sin, *more)
         return _nine(a - b for a, b in zip(turned, self.shift, strict=True))
@@ -173,7 +173,7 @@ def read(
     left: dict[int, float] | None = None,
     opened: set[Path] | None = None,
 ) -> Generator[Canonical]:
-    """Run a program through LinuxCNC's interpreter and yield its canonical calls as they come.
+    """Run a program through LinuxCNC's interpreter and yield its canonical calls one by one.
 
     Parameters
     ----------
@@ -181,32 +181,32 @@ def read(
     stored : Stored, optional
         Values stored in the controller. Default: none.
     inch : bool
-        The controller stands in G20 when the program starts.
+        G20 is in force when the program starts.
     block_delete : bool
         Lines that begin with ``/`` are not run.
     subroutines : sequence of Path
-        Folders of subprograms, at most 8; the program's own folder comes first anyway.
+        Folders of subprograms, at most 8; the folder of the program is always searched first.
     task : bool
         Value of ``#<_task>``: the program is run, not previewed.
     seconds : int
-        Processor time the interpreter may take [s]: a program can have an endless loop.
+        Maximum processor time of the interpreter [s], in case of an endless loop.
     left : dict, optional
-        Filled at the end with the parameters the controller would have stored afterwards.
+        Filled at the end with the parameters that the controller would store after the program.
     opened : set, optional
-        Filled at the end with the files the interpreter has opened: the program, and those of subprograms.
+        Filled at the end with the files opened by the interpreter: the program and its subprograms.
 
     Yields
     ------
     Canonical
-        Calls before the first line (offsets in force at the start) have line 0. Close the generator if not all is
-        read: it ends the interpreter.
+        Calls before the first line (offsets in force at the start) have line 0. Close the generator if it is not read
+        to its end: this terminates the interpreter.
 
     Raises
     ------
     ProgramError
-        The interpreter refuses the program: its line and its words.
+        The interpreter refuses the program: line and message of the interpreter.
     InputError
-        The file is not there, or the interpreter crashed.
+        The file does not exist, or the interpreter crashed.
     """
     job = InterpreterJob(
         path=path,

@@ -1,8 +1,8 @@
-"""LinuxCNC's own interpreter in a child process: what a program makes of a controller, in blocks of numbers.
+"""LinuxCNC's interpreter in a child process: canonical calls of a program, in blocks of numbers.
 
-The child runs isolated (``-I``) in a folder of its own and reads a copy of the program there: nothing that lies beside
-the program is imported or run, only subprograms (``.ngc``) are found. The copy is ASCII: the interpreter's module
-cannot tell of comments that are not.
+The child runs isolated (``-I``) in a separate folder and reads a copy of the program there: no other file next to the
+program is imported or run, only subprograms (``.ngc``) are found. The copy is ASCII: the interpreter's module cannot
+report other comments.
 """
 
 import json
@@ -21,21 +21,21 @@ from thermocomp.core.exceptions import InputError, ProgramError
 from thermocomp.files.scratch import scratch
 from thermocomp.nc.linuxcnc.stored import HIGHEST_TOOL, Stored
 
-#: The Python of the Debian package, which has the module `gcode`.
+#: Python of the Debian system, for which the module `gcode` is installed.
 PYTHON = Path("/usr/bin/python3")
-#: it sees nothing of the user's: no environment, no folder but the system's
+#: isolated from the user's environment and folders
 ISOLATED = "-I"
 CHILD = Path(__file__).with_name("_rs274_child.py")
 AXES = "XYZABCUVW"
 MOST_FOLDERS = 8
 MM = 25.4
-#: a canonical call: code of its kind, how many numbers, line, numbers
+#: a canonical call: code of its kind, count of numbers, line, numbers
 RECORD = np.dtype([("kind", "<u2"), ("count", "<u2"), ("line", "<i4"), ("values", "<f8", (10,))])
-#: factors of the axes of a move
+#: unit conversion factors of the axes of a move
 _UNITS = np.array((MM, MM, MM, 1.0, 1.0, 1.0, MM, MM, MM, 1.0))
 _ASCII = bytes(range(128)) + b"?" * 128
 _PIPE = 1 << 20
-#: the interpreter's words for a subprogram that it does not find
+#: message of the interpreter about a subprogram that is not found
 _NOT_THERE = re.compile(r"(?:EOF in file|Unable to open file).*?(o<[^>]*>)(?: from line: \d+)?.*")
 _TOO_DEEP = "Too many subroutine levels"
 _RECURSION = "more than 10 nested calls: a subprogram that calls itself does not end; write a loop instead"
@@ -43,34 +43,34 @@ _MISSING = r"\1 was not found: for a subprogram, name its folder (--subroutines)
 
 
 class CallBlock(NamedTuple):
-    """Canonical calls that come together."""
+    """Canonical calls of one output block."""
 
-    records: np.ndarray[tuple[int], np.dtype[Any]]  #: of `RECORD`; moves in program coordinates [mm, deg]
-    more: list[Any]  #: texts and curves; the first number of their record is their place here
+    records: np.ndarray[tuple[int], np.dtype[Any]]  #: layout `RECORD`; moves in program coordinates [mm, deg]
+    more: list[Any]  #: texts and curves; the first number of their record is the index in this list
 
 
 @dataclass(frozen=True)
 class InterpreterJob:
-    """A program, and the controller it is run in.
+    """Program, and the controller in which it runs.
 
     Parameters
     ----------
     path : Path
     stored : Stored
     inch : bool
-        The controller stands in G20 when the program starts.
+        G20 is in force when the program starts.
     block_delete : bool
         Lines that begin with ``/`` are not run.
     subroutines : sequence of Path
-        Folders of subprograms, at most 8; the program's own folder comes first anyway.
+        Folders of subprograms, at most 8; the folder of the program is always searched first.
     task : bool
         Value of ``#<_task>``: the program is run, not previewed.
     seconds : int
-        Processor time the interpreter may take [s].
+        Maximum processor time of the interpreter [s].
     """
 
     path: Path
-    stored: Stored = Stored()  # noqa: RUF009 - it cannot be changed
+    stored: Stored = Stored()  # noqa: RUF009 - immutable
     inch: bool = False
     block_delete: bool = False
     subroutines: Sequence[Path] = ()
@@ -79,17 +79,17 @@ class InterpreterJob:
 
 
 class InterpreterRun:
-    """Runs of the interpreter, one after the other; it starts with the object, and ends with the block.
+    """Consecutive runs of the interpreter, which starts with the object and ends with the `with` block.
 
     Parameters
     ----------
     *jobs : InterpreterJob
-        All of the same program.
+        Jobs, all of the same program.
 
     Attributes
     ----------
     codes : dict of str to int
-        Codes of the kinds of calls.
+        Numeric codes of the kinds of calls.
     """
 
     def __init__(self, *jobs: InterpreterJob) -> None:
@@ -127,7 +127,7 @@ class InterpreterRun:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.process.kill()  # does nothing if it has ended
+        self.process.kill()  # no effect on an ended process
         self.process.communicate()
         self._home.close()
 
@@ -137,7 +137,7 @@ class InterpreterRun:
         Raises
         ------
         ProgramError
-            The interpreter refuses the program: its line and its words.
+            The interpreter refuses the program: line and message of the interpreter.
         InputError
             The interpreter crashed.
         """
@@ -176,7 +176,7 @@ class InterpreterRun:
         self._ended(line, self.process.wait())
 
     def _ended(self, line: int, code: int) -> NoReturn:
-        """Raise the error of a child that ended too early."""
+        """Raise the error for a child process that ended too early."""
         words = (self.folder / "errors").read_text(encoding="utf-8", errors="replace").strip().splitlines()
         if code == -24:
             seconds = self.jobs[self._number].seconds
@@ -189,13 +189,13 @@ class InterpreterRun:
         raise InputError(f"LinuxCNC's interpreter ended with code {code}: {said}")
 
     def opened(self) -> set[Path]:
-        """Return the files the last job has opened: the program, and those of subprograms."""
+        """Return the files opened by the last job: the program and its subprograms."""
         names = map(os.fsdecode, (self.folder / str(self._number) / "opened").read_bytes().split(b"\0"))
         folder = self.folder.resolve()
         return {self.path.resolve(), *(file for file in map(Path, names) if not file.is_relative_to(folder))}
 
     def left(self) -> dict[int, float]:
-        """Return the parameters the controller would have stored after the last job."""
+        """Return the parameters that the controller would store after the last job."""
         text = (self.folder / str(self._number) / "parameters").read_text(encoding="ascii")
         rows = (row.split() for row in text.splitlines())
         return {int(row[0]): float(row[1]) for row in rows if len(row) == 2}
@@ -209,7 +209,7 @@ def _all(pipe: IO[bytes], size: int) -> bytes:
 
 
 def _lay_out(folder: Path, program: Path, folders: Sequence[Path], job: InterpreterJob, lines: int) -> None:
-    """Write the files of a run; links keep the lines of the settings short, which are cut at 255 characters."""
+    """Write the files of a run; links keep lines of the settings within the limit of 255 characters."""
     stored = job.stored
     folder.mkdir()
     names = [f"s{i}" for i in range(len(folders))]
@@ -237,7 +237,7 @@ def _lay_out(folder: Path, program: Path, folders: Sequence[Path], job: Interpre
         "tools": tools,
         "spindle": stored.spindle,
         "units": f"G21 G90 G17 G40 G49 G80 G94 {stored.startup}{start}",
-        # the child waits for this comment and the tool length after it: then the program begins
+        # the child waits for this comment and the following tool length: then the program begins
         "start": f"(begin) G2{int(not job.inch)} G43.1 Z{stored.active_length / (25.4 if job.inch else 1.0):.9f}",
         "block_delete": job.block_delete,
         "task": int(job.task),

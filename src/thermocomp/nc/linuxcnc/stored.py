@@ -1,4 +1,4 @@
-"""State stored in a controller and not in the program; and controllers that have nothing in common."""
+"""State stored in a controller and not in the program; random controllers without common data."""
 
 import random
 from collections.abc import Mapping, Sequence
@@ -31,11 +31,11 @@ class Stored:
     home28, home30 : sequence of float
         Positions approached by G28 and G30, X to W [mm, deg].
     startup : str
-        Codes in force at the start that no program's end puts back, such as ``G64 P0.01 G98`` (mm).
+        Codes in force at the start that the end of a program does not reset, such as ``G64 P0.01 G98`` (mm).
     start : sequence of float or None
         Machine coordinates at the start, X to W [mm, deg]; None: the origin of the first work coordinate system.
     parameters : dict of int to float
-        Others, such as ``#100``.
+        Other parameters, such as ``#100``.
     system : int
         Work coordinate system in force at the start: 1, G54, after the end of a program; any after an MDI command.
     """
@@ -55,7 +55,7 @@ class Stored:
     system: int = 1
 
     def numbers(self) -> dict[int, float]:
-        """Return all parameters as the controller keeps them."""
+        """Return all parameters as stored in the controller."""
         result = dict(self.parameters)
         result |= {5161 + i: value for i, value in enumerate(self.home28)}
         result |= {5181 + i: value for i, value in enumerate(self.home30)}
@@ -70,14 +70,14 @@ class Stored:
 
 @lru_cache(64)
 def draw_controller(seed: int, startup: str = "") -> Stored:
-    """Return a controller that has nothing else in common with that of another seed.
+    """Return a random controller; different seeds share only the codes in `startup`.
 
     Parameters
     ----------
     seed : int
-        Its parity tells of G98 (even) or G99, where `startup` does not.
+        Random seed; selects G98 (even) or G99 (odd) unless `startup` specifies it.
     startup : str
-        Codes in force at the start that are stated.
+        Specified codes in force at the start.
 
     Returns
     -------

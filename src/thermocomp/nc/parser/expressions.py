@@ -1,10 +1,11 @@
-"""Evaluate the values of NC words and parameters as LinuxCNC or Fanuc's custom macro B do.
+"""Evaluation of the values of NC words and parameters by the rules of LinuxCNC or Fanuc custom macro B.
 
-Only what is certain has a value: parameters that the program has set itself, and those the caller knows. All others,
-such as probe results, offsets and positions, are unknown, and a value that needs one is refused.
+Only known values are used: parameters set by the program itself or known to the caller. All others, such as probe
+results, offsets and positions, are unknown, and an expression that needs one is refused.
 
-LinuxCNC, from loosest to tightest, each from left to right: AND OR XOR; EQ NE GT GE LT LE; ``+ -``; ``* / MOD``;
-``**``; a sign belongs to the value behind it, so ``-2 ** 2`` is 4. Fanuc: comparisons; ``+ - OR XOR``; ``* / MOD AND``.
+Operators of LinuxCNC, by increasing precedence, left-associative: AND OR XOR; EQ NE GT GE LT LE; ``+ -``;
+``* / MOD``; ``**``; a sign belongs to the following value, so ``-2 ** 2`` is 4. Fanuc: comparisons; ``+ - OR XOR``;
+``* / MOD AND``.
 """
 
 import math
@@ -18,7 +19,7 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.nc.parser.line import Assignment
 from thermocomp.nc.parser.systemparameters import explain_unset, machine_meaning
 
-#: brackets inside brackets inside ...; a control's own limit is about 5 (Fanuc)
+#: maximum nesting depth of brackets; that of a control is about 5 (Fanuc)
 DEEPEST = 60
 
 _BLANKS = re.compile("[ \t]+")
@@ -27,10 +28,10 @@ _NAME = re.compile(r"<([^<>]*)>")
 _FUNCTION = re.compile(r"[a-z]+(?=\[)")
 _OPERATOR = re.compile(r"\*\*|[-+*/]|mod|and|xor|or|eq|ne|gt|ge|lt|le")
 
-#: numbers of a Fanuc nearer than this part of theirs may be the same to it
+#: relative difference below which a Fanuc may regard two numbers as equal
 _ROUNDED = 1e-8
 
-# most expressions of a loop: one value, or two and what is done to them
+# most expressions in loops: one value, or two values and an operator
 _OPERAND = r"(?:#([1-9][0-9]*)|([0-9]+\.?[0-9]*|\.[0-9]+))"
 _SIMPLE = re.compile(rf"(\[?){_OPERAND}(?:({_OPERATOR.pattern}){_OPERAND})?(\]?)")
 _ALONE = re.compile(r"#([1-9][0-9]*)")
@@ -53,7 +54,7 @@ def _round(a: float) -> float:
 
 
 def _angle(a: float) -> float:
-    if abs(a) > 1e9:  # its digits behind the point are lost
+    if abs(a) > 1e9:  # fractional digits are lost
         raise ValueError(f"an angle of {a:g} degrees is out of range")
     return math.radians(a)
 
@@ -65,7 +66,7 @@ def _tangent(a: float) -> float:
 
 
 def _sure(what: Binary) -> Binary:
-    """Return a comparison that refuses what two controls may see in two ways, as their numbers are rounded."""
+    """Wrap a comparison to refuse numbers that differ by rounding only: controls may disagree on the result."""
 
     def compared(a: float, b: float) -> float:
         if a != b and abs(a - b) <= _ROUNDED * max(abs(a), abs(b)):
@@ -100,7 +101,7 @@ def _bits(what: Callable[[int, int], int]) -> Binary:
     return on_integers
 
 
-# name: (how tightly it binds, what it does)
+# by name: precedence and function
 _LINUXCNC: dict[str, tuple[int, Binary]] = {
     "and": (1, lambda a, b: float(a != 0 and b != 0)),
     "or": (1, lambda a, b: float(a != 0 or b != 0)),
@@ -145,7 +146,7 @@ _FUNCTIONS: dict[str, Callable[[float], float]] = {
     "sqrt": math.sqrt,
     "tan": _tangent,
 }
-# where Fanuc differs: FIX cuts off, FUP goes away from zero
+# differences of Fanuc: FIX truncates, FUP rounds away from zero
 _FANUC_FUNCTIONS: dict[str, Callable[[float], float]] = {
     "fix": _sure_whole(math.trunc),
     "fup": _sure_whole(lambda a: math.copysign(math.ceil(abs(a)), a)),
@@ -158,7 +159,7 @@ _REFUSED_BY_FANUC = {
 
 
 class Parameters:
-    """Known values of parameters, local and global ones in one table.
+    """Known values of parameters; local and global parameters share one table.
 
     Parameters
     ----------
@@ -179,19 +180,19 @@ class Parameters:
         return _key(key) in self._values
 
     def __getitem__(self, key: Key) -> float:
-        """Return the value; InputError contains the reason if it is unknown."""
+        """Return the value of a parameter; the InputError for an unknown one contains the reason."""
         key = _key(key)
         if key in self._values:
             return self._values[key]
         raise InputError(f"{_written(key)} is unknown: {self._lost.get(key) or explain_unset(key, self.controller)}")
 
     def assign(self, assignments: Iterable[Assignment]) -> None:
-        """Carry out the assignments of one line; all values are those before the line, as in LinuxCNC.
+        """Run the assignments of one line; all use the values before the line, as in LinuxCNC.
 
         Raises
         ------
         InputError
-            A value cannot be evaluated, or a parameter of the machine itself is set. Then no parameter is changed.
+            A value cannot be evaluated, or the target is a parameter of the machine; no parameter is changed.
         """
         known: dict[Key, float] = {}
         for target, value, _, _ in assignments:
@@ -202,13 +203,13 @@ class Parameters:
         self._values.update(known)
 
     def forget(self, target: str, reason: str) -> None:
-        """Make a parameter unknown, such as one that an optional line sets: ``#5``, ``#<depth>``, ``#[#1 + 2]``."""
+        """Make a parameter unknown, for example after an optional line: ``#5``, ``#<depth>``, ``#[#1 + 2]``."""
         key = self.key(target)
         self._values.pop(key, None)
         self._lost[key] = reason
 
     def key(self, target: str) -> Key:
-        """Return number or name of the parameter that is written ``#5``, ``##2``, ``#<depth>`` or ``#[#1 + 2]``."""
+        """Return number or name of a parameter written as ``#5``, ``##2``, ``#<depth>`` or ``#[#1 + 2]``."""
         if simple := _ALONE.fullmatch(target):
             return int(simple[1])
         reader = _Reader(target, self)
@@ -228,12 +229,12 @@ def evaluate(text: str, parameters: Parameters, *, word: bool = True) -> float:
         As written, such as ``[#1 + 2]``, ``-#<depth>``, ``sin[30]``, ``12.5``; for Fanuc also ``#1 + 2``.
     parameters : Parameters
     word : bool
-        It is the value of a word: there a Fanuc's ROUND gives no whole number.
+        The text is the value of a word, in which a Fanuc's ROUND does not round to a whole number.
 
     Raises
     ------
     InputError
-        The expression is wrong, has no value (1 / 0), or needs a parameter that is unknown.
+        The expression is invalid, has no value (1 / 0), or needs an unknown parameter.
     """
     simple = _read_simple(text, parameters.controller)
     try:
@@ -257,7 +258,7 @@ def evaluate(text: str, parameters: Parameters, *, word: bool = True) -> float:
 def _read_simple(
     text: str, controller: Literal["linuxcnc", "fanuc"]
 ) -> tuple[float | int, Binary | None, float | int] | None:
-    """Return operator and operands of a simple expression: numbers, or numbers (int) of parameters; else None."""
+    """Return operands and operator of a simple expression, with parameter numbers as int; None for any other one."""
     found = _SIMPLE.fullmatch(_BLANKS.sub("", text).lower())
     if found is None or bool(found[1]) != bool(found[7]) or not (found[1] or controller == "fanuc" or not found[4]):
         return None
@@ -268,7 +269,7 @@ def _read_simple(
 
 
 class _Reader:
-    """Reads a squeezed, lower case text from left to right."""
+    """Parser of a text in lower case without blanks, from left to right."""
 
     def __init__(self, text: str, parameters: Parameters, *, word: bool = True) -> None:
         self.word = word
@@ -298,7 +299,7 @@ class _Reader:
             raise self.error("the end of the value")
 
     def expression(self) -> float:
-        """Read values and operators: of two adjacent operators the one of higher precedence goes first."""
+        """Read values and operators: of two adjacent operators, the one of higher precedence is applied first."""
         values = [self.value()]
         waiting: list[tuple[int, Binary]] = []
         while True:

@@ -1,54 +1,54 @@
-"""A line of an NC program, taken apart without losing a byte (ISO 6983 words)."""
+"""Parsed line of an NC program that preserves every byte of the text (ISO 6983 words)."""
 
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 
 class Word(NamedTuple):
-    """A letter and its value, such as ``X12.5``, ``Z - 1 . 5`` or ``Y[#3+2]``."""
+    """Letter and its value, such as ``X12.5``, ``Z - 1 . 5`` or ``Y[#3+2]``."""
 
     letter: str  #: upper case
-    start: int  #: column of the letter in the line's text, from 0
-    end: int  #: one past the last character of the value
-    value: str  #: the value as it is written, spaces included
-    number: float | None  #: the value of a plain number; None: it has to be evaluated
+    start: int  #: column of the letter in the text of the line (0-based)
+    end: int  #: column after the last character of the value
+    value: str  #: value as written, spaces included
+    number: float | None  #: value of a plain number; None if it must be evaluated
 
 
 class Assignment(NamedTuple):
-    """A parameter that is set, such as ``#5 = [#4 + 1]``."""
+    """Assignment to a parameter, such as ``#5 = [#4 + 1]``."""
 
     target: str  #: as written, without spaces: ``#5``, ``#<depth>``, ``#[#1+2]``
-    value: str  #: the value as it is written
+    value: str  #: value as written
     start: int  #: column of the ``#``
-    end: int  #: one past the last character of the value
+    end: int  #: column after the last character of the value
 
 
 @dataclass(slots=True)
 class Line:
-    """One line.
+    """One line of a program.
 
     Parameters
     ----------
     number : int
-        From 1.
+        Line number (1-based).
     text : str
-        The whole line with its ending: joined, the texts of all lines are the file.
+        The whole line with its ending: the joined texts of all lines are the file.
     words : list of Word
-        In the order they stand; without the line number ``N``.
+        Words in the order of the line, without the line number ``N``.
     assignments : list of Assignment
     optional : bool
-        It begins with ``/``: block delete may skip it.
+        The line begins with ``/``: block delete may skip it.
     flow : str
-        What steers the flow of the program, as written: an O-word with what follows, ``IF``, ``WHILE``, ``GOTO``,
-        ``DO``, ``END``; empty if nothing does. Such a line has no words.
+        Flow control, as written: an O-word with its operands, ``IF``, ``WHILE``, ``GOTO``, ``DO``, ``END``; empty if
+        there is none. Such a line has no words.
     demarcation : bool
-        A line that is nothing but ``%``.
+        The line consists of ``%`` only.
     comment : str
-        All comments on the line, without their marks, one after the other.
+        All comments on the line, without their delimiters, concatenated.
     label : str
-        Line number, such as ``120``; empty without one.
+        Line number word, such as ``120``; empty without one.
     error : str
-        Part that cannot be understood, and its position; empty if all of it can be.
+        Part that cannot be parsed, and its position; empty if there is none.
     """
 
     number: int

@@ -12,12 +12,12 @@ _GIVE = "give the NC program itself"
 
 class _Kind(NamedTuple):
     name: str
-    code: str  #: in the program, comments taken out but for their brackets, names of LinuxCNC but for theirs (<>)
-    raw: str = r"\Z."  #: at the beginning of a line as it stands; the default is never found
+    code: str  #: searched in the program text, with comments reduced to their brackets, and names of LinuxCNC to <>
+    raw: str = r"\Z."  #: matched at the beginning of unmodified lines; the default never matches
     advice: str = _POST
 
 
-# What no ISO program has. The order counts: Gerber lines end with a star as Heidenhain's ISO lines do.
+# Patterns that no ISO program contains. The order matters: Gerber lines end with a star, as do Heidenhain ISO lines.
 _KINDS = (
     _Kind(
         "Gerber (circuit boards)",
@@ -50,7 +50,7 @@ _KINDS = (
     ),
     _Kind(
         "for a control that reads G70 as inches and G71 as millimetres, such as a Siemens Sinumerik",
-        # elsewhere they are lathe cycles or rows of holes, which have words of their own
+        # in other dialects, G70 and G71 are lathe cycles or hole patterns, with additional words
         code=r"^(?!.*[DIJKLPQRUW]\s*[-+.0-9#\[]).*(?<![A-Z#\[<])G7[01](?![0-9.])",
         advice="if all else in it is plain ISO, write G20 for G70 and G21 for G71; if not, " + _POST,
     ),
@@ -71,10 +71,10 @@ _KINDS = (
 _PATTERNS = [(kind, re.compile(kind.code, re.I), re.compile(kind.raw, re.I)) for kind in _KINDS]
 
 _UTF_16 = "UTF-16 text, which controls cannot read; save it as plain text (ASCII)"
-#: share of NUL bytes at every second place, from which a text without a byte order mark is UTF-16
+#: minimum fraction of NUL bytes in every second position of UTF-16 text without a byte order mark
 _MOSTLY = 0.9
 
-# the first bytes of files that are no text
+# first bytes of non-text files
 _MAGIC = (
     ("%PDF-", "a PDF document"),
     ("PK\x03\x04", "a ZIP archive"),
@@ -98,12 +98,12 @@ def recognise(first_lines: Sequence[str]) -> str:
     Parameters
     ----------
     first_lines : sequence of str
-        The first some hundred lines, read as latin-1.
+        First several hundred lines, read as latin-1.
 
     Raises
     ------
     InputError
-        The file is empty or binary, or in the language of another control: by which line, and what can be done.
+        The file is empty or binary, or in the language of another control; the message gives the line and a remedy.
     """
     if not any(line.strip() for line in first_lines):
         raise InputError("the file is empty: give an NC program")

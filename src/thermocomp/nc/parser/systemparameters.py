@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-# first and last number, what it is
+# first and last number, meaning
 _LINUXCNC = (
     (5061, 5070, "result of a probe move (G38)"),
     (5161, 5169, "home position of G28"),
@@ -93,7 +93,7 @@ def machine_meaning(key: int | str, controller: Literal["linuxcnc", "fanuc"] = "
 
 
 def explain_unset(key: int | str, controller: Literal["linuxcnc", "fanuc"] = "linuxcnc") -> str:
-    """Return why a parameter that is not set is unknown, such as 'present position, which only the machine knows'."""
+    """Return the reason why an unset parameter is unknown, such as 'present position, which only the machine knows'."""
     if meaning := machine_meaning(key, controller):
         return f"{meaning}, which only the machine knows"
     return "the program has not set it before"

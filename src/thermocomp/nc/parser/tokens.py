@@ -1,8 +1,8 @@
-"""Tokeniser of ISO 6983 programs, without loss of text (syntax of LinuxCNC and of Fanuc).
+"""Tokeniser of ISO 6983 programs that preserves the text (syntax of LinuxCNC and Fanuc).
 
 Both controls ignore blanks, tabs and case outside comments: ``g 0 x - 1 . 5`` is ``G0X-1.5``. Ordinary lines (words,
-comments, line number, block delete) are read by one regular expression as they stand; all other lines are squeezed
-first, that is freed of blanks and comments, read in that form, and their columns are looked up afterwards.
+comments, line number, block delete) are parsed unchanged by one regular expression; all other lines are first squeezed,
+that is, stripped of blanks and comments, then parsed, and their columns are mapped back to the text.
 """
 
 import io
@@ -16,15 +16,15 @@ from thermocomp.nc.parser.line import Assignment, Line, Word
 
 Controller = Literal["linuxcnc", "fanuc"]
 
-#: no line of a program is longer [characters]; without a bound a file of rubbish would be read into memory whole
+#: maximum length of a line [characters]; without a limit, a file of garbage would be read into memory completely
 LONGEST = 1_000_000
 
 _BLANK = " \t\n\r\f\v"
 _UPPER = str.maketrans("abcdefghijklmnopqrstuvwxyz", "ABCDEFGHIJKLMNOPQRSTUVWXYZ")
 _BYTE_ORDER_MARKS = ("\ufeff", "ï»¿")
 
-# The fast way. What it does not match is left to the slow way, so it may be strict: numbers without blanks inside,
-# no brackets inside brackets, no assignments. [0-9] because \d takes digits of all scripts.
+# Fast parser. Other lines are left to the slow parser, so it may be strict: numbers without blanks inside, no nested
+# brackets, no assignments. [0-9] because \d matches digits of all scripts.
 _NO_MORE_DIGITS = r"(?![ \t]*[0-9.])"
 _HEAD = re.compile(r"[ \t]*(/?)[ \t]*(?:[Nn][ \t]*([0-9]++)" + _NO_MORE_DIGITS + ")?").match
 _NUMBER, _VALUE, _COMMENT, _REST, _END = 2, 3, 4, 5, 6  # groups of an item
@@ -46,15 +46,15 @@ _ITEM = {
     "fanuc": _item("A-MP-Za-mp-z", r"[ \t]*(?=[\r\n]|\Z)").match,
 }
 
-# The fastest way, for most lines of a long program: nothing but a few words with plain numbers.
+# Fastest parser, for most lines of a long program: only a few words with plain numbers.
 _FEW = 6
 _PLAIN_WORD = r"[ \t]*([A-MP-Z])([-+]?(?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++))"
 _WORDS = re.compile(_PLAIN_WORD + f"(?:{_PLAIN_WORD}" * (_FEW - 1) + ")?" * (_FEW - 1) + r"[ \t]*(?:\r?\n)?\Z").match
 
-_ORDINARY = 300  # characters: no number of an ordinary line can be infinite
-_new_word = tuple.__new__  # half the time of Word(...)
+_ORDINARY = 300  # maximum length [characters], so that no number can be infinite
+_new_word = tuple.__new__  # takes half the time of Word(...)
 
-# The slow way, on squeezed lines.
+# Slow parser, on squeezed lines.
 _PIECE = re.compile(r"\(([^()]*)(\)?)|;(.*)|[^ \t(;]+")
 _PLAIN = re.compile(r"[0-9]+\.?[0-9]*|\.[0-9]+")
 _LABEL = {"linuxcnc": re.compile(r"N([0-9]+(?:\.[0-9]+)?)"), "fanuc": re.compile(r"N([0-9]+)")}
@@ -68,7 +68,7 @@ _FANUC_OUTPUT = re.compile(r"DPRNT|BPRNT|POPEN|PCLOS|SETVN")
 
 
 class _NotUnderstoodError(Exception):
-    """Something at a place of the squeezed line."""
+    """Syntax error at a position of the squeezed line."""
 
     def __init__(self, place: int, what: str) -> None:
         super().__init__(what)
@@ -77,13 +77,13 @@ class _NotUnderstoodError(Exception):
 
 
 def program_lines(stream: TextIO) -> Iterator[str]:
-    r"""Give the lines of a program one after the other, with their endings: joined, they are the file.
+    r"""Yield the lines of a program, with their endings: the joined lines are the file.
 
     Parameters
     ----------
     stream : text stream
         Opened with ``newline=""`` and ``encoding="latin-1"``: then lines end at ``\n``, ``\r\n`` and a lone ``\r``, and
-        any bytes come through.
+        all bytes are preserved.
 
     Raises
     ------
@@ -100,33 +100,33 @@ def program_lines(stream: TextIO) -> Iterator[str]:
 
 
 def split_lines(text: str) -> Iterator[str]:
-    r"""Give the lines of a text one after the other, as `program_lines` does those of a file."""
+    r"""Yield the lines of a text, as `program_lines` does for a file."""
     return program_lines(io.StringIO(text, newline=""))
 
 
 def read_lines(texts: Iterable[str], controller: Controller = "linuxcnc") -> Iterator[Line]:
-    """Read line after line, numbered from 1, see `read_line`."""
+    """Yield the parsed lines, numbered from 1; see `read_line`."""
     for number, text in enumerate(texts, 1):
         yield read_line(text, number, controller)
 
 
 def read_line(text: str, number: int, controller: Controller = "linuxcnc") -> Line:
-    """Tokenise a line. Never raises: errors are given in ``Line.error``, with the column.
+    """Tokenise a line. Never raises: errors are reported in ``Line.error``, with the column.
 
     Parameters
     ----------
     text : str
         The line with its ending.
     number : int
-        Number of the line, from 1.
+        Line number (1-based).
     controller : {'linuxcnc', 'fanuc'}
-        Whose habits the program has. LinuxCNC: O-words, several assignments on a line, ``;`` begins a comment.
+        Control whose syntax the program uses. LinuxCNC: O-words, several assignments on a line, comments after ``;``.
         Fanuc: program numbers, ``IF [..] GOTO``, ``/2``, assignments without brackets, ``;`` ends the line.
 
     Returns
     -------
     Line
-        If it has an error, its words are those before the place that is not understood.
+        If it has an error, its words are those before the error.
     """
     found = _WORDS(text)
     if found is not None and len(text) < _ORDINARY and (few := _few_words(found)) is not None:
@@ -143,7 +143,7 @@ def read_line(text: str, number: int, controller: Controller = "linuxcnc") -> Li
         )
     item = _ITEM[controller]
     found = _HEAD(text)
-    if found is None or len(text) >= _ORDINARY:  # every part of the head may be missing, so it is always found
+    if found is None or len(text) >= _ORDINARY:  # every part of the head is optional, so it always matches
         return _read_slowly(text, number, controller)
     slash, label = found.groups()
     place = found.end()
@@ -200,7 +200,7 @@ def _runs_python(comment: str) -> bool:
 
 
 def _read_slowly(text: str, number: int, controller: Controller) -> Line:
-    """Read any line; `read_line` gives the same for the lines that it reads itself."""
+    """Parse any line, with the same result as `read_line` for ordinary lines."""
     line = Line(number, text)
     body = text.rstrip(_BLANK)
     columns: Sequence[int] = range(len(body))
@@ -215,7 +215,7 @@ def _read_slowly(text: str, number: int, controller: Controller) -> Line:
 
 
 def _refuse_bytes(text: str, body: str) -> None:
-    """Refuse what controls disagree about: where the line ends, and what the bytes are."""
+    """Refuse bytes that controls interpret differently: line endings, NUL bytes, byte order marks."""
     for mark in _BYTE_ORDER_MARKS:
         if text.startswith(mark):
             raise _NotUnderstoodError(0, "a byte order mark, which controls cannot read; save the program without it")
@@ -259,7 +259,7 @@ def _squeeze(body: str, controller: Controller, line: Line) -> tuple[str, list[i
 
 
 def _read_squeezed(text: str, columns: Sequence[int], controller: Controller, line: Line) -> None:
-    """Fill the line in."""
+    """Fill in the fields of a line from its squeezed text."""
     if line.text.strip(_BLANK) == "%":
         line.demarcation = True
         return
@@ -295,7 +295,7 @@ def _read_squeezed(text: str, columns: Sequence[int], controller: Controller, li
 
 
 def _check_control(text: str, place: int) -> None:
-    """Check what follows the name of an O-word."""
+    """Check the text after the name of an O-word."""
     found = _CONTROL.match(text, place)
     if found is None:
         raise _NotUnderstoodError(place, "an O-word needs sub, call, if, while, repeat ... after its number or name")
@@ -314,7 +314,7 @@ def _check_control(text: str, place: int) -> None:
 
 
 def _read_words(text: str, place: int, columns: Sequence[int], controller: Controller, line: Line) -> None:
-    """Read words and assignments up to the end of the line."""
+    """Parse words and assignments up to the end of the line."""
     letters = "ABCDEFGHIJKLMPQRSTUVWXYZ@^$" if controller == "linuxcnc" else "ABCDEFGHIJKLMPQRSTUVWXYZ"
     first: dict[str, int] = {}  # column of the first word of each letter
     while place < len(text):
@@ -346,7 +346,7 @@ def _read_words(text: str, place: int, columns: Sequence[int], controller: Contr
 
 
 def _complaint(text: str, place: int) -> str:
-    """Return the fault of a character that starts no token."""
+    """Return the error message for a character that starts no token."""
     letter = text[place]
     if letter == "," and text[place + 1 : place + 2] in {"R", "C", "A"}:
         return f"',{text[place + 1]}' (corner rounding, chamfer, angle) is not supported; replace it by its moves"
@@ -362,10 +362,10 @@ def _complaint(text: str, place: int) -> str:
 
 
 def _value(text: str, place: int, letter: str, controller: Controller) -> int:
-    """Return the end of the value."""
+    """Return the end of a value."""
     begin = place
     while text[place : place + 1] in {"+", "-"} and (controller == "linuxcnc" or place == begin):
-        place += 1  # LinuxCNC takes X--5 for X5
+        place += 1  # LinuxCNC reads X--5 as X5
     if found := _PLAIN.match(text, place):
         return found.end()
     head = text[place : place + 1]
@@ -383,7 +383,7 @@ def _value(text: str, place: int, letter: str, controller: Controller) -> int:
 
 
 def _parameter(text: str, place: int) -> int:
-    """Return the end of a parameter that starts here."""
+    """Return the end of a parameter that starts at this position."""
     while text.startswith("#", place):
         place += 1
     if found := _NAME.match(text, place) or re.compile("[0-9]+").match(text, place):
@@ -394,7 +394,7 @@ def _parameter(text: str, place: int) -> int:
 
 
 def _assigned(text: str, equals: int, controller: Controller) -> int:
-    """Return the end of the value of an assignment; Fanuc's is an expression without brackets, up to the end."""
+    """Return the end of the value of an assignment; in Fanuc, an unbracketed expression up to the end of the line."""
     if controller == "linuxcnc":
         return _value(text, equals + 1, "the parameter", controller)
     end = text.find("(", equals)
@@ -405,7 +405,7 @@ def _assigned(text: str, equals: int, controller: Controller) -> int:
 
 
 def _closed(text: str, place: int) -> int:
-    """Return one past the bracket that closes the one here."""
+    """Return the position after the bracket that closes the one at this position."""
     depth = 0
     for found in re.compile(r"[][(]").finditer(text, place):
         if found.group() == "(":

@@ -1,8 +1,8 @@
 """Cornering of a controller: the transition from one move to the next.
 
-The controller is LinuxCNC 2.9. Moves that meet at a small angle run through; else an arc is put into the corner, as
-wide as the tolerance and half of each move allow; where no arc fits, the next move begins while the last one brakes.
-Other controllers do alike under other names.
+The controller is LinuxCNC 2.9. Moves that meet at a small angle are joined without a stop; otherwise an arc is inserted
+in the corner, as large as the tolerance and half of each move allow; if no arc fits, the next move begins while the
+last one decelerates. Other controllers have similar functions under other names.
 """
 
 import math
@@ -10,21 +10,21 @@ import math
 from thermocomp.nc.planner.fillets import Bent, Straight
 from thermocomp.nc.planner.segment import ACROSS, ALONG, Segment, Vector
 
-#: share of an axis' acceleration that a kink between two moves may take
+#: fraction of the acceleration of an axis available for a kink between two moves
 KINK = 0.1
-#: moves that turn back sharper than that stop in between [rad]
+#: two moves that enclose a smaller angle (reversal) stop in between [rad]
 SHARP = math.radians(2.0)
-#: a rest of a move that would take less than so many cycles becomes part of the corner
+#: the rest of a move becomes part of the corner if it would take fewer cycles
 REST = 4
 
 
 class Corners:
-    """Transition between two moves.
+    """Corner transitions between two moves.
 
     Parameters
     ----------
     speeds, accelerations : tuple of float
-        Most of each axis [mm/s, mm/s2].
+        Limits of each axis [mm/s, mm/s2].
     cycle : float
         Interpolation cycle [s].
     """
@@ -33,19 +33,19 @@ class Corners:
         self.speeds, self.accelerations, self.cycle = speeds, accelerations, cycle
 
     def join(self, before: Segment, after: Segment, tolerance: float | None) -> Segment | None:
-        """Join two segments: settle the speed between them, and shorten them for an arc.
+        """Join two segments: set the speed between them, and shorten them for an arc.
 
         Parameters
         ----------
         before, after : Segment
-            Changed in place.
+            Segments, changed in place.
         tolerance : float or None
-            Largest deviation of the path from the corner [mm]; 0: as far as the moves allow; None: none.
+            Maximum deviation of the path from the corner [mm]; 0: limited by the moves only; None: no deviation.
 
         Returns
         -------
         Segment or None
-            The arc in the corner.
+            Arc in the corner.
         """
         if before.rapid != after.rapid:
             return None
@@ -67,13 +67,13 @@ class Corners:
             before.gives, after.gives = max(before.gives, kink), max(after.gives, kink)
             return None
         if tolerance is None:
-            # that is how it is: the corner is a stop, and the share of a kink is kept back all the same
+            # as in LinuxCNC: the moves stop in the corner, but the acceleration for a kink is nevertheless reserved
             before.gives = after.gives = KINK
             return None
         return self._around(before, after, tolerance, speed * KINK / kink)
 
     def _around(self, before: Segment, after: Segment, tolerance: float, kinked: float) -> Segment | None:
-        """Put an arc into a corner, or what is faster."""
+        """Insert an arc in a corner, or use a faster transition."""
         u, w = before.leave, after.entry
         dot = max(-1.0, min(1.0, u[0] * w[0] + u[1] * w[1] + u[2] * w[2]))
         turn = math.acos(dot)
@@ -99,7 +99,7 @@ class Corners:
             reach = min(room, math.cos(half) * within / (1.0 - math.sin(half)))
             widest = math.tan(half) * reach
             speed = min(math.sqrt(across * widest), goal)
-            # as wide as the speed needs, and as far as a blend of two brakings would begin
+            # as large as the speed requires, and as an overlap of both moves would extend
             blend = min(math.sqrt(a * reach), speed) / (0.5 * a) * speed
             radius = max(speed * speed / across, min(blend / (math.pi - 2.0 * half), widest))
             cut = corner.cut(radius, within)
@@ -122,7 +122,7 @@ class Corners:
         return arc
 
     def _in_plane(self, b: Vector) -> tuple[float, float]:
-        """Return the acceleration and speed that the axes allow in any direction across b."""
+        """Return the acceleration and speed that the axes allow in any direction perpendicular to b."""
         (ax, ay, az), (vx, vy, vz) = self.accelerations, self.speeds
         x, y, z = b
         x = 1.0 / math.sqrt(max(1.0 - x * x, 1e-12))
@@ -131,13 +131,13 @@ class Corners:
         return min(ax * x, ay * y, az * z), min(vx * x, vy * y, vz * z)
 
     def _overlap(self, before: Segment, after: Segment, tolerance: float, otherwise: float) -> bool:
-        """Let the second move begin while the first one brakes, if that is faster than a corner at a speed."""
+        """Let the second move begin while the first one decelerates, if this is faster than a given corner speed."""
         dot = 0.0
         if not before.rotary and not after.rotary:
             u, w = before.leave, after.entry
             dot = max(-1.0, min(1.0, u[0] * w[0] + u[1] * w[1] + u[2] * w[2]))
         overlap = (tolerance, math.sqrt((1.0 - dot) / 2.0))
-        # a later corner may take half of each
+        # the corner at the other end may take half of each
         first, second = find_overlap_speeds(overlap, before, before.kept(), after, after.kept(), 0.5)
         if math.sqrt((1.0 + dot) / 2.0) * (first + second) / 4.0 < otherwise:
             return False
@@ -149,7 +149,7 @@ class Corners:
 def find_overlap_speeds(
     overlap: tuple[float, float], before: Segment, a: float, after: Segment, b: float, share: float
 ) -> tuple[float, float]:
-    """Return below which speeds one move brakes while the next one speeds up [mm/s].
+    """Return the speeds below which one move decelerates while the next one accelerates [mm/s].
 
     Parameters
     ----------
@@ -157,12 +157,12 @@ def find_overlap_speeds(
         See `Segment`.
     before : Segment
     a : float
-        Its acceleration [mm/s2].
+        Acceleration of `before` [mm/s2].
     after : Segment
     b : float
-        Its acceleration [mm/s2].
+        Acceleration of `after` [mm/s2].
     share : float
-        Fraction of their lengths that is certainly available.
+        Fraction of the lengths that is certainly available.
     """
     tolerance, cos = overlap
     first = min(math.sqrt(a * before.length * share), before.speed)
@@ -178,7 +178,7 @@ def find_overlap_speeds(
 
 
 def _altitude(before: Segment, after: Segment, dot: float, turn: float) -> float:
-    """Return the speed at which the straight way between the two speeds passes by standstill, 0 beside an arc."""
+    """Return the minimum speed on the straight line between the two velocity vectors [mm/s], 0 next to an arc."""
     if before.radius or after.radius:
         return 0.0
     steep = math.cos(min(turn, 0.49 * math.pi))

@@ -1,4 +1,4 @@
-"""Arcs in corners: how wide they may be, and what they take from the moves on both sides."""
+"""Arcs in corners: maximum radius, and length removed from the adjacent moves."""
 
 import math
 
@@ -6,7 +6,7 @@ from thermocomp.nc.planner.segment import Segment, Vector
 
 
 class Straight:
-    """A corner of two lines."""
+    """Corner of two lines."""
 
     def __init__(self, before: Segment, after: Segment, turn: float) -> None:
         self.half = (math.pi - turn) / 2.0
@@ -14,21 +14,21 @@ class Straight:
         self.turn = turn
 
     def cut(self, radius: float, _: float) -> tuple[float, float, float]:
-        """Return the length that an arc of a radius takes from the first line, its own, and that from the second."""
+        """Return the length of the first line replaced by an arc, the arc length, and the same for the second line."""
         off = radius / math.tan(self.half)
         return off, radius * self.turn, off
 
 
 class Bent:
-    """A corner with arcs, in the plane of the two directions: the corner is at 0 0, the first move comes along x.
+    """Corner with arcs, in the plane of the two directions: corner at (0, 0), first move along x.
 
     Parameters
     ----------
     before, after : Segment
     b : tuple of float
-        Across the plane, such that the corner turns by the right hand.
+        Normal of the plane, oriented so that the corner turns in the right-hand sense.
     turn : float
-        By how much [rad].
+        Angle of the corner [rad].
     """
 
     def __init__(self, before: Segment, after: Segment, b: Vector, turn: float) -> None:
@@ -44,7 +44,7 @@ class Bent:
             about = segment.axis[0] * b[0] + segment.axis[1] * b[1] + segment.axis[2] * b[2]
             inside = about > 0.0
             most = min(segment.sweep * share, self.open if inside else math.pi / 2.0)
-            if inside:  # the arc bends away from its tangent: the corner is sharper
+            if inside:  # the arc bends away from its tangent, which makes the corner sharper
                 self.half = min(self.half, self.open - most / 4.0)
             self.most[k], self.inside[k] = most, inside
             flat = 1.0 - abs(about) < 1e-12
@@ -53,10 +53,10 @@ class Bent:
         self.room = 0.0 if narrow else min(rooms)
 
     def cut(self, radius: float, tolerance: float) -> tuple[float, float, float] | None:
-        """Return the length that an arc of a radius takes from the first move, its own, and that from the second."""
+        """Return the length of the first move replaced by an arc, the arc length, and the same for the second move."""
         cos, sin = math.cos(self.turn), math.sin(self.turn)
         r1, r2 = self.before.radius, self.after.radius
-        # centres of the arcs, and the way from them to the centre of the new one
+        # centres of the arcs, and distances from them to the centre of the new arc
         one = complex(0.0, r1 if self.inside[0] else -r1)
         two = complex(-sin, cos) * (r2 if self.inside[1] else -r2)
         d1, d2 = abs(r1 - radius * (1 if self.inside[0] else -1)), abs(r2 - radius * (1 if self.inside[1] else -1))
@@ -95,14 +95,14 @@ def _angle(v: complex, w: complex) -> float:
 
 
 def _on_line(point: complex, along: complex, centre: complex, distance: float) -> list[complex]:
-    """Return the places on a line that are a distance away from a centre."""
+    """Return the points on a line at a distance from a centre."""
     foot = ((centre - point) * along.conjugate()).real
     off = distance**2 - abs(point + foot * along - centre) ** 2
     return [point + (foot + s * math.sqrt(off)) * along for s in (-1.0, 1.0)] if off >= 0.0 else []
 
 
 def _on_circles(one: complex, d1: float, two: complex, d2: float) -> list[complex]:
-    """Return the places that are d1 away from one centre and d2 from another."""
+    """Return the points at distance d1 from one centre and d2 from another."""
     apart = abs(two - one)
     if apart < 1e-12:
         return []

@@ -1,4 +1,4 @@
-"""Moves as the planner of a controller sees them: pieces of the path, with limits along it."""
+"""Segments of a controller's path planner: pieces of the path, with limits along them."""
 
 import math
 
@@ -8,36 +8,36 @@ from thermocomp.nc.interpreter.block import PLANES, Block, Move
 
 Vector = tuple[float, float, float]
 
-#: share of the acceleration that may turn a move aside, and what is left of it along an arc that takes so much
+#: fraction of the acceleration available across the path, and fraction then left along an arc
 ACROSS, ALONG = math.sqrt(0.75), 0.5
-#: cycles that every piece of the path takes at least
+#: minimum duration of every segment [cycles]
 LEAST = 1.02
 
 
 class Segment:
-    """A piece of the path that is run at one speed, but for its ends.
+    """Piece of the path with constant speed, except at its ends.
 
     Parameters
     ----------
     owner : int
-        Number of its block.
+        Number of the block it belongs to.
     length : float
-        [mm], or [deg] if only rotary axes move.
+        Length [mm], or [deg] if only rotary axes move.
     entry, leave : tuple of float
-        Directions at its ends.
+        Directions at the ends.
     top, speed : float
-        Speed that the axes allow and that is asked for [mm/s].
+        Speed allowed by the axes, and programmed speed [mm/s].
     acceleration : float
-        [mm/s2]
+        Acceleration [mm/s2].
     rapid, rotary : bool
     radius : float
-        Radius of an arc, 0: a line [mm].
+        Radius of an arc; 0 for a line [mm].
     bend : float
-        The radius that its acceleration is counted with [mm].
+        Radius used to compute the centripetal acceleration [mm].
     sweep : float
         Angle of an arc [rad].
     axis : tuple of float
-        About which an arc turns, by the right hand.
+        Rotation axis of an arc, in the right-hand sense.
     """
 
     __slots__ = (
@@ -82,21 +82,21 @@ class Segment:
         self.speed = min(speed, top)
         self.rapid, self.rotary, self.radius, self.sweep, self.axis = rapid, rotary, radius, sweep, axis
         self.bend = bend
-        self.gives = 0.0  #: share of the acceleration that kinks at its ends take
-        self.halved = False  #: half of its acceleration is left to a neighbour that it overlaps
-        self.through = 0.0  #: most speed at its end [mm/s]
-        #: the next one begins before its end: tolerance [mm] and cosine of half the angle between them
+        self.gives = 0.0  #: fraction of the acceleration reserved for kinks at its ends
+        self.halved = False  #: half of its acceleration is reserved for an overlapping neighbour
+        self.through = 0.0  #: maximum speed at its end [mm/s]
+        #: if the next segment begins before the end of this one: tolerance [mm], cosine of half the angle between them
         self.overlap: tuple[float, float] | None = None
 
     def finish(self, cycle: float, last: bool = False) -> float:
-        """Settle its speed, now that its length and neighbours are known, and return its acceleration [mm/s2].
+        """Set the speed, when length and neighbours are final, and return the acceleration [mm/s2].
 
         Parameters
         ----------
         cycle : float
             Interpolation cycle [s].
         last : bool
-            Nothing follows: LinuxCNC keeps back half of the acceleration for what may still come.
+            Nothing follows: LinuxCNC reserves half of the acceleration for a possible next move.
         """
         self.top = min(self.top, self.length / (LEAST * cycle))
         a = self.acceleration * (1.0 - self.gives)
@@ -116,28 +116,28 @@ class Segment:
         return a
 
     def kept(self) -> float:
-        """Return the acceleration that it has for sure along the path, whatever comes next [mm/s2]."""
+        """Return the acceleration along the path that is available whatever move follows [mm/s2]."""
         return 0.5 * self.acceleration * (1.0 - self.gives) * (ALONG if self.radius else 1.0)
 
 
 class Segments:
-    """Makes segments of moves.
+    """Factory of segments from moves.
 
     Parameters
     ----------
     speeds, accelerations : tuple of float
-        Most of each axis [mm/s, mm/s2].
+        Limits of each axis [mm/s, mm/s2].
     feed : float
-        Most feed along the path [mm/s].
+        Maximum feed rate along the path [mm/s].
     rotary : tuple of float
-        Most speed and acceleration of a rotary axis [deg/s, deg/s2].
+        Maximum speed and acceleration of a rotary axis [deg/s, deg/s2].
     """
 
     def __init__(self, speeds: Vector, accelerations: Vector, feed: float, rotary: tuple[float, float]) -> None:
         self.speeds, self.accelerations, self.feed, self.rotary = speeds, accelerations, feed, rotary
 
     def of(self, serial: int, move: Move, block: Block) -> Segment | None:
-        """Return the planner's segment of a move; None if it has no length."""
+        """Return the segment of a move; None if it has no length."""
         if move.arc is not None:
             return self._arc(serial, move, block)
         (x, y, z), (ex, ey, ez) = move.start, move.end
@@ -164,14 +164,14 @@ class Segments:
         return Segment(serial, length, along, along, top, speed, a, move.rapid, move.rotary != 0.0)
 
     def _asked(self, move: Move, length: float, block: Block) -> float:
-        """Return the speed that the program asks for [mm/s]."""
+        """Return the programmed speed [mm/s]."""
         speed = length / move.seconds if move.seconds else move.feed / 60.0
         if not speed > 0.0:
             raise ProgramError(block.line.number, "a feed move, but no feed is in force: write F before it")
         return min(speed, self.feed)
 
     def _arc(self, serial: int, move: Move, block: Block) -> Segment:
-        """Return the planner's segment of an arc or a helix."""
+        """Return the segment of an arc or a helix."""
         arc = move.arc
         assert arc is not None
         i, j, k = PLANES[arc.plane]

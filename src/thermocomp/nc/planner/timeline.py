@@ -1,4 +1,4 @@
-"""When a controller runs which line: speeds, accelerations and corners of the moves, pauses and tool changes."""
+"""Timing of a program in a controller: speeds, accelerations and corners of the moves, pauses and tool changes."""
 
 import math
 from collections import deque
@@ -13,18 +13,17 @@ from thermocomp.nc.interpreter.codes import ADDITIONAL_SYSTEMS
 from thermocomp.nc.planner.corners import Corners, find_overlap_speeds
 from thermocomp.nc.planner.segment import Segment, Segments, Vector
 
-#: of an axis whose machine file does not tell: a machining centre of medium size [mm/min, mm/s2]
+#: defaults of an axis not specified in the machine file: medium machining centre [mm/min, mm/s2]
 RAPID, ACCELERATION = 30_000.0, 3000.0
-#: segments that the controller looks ahead
+#: number of segments in the look-ahead of the controller
 AHEAD = 50
-#: segments that are planned at once
+#: number of segments planned at once
 CHUNK = 500
-#: points that one line may replace
+#: maximum number of points replaced by one line
 CHAIN = 100
-#: a feed segment that takes less time than that gets one steady acceleration [s]
+#: a feed segment of shorter duration has one constant acceleration [s]
 STEADY = 0.01
-#: the axes come to a stop before these, as they do at LinuxCNC: pauses, probing, other coordinates, what has to be
-#: done at a place
+#: codes before which the axes stop, as in LinuxCNC: pauses, probing, other coordinates, actions at a position
 HALTS = frozenset(
     {"G4", "G10", "G31", "G38.2", "G38.3", "G38.4", "G38.5", "G43", "G43.1", "G43.2", "G44", "G49", "G52"}
     | {
@@ -57,17 +56,17 @@ class MotionLimits:
     Parameters
     ----------
     rapid : tuple of float
-        Most speed of X, Y, Z [mm/min].
+        Maximum speed of X, Y, Z [mm/min].
     acceleration : tuple of float
-        Most acceleration of X, Y, Z [mm/s2].
+        Maximum acceleration of X, Y, Z [mm/s2].
     feed : float
-        Most feed along the path [mm/min].
+        Maximum feed rate along the path [mm/min].
     rotary_rapid : float
-        Most speed of a rotary axis [deg/min].
+        Maximum speed of a rotary axis [deg/min].
     rotary_acceleration : float
-        [deg/s2]
+        Maximum acceleration of a rotary axis [deg/s2].
     tool_change : float
-        From the last move before a tool change to the first one after it [s].
+        Time from the last move before a tool change to the first move after it [s].
     stop : float
         Duration of M0, M1 and M60 [s]: the operator decides.
     spindle : float
@@ -105,14 +104,14 @@ class MotionLimits:
 
     @classmethod
     def of(cls, machine: Machine, **others: float) -> "MotionLimits":
-        """Return those of a machine file.
+        """Return the limits from a machine file.
 
         Parameters
         ----------
         machine : Machine
-            Axes that are not there or do not tell go as those of a medium machining centre.
+            Machine; axes that are missing or have no data are those of a medium machining centre.
         **others : float
-            The numbers that are not of one axis, such as ``tool_change``.
+            Values that do not belong to an axis, such as ``tool_change``.
         """
         axes = {a.name: a for a in machine.axes}
 
@@ -124,18 +123,18 @@ class MotionLimits:
 
 
 class Timed(NamedTuple):
-    """A block, and when it is run."""
+    """Block, and the time at which it is run."""
 
     block: Block
-    start: float  #: [s] since the program was started
-    end: float  #: [s]
+    start: float  #: time since the start of the program [s]
+    end: float  #: time since the start of the program [s]
 
 
 def time_blocks(blocks: Iterable[Block], kinematics: MotionLimits) -> Iterator[Timed]:
-    """Return the start and end time of each block.
+    """Yield the start and end time of each block.
 
-    A corner that is cut counts to the block after it, as it does at LinuxCNC, and of lines that become one under
-    ``G64 P`` the last one takes the time. Memory is bounded: some hundred moves are looked ahead.
+    A rounded corner counts to the block after it, as in LinuxCNC, and if lines are merged under ``G64 P``, the last one
+    takes the time. Memory is bounded: the look-ahead is several hundred moves.
 
     Parameters
     ----------
@@ -145,12 +144,12 @@ def time_blocks(blocks: Iterable[Block], kinematics: MotionLimits) -> Iterator[T
     Yields
     ------
     Timed
-        One for each block, in their order.
+        One for each block, in order.
 
     Raises
     ------
     ProgramError
-        A move in feed has no feed, or an arc has no radius.
+        A feed move has no feed, or an arc has no radius.
     """
     plan = _Plan(kinematics)
     done = plan.done
@@ -164,7 +163,7 @@ def time_blocks(blocks: Iterable[Block], kinematics: MotionLimits) -> Iterator[T
 
 
 class _Plan:
-    """Moves ahead of the controller, and those it has completed."""
+    """Planned moves of the controller, and completed blocks."""
 
     def __init__(self, kinematics: MotionLimits) -> None:
         self.kinematics = kinematics
@@ -173,18 +172,18 @@ class _Plan:
         rotary = (kinematics.rotary_rapid / 60.0, kinematics.rotary_acceleration)
         self.segments = Segments(speeds, kinematics.acceleration, kinematics.feed / 60.0, rotary)
         self.corners = Corners(speeds, kinematics.acceleration, kinematics.cycle)
-        self.now = 0.0  #: the segments up to here are timed [s]
-        self.since = 0.0  #: the blocks up to here are done [s]
-        self.speed = 0.0  #: of the path at that time [mm/s]
-        self.shared = 0.0  #: how long the next segment runs beside the one before it [s]
-        self.turning = 0.0  #: of the spindle [1/min]
+        self.now = 0.0  #: end time of the timed segments [s]
+        self.since = 0.0  #: end time of the completed blocks [s]
+        self.speed = 0.0  #: path speed at `now` [mm/s]
+        self.shared = 0.0  #: overlap of the next segment with the previous one [s]
+        self.turning = 0.0  #: spindle speed [1/min]
         self.exact = False
-        self.straight = 0.0  #: how far points may be off a line that replaces their lines [mm]
-        self.chain: list[Point] = []  #: of such a line, from where it begins
-        self.chained: tuple[int, Move, Block] | None = None  #: the last one that it replaces
-        self.last: Segment | None = None  #: its end is still open
-        self.tolerance: float | None = None  #: at the end of that
-        self.ahead: list[tuple[Segment, float]] = []  #: with accelerations
+        self.straight = 0.0  #: maximum distance of points from a line that replaces several lines [mm]
+        self.chain: list[Point] = []  #: points of the lines to be replaced, including the start
+        self.chained: tuple[int, Move, Block] | None = None  #: last of the lines to be replaced
+        self.last: Segment | None = None  #: last segment, whose end is still open
+        self.tolerance: float | None = None  #: tolerance at the end of `last`
+        self.ahead: list[tuple[Segment, float]] = []  #: segments to be timed, with accelerations
         self.waiting: deque[tuple[int, Block]] = deque()
         self.done: list[Timed] = []
 
@@ -218,7 +217,7 @@ class _Plan:
             self.halt(after)
 
     def halt(self, pause: float) -> None:
-        """Stop, and wait [s]."""
+        """Stop, and wait for a pause [s]."""
         self._unchain()
         if self.last is not None:
             self._push(self.last, self.tolerance is not None)
@@ -230,12 +229,12 @@ class _Plan:
             self._finish()
 
     def _path_mode(self, block: Block) -> None:
-        """Set how exact the path is from here on."""
+        """Set the path accuracy from this block on."""
         self._unchain()
         self.exact, self.straight = block.modal.exact_stop, block.modal.naive
 
     def _chain(self, serial: int, move: Move, block: Block) -> None:
-        """Replace lines in feed by one, as long as it passes near enough by their ends."""
+        """Replace feed lines by a single line while it passes close enough to their ends."""
         if self.chained is not None and (self.chained[1].feed != move.feed or not self._near(move.end)):
             self._unchain()
         if self.chained is None:
@@ -244,7 +243,7 @@ class _Plan:
         self.chained = (serial, move, block)
 
     def _near(self, end: Point) -> bool:
-        """Return whether a line to there passes near all points of the chain."""
+        """Return whether a line to this end passes close to all points of the chain."""
         chain, most = self.chain, self.straight * self.straight
         if len(chain) > CHAIN:
             return False
@@ -262,7 +261,7 @@ class _Plan:
         return True
 
     def _unchain(self) -> None:
-        """Add the line of the chain."""
+        """Add the line that replaces the chain."""
         if self.chained is not None:
             serial, move, block = self.chained
             self.chained = None
@@ -274,12 +273,12 @@ class _Plan:
             )
 
     def _finish(self) -> None:
-        """End the first block that waits."""
+        """Complete the first waiting block."""
         self.done.append(Timed(self.waiting.popleft()[1], self.since, self.now))
         self.since = self.now
 
     def _join(self, segment: Segment | None, block: Block) -> None:
-        """Put a segment behind the last one."""
+        """Append a segment, joined to the last one."""
         if segment is None:
             return
         last = self.last
@@ -300,7 +299,7 @@ class _Plan:
             self._run(CHUNK)
 
     def _run(self, count: int) -> None:
-        """Time the first segments."""
+        """Time a number of segments, from the first one on."""
         ahead, cycle = self.ahead, self.kinematics.cycle
         squares = self._leaving()
         sqrt = math.sqrt
@@ -323,23 +322,23 @@ class _Plan:
                 p = min(top, sqrt(peak / 2.0 + a * length))
                 now += (2.0 * p - v - w) / a + (length - (2.0 * p * p - peak) / (2.0 * a)) / p
                 if segment.overlap is not None:
-                    # the block changes when both are equally fast
+                    # the block changes when both segments are equally fast
                     following, b = ahead[k + 1]
                     below = min(p, find_overlap_speeds(segment.overlap, segment, a, following, b, 1.0)[0])
                     self.shared = below / (a + b)
                     now -= below / a - self.shared
                 elif not w:
-                    now += cycle / 2.0  # the next one begins in a cycle of its own
+                    now += cycle / 2.0  # the next segment begins in a separate cycle
             v = w
         self.now, self.speed = now, v
         del ahead[:count]
 
     def _leaving(self) -> list[float]:
-        """Return the squares of the most speeds at the ends of the segments, such that all can brake in time."""
+        """Return the squares of the maximum speeds at the ends of the segments from which all can stop in time."""
         ahead = self.ahead
         n = len(ahead)
         squares = [0.0] * n
-        ways = [0.0] * n  # what braking from here to the end of what lies ahead would shed
+        ways = [0.0] * n  # decrease of the squared speed by braking from here to the end of the look-ahead
         square = way = 0.0
         following = 0.0
         for k in range(n - 1, -1, -1):
@@ -357,7 +356,7 @@ class _Plan:
 
 
 def _lifts(segment: Segment, block: Block) -> bool:
-    """Return whether a segment of a cycle is the retract to its height R: all that follows that is run exactly."""
+    """Return whether a segment of a cycle is the retract to R: the following ones are run exactly."""
     first = block.moves[0]
     i, j, k = PLANES[block.modal.plane]
     up = first.end[k] > first.start[k] and first.end[i] == first.start[i] and first.end[j] == first.start[j]

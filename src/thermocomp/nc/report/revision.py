@@ -1,4 +1,4 @@
-"""The picture of a revised program: how far the tool would drift, and what is left of it."""
+"""Figure of a revised program: predicted drift of the tool, and remaining error."""
 
 import math
 from collections.abc import Sequence
@@ -15,16 +15,16 @@ from thermocomp.report.figures import COLOURS, MEASURED, RESIDUAL
 FloatArray = NDArray[np.float64]
 
 TAKEN_OFF = COLOURS[0]
-#: of so many tool changes every one gets its mark [per picture]
+#: maximum number of tool changes marked in a figure
 MANY_CHANGES = 60
-#: runs longer than that are shown in hours [s]
+#: runs longer than this are shown in hours [s]
 LONG = 2 * 3600.0
-#: least half of the scale of a drift [um]
+#: minimum range of the drift axis on each side of 0 [um]
 _SMALL = 1.0
 
 
 def draw(run: Run, bounds: Sequence[Bound], tool_changes: Sequence[float], title: str) -> Figure:
-    """Show the drift of each axis, what the program takes off, and what is left in the cuts; the spindle speed below.
+    """Plot the drift of each axis, the correction by the program, and the residual in the cuts; spindle speed below.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def draw(run: Run, bounds: Sequence[Bound], tool_changes: Sequence[float], title
 
 
 def render(run: Run, bounds: Sequence[Bound], tool_changes: Sequence[float], title: str) -> bytes:
-    """Return the picture as PNG.
+    """Return the figure as PNG.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def _drift(ax: Axes, bound: Bound, time: FloatArray, run: Run) -> None:
 
 
 def _said(bound: Bound, *, cut: bool) -> str:
-    """Return the text of the table: drift, its remainder, and the bound, which includes the model's error."""
+    """Return the title of a panel: drift, residual, and bound, which includes the error of the model."""
     far = max(abs(bound.low), abs(bound.high))
     if not cut:
         return f"the tool drifts by up to {far:.1f} um; nothing is cut"
@@ -104,14 +104,14 @@ def _said(bound: Bound, *, cut: bool) -> str:
 
 
 def _within(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return a curve that has the lowest and the highest value of each stretch at its end."""
+    """Return a curve through the lowest and the highest value of each interval, both at its end."""
     return np.concatenate([[0.0], np.repeat(time, 2)]), np.concatenate([values[0, :1], values.ravel()])
 
 
 def _cuts(time: FloatArray, left: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return a curve from one end of each cut to the other, with gaps where nothing is cut.
+    """Return a curve from one limit to the other in each cut, with gaps where nothing is cut.
 
-    Which end is the higher one is told by the cut before: curves continue.
+    The first limit is the one closer to the end of the previous cut, so that curves are continuous.
     """
     starts = np.concatenate([[0.0], time[:-1]])
     x = np.stack([starts, time, time], axis=1)

@@ -1,4 +1,4 @@
-"""A program is written out in plain lines before it is revised (``--expand``)."""
+"""Expansion of a program into plain lines before its revision (``--expand``)."""
 
 from array import array
 from collections.abc import Callable, Mapping, Sequence
@@ -19,7 +19,7 @@ def write_expanded(
     subroutines: Sequence[Path],
     progress: Callable[[int], object],
 ) -> "array[int]":
-    """Write a program out: LinuxCNC's by its interpreter, a Fanuc's by an unroller of our own.
+    """Expand a program: one for LinuxCNC by its interpreter, one for a Fanuc by a built-in unroller.
 
     Parameters
     ----------
@@ -30,17 +30,17 @@ def write_expanded(
     subroutines : sequence of Path
         Folders of subprograms, for LinuxCNC.
     progress : callable
-        Told how many lines are written of LinuxCNC's.
+        Called with the number of lines written, for LinuxCNC only.
 
     Returns
     -------
     array of int
-        For each line of `out`, from the first: the line of the program it comes from; 0: of none.
+        For each line of `out`: number of its line in the program; 0 if it has none.
 
     Raises
     ------
     InputError
-        It cannot be written out.
+        The program cannot be expanded.
     """
     if setup.controller == "linuxcnc":
         return expand(

@@ -1,4 +1,4 @@
-"""Forecasts of inputs that do not follow from a program: a CSV file with a time column and one per input."""
+"""Forecasts of inputs that do not follow from a program: CSV files with a time column and one column per input."""
 
 import csv
 import math
@@ -11,22 +11,22 @@ from thermocomp.recordings.headings import understand
 from thermocomp.recordings.readers.leftout import why_left_out
 from thermocomp.recordings.readers.limits import FileLimits, check_file
 
-#: hours at a row a second are below one
+#: maximum file size; several hours with one row per second take less than 1 MiB
 _MOST_BYTES = 64 << 20
 _TIME = ("time", "t", "elapsed")
 
 
 @dataclass(frozen=True)
 class Forecast:
-    """Content of a forecast file, in house units.
+    """Content of a forecast file, in internal units.
 
     Parameters
     ----------
     source : str
-        The file.
+        Path of the file.
     columns : dict of str to (tuple of float, tuple of float)
-        By channel name, such as ``t3_C``: times since the start of the program [s], and values; empty cells are left
-        out.
+        By channel name, such as ``t3_C``: times since the start of the program [s], and values; empty cells are
+        omitted.
     left_out : tuple of str
         Reasons why columns were not read.
     """
@@ -39,8 +39,9 @@ class Forecast:
 def read(path: str | Path) -> Forecast:
     """Read a forecast.
 
-    Headings tell the unit as in a recording: ``time_min``, ``t3_C``, ``room [degF]``. Lines that begin with ``#`` are
-    comments. Columns are parted by comma, semicolon or tab; a decimal comma is understood unless commas part them.
+    Headings specify the unit as in a recording: ``time_min``, ``t3_C``, ``room [degF]``. Lines that begin with ``#``
+    are comments. Columns are separated by comma, semicolon or tab; a decimal comma is accepted unless commas separate
+    columns.
 
     Parameters
     ----------
@@ -53,8 +54,8 @@ def read(path: str | Path) -> Forecast:
     Raises
     ------
     InputError
-        The file cannot be read, has no column of time or nothing else, a time is missing or does not rise, or a cell is
-        no number; the message names line and column.
+        The file cannot be read, has no time column or no other column, a time is missing or does not increase, or a
+        cell is not a number; the message names line and column.
     """
     source = Path(path)
     try:
@@ -113,7 +114,7 @@ def _cells(line: str, delimiter: str, where: str) -> list[str]:
 
 
 def _columns(headings: list[str], source: str) -> tuple[dict[int, tuple[str, Unit]], list[str]]:
-    """Return name and unit of the columns that can be read, by position; the name of the time is empty."""
+    """Return name and unit of the readable columns, by position; the name of the time column is empty."""
     kept: dict[int, tuple[str, Unit]] = {}
     left_out = []
     for k, heading in enumerate(headings):
@@ -138,7 +139,7 @@ def _columns(headings: list[str], source: str) -> tuple[dict[int, tuple[str, Uni
 
 
 def _number(cell: str, unit: Unit, delimiter: str, where: str) -> float | None:
-    """Return a cell in the internal unit; None if it is empty."""
+    """Return the value of a cell in the internal unit; None if it is empty."""
     text = cell.strip()
     if not text:
         return None

@@ -1,4 +1,4 @@
-"""Facts about the run in the header of a revised program."""
+"""Information about the revision in the header of a revised program."""
 
 import math
 from collections.abc import Sequence
@@ -11,9 +11,9 @@ from thermocomp.nc.rewrite.header import wrap_text
 from thermocomp.nc.rewrite.revise import Revision
 
 UNPROVED = "UNPROVED: NO INTERPRETER HAS JUDGED IT"
-#: most lines for the models, and for the place
+#: maximum number of lines for the models, and for origins and tools
 _MODELS, _PLACE = 2, 3
-#: lines for all else: that it has been revised, when, which program, start, zero, method, bound
+#: number of other lines: note of the revision, version and date, program, start, zero, method, bound
 _ALWAYS = 7
 
 
@@ -25,28 +25,28 @@ def count_lines(models: Sequence[str], taken: Sequence[str], states: str, *, by_
     models, taken : sequence of str
         Descriptions of the models, and of the persons who approved unproven ones.
     states : str
-        In which states of the controller it will be proved; empty: it will not be.
+        Description of the controller states for the proof; empty if there will be no proof.
     by_position : bool
-        The drift depends on the place.
+        The drift depends on the position.
 
     Returns
     -------
     int
     """
     told = min(len(models), _MODELS) + len(told_taken(taken))
-    # one more: what does not run in all states is known only afterwards
+    # plus one line: the settings without which the original does not run are only known later
     proof = len(wrap_text(f"proved {states}")) + 1 if states else 1
     return _ALWAYS + told + _PLACE * by_position + proof
 
 
 def describe_models(models: Sequence[str]) -> list[str]:
-    """Return the lines about the models, the last ones on one line."""
+    """Return the lines about the models, with all excess models on the last line."""
     said = [f"model {m}" for m in models]
     return said if len(said) <= _MODELS else [*said[: _MODELS - 1], ", ".join(said[_MODELS - 1 :])]
 
 
 def told_taken(taken: Sequence[str]) -> list[str]:
-    """Return the line about unproven models: who takes them."""
+    """Return the line about unproven models, with the persons who approved them."""
     return [f"unproven, taken by {'; '.join(taken)}"] if taken else []
 
 
@@ -58,17 +58,17 @@ def describe_bound(bounds: Sequence[Bound]) -> str:
 
 
 def describe_proof(proof: Proof | None, lines: int) -> list[str]:
-    """Return the states of the controller in which it was proved, in a given number of lines."""
+    """Return the description of the proof, including the controller states, in a given number of lines."""
     return [UNPROVED] if proof is None else wrap_text(f"proved {proof.sentence}", lines)
 
 
 def describe_place(revision: Revision, axes: Sequence[str]) -> list[str]:
-    """Return for which origins and tools it was made, and what others would cost."""
+    """Return the lines about the origins and tools of the revision, and the error with other ones."""
     return [*wrap_text(f"made for {describe_origins(revision)}", _PLACE - 1), cost(revision.elsewhere, axes)]
 
 
 def describe_origins(revision: Revision) -> str:
-    """Return the origins and lengths of tools that a drift along the axes was computed for."""
+    """Return the origins and tool lengths for which the drift along the axes was computed."""
     setup = revision.setup
     origins = [
         f"{system_name(system)} " + " ".join(f"{a}{v:g}" for a, v in zip("XYZ", place, strict=True))

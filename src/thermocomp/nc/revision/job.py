@@ -1,4 +1,4 @@
-"""One revision of a program: the files it reads and writes, all of them or none."""
+"""Revision of a program as a job: its files are written all together or not at all."""
 
 import time
 from array import array
@@ -24,35 +24,35 @@ from thermocomp.nc.rewrite.revise import Revised, Revision
 from thermocomp.nc.rewrite.travel import Travel
 from thermocomp.nc.thermal.drift import Drift
 
-#: what a program that cannot be proved is refused with
+#: remedy in the error for a program that cannot be proved
 ALL_THE_SAME = "--unproved writes it anyway, and its header says so"
-#: program and differences while their header says nothing yet
+#: names of the draft program and diff, whose header is still blank
 PROGRAM, DIFF = "program", "diff"
-#: of longer programs it is found out first whether they are refused: revising them takes a while [bytes]
+#: larger programs are checked completely before their revision, which takes long [bytes]
 LONG = 2_000_000
-#: lines after which the bar moves
+#: number of lines between progress reports
 TOLD = 500
 
 
-#: tells which share of the work is done, and where it is
+#: progress callback: fraction of the work done, and position
 Tell = Callable[[float, str], None]
-#: for the time of a phase of the work: who is told
+#: context of a phase of the work, by name, which provides the progress callback
 Phase = Callable[[str], AbstractContextManager[Tell]]
 
 
 class Paths(NamedTuple):
-    """The files that are written, by what they hold."""
+    """Output files, by content."""
 
     program: Path
     diff: Path
     table: Path
     job: Path
-    picture: Path | None  #: None: there is no matplotlib to draw it
-    expanded: Path | None  #: None: it is revised as it is
+    picture: Path | None  #: None: matplotlib is not installed
+    expanded: Path | None  #: None: the program is not expanded
 
     @classmethod
     def of(cls, output: Path, *, expanded: bool) -> "Paths":
-        """Return the names of the files next to a program."""
+        """Return the names of the output files for a given revised program."""
 
         def beside(end: str) -> Path:
             return output.with_name(output.name + end)
@@ -62,13 +62,13 @@ class Paths(NamedTuple):
         return cls(output, beside(".diff"), beside(".csv"), beside(".job.json"), drawn, plain)
 
     def all(self) -> list[Path]:
-        """Return those that will be there."""
+        """Return the paths of the files to be written."""
         return [p for p in self if p is not None]
 
 
 @dataclass(frozen=True)
 class Job:
-    """Job of revising a program.
+    """Data of the revision of one program.
 
     Parameters
     ----------
@@ -76,23 +76,23 @@ class Job:
     paths : Paths
     revision : Revision
     drift : Drift
-        That of the revision.
+        Drift of the revision.
     models : sequence of str
     taken : sequence of str
-        Persons who approved unproven ones of them, and the reasons.
+        Persons who approved unproven models, with reasons.
     start, zero, method : str
-        For the header: which models, from what state, what the drift counts from, in what way.
+        Header texts: initial thermal state, zero of the drift, and method.
     when : date
     unproved : bool
-        It is written though no interpreter has judged it.
+        The program is written without verification by an interpreter.
     diameters : dict of int to float, optional
         Tool diameters for the expansion [mm].
     subroutines : sequence of Path
         Folders of subprograms, for the expansion.
     travel : Travel, optional
-        Watches where the axes go.
+        Monitor of the travel of the axes.
     overwrite : bool
-        Files that are there are replaced.
+        Existing files are replaced.
     """
 
     program: Path
@@ -113,7 +113,7 @@ class Job:
 
     @property
     def begun(self) -> str:
-        """Return the initial thermal state of the run, in words."""
+        """Return the initial thermal state of the run as text."""
         return f"{self.start}, {self.zero}"
 
 
@@ -122,20 +122,20 @@ class Done(NamedTuple):
 
     run: Run
     bounds: tuple[Bound, ...]
-    written: bool  #: False: nothing was corrected, so there are no files
-    proof: Proof | None  #: None: the interpreter has not judged it
-    seconds: float  #: for the revision
-    proving: float  #: for the proof
+    written: bool  #: False: nothing was corrected, and no files were written
+    proof: Proof | None  #: None: not verified by the interpreter
+    seconds: float  #: duration of the revision
+    proving: float  #: duration of the proof
 
 
 def revise(job: Job, phase: Phase) -> Done:
-    """Revise a program and write all files; none if something is wrong, or if there is nothing to take off.
+    """Revise a program and write all files, or none in case of an error or if there is nothing to correct.
 
     Parameters
     ----------
     job : Job
     phase : callable
-        Gives, by the name of a phase, what is told how far that is.
+        Returns, for the name of a phase, a context that provides the progress callback.
 
     Returns
     -------
@@ -144,7 +144,7 @@ def revise(job: Job, phase: Phase) -> Done:
     Raises
     ------
     InputError
-        The program cannot be revised or proved, or the interpreter disagrees; the message begins with its name.
+        The program cannot be revised or proved, or the interpreter disagrees; the message begins with its path.
     """
     try:
         return _revise(job, phase)
@@ -154,7 +154,7 @@ def revise(job: Job, phase: Phase) -> Done:
 
 def _revise(job: Job, phase: Phase) -> Done:
     paths = job.paths
-    # the program comes last: where it is, all is
+    # the program is published last: if it exists, all other files exist
     with drafts(paths.all()[::-1], overwrite=job.overwrite) as started:
         folder = started[paths.program].parent
         source, lines = job.program, None
@@ -185,7 +185,7 @@ def _revise(job: Job, phase: Phase) -> Done:
         if not job.unproved:
             with phase("proving") as tell:
                 proof = _proved(job, source, folder / PROGRAM, ledger, tell)
-        # what is proved has a header that says nothing yet: from here on nothing but its comments changes
+        # the proved program has a blank header: from here on only its comments change
         filled = header.fill(
             _facts(job, bounds, proof), ending(blank[0]), len(blank), upper=job.revision.setup.controller == "fanuc"
         )
@@ -249,7 +249,7 @@ def _write(
             else:
                 blank = revised.texts
                 for listener in listeners:
-                    if isinstance(listener, Ledger):  # it counts the lines that are written
+                    if isinstance(listener, Ledger):  # the ledger counts all lines written
                         listener.take(revised)
             yield revised.text, revised.texts
 
@@ -268,7 +268,7 @@ def _write(
 
 
 def _row(revised: Revised, number: int, axes: Sequence[int]) -> str:
-    in_hole = revised.block is not None and revised.block.kind == "cycle"  # it counts, not the level where a cycle ends
+    in_hole = revised.block is not None and revised.block.kind == "cycle"  # inner, not final level
     carried = revised.inner if in_hole else revised.carried
     cells = "".join(f",{revised.deviation[k] + 0.0:.3f},{carried[k] + 0.0:.4f}" for k in axes)
     changed = revised.texts != (revised.text,)
@@ -306,12 +306,12 @@ def _facts(job: Job, bounds: Sequence[Bound], proof: Proof | None) -> list[str]:
         headers.describe_bound(bounds),
         *place,
     ]
-    # the first line says that it has been revised
+    # the first header line is the note of the revision
     return [*facts, *headers.describe_proof(proof, job.revision.header_lines - len(facts) - 1)]
 
 
 def _proved(job: Job, original: Path, revised: Path, ledger: Ledger, tell: Tell) -> Proof:
-    """Return the verdict of the interpreter."""
+    """Return the proof by the interpreter."""
     lines, last = max(job.revision.lines, 1), 0
 
     def progress(line: int) -> None:
@@ -324,5 +324,5 @@ def _proved(job: Job, original: Path, revised: Path, ledger: Ledger, tell: Tell)
         return prove(original, revised, ledger, job.revision.setup, progress)
     except ProgramError:
         raise
-    except InputError as e:  # whatever it is that keeps the interpreter from judging
+    except InputError as e:  # any reason that prevents the interpreter from verifying the program
         raise InputError(f"it cannot be proved: {e}; {ALL_THE_SAME}") from e

@@ -1,4 +1,4 @@
-"""State that a job leaves for the next one, as JSON: versioned, bit-exact, damaged or unknown files refused."""
+"""State at the end of a job as JSON: versioned, bit-exact; damaged or unknown files are refused."""
 
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
@@ -15,7 +15,7 @@ KIND = jsonfile.Format("thermocomp-job-state", 1, "state file of a job", "thermo
 
 @dataclass(frozen=True)
 class SavedJob:
-    """A state and when it was.
+    """State and the time at which it was reached.
 
     Parameters
     ----------
@@ -29,12 +29,12 @@ class SavedJob:
 
 
 def dumps(state: JobState, written: datetime) -> str:
-    """Return the text of a state file; floats are written so that reading gives the same bits.
+    """Return the text of a state file, with floats that can be read back bit by bit.
 
     Raises
     ------
     InputError
-        `written` does not know its time zone.
+        `written` has no time zone.
     """
     if written.tzinfo is None:
         raise InputError(f"state of a job: {written} has no time zone")
@@ -49,12 +49,12 @@ def loads(text: str, source: str = "state of a job") -> SavedJob:
     ----------
     text : str
     source : str
-        Name of the source in an error.
+        Name of the source, for error messages.
 
     Raises
     ------
     ModelFileError
-        Not JSON, not a state file, of a newer version, altered or incomplete.
+        The text is not JSON, not a state file, of a newer version, altered or incomplete.
     """
     jobs: list[SavedJob] = jsonfile.unpack(KIND, SavedJob, text, source).models
     if len(jobs) > 1:
@@ -64,7 +64,7 @@ def loads(text: str, source: str = "state of a job") -> SavedJob:
 
 
 def write(state: JobState, written: datetime, path: str | Path, *, overwrite: bool = False) -> None:
-    """Write what a job has left.
+    """Write the state at the end of a job.
 
     Parameters
     ----------
@@ -83,11 +83,11 @@ def write(state: JobState, written: datetime, path: str | Path, *, overwrite: bo
 
 
 def read(path: str | Path) -> SavedJob:
-    """Read what a job has left.
+    """Read the state at the end of a job.
 
     Raises
     ------
     ModelFileError
-        There is no such file, or it cannot be used; see `loads`.
+        The file does not exist, or cannot be used; see `loads`.
     """
     return loads(*jsonfile.read(KIND, path))

@@ -1,4 +1,4 @@
-"""NC programs as files: any bytes and line endings come through, and a header can be filled in when all is known."""
+"""NC programs as files: bytes and line endings are preserved, and a header can be filled in at the end."""
 
 import shutil
 from collections.abc import Mapping
@@ -9,12 +9,12 @@ from thermocomp.core.exceptions import InputError
 
 
 def open_to_read(path: Path) -> TextIO:
-    """Open a program for reading; its lines come with their endings.
+    """Open a program for reading; lines include their endings.
 
     Raises
     ------
     InputError
-        There is no such file.
+        The file does not exist.
     """
     if path.is_dir():
         raise InputError(f"{path}: is a directory; give an NC program")
@@ -25,23 +25,23 @@ def open_to_read(path: Path) -> TextIO:
 
 
 def open_to_write(path: Path) -> TextIO:
-    """Open a program for writing: what is written is what the file holds."""
+    """Open a program for writing, without translation of line endings."""
     return path.open("w", encoding="latin-1", newline="")
 
 
 def replace_lines(draft: Path, target: Path, lines: Mapping[str, str]) -> None:
-    """Copy a program, or a diff of it, with some of its lines replaced.
+    """Copy a program, or its diff, with some lines replaced.
 
     Parameters
     ----------
     draft, target : Path
     lines : mapping of str to str
-        New lines by old ones, with their endings. Each old one is there once, in this order.
+        New lines by old ones, with their endings. Each old line occurs once, in this order.
 
     Raises
     ------
     ValueError
-        One of them is not there.
+        An old line is missing.
     """
     waiting = [(old.encode("latin-1"), new.encode("latin-1")) for old, new in lines.items()]
     with draft.open("rb") as source, target.open("wb") as written:

@@ -80,7 +80,7 @@ class Drifting:
         return stations(models, self.axis or ())
 
     def others(self, found: Sequence[Station]) -> tuple[dict[str, InputSignal], list[str]]:
-        """Return the inputs that do not follow from the program, and what was not read of them."""
+        """Return the inputs that do not follow from the program, and notes on them."""
         models = [s.model for s in found]
         if self.constant and all(i.quantity == SPEED for m in models for i in m.inputs):
             raise InputError(f"--constant {self.constant[0]!r}: the models are driven by the spindle speed alone")
@@ -106,7 +106,7 @@ class Drifting:
         return signals | {n: InputSignal(*column) for n, column in read.columns.items() if n in wanted}, notes
 
     def hashes(self) -> dict[str, str]:
-        """Return the name of the file and the beginning of its SHA-256 by target."""
+        """Return the file name and the beginning of its SHA-256 for each target."""
         return {
             m.target: f"{path.name} {sha256(path.read_bytes()).hexdigest()[:8]}"
             for path in self.model
@@ -115,7 +115,7 @@ class Drifting:
 
 
 def _refuse_heated(model: ErrorModel, constant: Iterable[str]) -> None:
-    """Raise `InputError` if a temperature that the machine heats is set constant while a program runs."""
+    """Raise `InputError` if a temperature affected by the machine's heat is set constant while a program runs."""
     surroundings = model.validity.ambient_channel if model.validity is not None else ""
     for i in model.inputs:
         if i.name in constant and i.quantity == "temperature" and i.name != surroundings and i.high - i.low > WARMED:
@@ -186,14 +186,14 @@ class Starting:
         return self.zero or ("start" if self.cold else "cold" if self.carried is None else "last")
 
     def words(self) -> str:
-        """Return the start state in words."""
+        """Return the start state as text."""
         if self.carried is not None:
             name = self.carried.name
             return f"{self.pause} after {name}" if self.pause else f"as {name} left it"
         return f"measured {', '.join(self.measured)}" if self.measured else "cold"
 
     def counted(self) -> str:
-        """Return the zero of the drift, in words."""
+        """Return the zero of the drift as text."""
         return _COUNTED[self._zero]
 
 
@@ -273,7 +273,7 @@ class Way:
         return folders
 
     def words(self) -> str:
-        """Return the method in words."""
+        """Return the method as text."""
         often = f"every {self.every}" if self.every else f"by {self.tolerance}"
         return f"{self.method}, renewed {often}" + (f", steps {self.step}" if self.method == "coordinates" else "")
 

@@ -1,4 +1,4 @@
-"""Results of a revision: its warnings, and all its numbers."""
+"""Results of a revision: warnings and numbers."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -70,7 +70,7 @@ def warnings(job: Job, done: Done) -> list[str]:
 
 
 def describe_place(job: Job, done: Done) -> list[str]:
-    """Return for which origins a program was made, where the drift depends on the place."""
+    """Return the origins and tools of a revision, if the drift depends on the position."""
     if not (done.written and job.drift.by_position):
         return []
     revision = job.revision
@@ -103,7 +103,7 @@ def explain_nothing(job: Job, done: Done) -> str:
 
 
 def _assumed(setup: Setup) -> str:
-    """Return the assumptions about the controller that were neither stated nor tested."""
+    """Return the assumptions about the controller that were neither specified nor tested."""
     found = [
         text
         for text, missing in (
@@ -118,7 +118,7 @@ def _assumed(setup: Setup) -> str:
 
 
 def content(job: Job, done: Done, notes: Sequence[str]) -> dict[str, Any]:
-    """Return all numbers, units in the names."""
+    """Return all results, with units in the names."""
     revision, paths = job.revision, job.paths
     return {
         "program": str(job.program),
@@ -172,7 +172,7 @@ def _proof(proof: Proof) -> dict[str, Any]:
 
 
 def duration(seconds: float) -> str:
-    """Return a duration in words."""
+    """Return a duration as text."""
     if seconds < 120:
         return f"{seconds:.3g} s"
     minutes = round(seconds / 60)

@@ -1,4 +1,4 @@
-"""Preparation of a job from the options of a revision; wrong options are refused before any work."""
+"""Preparation of a job from the options of a revision; invalid options are refused before any work."""
 
 from collections.abc import Mapping, Sequence
 from datetime import date, datetime
@@ -45,7 +45,7 @@ def prepare_job(
     controller : Controller
     timing : Timing
     when : str or None
-        Date for the header; today without it.
+        Date for the header. Default: today.
     overwrite : bool
         Existing files are replaced.
 
@@ -57,7 +57,7 @@ def prepare_job(
     Raises
     ------
     InputError
-        It cannot be done, which is found out before any work.
+        The job is impossible, which is detected before any work.
     """
     if controller.controller is None:
         _check_dialect(program, controller)
@@ -109,7 +109,7 @@ def prepare_job(
 
 
 def _files(stations: Sequence[Station], hashes: Mapping[str, str]) -> list[str]:
-    """Return the files of the models, each with the targets used."""
+    """Return the files of the models, each with the axes that use them."""
     found = []
     for name in dict.fromkeys(hashes[s.model.target] for s in stations):
         mine = [s for s in stations if hashes[s.model.target] == name]
@@ -121,7 +121,7 @@ def _files(stations: Sequence[Station], hashes: Mapping[str, str]) -> list[str]:
 
 
 def _check_dialect(program: Path, controller: Controller) -> None:
-    """Raise `InputError` if the dialect of a program is not specified, and it need not be LinuxCNC's."""
+    """Raise `InputError` if the dialect of a program is not specified and may be other than LinuxCNC."""
     startup = f"{controller.startup or ''} {'G20' if controller.units == 'inch' else ''}"
     with ncprogram.open_to_read(program) as texts:
         lines = program_lines(texts)
@@ -133,7 +133,7 @@ def _check_dialect(program: Path, controller: Controller) -> None:
 
 
 def _refuse_optional(program: Path) -> None:
-    """Raise `InputError` if the program has optional lines: written out, they would be run always, or never."""
+    """Raise `InputError` if the program has optional lines: expanded, they would be run always or never."""
     with ncprogram.open_to_read(program) as lines:
         for line in read_lines(lines):
             if line.optional:
@@ -144,7 +144,7 @@ def _refuse_optional(program: Path) -> None:
 
 
 def _check_interpreter(way: Way, setup: Setup, *, diameters: bool) -> None:
-    """Raise `InputError` before any work if the interpreter is needed and cannot be had."""
+    """Raise `InputError` before any work if the interpreter is needed but not available."""
     if way.expand and setup.controller == "linuxcnc" and (reason := rs274.find_obstacle()) is not None:
         raise InputError(f"--expand: {reason}")
     if way.expand and setup.controller == "fanuc" and (way.subroutines or diameters):
@@ -156,12 +156,12 @@ def _check_interpreter(way: Way, setup: Setup, *, diameters: bool) -> None:
 
 
 def _moment(text: str | None) -> datetime:
-    """Return the date: given by the user, or now.
+    """Return the date given by the user, or the present time.
 
     Raises
     ------
     InputError
-        It is not a date.
+        The text is not a date.
     """
     if text is None:
         return datetime.now().astimezone()

@@ -20,11 +20,11 @@ def read_value(text: str, quantity: str, option: str, example: str) -> float:
     Parameters
     ----------
     text : str
-        As it was given.
+        Text of the option.
     quantity : str
-        Such as ``time``.
+        Quantity, such as ``time``.
     option : str
-        Its name.
+        Name of the option.
     example : str
         Example of a valid value.
 
@@ -35,7 +35,7 @@ def read_value(text: str, quantity: str, option: str, example: str) -> float:
     Raises
     ------
     InputError
-        It is no value with a unit of that quantity.
+        The text is not a value with a unit of the quantity.
     """
     try:
         number = with_unit(text, quantity)
@@ -52,11 +52,11 @@ def read_positive(text: str, quantity: str, option: str, example: str) -> float:
     Parameters
     ----------
     text : str
-        As it was given.
+        Text of the option.
     quantity : str
-        Such as ``time``.
+        Quantity, such as ``time``.
     option : str
-        Its name.
+        Name of the option.
     example : str
         Example of a valid value.
 
@@ -67,7 +67,7 @@ def read_positive(text: str, quantity: str, option: str, example: str) -> float:
     Raises
     ------
     InputError
-        It is none, or not positive.
+        The text is not a value with a unit of the quantity, or not positive.
     """
     number = read_value(text, quantity, option, example)
     if not number > 0:
@@ -81,7 +81,7 @@ def origin_of(text: str) -> tuple[int, Point]:
     Parameters
     ----------
     text : str
-        As it was given.
+        Text of the option.
 
     Returns
     -------
@@ -90,7 +90,7 @@ def origin_of(text: str) -> tuple[int, Point]:
     Raises
     ------
     InputError
-        It is none.
+        The text is not an origin.
     """
     name, _, place = text.partition("=")
     said = f"--origin {text!r}"
@@ -103,7 +103,7 @@ def rotations_of(texts: Sequence[str]) -> dict[int, float]:
     Parameters
     ----------
     texts : sequence of str
-        As they were given.
+        Texts of the options.
 
     Returns
     -------
@@ -112,7 +112,7 @@ def rotations_of(texts: Sequence[str]) -> dict[int, float]:
     Raises
     ------
     InputError
-        One of them is none.
+        A text is not a rotation.
     """
     if [text.strip().lower() for text in texts] == ["none"]:
         return dict.fromkeys(range(1, 10), 0.0)
@@ -146,9 +146,9 @@ def point_of(text: str, said: str) -> Point:
     Parameters
     ----------
     text : str
-        As it was given.
+        Text of the option.
     said : str
-        Start of the message.
+        Beginning of the error message.
 
     Returns
     -------
@@ -157,7 +157,7 @@ def point_of(text: str, said: str) -> Point:
     Raises
     ------
     InputError
-        It is none.
+        The text is not a point.
     """
     parts = [part.strip() for part in text.split(",")]
     if len(parts) != 3:
@@ -167,24 +167,24 @@ def point_of(text: str, said: str) -> Point:
 
 
 def startup_of(text: str, controller: Controller) -> str:
-    """Return codes that are in force at the start.
+    """Return codes in force at the start of a program.
 
     Parameters
     ----------
     text : str
-        As it was given.
+        Text of the option.
     controller : str
         Name of the controller.
 
     Returns
     -------
     str
-        Tidied.
+        Normalised codes.
 
     Raises
     ------
     InputError
-        They are none, or not such as may be stated.
+        The text does not consist of permitted startup codes.
     """
     try:
         return startup.tidy(text, controller)
@@ -193,12 +193,12 @@ def startup_of(text: str, controller: Controller) -> str:
 
 
 def m_code_of(text: str, controller: Controller) -> int:
-    """Return the number of an M code whose meaning is not known.
+    """Return the number of an M code whose meaning is unknown.
 
     Parameters
     ----------
     text : str
-        As it was given.
+        Text of the option.
     controller : str
         Name of the controller.
 
@@ -209,7 +209,7 @@ def m_code_of(text: str, controller: Controller) -> int:
     Raises
     ------
     InputError
-        It is none, or its meaning is known.
+        The text is not an M code, or its meaning is known.
     """
     number = text.upper().removeprefix("M")
     if not number.isdecimal():
@@ -229,9 +229,9 @@ def tool_of(text: str, option: str, example: str) -> tuple[int, float]:
     Parameters
     ----------
     text : str
-        As it was given.
+        Text of the option.
     option : str
-        Its name.
+        Name of the option.
     example : str
         Example of a valid value.
 
@@ -242,7 +242,7 @@ def tool_of(text: str, option: str, example: str) -> tuple[int, float]:
     Raises
     ------
     InputError
-        It is none.
+        The text is not a tool number with a length or diameter.
     """
     name, _, length = (part.strip() for part in text.partition("="))
     number = name.upper().removeprefix("T")

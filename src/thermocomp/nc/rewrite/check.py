@@ -1,4 +1,4 @@
-"""A revised program is read again before anybody gets it: every move is the original's plus what was asked for."""
+"""Check of a revised program by interpretation: every move must be that of the original plus its correction."""
 
 from collections import deque
 from collections.abc import Iterator
@@ -11,17 +11,17 @@ from thermocomp.nc.rewrite.frame import Vector
 from thermocomp.nc.rewrite.method import Change
 from thermocomp.nc.rewrite.text import LONGEST
 
-#: largest difference that is rounding [um]
+#: largest difference regarded as rounding [um]
 ROUNDING = 0.1
 
 
 class Check:
-    """Interprets the revised program in parallel with the original.
+    """Interpreter of the revised program in parallel with the original.
 
     Parameters
     ----------
     setup : Setup
-        That of the original.
+        Setup of the original.
     """
 
     def __init__(self, setup: Setup) -> None:
@@ -33,7 +33,7 @@ class Check:
             yield self._texts.popleft()
 
     def check(self, block: Block, change: Change) -> None:
-        """Compare a block with what it has become.
+        """Compare a block with its revision.
 
         Parameters
         ----------
@@ -43,7 +43,7 @@ class Check:
         Raises
         ------
         ProgramError
-            A move is not where it should be. This is a fault of thermocomp, and better found here than at the machine.
+            A move does not have its required end. This is an error in thermocomp, detected before the program is run.
         """
         longest = max(map(len, change.texts))
         if longest > max(LONGEST, len(block.line.text)):

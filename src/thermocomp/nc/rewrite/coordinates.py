@@ -1,15 +1,16 @@
-"""The paper's way: the correction is added to the words of X, Y and Z (P-06).
+"""Correction by coordinates, as in the paper: the correction is added to the words of X, Y and Z (P-06).
 
-What becomes of a block, by its kind:
+Treatment of a block, by its kind:
 
-- a line: every word of an axis gets the correction of that axis; an axis that is not named, but whose correction has
-  changed, gets a word;
-- in G91 a word gets what the correction has changed since that axis moved last;
-- an arc: the axes of its plane keep what they carry, so that its radius stays; its third axis is that of a line;
+- a line: every axis word gets the present correction of its axis; an axis without a word, but with a changed
+  correction, gets a word;
+- in G91 a word gets the change of the correction since the last move of its axis;
+- an arc: the axes of its plane keep their correction, so that the radius is unchanged; the third axis is treated as in
+  a line;
 - a drilling cycle: depth and retract plane both get the correction of the drilling axis;
-- G92 and G10 L20: the value gets what the axis carries, so that the coordinates stay where they were;
-- G53, G28, G30: machine coordinates, they carry nothing;
-- with cutter radius compensation on: everything stays as it was when it was switched on.
+- G92 and G10 L20: the value gets the correction of its axis, so that the coordinates are preserved;
+- G53, G28, G30: machine coordinates, without correction;
+- during cutter radius compensation: the correction remains as it was when compensation was switched on.
 """
 
 import math
@@ -24,29 +25,29 @@ from thermocomp.nc.rewrite.method import AXES, STILL, CorrectionMethod
 from thermocomp.nc.rewrite.path import length
 from thermocomp.nc.rewrite.text import format_number, format_shifted, shift_words
 
-#: motions that take a word they did not have
+#: motion codes of lines that can get additional words
 PLAIN = ("G0", "G1")
-#: by how much the time of a cut may change: relatively, and in any case [s]
+#: allowed change in the duration of a cut: relative, and absolute [s]
 SLOWER, LATER = 0.015, 0.004
 
 
 @dataclass
 class Coordinates(CorrectionMethod):
-    """Adds the correction to the words.
+    """Correction method that adds the correction to the words.
 
     Parameters
     ----------
     helix : bool
-        An arc may get a word of its third axis.
+        An arc may get a word for its third axis.
     """
 
     helix: bool = True
     contact: Contact = field(init=False)
-    #: what depth and retract plane of the cycle in force got
+    #: correction of depth and retract plane of the cycle in force
     _cycle: float = field(default=0.0, init=False)
-    #: level at which a series of cycles began [mm], if nobody has moved the axis, and what the axes carry there [um]
+    #: initial level of a series of cycles [mm], if the axis has not been moved since, with its correction [um]
     _series: tuple[float, Vector] | None = field(default=None, init=False)
-    #: axis and retract plane [mm] of the last cycle, as long as the tool may still stand there
+    #: axis and retract plane [mm] of the last cycle, while the tool may still be there
     _plane: tuple[int, float] | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
@@ -81,7 +82,7 @@ class Coordinates(CorrectionMethod):
 
     @property
     def splits(self) -> bool:
-        """Whether a cut that is split can follow the drift more nearly: where the places inside it can be written."""
+        """Whether splitting a cut can improve the correction: positions inside the cut must be representable."""
         return self.digits.mm >= 4
 
     def held_by(self, block: Block) -> str:
@@ -167,7 +168,7 @@ class Coordinates(CorrectionMethod):
                 shifts[AXES[i]] = round(new[i] - old[i], frame.digits)
         if block.line.optional and tuple(new) != old:
             raise ProgramError(block.line.number, "an optional line that drills: give --block-delete off or on")
-        if not block.moves:  # K0: it stores its words, and drills where later lines say
+        if not block.moves:  # K0: the cycle is stored, and drills at later lines
             return self._store(block, axis, frame, old, goal[axis])
         self._take(block, frame, old, new)
         if block.modal.absolute:
@@ -175,7 +176,7 @@ class Coordinates(CorrectionMethod):
         return shift_words(block, shifts, added, frame.digits)
 
     def _refuse_mixed_levels(self, block: Block, axis: int) -> None:
-        """Raise `ProgramError` if levels that were shifted as places continue as distances in G91."""
+        """Raise `ProgramError` if corrected absolute levels would be reused as distances in G91."""
         if block.modal.absolute:
             return
         if any(word not in block.words for word in (AXES[axis], "R")):
@@ -193,7 +194,7 @@ class Coordinates(CorrectionMethod):
         shifts, added = dict[str, float](), dict[str, float]()
         if block.modal.absolute:
             self._levels(block, axis, frame, goal, shifts, added)
-            # the axes stay where they are, and may get a word that says so
+            # the axes do not move, but may have words for their present position
             shifts |= {AXES[i]: old[i] for i in self.named(block) if i != axis}
             self.carried, self.inner = carried, None
             self.fixed[axis], self.doubtful[axis] = before
@@ -202,13 +203,13 @@ class Coordinates(CorrectionMethod):
     def _levels(
         self, block: Block, axis: int, frame: Frame, goal: float, shifts: dict[str, float], added: dict[str, float]
     ) -> None:
-        """Shift depth and retract plane of a cycle, together or not at all."""
+        """Shift depth and retract plane of a cycle, both or neither."""
         words = (AXES[axis], "R")
         if self._series is None:
             self._series = block.start[axis], self.carried
         plane = block.sticky["R"] / (frame.scale[axis] * 1e3)
         level, carried = self._series
-        # which level is the higher one must not change, if nobody has moved the axis
+        # if the axis has not been moved, the order of the levels must not change
         held = True
         if abs(block.start[axis] - plane) < CLEAR:
             goal = frame.words(self.carried)[axis]
@@ -260,10 +261,10 @@ class Coordinates(CorrectionMethod):
         old = frame.words(self.carried)
         return shift_words(block, {AXES[i]: old[i] for i in self.named(block)}, {}, frame.digits)
 
-    # -- what may change ---------------------------------------------------------------------------------------------
+    # -- allowed changes ---------------------------------------------------------------------------------------------
 
     def _placed(self, block: Block, axis: int, carried: float, *, moved: bool) -> None:
-        """Register that an axis moves to a position in absolute coordinates, if the line is run."""
+        """Record that an axis moves to a position in absolute coordinates, if the line is run."""
         self.fixed[axis] = False
         if not block.line.optional:
             self.doubtful[axis] = False
@@ -271,9 +272,9 @@ class Coordinates(CorrectionMethod):
             self.doubt(axis, carried)
 
     def _hurries(self, block: Block, frame: Frame, goal: Vector, holds: tuple[int, ...]) -> bool:
-        """Return whether a change of the correction would alter the time of a cut by more than is allowed.
+        """Return whether a change of the correction would change the duration of a cut beyond the allowed limits.
 
-        Axes of which nobody knows where they are count as well, if the line names them: no hand may have moved them.
+        Axes with uncertain positions are included if the line names them: they may not have been moved by hand.
         """
         if len(block.moves) != 1 or block.moves[0].rapid or not block.moves[0].feed:
             return False
@@ -282,7 +283,7 @@ class Coordinates(CorrectionMethod):
         gaps = [0.0 if i in holds else (moved[i] - self.carried[i]) * 1e-3 for i in range(3)]
         for i, letter in enumerate(AXES):
             if (self.fixed[i] or self.doubtful[i]) and not (block.modal.absolute and letter in block.words):
-                gaps[i] = 0.0  # it gets no other word
+                gaps[i] = 0.0  # no other word
         way = length(move)
         if move.arc is None:
             longer = math.hypot(*(b - a + g for a, b, g in zip(move.start, move.end, gaps, strict=True)))
@@ -293,7 +294,7 @@ class Coordinates(CorrectionMethod):
         return abs(longer - way) > max(SLOWER * way, move.feed / 60.0 * LATER)
 
     def _holds(self, block: Block, frame: Frame) -> tuple[int, ...]:
-        """Return the axes that have to keep what they carry in this block."""
+        """Return the axes that must keep their correction in this block."""
         modal = block.modal
         if block.kind == "curve" or modal.motion == "G33.1" or self.stands(block):
             return (0, 1, 2)
@@ -305,7 +306,7 @@ class Coordinates(CorrectionMethod):
         return ()
 
     def _takes_words(self, block: Block, named: list[int]) -> bool:
-        """Return whether a block may get words that it does not have."""
+        """Return whether a block may get additional words."""
         modal = block.modal
         if block.line.optional or modal.cutter or not block.moves:
             return False
@@ -315,20 +316,20 @@ class Coordinates(CorrectionMethod):
         return block.kind == "line" and modal.motion in PLAIN and bool(named)
 
     def _limited(self, block: Block, frame: Frame, demand: Vector) -> Vector:
-        """Return the demand, or what a cut may take of it, spread over the block."""
+        """Return the demanded correction, limited to the change allowed in a cut over the length of the block."""
         out = []
         for i in range(3):
             gap, most = demand[i] - self.carried[i], self.contact.most(block, i)
             if abs(gap) <= most or self.fixed[i] or self.doubtful[i] or not (self.before[i] or self.contact.touching):
                 out.append(demand[i])
             else:
-                # where a least increment is coarser than the step, nothing smaller can be written
+                # if the least increment is greater than the step, it is the smallest possible change
                 least = 10.0**-frame.digits / frame.scale[i]
                 out.append(self.carried[i] + math.copysign(min(abs(gap), max(most, least)) if most else 0.0, gap))
         return out[0], out[1], out[2]
 
     def _take(self, block: Block, frame: Frame, old: Vector, new: list[float]) -> None:
-        """Store the new words; an axis with an unchanged word too, if it is on the line in G90."""
+        """Store the new words; in G90, also those of axes whose word on the line is unchanged."""
         words = block.words if block.modal.absolute else {}
         taken = [n != o or letter in words for letter, n, o in zip(AXES, new, old, strict=True)]
         if frame.turned:
@@ -339,9 +340,9 @@ class Coordinates(CorrectionMethod):
 
 
 def _same_pecks(block: Block, depth: str, shift: float, digits: int) -> float:
-    """Return the nearest shift with which a cycle pecks as often as without it.
+    """Return the nearest shift with which a cycle has the same number of pecks as without.
 
-    Where Q divides the depth, the rounding of numbers decides whether there is one more.
+    If Q divides the depth, the number of pecks depends on rounding.
     """
     feed = block.sticky["Q"]
 

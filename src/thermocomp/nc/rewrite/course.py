@@ -1,4 +1,4 @@
-"""Course of a revised program over time, in as many points as a picture needs, however long it is."""
+"""Course of a revised program over time, reduced to a number of points suitable for a figure."""
 
 import math
 from dataclasses import dataclass, field
@@ -17,25 +17,25 @@ _NOT_CUTTING = (math.nan,) * 3
 
 
 class Run(NamedTuple):
-    """A run in stretches of time: the lowest and the highest value in each."""
+    """Run divided into time intervals, with the lowest and the highest value in each."""
 
-    time: FloatArray  #: (n,), end of each stretch [s]; the first begins at 0
+    time: FloatArray  #: (n,), end of each interval [s]; the first begins at 0
     deviation: FloatArray  #: (n, 2, 3), drift of X, Y, Z [um]
     carried: FloatArray  #: (n, 2, 3), correction in force [um]
-    left: FloatArray  #: (n, 2, 3), what it leaves of the drift in the cuts [um]; nan where nothing is cut
-    speed: FloatArray  #: (n, 2), of the spindle [1/min]
+    left: FloatArray  #: (n, 2, 3), remaining drift in the cuts [um]; nan where nothing is cut
+    speed: FloatArray  #: (n, 2), spindle speed [1/min]
 
 
 class Bound(NamedTuple):
     """Error bound of the tool in a cut, of one axis [um]."""
 
     axis: str
-    low: float  #: of the drift, in the whole run
+    low: float  #: lowest drift in the whole run
     high: float
     without: float  #: largest drift in a cut
-    left: float  #: what the correction leaves of it, between its updates
-    line: int  #: where
-    model: float  #: how wrong the models may be; nan: they were never judged
+    left: float  #: remaining drift in a cut, between updates of the correction
+    line: int  #: line of `left`
+    model: float  #: error bound of the models; nan: they were never judged
 
     @property
     def most(self) -> float:
@@ -45,12 +45,12 @@ class Bound(NamedTuple):
 
 @dataclass
 class Course:
-    """Collects a run.
+    """Recorder of a run.
 
     Parameters
     ----------
     most : int
-        Stretches that are kept; neighbours are put together as soon as there are more.
+        Maximum number of intervals; adjacent ones are merged when exceeded.
     """
 
     most: int = 1500
@@ -58,8 +58,8 @@ class Course:
     _low: list[tuple[float, ...]] = field(default_factory=list, init=False)
     _high: list[tuple[float, ...]] = field(default_factory=list, init=False)
     _last: tuple[Vector, Vector, float, CutErrors | None] | None = field(default=None, init=False)
-    _rows: int = field(default=0, init=False)  # in the last stretch
-    _stride: int = field(default=1, init=False)  # rows of a stretch
+    _rows: int = field(default=0, init=False)  # rows in the last interval
+    _stride: int = field(default=1, init=False)  # rows per interval
 
     def take(self, revised: Revised) -> None:
         """Add a line, in order."""
@@ -68,7 +68,7 @@ class Course:
             return
         speed, cut = abs(block.speed), revised.cut
         row = revised.deviation, revised.carried, speed, cut
-        if row == self._last:  # nothing moves but time
+        if row == self._last:  # only the time has changed
             self._times[-1] = revised.end
             return
         self._last = row
@@ -102,7 +102,7 @@ class Course:
         )
 
     def _join(self) -> None:
-        """Put neighbours together; an odd one stays open at the end."""
+        """Merge adjacent intervals; an unpaired last one remains open."""
         n = len(self._times) // 2 * 2
         odd = len(self._times) > n
         self._times = self._times[1:n:2] + self._times[n:]

@@ -1,4 +1,4 @@
-"""When the correction in a program is renewed, and what it leaves of the drift."""
+"""Update of the correction in a program, and the remaining drift."""
 
 import math
 from collections.abc import Callable, Iterable, Sequence
@@ -11,7 +11,7 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.nc.interpreter.block import Point
 from thermocomp.nc.rewrite.frame import Vector
 
-#: what the tool point deviates by at a point of the machine [um]
+#: deviation of the tool point at a point in machine coordinates [um]
 Field = Callable[[Point], Vector]
 
 
@@ -20,33 +20,33 @@ class DriftSource(Protocol):
 
     @property
     def by_position(self) -> bool:
-        """Whether the deviation varies with the place."""
+        """Whether the deviation depends on the position."""
 
     def advance(self, dt: float, speed: float) -> None:
-        """Let `dt` seconds pass with the spindle at `speed` [1/min]."""
+        """Advance the time by `dt` seconds with the spindle at `speed` [1/min]."""
 
     def deviation(self, point: Point) -> Vector:
-        """Return by how much the tool point deviates now [um], at a place in machine coordinates [mm]."""
+        """Return the present deviation of the tool point [um] at a point in machine coordinates [mm]."""
 
     def field(self) -> Field:
-        """Return the present `deviation` as a function of position that time no longer changes."""
+        """Return the present `deviation` as a function of position that is independent of time."""
 
 
 @dataclass
 class Demand:
-    """Corrections required of the axes.
+    """Required corrections of the axes, and their updates.
 
-    A correction is renewed when it is due: every `every` seconds (P-06), or as soon as the drift has moved by
-    `tolerance` since. Renewed every so often, it still follows the place by `tolerance`, where it depends on it.
+    A correction is updated when it is due: every `every` seconds (P-06), or as soon as the drift has changed by
+    `tolerance` since the last update. With `every`, it still follows a dependence on position by `tolerance`.
 
     Parameters
     ----------
     tolerance : float
-        [um]
+        Change of the drift that causes an update [um].
     every : float or None
-        [s]; None: by tolerance alone.
+        Interval between updates [s]; None: updates by tolerance alone.
     most : float
-        A correction beyond that is no thermal drift any more [um].
+        Largest plausible correction; a larger one is not a thermal drift [um].
     """
 
     tolerance: float
@@ -57,26 +57,26 @@ class Demand:
     _next: float = field(default=0.0, init=False)
 
     def at(self, time: float, drift: DriftSource, point: Point) -> Vector:
-        """Return the correction in force at a time [s] and place [mm, machine coordinates].
+        """Return the correction in force at a time [s] and point [mm, machine coordinates].
 
         Parameters
         ----------
         time : float
-            [s]
+            Time since the start of the program [s].
         drift : DriftSource
-            At that time.
+            Drift at that time.
         point : tuple of float
             Machine coordinates [mm].
 
         Returns
         -------
         tuple of float
-            [um, machine axes], minus the deviation (E-P4).
+            Correction, minus the deviation [um, machine axes] (E-P4).
 
         Raises
         ------
         InputError
-            It is larger than any thermal drift, or not a number.
+            The correction is larger than any thermal drift, or not a number.
         """
         renewed = False
         now: Field = drift.deviation
@@ -88,7 +88,7 @@ class Demand:
         deviation, force, near = now(point), self._force, self.tolerance
         if not renewed and all(abs(d + f) <= near for d, f in zip(deviation, force, strict=True)):
             return force
-        x, y, z = (  # a nan is never near, and no correction opposes it
+        x, y, z = (  # a nan exceeds any tolerance, and has no opposing correction
             f if not renewed and abs(w - f) <= near else w
             for w, f in zip(oppose_deviation(deviation), force, strict=True)
         )
@@ -108,24 +108,24 @@ def oppose_deviation(deviation: Vector) -> Vector:
 
 
 class CutErrors(NamedTuple):
-    """Deviations in a block in which the tool cuts, at its ends and inside: lowest and highest of each axis [um]."""
+    """Deviations in a cut, at its ends and inside: lowest and highest of each axis [um]."""
 
     drift: tuple[Vector, Vector]
-    left: tuple[Vector, Vector]  #: what the correction leaves of it
+    left: tuple[Vector, Vector]  #: remaining drift after the correction
 
 
 @dataclass
 class Left:
-    """Remainder of the drift in the cuts, after the correction that was computed from it.
+    """Remaining drift in the cuts, after the correction computed from the same drift.
 
     Parameters
     ----------
     most : list of float
-        Per axis, largest magnitude in the cuts [um].
+        Largest magnitude in the cuts, per axis [um].
     line : list of int
-        Line of each.
+        Line of each of these.
     without : list of float
-        The same without correction.
+        Largest magnitude without correction, per axis [um].
     """
 
     most: list[float] = field(default_factory=lambda: [0.0] * 3)
@@ -139,12 +139,12 @@ class Left:
         ----------
         line : int
         samples : iterable of (tuple of float, tuple of float)
-            Deviation and correction carried [um], at both ends and here and there on the way.
+            Deviation and correction [um], at both ends and at points in between.
 
         Returns
         -------
         CutErrors
-            All that is told of this cut comes from here.
+            Lowest and highest values in this cut.
         """
         drifts, lefts = [], []
         for deviation, carried in samples:

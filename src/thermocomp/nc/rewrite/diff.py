@@ -1,11 +1,11 @@
-"""A unified diff made while a program is revised: lines go one to one, so nothing has to be searched for."""
+"""Unified diff generated while a program is revised: corresponding lines are known, so no search is needed."""
 
 from collections import deque
 from collections.abc import Iterable, Iterator
 
-#: unchanged lines around a change
+#: number of unchanged lines around a change
 CONTEXT = 3
-#: lines of a hunk that are held in memory: one that is longer comes in parts without context
+#: maximum number of lines of a hunk in memory: a longer one is divided into parts without context
 LONGEST = 4000
 
 
@@ -15,21 +15,21 @@ def unified(pairs: Iterable[tuple[str, tuple[str, ...]]], name: str, revised: st
     Parameters
     ----------
     pairs : iterable of (str, tuple of str)
-        Lines of the original in order, each with the lines it has become; an empty text stands for no line.
+        Lines of the original in order, each with its revised lines; an empty text denotes no line.
     name, revised : str
         Names of the two programs.
     before : int
-        Lines that the revised program begins with and that are in none of the pairs.
+        Number of lines at the beginning of the revised program that are not in the pairs.
 
     Yields
     ------
     str
     """
     head = [f"--- {name}\n", f"+++ {revised}\n"]
-    waiting: deque[tuple[str, str]] = deque(maxlen=CONTEXT)  # unchanged lines that may come before a hunk
+    waiting: deque[tuple[str, str]] = deque(maxlen=CONTEXT)  # unchanged lines that may precede a hunk
     hunk: list[tuple[str, str]] = []
     quiet = 0
-    old = new = 0  # lines seen
+    old = new = 0  # number of lines processed
     first = (0, 0)
     for text, texts in pairs:
         changed = texts != ((text,) if text else ())
@@ -43,7 +43,7 @@ def unified(pairs: Iterable[tuple[str, tuple[str, ...]]], name: str, revised: st
             quiet = 0
             waiting.clear()
             if len(hunk) > LONGEST:
-                # a hunk that ends without context may not begin with any: patch would look for it at the file's end
+                # without trailing context, omit the leading context: patch would search for it at the end of the file
                 before_change = next(k for k, (mark, _) in enumerate(hunk) if mark != " ")
                 first = (first[0] + before_change, first[1] + before_change)
                 yield from _hunk(head, hunk[before_change:], first, before)

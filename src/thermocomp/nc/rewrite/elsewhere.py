@@ -1,4 +1,4 @@
-"""Error of a program, revised for some work offsets, with others, where the drift depends on the position."""
+"""Error of a program when run with work offsets other than those of its revision, for position-dependent drift."""
 
 import math
 from dataclasses import dataclass, field
@@ -6,21 +6,21 @@ from dataclasses import dataclass, field
 from thermocomp.nc.interpreter.block import Point
 from thermocomp.nc.rewrite.demand import DriftSource
 
-#: how far away it is asked [mm]
+#: distance of the compared positions [mm]
 AWAY = 100.0
-#: how often: in time [s], and along the way [mm]
+#: sampling intervals: in time [s], and along the path [mm]
 OFTEN = 20.0
 DENSE = 20.0
 
 
 @dataclass
 class Elsewhere:
-    """Compares the drift in the cuts with that 100 mm away, along each axis, both ways.
+    """Comparison of the drift in the cuts with the drift 100 mm away, along each axis in both directions.
 
     Parameters
     ----------
     most : list of float
-        Per axis of the drift, its largest change [um].
+        Largest change of the drift, per axis [um].
     """
 
     most: list[float] = field(default_factory=lambda: [0.0] * 3)
@@ -28,7 +28,7 @@ class Elsewhere:
     _place: Point = field(default=(math.inf,) * 3, init=False)
 
     def take(self, time: float, point: Point, drift: DriftSource) -> None:
-        """Process the position of a cut [mm, machine coordinates] at a time [s]; most of them add nothing new."""
+        """Process the position of a cut [mm, machine coordinates] at a time [s], if far enough from the last sample."""
         if time - self._time < OFTEN and math.dist(point, self._place) < DENSE:
             return
         self._time, self._place = time, point

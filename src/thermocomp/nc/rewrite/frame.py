@@ -1,4 +1,4 @@
-"""Corrections in machine axes, and as the numbers in a program."""
+"""Conversion of corrections between machine axes and words of a program."""
 
 import math
 from dataclasses import dataclass
@@ -20,9 +20,9 @@ class Frame:
     scale : tuple of float
         Program units per um, of X, Y and Z.
     cosine, sine : float
-        Cosine and sine of the work coordinate system's rotation about Z.
+        Cosine and sine of the rotation of the work coordinate system about Z.
     digits : int
-        Decimals.
+        Number of decimals.
     """
 
     scale: Vector
@@ -40,11 +40,11 @@ class Frame:
 
     @property
     def turned(self) -> bool:
-        """Whether X and Y of the program are not those of the machine."""
+        """Whether X and Y of the program differ in direction from those of the machine."""
         return self.sine != 0 or self.cosine != 1
 
     def words(self, shift: Vector) -> Vector:
-        """Return the amount that a shift [um, machine axes] adds to absolute words, rounded to the decimals."""
+        """Return the amounts that a shift [um, machine axes] adds to absolute words, rounded to the decimals."""
         x, y, z = shift
         if self.turned:
             x, y = self.cosine * x + self.sine * y, self.cosine * y - self.sine * x
@@ -53,7 +53,7 @@ class Frame:
         return round(a * x, digits) + 0.0, round(b * y, digits) + 0.0, round(c * z, digits) + 0.0
 
     def shift(self, words: Vector) -> Vector:
-        """Return the shift [um, machine axes] of numbers that were added to words."""
+        """Return the shift [um, machine axes] for given amounts added to words."""
         x, y, z = (w / s for w, s in zip(words, self.scale, strict=True))
         if self.turned:
             x, y = self.cosine * x - self.sine * y, self.cosine * y + self.sine * x

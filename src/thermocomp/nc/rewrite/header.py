@@ -1,4 +1,4 @@
-"""The comment at the top of a revised program: what was done to it, and that it must not be done again."""
+"""Header comment of a revised program: what was done, and that it must not be revised again."""
 
 import re
 import textwrap
@@ -7,17 +7,17 @@ from collections.abc import Sequence
 from thermocomp.core.exceptions import ProgramError
 from thermocomp.nc.parser.line import Line
 
-#: every line of a header begins so; a program that has one has been revised
+#: beginning of every header line; a program with such a line has been revised
 MARK = "THERMOCOMP"
-#: lines of a header if nobody says how many: what they say is known only when the program has been read to its end
+#: default number of header lines, fixed before their content is known at the end of the program
 LINES = 9
-#: widest comment that old controls read
+#: maximum width of a comment on old controls
 WIDTH = 78
-#: room for words in a line
+#: characters available for text in a line
 ROOM = WIDTH - len(MARK) - 3
 
 _NUMBER = re.compile(r"\s*[O:]\s*\d+\b", re.IGNORECASE)
-#: brackets end a comment; % ends a program on old controls, even in a comment; ; ends a block on some
+#: brackets end a comment; % ends a program on old controls, even in a comment; ; ends a block on some controls
 _TOLD = str.maketrans("()%;", "[]_,")
 
 
@@ -32,13 +32,13 @@ def fill(facts: Sequence[str], ending: str, lines: int = LINES, *, upper: bool =
     Parameters
     ----------
     facts : sequence of str
-        At most ``lines - 1``; what does not fit into a comment is cut or replaced.
+        At most ``lines - 1`` texts; those too long for a comment are truncated, invalid characters replaced.
     ending : str
         Line ending.
     lines : int
         Number of lines.
     upper : bool
-        In capitals: old controls have no small letters.
+        Use capitals: old controls have no lower case letters.
 
     Returns
     -------
@@ -56,7 +56,7 @@ def clean_comment(text: str) -> str:
 
 
 def wrap_text(text: str, lines: int | None = None) -> list[str]:
-    """Return a text in lines of a header, as many as needed; dots replace the part beyond a given number."""
+    """Return a text divided into header lines, as many as needed; dots replace the part beyond a maximum number."""
     return textwrap.wrap(text, ROOM, max_lines=lines, placeholder=" ...")
 
 
@@ -70,5 +70,5 @@ def refuse_revised(line: Line) -> None:
 
 
 def comes_first(line: Line) -> bool:
-    """Return whether a line has to stay before the header: ``%``, the program's number, nothing at all."""
+    """Return whether a line must stay before the header: ``%``, the program number, or an empty line."""
     return line.demarcation or not line.text.strip() or bool(_NUMBER.match(line.text) and not line.flow)

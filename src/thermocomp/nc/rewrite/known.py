@@ -1,4 +1,4 @@
-"""Facts that must be known before a block can be corrected, and the errors where they are not."""
+"""Facts that must be known before a block can be corrected, and the errors if they are unknown."""
 
 import math
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from thermocomp.nc.rewrite.frame import Vector
 
 @dataclass
 class SpindleState:
-    """Spindle speed, also of a program that finds the spindle running."""
+    """Spindle speed, including the case that the spindle already runs at the start of the program."""
 
     setup: Setup
     _told: bool = False
@@ -21,7 +21,7 @@ class SpindleState:
         Raises
         ------
         ProgramError
-            The program cuts, and nobody knows how fast the spindle turns.
+            The program cuts while the spindle speed is unknown.
         """
         if not self._told:
             self._told = any(code in ("M3", "M4", "M5") for code in block.codes)
@@ -37,19 +37,19 @@ class SpindleState:
 
 
 def refuse_unknown(block: Block, setup: Setup, *, by_position: bool) -> None:
-    """Refuse a block in which the drift would not be known.
+    """Refuse a block in which the drift would be unknown.
 
     Parameters
     ----------
     block : Block
     setup : Setup
     by_position : bool
-        The drift depends on the place.
+        The drift depends on the position.
 
     Raises
     ------
     ProgramError
-        It depends on the place, and origin or tool length are not told; a rotary axis may tilt the spindle.
+        The drift depends on the position, and origin or tool length are unknown; or a rotary axis may tilt the spindle.
     """
     if by_position:
         _refuse_unknown_place(block)
@@ -73,7 +73,7 @@ def _refuse_unknown_place(block: Block) -> None:
 
 
 def _refuse_turned(block: Block, setup: Setup) -> None:
-    """Raise `ProgramError` if a rotary axis is not at 0 and may tilt the spindle: it grows along the tool."""
+    """Raise `ProgramError` if a rotary axis is not at 0 and may tilt the spindle, which grows along the tool."""
     for letter, angle in block.turned.items():
         side = setup.rotary.get(letter)
         if side == "table":
@@ -89,7 +89,7 @@ def _refuse_turned(block: Block, setup: Setup) -> None:
 
 
 def refuse_untold_rotation(block: Block, carried: Vector) -> None:
-    """Raise `ProgramError` if a rotation that is stored in the controller would turn corrections of X and Y."""
+    """Raise `ProgramError` if a rotation stored in the controller would rotate corrections of X and Y."""
     if not (carried[0] or carried[1]) or block.modal.rotation_told:
         return
     name, told = system_name(block.modal.system), block.modal.system_told

@@ -1,4 +1,4 @@
-"""Common base of the two methods: the correction that each axis carries, and its change by a block."""
+"""Base class of the correction methods: correction of each axis, and its change by a block."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
@@ -12,49 +12,49 @@ from thermocomp.nc.rewrite.text import LONGEST, Digits, part_comments
 
 AXES = "XYZ"
 ALL: Known = (True, True, True)
-#: shorter ways are none: F counts degrees then, if rotary axes turn [mm]
+#: a shorter linear move counts as none: F is then in degrees if rotary axes move [mm]
 STILL = 1e-7
 
 
 class Change(NamedTuple):
     """Result of revising a block."""
 
-    texts: tuple[str, ...]  #: lines to write instead of its line; the last one is the line itself
-    before: Vector  #: correction that the axes carried when it began [um, machine axes]
-    after: Vector  #: correction that they carry at its end
-    inner: Vector  #: and on the way, in a cycle that ends where it began
-    other: Vector | None = None  #: what they may carry instead at its end, where the program leaves open which
-    placed: bool = True  #: it is known where the axes stood that it names
+    texts: tuple[str, ...]  #: lines that replace the line; the last one is the line itself
+    before: Vector  #: correction of the axes at the start of the block [um, machine axes]
+    after: Vector  #: correction at the end of the block
+    inner: Vector  #: correction during a cycle that ends at its start
+    other: Vector | None = None  #: alternative correction at the end, if the program does not determine which
+    placed: bool = True  #: previous positions of the axes in the block are known
 
 
 @dataclass
 class CorrectionMethod(ABC):
-    """A way of getting a correction into a program.
+    """Method of writing a correction into a program.
 
     Parameters
     ----------
     digits : Digits
     step : float
-        In a cut the correction changes by that at most, per 10 mm of way [um].
+        Maximum change of the correction in a cut per 10 mm of path [um].
     safe_z : float or None
-        At and above this Z of the work coordinates the tool is up [mm].
+        Work coordinate Z at and above which the tool is up [mm].
     """
 
     digits: Digits
     step: float
     safe_z: float | None = None
-    #: correction that each axis carries now [um]
+    #: present correction of each axis [um]
     carried: Vector = field(default=(0.0, 0.0, 0.0), init=False)
-    #: axes that stand where machine coordinates or an optional line have put them: no correction to build on
+    #: axes positioned by machine coordinates or an optional line: without a correction to continue from
     fixed: list[bool] = field(default_factory=lambda: [False, False, False], init=False)
-    #: axes of which nobody knows what they carry: an optional line, a tool change, a stop or a cycle whose end is not
-    #: certain may have moved them
+    #: axes with uncertain correction: an optional line, a tool change, a stop or a cycle with an uncertain end may have
+    #: moved them
     doubtful: list[bool] = field(default_factory=lambda: [False, False, False], init=False)
-    #: what doubtful axes may carry instead [um]
+    #: alternative corrections of doubtful axes [um]
     other: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0], init=False)
-    #: axes whose place was known before the block
+    #: axes whose position was known before the block
     before: Known = field(default=(False, False, False), init=False)
-    #: what the axes carry within a cycle [um]
+    #: correction of the axes within a cycle [um]
     inner: Vector | None = field(default=None, init=False)
     _modal: Modal | None = field(default=None, init=False)
     _frame: Frame = field(default_factory=lambda: Frame.of(Modal(), Digits()), init=False)
@@ -66,7 +66,7 @@ class CorrectionMethod(ABC):
         ----------
         block : Block
         demand : tuple of float
-            Demanded corrections of the axes at its end [um, machine axes].
+            Demanded corrections of the axes at the end of the block [um, machine axes].
 
         Returns
         -------
@@ -82,7 +82,7 @@ class CorrectionMethod(ABC):
         if block.tool_change is not None:  # the changer may have moved any axis
             self.doubt_all()
         texts = self._revise(block, demand)
-        if block.stops:  # the operator may move any axis now
+        if block.stops:  # the operator may now move any axis
             self.doubt_all()
         if len(texts[-1]) > LONGEST and texts[-1] != block.line.text:
             texts = (*texts[:-1], *part_comments(texts[-1]))
@@ -98,17 +98,17 @@ class CorrectionMethod(ABC):
 
     @property
     def splits(self) -> bool:
-        """Whether a cut that is split can follow the drift more nearly."""
+        """Whether splitting a cut can improve the correction."""
         return False
 
     @property
     def leaves_mark(self) -> bool:
-        """Whether something may stay in the controller if the program is aborted."""
+        """Whether an offset may remain in the controller if the program is aborted."""
         return False
 
     @property
     def leaves_offset(self) -> bool:
-        """Whether an offset is in force that the program has to take back."""
+        """Whether an offset is in force that the program must cancel."""
         return False
 
     @abstractmethod
@@ -119,26 +119,26 @@ class CorrectionMethod(ABC):
     def _revise(self, block: Block, demand: Vector) -> tuple[str, ...]: ...
 
     def doubt(self, axis: int, other: float) -> None:
-        """Register that an axis may have another correction [um]; one at machine coordinates does not."""
+        """Record that an axis may have an alternative correction [um], unless it is at machine coordinates."""
         if not self.fixed[axis]:
             if not self.doubtful[axis]:
                 self.other[axis] = other
             self.doubtful[axis] = True
 
     def doubt_all(self) -> None:
-        """Register that any axis may have been moved by hand or by the machine itself."""
+        """Record that any axis may have been moved by hand or by the machine itself."""
         for i in range(3):
             self.doubt(i, self.carried[i])
 
     def stands(self, block: Block) -> bool:
-        """Return whether a block moves no linear axis: it must not do so afterwards either.
+        """Return whether a block moves no linear axis, and so must not move one after revision either.
 
-        So does a cut, or a rapid with a rotary axis, after a stop, if no hand has moved the axes since.
+        This includes cuts, and rapids with a rotary axis, after a stop, if the axes have not been moved by hand since.
 
         Raises
         ------
         ProgramError
-            It turns rotary axes in feed, and nobody knows whether it moves linear axes too, which decides what F means.
+            The block moves rotary axes at feed rate, and the meaning of F depends on unknown motion of linear axes.
         """
         if block.kind != "line":
             return False
@@ -157,21 +157,21 @@ class CorrectionMethod(ABC):
 
     def frame(self, block: Block) -> Frame:
         """Return the conversion of corrections into the words of a block."""
-        if block.modal is not self._modal:  # one snapshot serves many blocks
+        if block.modal is not self._modal:  # one modal state serves many blocks
             self._modal, self._frame = block.modal, Frame.of(block.modal, self.digits)
         return self._frame
 
     def named(self, block: Block) -> list[int]:
-        """Return the axes that a block names."""
+        """Return the axes that have a word in a block."""
         return [i for i, letter in enumerate(AXES) if letter in block.words]
 
     def names_place(self, block: Block) -> bool:
-        """Return whether a block renames the position of the tool.
+        """Return whether a block redefines the coordinates of the present position.
 
         Raises
         ------
         ProgramError
-            It does so in a way that is not followed.
+            The block does so in an unsupported way.
         """
         if "G92" in block.codes:
             return True
@@ -192,7 +192,7 @@ class CorrectionMethod(ABC):
         return True
 
     def leave(self, block: Block) -> None:
-        """Process a move in machine coordinates: its axes have no correction afterwards."""
+        """Process a move to machine coordinates: its axes have no correction afterwards."""
         all_go = block.kind == "home" and ROTARY.isdisjoint(block.words)
         axes = self.named(block) or ([0, 1, 2] if all_go else [])
         if axes and self.frame(block).turned and {0, 1} & set(axes):
@@ -215,7 +215,7 @@ class CorrectionMethod(ABC):
 
 
 def refuse_probing(block: Block) -> None:
-    """Raise `ProgramError` if a block probes: its result contains an unknown correction."""
+    """Raise `ProgramError` if a block probes: its result would contain an unknown correction."""
     if block.kind == "probe":
         raise ProgramError(
             block.line.number,

@@ -1,8 +1,8 @@
-"""The second way: the whole work coordinate system is shifted by ``G52``, where it cannot mark the part.
+"""Correction by offset: ``G52`` shifts the whole work coordinate system, only where this cannot mark the part.
 
-``G52`` is absolute, says itself whether it is in force, and is the same for LinuxCNC and Fanuc. A new one is written at
+``G52`` is absolute, is in force whenever written, and is the same in LinuxCNC and Fanuc. A new one is written at
 safe points only: the tool is up, no cutter compensation or cycle is on, and the next block is a rapid in G90. The words
-of the program stay untouched.
+of the program are unchanged.
 """
 
 from dataclasses import dataclass, field
@@ -15,18 +15,18 @@ from thermocomp.nc.rewrite.frame import Frame, Vector
 from thermocomp.nc.rewrite.method import AXES, STILL, CorrectionMethod
 from thermocomp.nc.rewrite.text import format_number
 
-#: codes that use what G52 uses
+#: codes that use the same stored offset as G52
 SAME_STORE = ("G52", "G92", "G92.1", "G92.2", "G92.3")
 
 
 @dataclass
 class Offset(CorrectionMethod):
-    """Shifts the work coordinate system at safe points.
+    """Correction method that shifts the work coordinate system at safe points.
 
     Parameters
     ----------
     axes : tuple of bool
-        Axes that a ``G52`` names.
+        Axes that ``G52`` names.
     """
 
     axes: tuple[bool, bool, bool] = (True, True, True)
@@ -34,7 +34,7 @@ class Offset(CorrectionMethod):
     _begun: bool = field(default=False, init=False)
     _cycling: bool = field(default=False, init=False)
     _shift: Vector = field(default=(0.0, 0.0, 0.0), init=False)
-    #: what the level carries at which a series of cycles began [um]
+    #: correction at the initial level of a series of cycles [um]
     _level: float | None = field(default=None, init=False)
 
     def held_by(self, block: Block) -> str:  # noqa: ARG002 - whatever it does
@@ -43,12 +43,12 @@ class Offset(CorrectionMethod):
 
     @property
     def leaves_mark(self) -> bool:
-        """Whether something may stay in the controller if the program is aborted."""
+        """Whether an offset may remain in the controller if the program is aborted."""
         return self._begun
 
     @property
     def leaves_offset(self) -> bool:
-        """Whether an offset is in force that the program has to take back."""
+        """Whether an offset is in force that the program must cancel."""
         return self._begun and any(self._shift)
 
     def _revise(self, block: Block, demand: Vector) -> tuple[str, ...]:
@@ -56,7 +56,7 @@ class Offset(CorrectionMethod):
         frame = self.frame(block)
         before: tuple[str, ...] = ()
         if self._safe(block):
-            # in its plane the others would take it up later, in a cut; across it the tool comes down first
+            # other axes of the plane would only move later, in a cut; perpendicular to it, the tool first comes down
             named = {*self.named(block), PLANES[block.modal.plane][2]}
             x, y, z = (demand[i] if i in named else self._shift[i] for i in range(3))
             before = self._update(block, frame, (x, y, z))
@@ -72,7 +72,7 @@ class Offset(CorrectionMethod):
         self._look_up(block)
         return (*before, block.line.text)
 
-    # -- where -------------------------------------------------------------------------------------------------------
+    # -- conditions --------------------------------------------------------------------------------------------------
 
     def _safe(self, block: Block) -> bool:
         modal = block.modal
@@ -85,14 +85,14 @@ class Offset(CorrectionMethod):
             and modal.absolute
             and bool(block.moves)
             and not modal.cutter
-            and not (modal.turned or "G69" in block.codes)  # G52 would come before G69
+            and not (modal.turned or "G69" in block.codes)  # G52 would precede G69
             and not block.line.optional
             and bool(self.named(block))
             and not self.stands(block)
         )
 
     def _near(self, block: Block) -> bool:
-        """Return whether a cycle begins at its R, so that their order must not change, or at the tool position."""
+        """Return whether a cycle begins at its R, so that the order of levels is critical, or at the tool position."""
         first, second, drill = PLANES[block.modal.plane]
         if all(self.before[i] and abs(block.end[i] - block.start[i]) <= STILL for i in (first, second)):
             return True
@@ -100,7 +100,7 @@ class Offset(CorrectionMethod):
         return self.before[drill] and abs(block.start[drill] - plane) < CLEAR
 
     def _look_up(self, block: Block) -> None:
-        """Notice whether the tool is up after a block."""
+        """Update whether the tool is up after a block."""
         if block.tool_change is not None or (block.kind in ("machine", "home") and (self.fixed[2])):
             self._up = True
         elif block.moves:
@@ -108,18 +108,18 @@ class Offset(CorrectionMethod):
             high = self.safe_z is not None and block.known[2] and block.end[2] >= self.safe_z - 1e-9
             level = block.end[2] == block.start[2]
             self._up = rapid and ((high and not block.line.optional) or (self._up and level))
-        if block.moves or block.kind == "cycle":  # K0 stores its words, for the level where the tool is now
+        if block.moves or block.kind == "cycle":  # K0 stores its words, for the present level of the tool
             self._cycling = block.kind == "cycle"
 
     def _stay(self, block: Block, frame: Frame) -> tuple[str, ...]:
-        """Reset the offset of axes that a block names at their position: it would move them."""
+        """Reset the offset of axes that a block names at their present position, so that they do not move."""
         named = self.named(block) if block.modal.absolute else []
         x, y, z = (self.carried[i] if i in named else self._shift[i] for i in range(3))
         if (x, y, z) == self._shift or block.modal.cutter or block.modal.turned or block.line.optional:
             return ()
         return self._update(block, frame, (x, y, z))
 
-    # -- what --------------------------------------------------------------------------------------------------------
+    # -- changes -----------------------------------------------------------------------------------------------------
 
     def _update(self, block: Block, frame: Frame, demand: Vector) -> tuple[str, ...]:
         if frame.turned and any(demand[:2]):
@@ -129,7 +129,7 @@ class Offset(CorrectionMethod):
         words = frame.words(demand)
         if not any(self.axes) or (self._begun and frame.shift(words) == self._shift):
             return ()
-        # the first one is written even if it is zero: an aborted run may have left another one in force
+        # the first G52 is written even if it is zero: an aborted run may have left an offset in force
         self._begun, self._shift = True, frame.shift(words)
         text = "G90 G52" + "".join(
             f" {letter}{format_number(w, frame.digits)}"
@@ -139,10 +139,10 @@ class Offset(CorrectionMethod):
         return (text + ending(block.line.text),)
 
     def _carry(self, block: Block, frame: Frame) -> None:
-        """Follow what the controller makes of it: a named axis goes to the shifted place."""
+        """Update the correction of the axes as the controller does: a named axis moves to the shifted position."""
         kind = block.kind
         if kind in ("machine", "home"):
-            if kind == "home" and block.modal.absolute:  # by way of a place in work coordinates
+            if kind == "home" and block.modal.absolute:  # via a position in work coordinates
                 named = self.named(block)
                 x, y, z = (self._shift[i] if i in named else self.carried[i] for i in range(3))
                 self.inner = x, y, z
@@ -195,7 +195,7 @@ class Offset(CorrectionMethod):
                 )
 
     def _refuse_mixed(self, block: Block, axes: list[int], what: str) -> None:
-        """Raise `ProgramError` if an axis has not moved since the offset was changed, and its place matters."""
+        """Raise `ProgramError` if an axis has not moved since a change of the offset, and its position matters."""
         for i in axes:
             if self.carried[i] != self._shift[i]:
                 raise ProgramError(
@@ -206,5 +206,5 @@ class Offset(CorrectionMethod):
 
 
 def ending(text: str) -> str:
-    """Return the ending of a line."""
+    """Return the line ending of a text."""
     return text[len(text.rstrip("\r\n")) :] or "\n"

@@ -1,4 +1,4 @@
-"""Along a move: how long it is, and where the tool is on it."""
+"""Length of a move, and positions of the tool along it."""
 
 import math
 

@@ -1,7 +1,7 @@
-"""Precompensation: a program is revised before it is run, by the drift it will cause (P-06).
+"""Precompensation: revision of a program before it is run, by the drift it will cause (P-06).
 
-Everything streams: lines are read, followed, timed, corrected and read again one after the other; what a run tells as a
-whole (`Revision`) grows with it.
+All steps are streamed: lines are read, interpreted, timed, corrected and checked one by one; the results for the
+whole run (`Revision`) are updated with each line.
 """
 
 import copy
@@ -30,76 +30,76 @@ from thermocomp.nc.rewrite.offset import ending
 from thermocomp.nc.rewrite.path import find_point, length
 from thermocomp.nc.rewrite.split import Sample, axes_to_split, may_split, pieces, shares
 
-#: lines by which the control is recognised that a program is for
+#: number of lines used to recognise the control of a program
 FIRST = 200
-#: how often a cut is looked at: in time [s], and along the way where the drift depends on the place [mm]
+#: sampling intervals in a cut: in time [s], and along the path if the drift depends on the position [mm]
 OFTEN = 20.0
 DENSE = 20.0
 MOST_PIECES = 1000
-#: the drift continues within a line: so much more than the tolerance may be left before anything is said to hold it
+#: the drift continues within a line: a residual up to this multiple of the tolerance is not reported as held
 TELLING = 1.1
 _PLAIN = frozenset(("G0", "G1"))
 
 
 class Revised(NamedTuple):
-    """A line, and what has become of it."""
+    """Original line with its revision."""
 
-    number: int  #: of the original line; 0 for the header
+    number: int  #: number of the original line; 0 for the header
     text: str  #: the original line; empty for the header
-    texts: tuple[str, ...]  #: what stands in its place
-    block: Block | None  #: what it does; None for the header and for what stands behind the end
-    start: float  #: when it begins [s]
-    end: float  #: when it ends [s]
-    deviation: Vector  #: drift at its end, at its place [um, machine axes]
-    carried: Vector  #: correction that the axes carry at its end [um, machine axes]
-    inner: Vector  #: and on the way, in a cycle that ends where it began
-    cut: CutErrors | None = None  #: what was met in it, if the tool cuts
-    other: Vector | None = None  #: what the axes may carry instead at its end, where the program leaves open which
-    placed: bool = True  #: it is known where the axes stood that it names: if they do not move, they may not
-    knots: tuple[Vector, ...] = ()  #: what the axes carry at the inner ends of its pieces, where it is split [um]
+    texts: tuple[str, ...]  #: lines that replace it
+    block: Block | None  #: effect of the line; None for the header and after the end of the program
+    start: float  #: start time [s]
+    end: float  #: end time [s]
+    deviation: Vector  #: drift at the end of the line, at its end position [um, machine axes]
+    carried: Vector  #: correction of the axes at the end of the line [um, machine axes]
+    inner: Vector  #: correction during a cycle that ends at its start
+    cut: CutErrors | None = None  #: errors in the line, if the tool cuts
+    other: Vector | None = None  #: alternative correction at the end, if the program does not determine which
+    placed: bool = True  #: previous positions of its axes are known; otherwise the line may move them or not
+    knots: tuple[Vector, ...] = ()  #: corrections at the inner ends of the pieces of a split line [um]
 
 
 @dataclass
 class Revision:
-    """One run of the revision.
+    """Revision of one program.
 
     Parameters
     ----------
     setup : Setup
     kinematics : MotionLimits
     drift : DriftSource
-        At its start state.
+        Drift in its initial state.
     method : CorrectionMethod
     demand : Demand
     header_lines : int
-        Lines of the header.
+        Number of header lines.
     split : bool
-        A long cut is split where one change of the correction would leave more than the method's step in its middle.
+        A long cut is split if a single change of the correction would leave more than one step in its middle.
 
     Attributes
     ----------
     left : Left
-        Residual of the drift after the correction in the cuts.
+        Remaining drift in the cuts after the correction.
     elsewhere : Elsewhere
-        Cost of another work offset, where the drift depends on the position.
+        Error with a different work offset, if the drift depends on the position.
     taken_system : bool
-        The tool cut before the program said in which work coordinate system: G54 was taken.
+        The tool cut before the program specified a work coordinate system: G54 was assumed.
     corrected : bool
-        A correction was in force at some time.
+        A correction was in force at some point.
     lines, changed : int
-        Lines read, and how many of them are not as they were.
+        Number of lines read, and of lines changed.
     seconds : float
         Duration of the program [s].
     tool_changes : list of float
         Times of the tool changes [s].
     slowest, fastest : float
-        Spindle speeds met [1/min].
+        Lowest and highest spindle speed [1/min].
     held : dict of str to (float, int)
-        Reason why a correction could not follow the drift in a cut, the largest residual there [um], and its line.
+        By reason why a correction could not follow the drift in a cut: the largest residual [um], and its line.
     standing : int
-        First line that cuts while the spindle is stopped; 0: none does.
+        First line that cuts while the spindle is stopped; 0 if there is none.
     idle : int
-        Lines behind the end of the program that have words: nothing is corrected there.
+        Number of lines with words after the end of the program, which are not corrected.
     """
 
     setup: Setup
@@ -123,25 +123,25 @@ class Revision:
     standing: int = field(default=0, init=False)
     idle: int = field(default=0, init=False)
     _touching: bool = field(default=False, init=False)
-    _why: str = field(default="", init=False)  # what has held the correction in the cut before
+    _why: str = field(default="", init=False)  # reason that held the correction in the previous cut
 
     def rehearse(self, texts: Iterable[str]) -> Iterator[Block]:
-        """Go through a program and correct nothing: what will be refused whatever the drift is refused now, and soon.
+        """Run through a program without corrections, to refuse it early for reasons that do not depend on the drift.
 
         Parameters
         ----------
         texts : iterable of str
-            Its lines, with their endings.
+            Lines of the program, with their endings.
 
         Yields
         ------
         Block
-            One for every line.
+            One for each line.
 
         Raises
         ------
         ProgramError
-            A line cannot be read, followed or shifted safely.
+            A line cannot be read, interpreted or shifted safely.
         """
         method, steered = copy.deepcopy(self.method), known.SpindleState(self.setup)
         nothing: Vector = (0.0, 0.0, 0.0)
@@ -149,7 +149,7 @@ class Revision:
         for block in follow_program(self._guarded(read_lines(_recognised(texts), self.setup.controller)), self.setup):
             steered.speed(block)
             known.refuse_unknown(block, self.setup, by_position=self.drift.by_position)
-            # lines with the words and in the state of one before tell a method that corrects nothing nothing new
+            # lines with the same words and modal state as an earlier one do not change a method without corrections
             words = tuple(block.words)
             plain = block.kind == "line" and _PLAIN.issuperset(block.codes) and not block.line.optional
             if not plain or block.modal is not modal:
@@ -158,7 +158,7 @@ class Revision:
             elif words in seen:
                 yield block
                 continue
-            if plain and ROTARY.isdisjoint(words):  # of those the place counts too
+            if plain and ROTARY.isdisjoint(words):  # for rotary axes, the position matters too
                 seen.add(words)
             method.revise(block, nothing)
             yield block
@@ -169,19 +169,19 @@ class Revision:
         Parameters
         ----------
         texts : iterable of str
-            Its lines, with their endings.
+            Lines of the program, with their endings.
 
         Yields
         ------
         Revised
-            For every line in order, and once for an empty header (`thermocomp.nc.rewrite.header`).
+            One for each line in order, and one for an empty header (`thermocomp.nc.rewrite.header`).
 
         Raises
         ------
         ProgramError
-            The program cannot be revised safely; what was yielded before is worth nothing.
+            The program cannot be revised safely; all previous output is invalid.
         InputError
-            It is not an ISO program.
+            The program is not an ISO program.
         """
         lines = self._guarded(read_lines(_recognised(texts), self.setup.controller))
         check = Check(self.setup)
@@ -243,7 +243,7 @@ class Revision:
         self._refuse_open(ended, carried)
 
     def _cut(self, block: Block, samples: list[Sample], knots: list[tuple[float, Vector]], demand: Vector) -> CutErrors:
-        """Return the error of the tool in a cut, and note the reason that held the correction."""
+        """Return the error of the tool in a cut, and record the reason that held the correction."""
         cut = self.left.take(block.line.number, _beside(samples, knots))
         self._note_held(block, demand, samples[0].deviation, (knots[0][1], knots[-1][1]), cut)
         return cut
@@ -274,7 +274,7 @@ class Revision:
         return revised
 
     def _changed(self, block: Block, samples: list[Sample], check: Check) -> tuple[Change, list[tuple[float, Vector]]]:
-        """Return the change of a block, and the corrections that the axes carry along its path."""
+        """Return the change of a block, and the corrections along its path."""
         method = self.method
         before, begun = method.before, method.carried
         parts = [1.0]
@@ -305,7 +305,7 @@ class Revision:
         ), knots
 
     def _worth(self, block: Block, samples: list[Sample], parts: list[float]) -> bool:
-        """Return whether less is left in a cut that is split, and at its end not more than a step more."""
+        """Return whether splitting a cut reduces its residual, with an increase at the end of at most one step."""
         found = []
         for ends in ([1.0], parts):
             method = copy.deepcopy(self.method)
@@ -325,7 +325,7 @@ class Revision:
             raise ProgramError(line, str(e)) from e
 
     def _cuts(self, block: Block) -> bool:
-        """Return whether the tool may cut in a block: it moves in feed, or stays where it has cut."""
+        """Return whether the tool may cut in a block: it moves at feed rate, or stays in contact after a cut."""
         if block.tool_change is not None or block.kind in ("machine", "home"):
             self._touching = False
         elif block.moves:
@@ -334,7 +334,7 @@ class Revision:
         return self._touching
 
     def _advance(self, block: Block, dt: float, speed: float, point: Point, cutting: bool) -> list[Sample]:
-        """Let the time of a block pass; return where a cut is looked at, but for its end."""
+        """Advance the drift over a block; return the samples of a cut, except that at its end."""
         if dt > 0 and speed:
             self.slowest = min(self.slowest, abs(speed))
             self.fastest = max(self.fastest, abs(speed))
@@ -368,7 +368,7 @@ class Revision:
     def _note_held(
         self, block: Block, demand: Vector, drift: Vector, ends: tuple[Vector, Vector], cut: CutErrors
     ) -> None:
-        """Note what keeps the correction from following in a cut that began at a drift."""
+        """Record the reason that held the correction in a cut, given the drift at its start."""
         tolerance = self.demand.tolerance
         gap = max(*cut.left[1], -min(cut.left[0]))
         if gap <= TELLING * tolerance:
@@ -386,7 +386,7 @@ class Revision:
             self.held[self._why] = gap, block.line.number
 
     def _refuse_open(self, ended: bool, carried: Vector) -> None:
-        """Raise `ProgramError` if an offset would stay in force behind the last line."""
+        """Raise `ProgramError` if an offset would remain in force after the last line."""
         if not ended and any(carried) and self.method.leaves_offset:
             raise ProgramError(
                 self.lines,
@@ -395,7 +395,7 @@ class Revision:
 
 
 def _recognised(texts: Iterable[str]) -> Iterator[str]:
-    """Pass lines on, if they are of a control that is known."""
+    """Return the lines unchanged, if the control is a supported one."""
     rest = iter(texts)
     first = list(itertools.islice(rest, FIRST))
     recognise(first)
@@ -403,7 +403,7 @@ def _recognised(texts: Iterable[str]) -> Iterator[str]:
 
 
 def _beside(samples: list[Sample], knots: list[tuple[float, Vector]]) -> Iterator[tuple[Vector, Vector]]:
-    """Yield deviation and the correction that is in force there: it changes evenly from knot to knot."""
+    """Yield deviation and correction of each sample: the correction is linear between knots."""
     k = 1
     for sample in samples:
         while sample.share > knots[k][0]:

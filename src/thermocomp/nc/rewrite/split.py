@@ -1,4 +1,4 @@
-"""Splits a long cut into pieces where one straight change of the correction would leave too much in its middle."""
+"""Splitting of a long cut if a single linear change of the correction would leave too large an error in its middle."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -15,13 +15,13 @@ from thermocomp.nc.rewrite.offset import ending
 from thermocomp.nc.rewrite.path import find_point
 from thermocomp.nc.rewrite.text import format_number
 
-#: decimals of places inside a cut: they lie beside the path by a thousandth of what a correction is rounded to
+#: decimals of positions inside a cut: their rounding is a thousandth of that of a correction
 DIGITS: Final = 6
-#: shorter pieces are not made [mm]
+#: minimum length of a piece [mm]
 SHORTEST: Final = 2.0
-#: pieces of one cut at most
+#: maximum number of pieces of a cut
 MOST: Final = 64
-#: what may stand beside the motion code: all that comes into force before the first piece and stays so
+#: codes allowed next to the motion code: they take effect before the first piece and stay in force
 _BESIDE: Final = frozenset(
     {
         "G1",
@@ -47,21 +47,21 @@ _BESIDE: Final = frozenset(
 
 
 class Sample(NamedTuple):
-    """A place in a block."""
+    """Sampled position in a block."""
 
-    share: float  #: of its way
-    deviation: Vector  #: of the tool point [um]
-    demand: Vector | None  #: what the axes should carry there [um]; None: not asked for
+    share: float  #: fraction of the path
+    deviation: Vector  #: deviation of the tool point [um]
+    demand: Vector | None  #: required correction of the axes [um]; None: not computed
 
 
 def may_split(block: Block, before: Known) -> bool:
-    """Return whether a block is a plain cut of which every place is known.
+    """Return whether a block is a plain cut with known positions.
 
     Parameters
     ----------
     block : Block
     before : tuple of bool
-        Axes whose place was known before it.
+        Axes whose position was known before the block.
     """
     modal, words = block.modal, block.words
     ends = block.line.text.endswith(("\r", "\n"))  # not the last line of a file
@@ -88,13 +88,13 @@ def shares(samples: Sequence[Sample], carried: Vector, axes: Sequence[int], step
     Parameters
     ----------
     samples : sequence of Sample
-        From the start to the end.
+        Samples from the start to the end.
     carried : tuple of float
         Corrections of the axes at the start [um].
     axes : sequence of int
-        Those whose correction can change within it.
+        Axes whose correction can change within the cut.
     step : float
-        As much may be left inside a piece [um].
+        Allowed residual inside a piece [um].
     way : float
         Length of the cut [mm].
     """
@@ -118,23 +118,23 @@ def shares(samples: Sequence[Sample], carried: Vector, axes: Sequence[int], step
 
 
 def axes_to_split(block: Block, before: Known) -> list[int]:
-    """Return the axes whose correction can change within a block: all of a line, the third one of an arc."""
+    """Return the axes whose correction can change within a block: all for a line, the third one for an arc."""
     arc = block.moves[0].arc
     found = range(3) if arc is None else (PLANES[arc.plane][2],)
     return [i for i in found if AXES[i] in block.words or before[i]]
 
 
 def pieces(block: Block, parts: Sequence[float], before: Known, controller: Controller) -> Iterator[Block]:
-    """Yield the pieces of a block, each as if it were a line of the program.
+    """Yield the pieces of a block, as if each were a line of the program.
 
     Parameters
     ----------
     block : Block
-        One that `may_split`.
+        A block for which `may_split` is True.
     parts : sequence of float
         Ends of the parts, as fractions of its path; the last is 1.
     before : tuple of bool
-        Axes whose place was known before it.
+        Axes whose position was known before the block.
     controller : {'linuxcnc', 'fanuc'}
     """
     move, modal = block.moves[0], block.modal
@@ -167,14 +167,14 @@ def pieces(block: Block, parts: Sequence[float], before: Known, controller: Cont
 
 
 def _words(block: Block) -> list[int]:
-    """Return the axes that every piece names."""
+    """Return the axes that have a word in every piece."""
     arc = block.moves[0].arc
     plane = () if arc is None else PLANES[arc.plane][:2]
     return [i for i, letter in enumerate(AXES) if letter in block.words or i in plane]
 
 
 def _place(block: Block, end: Point, share: float, shift: Sequence[float]) -> Point:
-    """Return a place inside a cut in program coordinates, as it is written [mm]."""
+    """Return a position inside a cut in program coordinates, rounded as written [mm]."""
     if block.moves[0].arc is None:
         exact = [a + share * (b - a) for a, b in zip(block.start, block.end, strict=True)]
     else:
@@ -198,7 +198,7 @@ def _bare(values: dict[str, float]) -> str:
 
 
 def _written(block: Block, values: dict[str, float], drop: str) -> str:
-    """Return the text of a block's line with these words; those that it does not have come behind its last one."""
+    """Return the line of a block with the given words; additional ones are appended after its last word."""
     text = block.line.text
     behind = max(word.end for word in block.line.words)
     added = _bare({letter: value for letter, value in values.items() if letter not in block.words})

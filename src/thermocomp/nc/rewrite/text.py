@@ -1,4 +1,4 @@
-"""Writing a shift into the words of a line; whatever is not shifted stays as it is, byte for byte."""
+"""Writing of shifts into the words of a line; everything else is preserved byte for byte."""
 
 import re
 from collections.abc import Mapping
@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from thermocomp.nc.interpreter.block import Block
 from thermocomp.nc.parser.line import Line, Word
 
-#: characters of a line that every control reads: LinuxCNC takes what is behind the 252nd for the next line
+#: maximum line length for all controls: LinuxCNC reads characters after the 252nd as the next line
 LONGEST = 240
 
 _COMMENTS = re.compile(r"\([^()]*\)|;.*")
 
-#: letter -> what is added to its value, in the program's units
+#: letter -> amount added to its value, in the program's units
 Shifts = Mapping[str, float]
 
 
@@ -23,7 +23,7 @@ class Digits:
     Parameters
     ----------
     mm, inch : int
-        Decimals to which a correction is rounded: all of it is in these decimals, so that no word is rounded twice.
+        Decimals to which a correction is rounded, so that words are not rounded a second time.
     """
 
     mm: int = 4
@@ -34,12 +34,12 @@ class Digits:
         return self.inch if inch else self.mm
 
 
-#: LinuxCNC reads any number of decimals; a Fanuc with its least increment of 1 um (IS-B) no more than these
+#: LinuxCNC reads any number of decimals; a Fanuc with a least increment of 1 um (IS-B) at most these
 DIGITS = {"linuxcnc": Digits(), "fanuc": Digits(3, 4)}
 
 
 def format_number(value: float, digits: int) -> str:
-    """Return a number always with a decimal point, and without redundant zeros."""
+    """Return a number as text, always with a decimal point, and without redundant zeros."""
     text = f"{value:.{digits}f}".rstrip("0")
     if text.endswith("."):
         text += "0"
@@ -47,15 +47,15 @@ def format_number(value: float, digits: int) -> str:
 
 
 def shift_words(block: Block, shifts: Shifts, added: Mapping[str, float], digits: int) -> str:
-    """Return the text of a block's line with shifted words.
+    """Return the line of a block with shifted words.
 
     Parameters
     ----------
     block : Block
     shifts : mapping of str to float
-        By letter of a word that stands on the line; a word with a shift of 0 is left alone.
+        Shift by letter of a word on the line; a word with a shift of 0 is unchanged.
     added : mapping of str to float
-        Words that are not on the line and come behind its last one, in this order.
+        Words to be appended after the last word of the line, in this order.
     digits : int
         Decimals of shifts and added words.
 
@@ -79,7 +79,7 @@ def shift_words(block: Block, shifts: Shifts, added: Mapping[str, float], digits
 
 
 def part_comments(text: str) -> tuple[str, ...]:
-    """Return a line, the comments of one that is too long on a line before it, where controls show them anyway."""
+    """Return a line; if it is too long, its comments are moved to a line before it."""
     comments = _COMMENTS.findall(text)
     if len(text) <= LONGEST or not comments:
         return (text,)
@@ -93,7 +93,7 @@ def _start(change: tuple[Word, float]) -> int:
 
 
 def _end(line: Line) -> int:
-    """Return the column behind the last word of a line."""
+    """Return the column after the last word of a line."""
     return max(word.end for word in line.words)
 
 
@@ -104,9 +104,9 @@ def format_shifted(word: Word, value: float, shift: float, digits: int) -> str:
     ----------
     word : Word
     value, shift : float
-        In the program's units.
+        Value and shift, in the program's units.
     digits : int
-        Decimals at least; a word that has more keeps them.
+        Minimum number of decimals; a word with more keeps them.
     """
     if word.number is None:
         return f"[{word.value.strip()}{'+' if shift > 0 else ''}{format_number(shift, digits)}]"

@@ -1,17 +1,17 @@
-"""Check that a program stays within the travel of the machine: if not, the program or its stated origins are wrong."""
+"""Check that a program stays within the travel of the machine; otherwise the program or the given origins are wrong."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from thermocomp.nc.rewrite.revise import Revised
 
-#: so far beyond the travel an axis has to go before anybody is told [mm]
+#: minimum distance beyond the travel that is reported [mm]
 BEYOND = 1.0
 
 
 @dataclass
 class Travel:
-    """Checks the cuts of a program in machine coordinates, where program or setup define origin and tool length.
+    """Check of the cuts of a program in machine coordinates, if program or setup define origin and tool length.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class Travel:
                     self._farthest[axis] = beyond, position, block.line.number
 
     def warnings(self) -> list[str]:
-        """Return the axes that have left their travel, and the positions farthest beyond."""
+        """Return warnings for the axes that exceed their travel, with the positions farthest beyond it."""
         return [
             f"{axis} goes to {position:.6g} mm at line {line}, in machine coordinates: outside its travel, "
             f"{self.limits[axis][0]:g} to {self.limits[axis][1]:g} mm; check the program and the origins"

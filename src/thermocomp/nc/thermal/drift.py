@@ -1,8 +1,9 @@
-"""The drift along a program: frozen models in free run, driven by its spindle speed (P-05, P-06).
+"""Drift along a program: frozen models in free run, driven by its spindle speed (P-05, P-06).
 
-Time passes in pieces as short as a move; the models are stepped on a coarser clock: at least every `Drift.step`
-seconds, when the spindle speed changes, and again soon after that, since part of a deviation may follow the speed at
-once. While the inputs are constant the families of `thermocomp.core` do not mind how a time is divided.
+Program time advances in steps as short as a move; the models are stepped on a coarser clock: at least every
+`Drift.step` seconds, when the spindle speed changes, and again soon after, because part of a deviation may follow the
+speed immediately. While the inputs are constant, the results of the families of `thermocomp.core` do not depend on the
+division of time into steps.
 """
 
 import copy
@@ -21,21 +22,21 @@ from thermocomp.nc.thermal.jobstate import JobState
 from thermocomp.nc.thermal.start import ThermalStart, hand_over_state
 from thermocomp.nc.thermal.stations import AXES, Station, check_stations
 
-#: a speed that lasts no longer counts with its share of the mean; what follows a speed at once does so after this [s]
+#: a speed of shorter duration is averaged; the immediate response to a speed is updated after this time [s]
 SOON = 0.5
-#: a pause with a forecast is divided into so many steps at most
+#: maximum number of steps into which a pause with a forecast is divided
 MOST_STEPS = 5000
 
 
 class Outside(NamedTuple):
-    """An input that was beyond the range a model was trained in, the margin of its support included."""
+    """Input that was beyond the range in which a model was trained, including the margin of its support."""
 
     name: str
     unit: str
     low: float  #: trained range [unit]
     high: float
-    farthest: float  #: the value farthest from it [unit]
-    seconds: float  #: how long it was outside [s]
+    farthest: float  #: value farthest outside [unit]
+    seconds: float  #: time outside [s]
 
 
 class Drift:
@@ -44,31 +45,31 @@ class Drift:
     Parameters
     ----------
     stations : sequence of Station
-        Per axis one, or several along one axis: between them the deviation is linear, beyond them that of the
-        outermost (P-04).
+        One per axis, or several along one axis: between them the deviation is linear, beyond them it is that of the
+        outermost one (P-04).
     start : ThermalStart
         From `thermocomp.nc.thermal.start`.
     others : mapping of str to Signal, optional
-        Inputs that the program does not tell.
+        Inputs that do not follow from the program.
     zero : {'start', 'cold', 'last'}
-        From where the drift counts. ``start``: work offsets and tools were set at the start of the program; ``cold``:
-        on the cold machine, the deviation is what the models say; ``last``: as in the job that was carried over.
+        Zero of the drift. ``start``: work offsets and tools were set at the start of the program; ``cold``: on the cold
+        machine, the deviation is the output of the models; ``last``: as in the previous job.
     step : float
-        The models are stepped at least this often [s].
+        Maximum time between steps of the models [s].
 
     Attributes
     ----------
     time : float
-        Since the start of the program, up to the last step of the models [s].
+        Time since the start of the program, up to the last step of the models [s].
     assumed : tuple of str
-        Assumptions made at the start about one measurement for several stations.
+        Assumptions made at the start if one measurement applies to several stations.
     beyond : dict of str to float
-        Per axis, how far the positions asked for were beyond its outermost station, at most [mm].
+        Largest distance of a requested position beyond the outermost station, per axis [mm].
 
     Raises
     ------
     InputError
-        The stations do not fit together, a model wants an input that nobody gives, or there is no last job.
+        The stations are inconsistent, a model requires an input that is not given, or there is no last job.
     """
 
     def __init__(
@@ -109,7 +110,7 @@ class Drift:
             self.advance(start.pause, 0.0)
             self._flush()
             self.time = 0.0
-        # an error of the model at the moment that counts as zero is an error at all later ones
+        # a model error at the time of the zero affects all later times
         if zero == "start":
             self._zeros, self._zero_known = [float(s.deviation) for s in self._states], start.known
         elif zero == "last" and start.zeros is not None:
@@ -118,17 +119,17 @@ class Drift:
             self._zero_known = True
         self._publish()
 
-    # -- time passes -------------------------------------------------------------------------------------------------
+    # -- time --------------------------------------------------------------------------------------------------------
 
     def advance(self, dt: float, speed: float) -> None:
-        """Let time pass with the spindle at a speed.
+        """Advance the time with the spindle at a speed.
 
         Parameters
         ----------
         dt : float
-            [s]
+            Time step [s].
         speed : float
-            [1/min]; the sense of rotation does not matter.
+            Spindle speed [1/min]; the direction of rotation does not matter.
 
         Raises
         ------
@@ -156,7 +157,7 @@ class Drift:
         self._due = min(SOON, self.step)
 
     def _flush(self) -> None:
-        """Step the models through the time that has passed since their last step."""
+        """Step the models through the time since their last step."""
         total, speed = self._pending, self._speed
         if self._counted:
             speed = (self._turns + (total - self._counted) * speed) / total
@@ -180,7 +181,7 @@ class Drift:
             if not station.model.remembers:
                 self._doubts[k] = said if out.any() else 0.0
             elif k in self._doubtful or out.any():
-                # once the memory has been driven by inputs that were cut, it stays in doubt
+                # a memory that was driven by clipped inputs remains doubtful
                 self._doubtful.add(k)
                 self._doubts[k] = max(self._doubts[k], said)
 
@@ -194,10 +195,10 @@ class Drift:
                 farthest = value
             self._outside[k, i] = farthest, seconds + dt
 
-    # -- where the tool point is -------------------------------------------------------------------------------------
+    # -- deviation ---------------------------------------------------------------------------------------------------
 
     def deviation(self, point: Point) -> Point:
-        """Return by how much the tool point deviates now, actual minus commanded, at a place.
+        """Return the present deviation of the tool point, actual minus commanded, at a position.
 
         Parameters
         ----------
@@ -207,7 +208,7 @@ class Drift:
         Returns
         -------
         tuple of float
-            X, Y, Z, counted from the stated zero; 0 for an axis without a model [um].
+            X, Y, Z, relative to the given zero; 0 for an axis without a model [um].
         """
         if not self._ladders:
             return self._everywhere
@@ -221,23 +222,23 @@ class Drift:
         return (found[0], found[1], found[2])
 
     def field(self) -> Callable[[Point], Point]:
-        """Return the present `deviation` as a function of position that time no longer changes."""
+        """Return the present `deviation` as a function of position that is independent of time."""
         everywhere = self._everywhere
         if not self._ladders:
             return lambda _: everywhere
         frozen = copy.copy(self)
         frozen._ladders = tuple(copy.copy(ladder) for ladder in self._ladders)
-        frozen.beyond = {}  # asked for anywhere, not only where the program goes
+        frozen.beyond = {}  # separate: positions may be outside the program
         return frozen.deviation
 
     @property
     def values(self) -> tuple[float, ...]:
-        """Deviation now, per station, counted from the stated zero [um]."""
+        """Present deviation, per station, relative to the given zero [um]."""
         return tuple(float(s.deviation) - z for s, z in zip(self._states, self._zeros, strict=True))
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """The axes that have a model."""
+        """Axes that have a model."""
         return tuple(a for a in AXES if any(s.axis == a for s in self.stations))
 
     @property
@@ -249,11 +250,11 @@ class Drift:
 
     @property
     def by_position(self) -> bool:
-        """True if the deviation varies with the place."""
+        """Whether the deviation depends on the position."""
         return bool(self._ladders)
 
     def _publish(self) -> None:
-        """Make ready what `deviation` gives until the next step."""
+        """Update the values that `deviation` returns until the next step."""
         values = self.values
         places = [0.0, 0.0, 0.0]
         for station, value in zip(self.stations, values, strict=True):
@@ -262,11 +263,11 @@ class Drift:
         for ladder in self._ladders:
             ladder.values = values[ladder.stations]
 
-    # -- how far to trust it -----------------------------------------------------------------------------------------
+    # -- uncertainty -------------------------------------------------------------------------------------------------
 
     @property
     def outside(self) -> tuple[Outside, ...]:
-        """Inputs that have left the trained range of a model so far; per input the model it left the farthest."""
+        """Inputs that have left the trained range of a model so far, each with the model of the largest excess."""
         found: dict[str, Outside] = {}
         for (k, i), (farthest, seconds) in self._outside.items():
             state, channel = self._states[k], self.stations[k].model.inputs[i]
@@ -279,15 +280,15 @@ class Drift:
 
     @property
     def held(self) -> dict[str, float]:
-        """Forecasts that do not cover the program so far, and for how long they were held beyond their points [s]."""
+        """Forecasts that do not cover the program so far, with the time held beyond their points [s]."""
         used = {i.name for s in self.stations for i in s.model.inputs}
         return {n: h for n, s in self._others.items() if n in used and (h := s.held(self.time)) > 0}
 
     def uncertainty(self) -> tuple[float, float, float]:
         """Return the error bounds of the models.
 
-        Per axis, of its stations the greatest of: the greatest error on cycles the method had not seen, twice if the
-        zero itself is a prediction; and, since an input has left the trained range, all that the model says on top.
+        Per axis, the largest value of its stations: the largest error on unseen cycles, doubled if the zero itself is a
+        prediction, plus, after an input has left the trained range, the whole output of the model.
 
         Returns
         -------
@@ -302,17 +303,17 @@ class Drift:
                 worst[k] = error if not math.isnan(worst[k]) else math.nan
         return (worst[0], worst[1], worst[2])
 
-    # -- the next job ------------------------------------------------------------------------------------------------
+    # -- next job ----------------------------------------------------------------------------------------------------
 
     def state(self) -> JobState:
-        """Return the state from which the next job can start; the models are stepped up to now."""
+        """Return the state from which the next job can start, after stepping the models to the present time."""
         if self._pending:
             self._flush()
         return hand_over_state(self.stations, self._states, self._zeros, self._doubts, zero_known=self._zero_known)
 
 
 class _Ladder:
-    """The stations of one axis along another one."""
+    """Stations of one axis along another axis."""
 
     __slots__ = ("along", "axis", "positions", "stations", "values")
 
@@ -321,7 +322,7 @@ class _Ladder:
         self.values: tuple[float, ...] = ()
 
     def at(self, position: float) -> float:
-        """Return the deviation at a position, linear between stations, that of the outermost beyond them [um]."""
+        """Return the deviation at a position, linear between stations, constant beyond the outermost ones [um]."""
         positions, values = self.positions, self.values
         k = bisect_right(positions, position)
         if k == 0:

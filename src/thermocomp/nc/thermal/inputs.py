@@ -1,4 +1,4 @@
-"""Inputs of the models along a program: the spindle speed of the program, all else constant or forecast."""
+"""Inputs of the models along a program: spindle speed from the program, all others constant or forecast."""
 
 import math
 from bisect import bisect_right
@@ -17,7 +17,7 @@ from thermocomp.core.units import read_with_unit
 FloatArray = NDArray[np.float64]
 
 SPEED = "spindle_speed"
-#: how a value of each quantity is written, in messages
+#: example value of each quantity, for messages
 _EXAMPLES = {
     "temperature": "21.5degC",
     "displacement": "3um",
@@ -29,19 +29,19 @@ _EXAMPLES = {
 
 @dataclass(frozen=True)
 class InputSignal:
-    """A value over the time of the program: linear between its points, held before the first and after the last.
+    """Value over the time of the program: linear between its points, constant before the first and after the last.
 
     Parameters
     ----------
     time : tuple of float
-        Since the start of the program, rising [s].
+        Time since the start of the program, increasing [s].
     values : tuple of float
-        As many.
+        Values at these times.
 
     Raises
     ------
     InputError
-        There is no point, a number is not finite, or the time does not rise.
+        There is no point, a number is not finite, or the time does not increase.
     """
 
     time: tuple[float, ...]
@@ -59,12 +59,12 @@ class InputSignal:
 
     @classmethod
     def constant(cls, value: float) -> "InputSignal":
-        """Return the signal that always has this value."""
+        """Return a constant signal."""
         return cls((0.0,), (value,))
 
     @property
     def varies(self) -> bool:
-        """False if it is constant."""
+        """Whether the signal is not constant."""
         return len(self.time) > 1
 
     def at(self, time: float) -> float:
@@ -78,32 +78,32 @@ class InputSignal:
         return (1.0 - share) * self.values[k - 1] + share * self.values[k]
 
     def held(self, time: float) -> float:
-        """Return for how long of the program, up to a time, it was held beyond its points [s]."""
+        """Return the duration, up to a time of the program, for which the value was held beyond its points [s]."""
         if not self.varies:
             return 0.0
         return max(time - self.time[-1], 0.0) + max(min(time, self.time[0]), 0.0)
 
 
-#: input name to its value over the program
+#: signal over the program, by input name
 Inputs = Mapping[str, InputSignal]
 
 
 class Wiring:
     """Sources of the inputs of one model.
 
-    An input of quantity ``spindle_speed`` gets the speed of the program; one without influence on the deviation needs
-    nothing.
+    An input of quantity ``spindle_speed`` gets the speed of the program; an input without influence on the deviation
+    needs no source.
 
     Parameters
     ----------
     model : ErrorModel
     others : mapping of str to InputSignal
-        Inputs that the program does not tell.
+        Inputs that do not follow from the program.
 
     Raises
     ------
     InputError
-        The model wants an input that nobody gives.
+        The model requires an input that is not given.
     """
 
     def __init__(self, model: ErrorModel, others: Inputs) -> None:
@@ -116,11 +116,11 @@ class Wiring:
 
     @property
     def varies(self) -> bool:
-        """True if there is a forecast among the inputs."""
+        """Whether a forecast is among the inputs."""
         return bool(self._varying)
 
     def values(self, time: float, speed: float) -> FloatArray:
-        """Return the inputs of the model, in its order, at a time [s] and a spindle speed [1/min]."""
+        """Return the inputs of the model, in their order, at a time [s] and a spindle speed [1/min]."""
         values = self._values.copy()
         for k in self._speed:
             values[k] = speed
@@ -135,7 +135,7 @@ def constants(texts: Sequence[str], models: Sequence[ErrorModel]) -> dict[str, I
     Parameters
     ----------
     texts : sequence of str
-        Such as ``t3=21.5degC``: an input, with or without its unit at the end (``t3_C``), and its value with a unit.
+        Input name, with or without its unit at the end (``t3_C``), and value with a unit, such as ``t3=21.5degC``.
     models : sequence of ErrorModel
         Models that have these inputs.
 
@@ -146,7 +146,7 @@ def constants(texts: Sequence[str], models: Sequence[ErrorModel]) -> dict[str, I
     Raises
     ------
     InputError
-        No model has such an input, it is the spindle speed, it is there twice, or the value has no unit of it.
+        No model has the input, it is the spindle speed, it is given twice, or its value has no suitable unit.
     """
     inputs = {i.name: i for m in models for i in m.inputs}
     found: dict[str, InputSignal] = {}

@@ -1,4 +1,4 @@
-"""`JobState`: what one job leaves behind for the next one."""
+"""`JobState`: thermal state at the end of a job, for the next one."""
 
 from dataclasses import dataclass
 
@@ -17,16 +17,16 @@ class StationState:
     target : str
         Target of its model.
     model : str
-        Hash of the numbers of the model.
+        Hash of the parameters of the model.
     reference : tuple of float
         Zero of each input.
     memory : tuple of float
     deviation : float
-        Last deviation given [um].
+        Last output deviation [um].
     zero : float
         Deviation that counts as zero [um].
     doubt : float
-        Widening of the bound because the model had left its training range [um].
+        Increase of the bound because the model has left its training range [um].
     """
 
     station: str
@@ -49,18 +49,18 @@ class StationState:
 
 @dataclass(frozen=True)
 class JobState:
-    """State that one job leaves for the next one (E-P5).
+    """State at the end of a job, for the next one (E-P5).
 
     Parameters
     ----------
     stations : tuple of StationState
     zero_known : bool
-        The deviation that counts as zero is no prediction: the machine was cold then, or measured.
+        The deviation that counts as zero is not a prediction: the machine was cold at that time, or measured.
 
     Raises
     ------
     InputError
-        There is no station, or one of them is there twice.
+        There is no station, or a station occurs twice.
     """
 
     stations: tuple[StationState, ...]

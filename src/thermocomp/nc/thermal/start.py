@@ -1,4 +1,4 @@
-"""The state the machine is in when the program starts: cold, left by the last job, or measured (E-P5)."""
+"""Thermal state of the machine at the start of the program: cold, left by the last job, or measured (E-P5)."""
 
 import hashlib
 import json
@@ -17,34 +17,34 @@ from thermocomp.nc.thermal.inputs import SPEED, Inputs, Wiring
 from thermocomp.nc.thermal.jobstate import JobState, StationState
 from thermocomp.nc.thermal.stations import Station
 
-#: a speed that explains a measured deviation is looked for between so many
+#: number of speeds tried to explain a measured deviation
 _TRIED = 129
-#: how well it explains it [um]
+#: tolerance for a deviation to be explained [um]
 _CLOSE = 1e-9
-#: an autoregressive model has settled after that [s]
+#: settling time of an autoregressive model [s]
 _LONG = 2 * 86400.0
 
 
 class ThermalStart(NamedTuple):
-    """State of the models when the program starts, or earlier by the time the spindle is stopped."""
+    """State of the models at the start of the program, or earlier by a pause of the spindle."""
 
     states: tuple[State, ...]  #: per station
-    known: bool  #: the state is no prediction: the machine is cold or measured
+    known: bool  #: the state is not a prediction: the machine is cold or measured
     pause: float = 0.0  #: time the spindle is stopped before the program [s]
     zeros: tuple[float, ...] | None = None  #: deviation that counted as zero in the last job, per station [um]
-    zero_known: bool = False  #: that one was no prediction
-    doubts: tuple[float, ...] | None = None  #: what the last job widened the bound by, per station [um]
-    assumed: tuple[str, ...] = ()  #: what was made of one measurement for several stations
+    zero_known: bool = False  #: the zero of the last job was not a prediction
+    doubts: tuple[float, ...] | None = None  #: increase of the bound in the last job, per station [um]
+    assumed: tuple[str, ...] = ()  #: assumptions if one measurement applies to several stations
 
 
 def begin_cold(stations: Sequence[Station], others: Inputs) -> ThermalStart:
-    """Return the state of a machine at rest: the spindle has not turned for long.
+    """Return the state of a machine at rest: the spindle has been stopped for a long time.
 
     Parameters
     ----------
     stations : sequence of Station
     others : mapping of str to Signal
-        Inputs that the program does not tell.
+        Inputs that do not follow from the program.
 
     Returns
     -------
@@ -53,20 +53,20 @@ def begin_cold(stations: Sequence[Station], others: Inputs) -> ThermalStart:
     Raises
     ------
     InputError
-        A model wants an input that nobody gives.
+        A model requires an input that is not given.
     """
     return ThermalStart(tuple(_resting(s.model, Wiring(s.model, others), 0.0) for s in stations), known=True)
 
 
 def carry_over(stations: Sequence[Station], left: JobState, pause: float = 0.0) -> ThermalStart:
-    """Return the state that the last job has left, and a pause in which the spindle was stopped still.
+    """Return the state at the end of the last job, and a pause with the spindle stopped.
 
     Parameters
     ----------
     stations : sequence of Station
     left : JobState
     pause : float
-        From the end of the last job to the start of this one [s].
+        Time from the end of the last job to the start of this one [s].
 
     Returns
     -------
@@ -75,7 +75,7 @@ def carry_over(stations: Sequence[Station], left: JobState, pause: float = 0.0) 
     Raises
     ------
     InputError
-        The state is not that of these models, or the pause is negative.
+        The state belongs to other models, or the pause is negative.
     """
     if not 0 <= pause < math.inf:
         raise InputError(f"pause since the last job: {pause} s must be finite and not negative")
@@ -99,18 +99,18 @@ def carry_over(stations: Sequence[Station], left: JobState, pause: float = 0.0) 
 def begin_measured(stations: Sequence[Station], deviations: Mapping[str, float], others: Inputs) -> ThermalStart:
     """Return a state in which the outputs of the models equal the measurement, with the spindle stopped.
 
-    An autoregressive model is told its past. For another one that remembers, the machine is taken to have settled at
-    that constant spindle speed, the least one in the trained range, at which the deviation is the measured one as soon
-    as the spindle stops. One measurement fixes all stations of an axis: each gets the state of the one speed at which
-    the mean over them, or that of the one station that was measured, is the measured deviation.
+    An autoregressive model gets the measurement as its past. For other models with memory, the machine is assumed to
+    have settled at a constant spindle speed: the lowest one in the trained range at which the deviation equals the
+    measured one as soon as the spindle stops. One measurement determines all stations of an axis: each gets the state
+    for the one speed at which the mean over them, or the deviation of the one measured station, equals the measurement.
 
     Parameters
     ----------
     stations : sequence of Station
     deviations : mapping of str to float
-        By axis, or by target: that of one station of an axis or of each; counted from the cold machine [um].
+        Measured deviation by axis, or by target (one or all stations of an axis), relative to the cold machine [um].
     others : mapping of str to Signal
-        Inputs that the program does not tell.
+        Inputs that do not follow from the program.
 
     Returns
     -------
@@ -119,8 +119,8 @@ def begin_measured(stations: Sequence[Station], deviations: Mapping[str, float],
     Raises
     ------
     InputError
-        A deviation is missing, belongs to no station or to one that has another already; a model has no memory, or no
-        speed in its trained range leaves the measured deviation.
+        A deviation is missing, or belongs to no station or to one that already has another; a model has no memory, or
+        no speed in its trained range causes the measured deviation.
     """
     by_axis = {a: [s for s in stations if s.axis == a] for a in dict.fromkeys(s.axis for s in stations)}
     known = [n for a, mine in by_axis.items() for n in (a, *(_names(s)[0] for s in mine if len(mine) > 1))]
@@ -156,22 +156,22 @@ def begin_measured(stations: Sequence[Station], deviations: Mapping[str, float],
 
 
 def deviations(texts: Sequence[str]) -> dict[str, float]:
-    """Read what the user has measured.
+    """Parse the deviations measured by the user.
 
     Parameters
     ----------
     texts : sequence of str
-        Such as ``Z=12um``, ``z_at_200=0.012mm``.
+        Measurements, such as ``Z=12um``, ``z_at_200=0.012mm``.
 
     Returns
     -------
     dict of str to float
-        By axis (upper case) or target [um].
+        Deviation by axis (upper case) or target [um].
 
     Raises
     ------
     InputError
-        Not of that form, or named twice.
+        A text does not have this form, or a name occurs twice.
     """
     found: dict[str, float] = {}
     for text in texts:
@@ -202,11 +202,11 @@ def hand_over_state(
     ----------
     stations : sequence of Station
     states : sequence of State
-        States of their models.
+        Present states of the models.
     zeros, doubts : sequence of float
         Per station, see `StationState` [um].
     zero_known : bool
-        The zeros are no predictions.
+        The zeros are not predictions.
 
     Returns
     -------
@@ -231,19 +231,19 @@ def hand_over_state(
 
 
 def identity(model: ErrorModel) -> str:
-    """Return a hash of the numbers a model is made of; where it comes from and how it was judged do not matter."""
+    """Return a hash of the parameters of a model, independent of its origin and assessment."""
     numbers = {k: v for k, v in asdict(model).items() if k not in ("family", "provenance", "honest_error")}
     return hashlib.sha256(json.dumps([model.family, numbers], sort_keys=True).encode()).hexdigest()
 
 
 def _names(station: Station) -> list[str]:
-    """Return the names for a measured deviation of a station, the best first; its axis is another name."""
+    """Return the names accepted for a measured deviation of a station, the preferred one first, besides its axis."""
     target = station.model.target
     return [n for n in (target.removesuffix("_um"), target) if n != station.axis]
 
 
 def _resting(model: ErrorModel, wiring: Wiring, speed: float) -> State:
-    """Return the state of a machine that has settled at a constant speed."""
+    """Return the state of a machine settled at a constant speed."""
     return model.step(model.init(), wiring.values(0.0, speed), 0.0)[0]
 
 
@@ -267,9 +267,9 @@ def _restored(model: ErrorModel, saved: StationState) -> State:
 def _explaining(
     stations: Sequence[Station], seen: Sequence[Station], others: Inputs, deviation: float
 ) -> tuple[list[State], float]:
-    """Return states of the stations of an axis, the spindle standing still, and the speed [1/min] that leaves them.
+    """Return states of the stations of an axis with the spindle stopped, and the preceding speed [1/min].
 
-    The mean over those that were seen is the measured deviation [um].
+    In these states, the mean over the measured stations is the measured deviation [um].
     """
     what = seen[0].model.target if len(seen) == 1 else f"{seen[0].axis} (the mean of {len(seen)} models)"
     if not math.isfinite(deviation):
@@ -314,7 +314,7 @@ def _explaining(
 
 
 def _stopped(model: ErrorModel, wiring: Wiring, speed: float) -> State:
-    """Return the state of a machine that has settled at a constant speed, as soon as the spindle stops."""
+    """Return the state of a machine settled at a constant speed, as soon as the spindle stops."""
     if isinstance(model, Ticking):
         reference, inputs = model.init().reference, wiring.values(0.0, speed)
         begun = model.begin_at(0.0, inputs, np.where(np.isnan(reference), inputs, reference))
@@ -330,7 +330,7 @@ def _begun(model: Ticking, wiring: Wiring, deviation: float) -> State:
 
 
 def _bisected(too_much: Callable[[float], float], low: float, high: float) -> float:
-    """Return the zero of a function with a sign change between both ends, to the precision of the numbers."""
+    """Return the zero of a function with a sign change between both ends, to floating-point precision."""
     rising = too_much(low) <= 0
     while low < (middle := 0.5 * (low + high)) < high:
         if (too_much(middle) <= 0) == rising:

@@ -11,36 +11,36 @@ from thermocomp.core.units import read_with_unit
 
 AXES = "XYZ"
 _NUMBER = r"-?\d+(?:\.\d+)?"
-#: x_um, z, z_at_200, x_at_z-50_um
+#: target names such as x_um, z, z_at_200, x_at_z-50_um
 _NAME = re.compile(rf"([xyz])(?:_at_([xyz]?)({_NUMBER})(?:mm)?)?(?:_um)?", re.IGNORECASE)
-#: y1_um, but not yaw
+#: axis letter at the beginning of a name: y1_um, but not yaw
 _BEGINS = re.compile(r"[xyz](?![a-z])", re.IGNORECASE)
-#: Z, X at Z 200 mm
+#: axes given by the user: Z, X at Z 200 mm
 _PLACE = re.compile(rf"([xyz])(?:\s+at\s+([xyz])\s*=?\s*({_NUMBER}\s*[a-z]*))?", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
 class Station:
-    """A model of the drift of one axis; one of several along an axis, or the only one.
+    """Model of the drift of one axis: the only one, or one of several along an axis.
 
     Parameters
     ----------
     axis : {'X', 'Y', 'Z'}
-        The direction that deviates.
+        Axis along which the tool point deviates.
     model : ErrorModel
-        In um.
+        Model with an output in um.
     along : {'X', 'Y', 'Z'} or None
-        The axis whose position it depends on; None: the model holds everywhere.
+        Axis on whose position the drift depends; None: the model is valid everywhere.
     at : float
         Position along it at which the model is valid, machine coordinate [mm].
     shadow : bool
-        True: the drift is computed, and no machine runs by it, as in a study; the model may be one that was never
-        judged.
+        True: the drift is only computed, for example in a study, and not used to run a machine; the model may be one
+        that was never judged.
 
     Raises
     ------
     InputError
-        The model is not in um, or may not run; there is no such axis.
+        The model is not in um, or may not run; or the axis does not exist.
     """
 
     axis: str
@@ -66,26 +66,26 @@ class Station:
 
 
 def stations(models: Sequence[ErrorModel], texts: Sequence[str] = ()) -> list[Station]:
-    """Find out which axis each model is for.
+    """Return the stations of the models, with their axes.
 
     Parameters
     ----------
     models : sequence of ErrorModel
-        Models of one model file, or of several.
+        Models from one or more model files.
     texts : sequence of str
-        What the user says: ``ch3=Z``, ``zz=X at Z 200 mm``, or only a target whose name says it. Models that no text
-        names are left out. Without any text all are taken, and the names of their targets must say it: ``x``, ``y_um``,
-        ``z_at_200``, ``x_at_z200`` (positions in mm).
+        Assignments by the user: ``ch3=Z``, ``zz=X at Z 200 mm``, or only a target whose name specifies the axis. Models
+        without a text are ignored. Without any text all are used, and the names of their targets must specify the axis:
+        ``x``, ``y_um``, ``z_at_200``, ``x_at_z200`` (positions in mm).
 
     Returns
     -------
     list of Station
-        By axis and position.
+        Stations by axis and position.
 
     Raises
     ------
     InputError
-        A target is unknown, comes twice, or does not say its axis; or the stations do not fit together.
+        A target is unknown, occurs twice, or does not specify its axis; or the stations are inconsistent.
     """
     targets = [m.target for m in models]
     if len(set(targets)) != len(targets):
@@ -105,13 +105,13 @@ def stations(models: Sequence[ErrorModel], texts: Sequence[str] = ()) -> list[St
 
 
 def check_stations(found: Sequence[Station]) -> list[Station]:
-    """Return stations in their order, by axis and position.
+    """Return stations ordered by axis and position.
 
     Raises
     ------
     InputError
-        There is none, or an axis has neither a single one that holds everywhere nor several along one axis, each at
-        another place.
+        There is no station, or an axis has neither a single one valid everywhere nor several along one axis, each at a
+        different position.
     """
     if not found:
         raise InputError("no model was given to correct a program with; give at least one")
@@ -140,7 +140,7 @@ def _by_name(model: ErrorModel, targets: Sequence[str]) -> Station:
         axis, along, at = (part and part.upper() for part in match.groups())
         if at is None:
             return Station(axis, model)
-        if along or axis == "Z":  # x_at_200 could be a place along X as well as along Z
+        if along or axis == "Z":  # x_at_200 could be a position along X or Z
             return Station(axis, model, along or axis, float(at))
     begins = _BEGINS.match(model.target)
     meant = begins[0].upper() if begins else "Z"

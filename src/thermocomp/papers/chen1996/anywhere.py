@@ -1,7 +1,7 @@
-"""Chen, Yuan, Ni 1996, headline: the error anywhere in the work volume, compensated.
+"""Chen, Yuan, Ni 1996, headline: compensation of the error anywhere in the work volume.
 
-The synthesis itself is in the paper's ref. 6; here it is that of `thermocomp.volumetric`. What is compensated is judged
-by `thermocomp.virtual.volume`, which knows the machine and nothing of that synthesis.
+The synthesis itself is in ref. 6 of the paper; here that of `thermocomp.volumetric` is used. The compensation is judged
+by `thermocomp.virtual.volume`, which models the machine independently of that synthesis.
 """
 
 from collections.abc import Collection, Mapping
@@ -29,14 +29,14 @@ from thermocomp.virtual.probes import NEARER, swing
 from thermocomp.virtual.volume import VolumetricTruth
 from thermocomp.volumetric.models.position import PositionFit
 
-#: points in the work volume, each in a thermal state of its own (C-35)
+#: number of points in the work volume, each in a different thermal state (C-35)
 POINTS = 1000
-#: what first order may cost against exact transforms [um]
+#: largest permitted difference between first order and exact transforms [um]
 CLOSED = 0.1
-#: share of the points that the error's upper bound is told for [%]
+#: share of the points for which the upper bound of the error is reported [%]
 MOST = 95
 WITHOUT, WITH, LINES = "no compensation", "all components", "one straight line per axis"
-#: where what is left comes from
+#: causes of the residual
 SPINDLE, AXES_SHARE, START = "drift of the tool point at rest", "axes", "start of a test"
 MIDDLE = tuple(float(TEST_POSITION[a]) for a in AXES)
 #: shortest and longest tool [mm]
@@ -45,19 +45,19 @@ TOOLS = (60.0, 300.0)
 
 @dataclass(frozen=True, eq=False)
 class Volume:
-    """Residuals of compensation at random points of the work volume, in random thermal states of unseen tests.
+    """Residuals after compensation at random points of the work volume, in random thermal states of unseen tests.
 
     Parameters
     ----------
     learned : LearnedVolume
     errors : mapping of str to ndarray of shape (n, 3)
-        By what was compensated [um].
+        Errors by type of compensation [um].
     causes : mapping of str to ndarray of shape (n, 3)
-        What is left with all components, by what was not told; and what is left at the start of the test [um].
+        Residuals with all components by cause, including that at the start of the test [um].
     by_component : mapping of str to float
-        RMS of what each component's error does to the tool point [um].
+        RMS effect of the error of each component on the tool point [um].
     closure : float
-        Largest difference between the error of first order, from the true components, and the true error [um].
+        Largest difference between the first-order error from the true components and the true error [um].
     """
 
     learned: LearnedVolume
@@ -77,18 +77,19 @@ class Volume:
 
 
 class _Points(NamedTuple):
-    """Random points of the volume in random rows of a test: the machine then, and the prediction of a model.
+    """Random points of the volume in random rows of a test, with the state of the machine and the model predictions.
 
     Parameters
     ----------
     now, start : ndarray of shape (n, n_observables)
-        The machine at the instant, and when the test began.
+        Observables of the machine at the time of the row, and at the start of the test.
     points, tools : ndarray of shape (n, 3)
-        [mm]
+        Points, and vectors to the tool tip [mm].
     told : ndarray of shape (n, 32)
         Predicted components [um, urad].
     full, lines, begin : ndarray of shape (n, 3)
-        Corrections: by all components, by one straight line per axis, and by all components when the test began [um].
+        Corrections: by all components, by one straight line per axis, and by all components at the start of the test
+        [um].
     """
 
     now: FloatArray
@@ -102,7 +103,7 @@ class _Points(NamedTuple):
 
 
 def judge(learned: LearnedVolume, seed: int) -> Volume:
-    """Compensate experiment ``volumetric-new`` at random points of the volume and in random rows of its tests.
+    """Judge compensation in experiment ``volumetric-new`` at random points of the volume and in random rows.
 
     Parameters
     ----------
@@ -128,7 +129,7 @@ def judge(learned: LearnedVolume, seed: int) -> Volume:
         alone[:, columns] = values[:, columns]
         return np.vstack([kinematics.synthesize(*each)[0] for each in zip(alone, p.points, p.tools, strict=True)])
 
-    # the zero was set at the test position with this tool, when the test began
+    # the zero was set at the test position with this tool, at the start of the test
     zero = truth.error(p.start, np.tile(MIDDLE, (POINTS, 1)), p.tools)
     errors = {
         name: truth.error(p.now, p.points + 1e-3 * added, p.tools) - zero + added
@@ -181,15 +182,15 @@ def _points(learned: LearnedVolume, test: SimulatedTest, n: int, rng: np.random.
 
 
 def as_measured(truth: VolumetricTruth, now: FloatArray, start: FloatArray, points: FloatArray) -> FloatArray:
-    """Return the true components as measured: lasers set to zero at the test position, and a nest there.
+    """Return the true components as measured: lasers zeroed at the test position, and a probe nest there.
 
     Parameters
     ----------
     truth : VolumetricTruth
     now, start : ndarray of shape (n, n_observables)
-        The machine at the instant, and when the nest was set to zero.
+        Observables of the machine at the time of the row, and when the nest was zeroed.
     points : ndarray of shape (n, 3)
-        [mm]
+        Points [mm].
 
     Returns
     -------
@@ -205,7 +206,7 @@ def as_measured(truth: VolumetricTruth, now: FloatArray, start: FloatArray, poin
             values[:, INDEX[code]] = value
         elif group == "axis":
             values[:, INDEX[code]] = value - there[code]
-        else:  # the nest sees the sum of all bodies
+        else:  # the nest measures the sum over all bodies
             bodies = [code, *(f"E{code[0]}{axis}" for axis in "XYZ")]
             values[:, INDEX[code]] = sum(there[body] - before[body] for body in bodies)
     for axis, nearer in NEARER.items():
@@ -220,7 +221,7 @@ def as_measured(truth: VolumetricTruth, now: FloatArray, start: FloatArray, poin
     return values
 
 
-# -- claims ----------------------------------------------------------------------------------------------------------
+# -- claims ------------------------------------------------------------------------------------------------------------
 
 
 claims = Claims[Volume]()
@@ -287,17 +288,17 @@ def _lines(found: Volume) -> str:
 
 
 def numbers(found: Volume) -> dict[str, float]:
-    """Return the figures that a page can assert."""
+    """Return the numbers asserted by the documentation."""
     made = {"volume_closure_um": found.closure, "volume_gain": found.gain(), "volume_gain_lines": found.gain(LINES)}
     short = {WITHOUT: "none", LINES: "lines", WITH: "all"}
     return made | {f"volume_{short[name]}_um": rms(e) for name, e in found.sizes.items()}
 
 
-# -- tables and figures ----------------------------------------------------------------------------------------------
+# -- tables and figures ------------------------------------------------------------------------------------------------
 
 
 def tables(found: Volume) -> list[StudyTable]:
-    """Return the error before and after, and what each component was made of and leaves."""
+    """Return the errors before and after compensation, and source and residual of each component."""
     rows = []
     for name, size in found.sizes.items():
         along = [f"{rms(found.errors[name][:, k]):.2f}" for k in range(3)]
@@ -334,7 +335,7 @@ def figures(found: Volume) -> list[Figure]:
 
 
 def _off(fit: PositionFit) -> float:
-    """Return the error of the cold profile of EYX from the true one, RMS over the travels of X and Z [um]."""
+    """Return the RMS error of the cold profile of EYX over the travels of X and Z [um]."""
     x, z = np.meshgrid(*(np.linspace(0.0, TRAVEL[a], 31) for a in "xz"))
     points = np.stack([x.ravel(), np.full(x.size, float(TEST_POSITION["y"])), z.ravel()], axis=-1)
     assert fit.model.profile is not None

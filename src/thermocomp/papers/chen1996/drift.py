@@ -1,4 +1,4 @@
-"""Chen, Yuan, Ni 1996, sections 3.2 and 4.2: the drifts of the spindle, fitted by regression and by a net."""
+"""Chen, Yuan, Ni 1996, sections 3.2 and 4.2: spindle drifts, fitted by regression and by a neural net."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,29 +16,29 @@ from thermocomp.papers.chen1996.setup import CLOSELY, COMPETITIVE, DRIFTS, TEMPE
 from thermocomp.papers.study import Claims, FloatArray, Ours
 from thermocomp.recordings.samples import Samples
 
-#: printed: unscreened and screened terms (C-10, C-20), mean absolute errors after training [um] (C-31)
+#: printed: numbers of unscreened and screened terms (C-10, C-20), mean absolute errors after training [um] (C-31)
 CANDIDATES = {"x": 20, "y": 35, "z": 20}
 TERMS = {"x": 7, "y": 15, "z": 7}
 MAE_NET = {"x": 6.5, "y": 4.2, "z": 6.0}
 MAE_MRA = {"x": 8.9, "y": 3.8, "z": 6.9}
-#: printed: fit of x (C-19), removals in the log, which is that of y (C-17, E-C1)
+#: printed: fit of x (C-19), number of removals in the log, which belongs to y (C-17, E-C1)
 R2_X, SEE_X, REMOVALS = 0.988, 10.628, 6
-#: hidden nodes of the chosen net (C-26), how often it is trained, and what else is tried, how often
+#: hidden nodes of the chosen net (C-26) and number of trainings; alternatives and number of trainings of each
 HIDDEN, STARTS = 20, 5
 SWEEP, SWEEP_STARTS = (5, 10, 15, 25, 30), 3
 
 
 @dataclass(frozen=True, eq=False)
 class LearnedNet:
-    """A net, from one start.
+    """A net trained from one set of starting weights.
 
     Parameters
     ----------
     net : SigmoidNet
     models : mapping of str to ErrorModel
-        One per drift.
+        Model of each drift.
     mae : mapping of str to float
-        After training [um].
+        Mean absolute error after training [um].
     """
 
     net: SigmoidNet
@@ -47,7 +47,7 @@ class LearnedNet:
 
     @property
     def mean(self) -> float:
-        """Mean of the three [um]."""
+        """Mean over the three drifts [um]."""
         return float(np.mean(list(self.mae.values())))
 
 
@@ -59,13 +59,14 @@ class LearnedDrift:
     ----------
     samples : Samples
     regressions : mapping of str to SecondOrderRegression
-        Per drift.
+        Regression of each drift.
     models : mapping of str to ErrorModel
-        The same, frozen.
+        The regressions, frozen.
     wide : mapping of str to ErrorModel
-        Ours, to tell what the choice of the subgroups does: stepwise regressions on all nine, as the net gets them.
+        Additional models to show the effect of the subgroups: stepwise regressions on all nine temperatures, as for the
+        net.
     nets : sequence of LearnedNet
-        9-20-3, each from another start.
+        9-20-3 nets, each from other starting weights.
     others : mapping of str to sequence of LearnedNet
         Methods that the paper tried and rejected (C-26, C-28, C-30).
     """
@@ -79,12 +80,12 @@ class LearnedDrift:
 
     @cached_property
     def typical(self) -> LearnedNet:
-        """The net with the median error after training: the one that is drawn."""
+        """The net with the median error after training, which is shown in the figures."""
         return sorted(self.nets, key=lambda t: t.mean)[len(self.nets) // 2]
 
     @cached_property
     def mra_residual(self) -> dict[str, FloatArray]:
-        """Of the regressions on the 810 rows [um]."""
+        """Residuals of the regressions on the 810 rows [um]."""
         return {t: common.residual(m, self.samples) for t, m in self.models.items()}
 
     def mae_net(self, target: str) -> FloatArray:
@@ -93,7 +94,7 @@ class LearnedDrift:
 
     @cached_property
     def net(self) -> dict[str, float]:
-        """Median of these, by drift [um]."""
+        """Median mean absolute error of the nets, by drift [um]."""
         return {t: float(np.median(self.mae_net(t))) for t in DRIFTS}
 
     @cached_property
@@ -103,12 +104,12 @@ class LearnedDrift:
 
     @property
     def terms(self) -> dict[str, int]:
-        """Terms of the regressions."""
+        """Number of terms of the regressions."""
         return {t: len(r.terms_) for t, r in self.regressions.items()}
 
     @property
     def candidates(self) -> dict[str, int]:
-        """Terms that they were chosen from."""
+        """Number of candidate terms of the regressions."""
         return {t: len(r.candidates_) for t, r in self.regressions.items()}
 
     @property
@@ -118,19 +119,19 @@ class LearnedDrift:
 
     @property
     def ranges(self) -> dict[str, float]:
-        """From the lowest to the highest drift [um]."""
+        """Range of each drift [um]."""
         return {t: float(np.ptp(common.take_measured(self.samples, t))) for t in DRIFTS}
 
 
 def learn(seed: int, told: Callable[[float], None]) -> LearnedDrift:
-    """Run the five tests and fit what the paper fits.
+    """Run the five tests and fit the models of the paper.
 
     Parameters
     ----------
     seed : int
-        Random seed of weather and noise; the nets' own starts are the same for every seed.
+        Random seed of weather and noise; the starting weights of the nets are the same for each seed.
     told : callable
-        Is told the share done (0..1).
+        Called with the completed fraction (0..1).
 
     Returns
     -------
@@ -167,7 +168,7 @@ def _train(net: SigmoidNet, heat: Samples) -> LearnedNet:
     return LearnedNet(net, models, mae)
 
 
-# -- claims --------------------------------------------------------------------------------------------------------
+# -- claims ------------------------------------------------------------------------------------------------------------
 
 claims = Claims[LearnedDrift]()
 
@@ -267,7 +268,7 @@ def _nodes(found: LearnedDrift) -> Ours:
 
 
 def _rejected(found: LearnedDrift, kind: str) -> Ours:
-    """Judge what the paper rejected: its mean error after training must be above that of the chosen net."""
+    """Return our result for a rejected alternative: its mean error after training must exceed the chosen one's."""
     chosen, other = (float(np.mean([n.mean for n in nets])) for nets in (found.nets, found.others[kind]))
     return Ours(
         f"{chosen:.2f} um; {kind} {other:.2f} um",
@@ -314,7 +315,7 @@ def _starts(found: LearnedDrift) -> str:
 
 
 def screening(found: LearnedDrift) -> dict[str, tuple[float, ...]]:
-    """Return the correlation of each of the nine temperatures with x, y, z, without its sign (C-11)."""
+    """Return the absolute correlation of each of the nine temperatures with x, y, z (C-11)."""
     change = found.samples.change()
     return {
         name: tuple(abs(float(np.corrcoef(change[:, j], y)[0, 1])) for y in found.samples.deviations.T)
@@ -323,7 +324,7 @@ def screening(found: LearnedDrift) -> dict[str, tuple[float, ...]]:
 
 
 def numbers(found: LearnedDrift) -> dict[str, float]:
-    """Return the figures that a page can assert; of the nets the median."""
+    """Return the numbers asserted by the documentation; medians for the nets."""
     made = {"rows": float(len(found.samples)), "parameters_net": float(found.typical.net.n_parameters_)}
     for t, r in found.regressions.items():
         made |= {

@@ -1,8 +1,8 @@
 """Chen, Yuan, Ni 1996, section 3.3: recovery of the slope law from 51 profiles. Eq. 6 and 8 are the known law.
 
-The virtual machine's own slopes follow no law in temperatures that anyone knows. So its temperatures are kept, and its
-profiles are replaced by those of a machine that obeys Eq. 6 and 8; noise is then put on all that is read. What is found
-can be held against what was planted (C-23).
+The slopes of the virtual machine follow no known law of the temperatures. Therefore only its temperatures are used, and
+its profiles are replaced by those of a machine that obeys Eq. 6 and 8; noise is added to all readings. The recovered
+law can thus be compared with the known one (C-23).
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,15 +25,15 @@ from thermocomp.recordings.profiles import Profiles
 from thermocomp.recordings.recording import Recording
 from thermocomp.volumetric.models.position import PositionFit, PositionOptions, fit_position
 
-#: noise of one run of the laser at a position [um], and of one reading of a temperature [degC]
+#: noise of one laser run at a position [um], and of one temperature reading [degC]
 LASER, SENSOR = 0.3, 0.05
-#: share of the draws in which the whole law must come back, to say that it does
+#: minimum share of draws with the complete law for it to count as recovered
 MOST = 0.95
-#: days with another weather, and draws of the noise over all of them: of `OURS`, and of each other design
+#: number of days with different weather, and of noise draws over all of them: for `OURS`, and for each other design
 DAYS, DRAWS, FEWER = 5, 200, 50
-#: nodes of the 5-8-1 net (C-27)
+#: number of hidden nodes of the 5-8-1 net (C-27)
 HIDDEN = 8
-#: where the laser measures [mm]
+#: measuring positions of the laser [mm]
 POSITIONS = np.arange(0.0, 551.0, 50.0)
 
 
@@ -47,13 +47,14 @@ class Design:
     experiment : str
         Experiment that supplies the temperatures.
     runs : int
-        Number of runs of the laser, whose mean is a profile; the temperatures are means over them too.
+        Number of laser runs, whose mean is a profile; the temperatures are means over the same runs.
     centred : bool
-        Temperatures and slopes count from the mean of all states of their test; else from its first one, as Chen's.
+        Temperatures and slopes are relative to the mean of all states of their test; else to the first state, as
+        in Chen's work.
     laser, sensor : float
-        As `LASER` and `SENSOR`.
+        See `LASER` and `SENSOR`.
     hierarchy : bool
-        A square or product enters only when its factors are in; Chen's are free of that (C-21).
+        Whether squares and products require their factors as terms; not so for Chen (C-21).
     """
 
     name: str
@@ -70,13 +71,13 @@ class Design:
         return SecondOrderRegression(differences=setup.DIFFERENCES, subset=SLOPE_VARIABLES, hierarchy=self.hierarchy)
 
     def reference(self, n_states: int) -> list[int]:
-        """Return the states of a test that are counted from the mean of."""
+        """Return the states of a test whose mean is the reference."""
         return list(range(n_states)) if self.centred else [0]
 
 
-#: the one that tells the law
+#: the design that recovers the law
 OURS = Design("three tests, five runs, counted from the mean state")
-#: a day of the paper, what helps, and what spoils it
+#: the measurement of the paper, improvements of it, and degradations
 DESIGNS = (
     Design("one warm-up, one run, counted from the cold state", "chen1996-slope", 1, centred=False),
     Design("three tests, five runs, counted from the cold state", centred=False),
@@ -102,12 +103,12 @@ class Measured(NamedTuple):
     errors: FloatArray
 
     def counted(self, design: Design) -> tuple[FloatArray, FloatArray]:
-        """Return changes of temperature and slopes k1 [um/m], from where the design counts."""
+        """Return changes of temperature and slopes k1 [um/m], relative to the reference of the design."""
         change, thermal = (v - v[design.reference(len(v))].mean(axis=0) for v in self)
         return change, 1e3 * (thermal @ POSITIONS) / (POSITIONS @ POSITIONS)
 
     def profiles(self, name: str) -> Profiles:
-        """Return the same as profiles of EYY, an hour apart, with the differences that the slope depends on."""
+        """Return the data as profiles of EYY, one hour apart, with the temperature differences for the slope."""
         n = len(self.errors)
         channels = tuple(Channel(t, "temperature", "degC") for t in TEMPERATURES)
         table = pd.DataFrame(self.temperatures, columns=list(TEMPERATURES))
@@ -122,13 +123,13 @@ class Measured(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Recovery:
-    """Recovery of the law in many draws.
+    """Recovery of the law over many draws.
 
     Parameters
     ----------
     design : Design
     found : sequence of mapping of str to float
-        Per draw, coefficients by the names of the terms [um/m per degC, degC2].
+        Coefficients by term name, one mapping per draw [um/m per degC, degC2].
     """
 
     design: Design
@@ -146,12 +147,12 @@ class Recovery:
 
     @property
     def wrong(self) -> float:
-        """Share of the draws in which a term came in that is not in Eq. 8."""
+        """Share of the draws with a term that is not in Eq. 8."""
         return float(np.mean([bool(f.keys() - EQ8.keys()) for f in self.found]))
 
     @property
     def coefficients(self) -> FloatArray:
-        """Coefficients of Eq. 8 in the draws with exactly its terms, (n_whole, 4); a row of nan if there are none."""
+        """Coefficients of Eq. 8 in the draws with exactly its terms, (n_whole, 4); one row of nan if there are none."""
         rows = [[f[t] for t in EQ8] for f in self.found if f.keys() == EQ8.keys()]
         return np.array(rows or [[np.nan] * len(EQ8)])
 
@@ -169,12 +170,12 @@ def temperatures(experiment: str, seed: int) -> list[FloatArray]:
 
 
 def plant(day: Sequence[FloatArray], design: Design, rng: np.random.Generator) -> list[Measured]:
-    """Measure profiles by Eq. 6 and 8.
+    """Return simulated measurements of profiles that obey Eq. 6 and 8.
 
     Parameters
     ----------
     day : sequence of ndarray of shape (n_runs, 9)
-        From `temperatures`, a row per run of the laser; the first is that of the cold machine.
+        From `temperatures`, one row per laser run; the first is the cold machine.
     design : Design
     rng : Generator
         Generator of the noise.
@@ -196,12 +197,12 @@ def plant(day: Sequence[FloatArray], design: Design, rng: np.random.Generator) -
 
 
 def slope(change: FloatArray) -> FloatArray:
-    """Return the slope of Y by Eq. 8 [um/m].
+    """Return the slope of Y according to Eq. 8 [um/m].
 
     Parameters
     ----------
     change : ndarray of shape (n, 9)
-        T1 to T9 [degC].
+        Changes of T1 to T9 [degC].
     """
     column = dict(zip(TEMPERATURES, change.T, strict=True))
     k1 = np.zeros(len(change))
@@ -212,13 +213,13 @@ def slope(change: FloatArray) -> FloatArray:
 
 
 def recover(design: Design, days: Sequence[Sequence[FloatArray]], n_draws: int, seed: int) -> Recovery:
-    """Seek the law in many draws.
+    """Return the recovery of the law over many draws.
 
     Parameters
     ----------
     design : Design
     days : sequence of sequence of ndarray
-        With another weather each, taken in turn; see `plant`.
+        Temperatures of days with different weather, used in turn; see `plant`.
     n_draws : int
     seed : int
         Random seed of the noise.
@@ -244,14 +245,14 @@ class Law:
     fit : PositionFit
         Fit of the first draw of `OURS`.
     net : SigmoidNet
-        5-8-1, trained on the same profiles, counted from the cold state.
+        5-8-1 net, trained on the same profiles, relative to the cold state.
     net_r2 : float
-        About zero, in-sample (E-C10).
+        R2 about zero, in-sample (E-C10).
     idle : float
-        Largest change of the net's slope over the range of T1, on which the law does not depend [um/m].
+        Largest change of the net's slope over the range of T1, which is not in the law [um/m].
     elsewhere : mapping of str to float
-        Of a test in which all is warmed together: RMS of the slope ("law"), and of what regression ("MRA") and net
-        ("net") miss of it [um/m].
+        For a test in which all temperatures rise together: RMS of the slope ("law"), and of the residuals of regression
+        ("MRA") and net ("net") [um/m].
     """
 
     recoveries: Mapping[Design, Recovery]
@@ -263,7 +264,7 @@ class Law:
 
 
 def seek(seed: int) -> Law:
-    """Plant the law and seek it, by all designs.
+    """Simulate measurements that obey the law and recover it, for all designs.
 
     Parameters
     ----------
@@ -276,7 +277,7 @@ def seek(seed: int) -> Law:
     """
     days = {e: [temperatures(e, seed + k) for k in range(DAYS)] for e in {d.experiment for d in DESIGNS}}
     recoveries = {d: recover(d, days[d.experiment], DRAWS if d is OURS else FEWER, seed) for d in DESIGNS}
-    # the first draw again, whatever it gave
+    # the first draw again, whatever its outcome
     first = plant(days[OURS.experiment][0], OURS, np.random.default_rng(seed))
     profiles = [m.profiles(f"test {k}") for k, m in enumerate(first, start=1)]
     options = PositionOptions(order=EQ6.degree(), inputs=SLOPE_VARIABLES, method=SigmoidNet(hidden=HIDDEN))
@@ -306,11 +307,11 @@ def seek(seed: int) -> Law:
 
 
 def r2_about_zero(measured: FloatArray, predicted: FloatArray) -> float:
-    """Return R2 about zero, as of a regression without constant (E-C10)."""
+    """Return R2 about zero, as for a regression without a constant (E-C10)."""
     return float(1 - np.sum((measured - predicted) ** 2) / np.sum(measured**2))
 
 
-# -- claims --------------------------------------------------------------------------------------------------------
+# -- claims ------------------------------------------------------------------------------------------------------------
 
 
 claims = Claims[Law]()
@@ -359,7 +360,7 @@ def _net(found: Law) -> str:
 
 
 def numbers(found: Law) -> dict[str, float]:
-    """Return the figures that a page can assert."""
+    """Return the numbers asserted by the documentation."""
     ours, paper, cold = (found.recoveries[d] for d in (OURS, DESIGNS[0], DESIGNS[1]))
     made = {"law_whole": ours.whole, "law_missing": ours.missing, "law_wrong": ours.wrong}
     made |= {"law_whole_one_warm_up": paper.whole, "law_whole_cold": cold.whole}
@@ -368,7 +369,7 @@ def numbers(found: Law) -> dict[str, float]:
 
 
 def tables(found: Law) -> list[StudyTable]:
-    """Return the frequency with which the law was recovered, and its coefficients."""
+    """Return the frequency of recovery of the law, and its coefficients."""
     rates = [
         [d.name, f"{d.laser:g}", f"{d.sensor:g}", *(f"{v:.1%}" for v in (r.whole, r.missing, r.wrong))]
         for d, r in found.recoveries.items()

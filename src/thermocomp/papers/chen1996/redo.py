@@ -11,14 +11,15 @@ TITLE = "J. S. Chen, J. Yuan, J. Ni (1996): Thermal Error Modelling for Real-Tim
 
 
 def run(seed: int, progress: Progress) -> Study:
-    """Redo the study.
+    """Reproduce the study.
 
     Parameters
     ----------
     seed : int
-        Random seed of weather and noise. New tests get others: the same seed would repeat the weather of the training.
+        Random seed of weather and noise. New tests get other seeds, since the same seed would repeat the training
+        weather.
     progress : callable
-        Told the share done and what comes next.
+        Called with the completed fraction and the next step.
 
     Returns
     -------
@@ -46,6 +47,6 @@ def run(seed: int, progress: Progress) -> Study:
 
 
 def _number(figure: Figure) -> float:
-    """Return the number of the paper's figure; what is not in the paper comes last."""
+    """Return the number of the figure in the paper; infinity for additional figures."""
     number = figure.key.removeprefix("chen1996-fig")
     return float(number) if number.isdigit() else np.inf

@@ -1,4 +1,4 @@
-"""Chen, Yuan, Ni 1996: sensors, subgroups and printed numbers, and the recordings in the paper's names."""
+"""Chen, Yuan, Ni 1996: sensors, subgroups and printed numbers; recordings with the names of the paper."""
 
 from collections.abc import Sequence
 
@@ -27,7 +27,7 @@ TEMPERATURES = tuple(f"T{k}" for k in range(1, 10))
 DRIFTS = {"x": "x1_um", "y": "y1_um", "z": "z_um"}
 SPEED = {"speed": "spindle_rpm"}
 
-#: C-12: differences that are variables of their own
+#: C-12: differences used as separate variables
 DIFFERENCES = (("T6", "T7"), ("T8", "T9"), ("T6", "T8"), ("T7", "T9"))
 #: Table 2 (C-13)
 SUBGROUPS = {
@@ -35,32 +35,32 @@ SUBGROUPS = {
     "y": ("T1", "T2", "T3", "T4", "T5", "T6-T8", "T7-T9"),
     "z": ("T1", "T2", "T3", "T6-T8", "T7-T9"),
 }
-#: of the slope of Y (C-23; no row of Table 2 is this set, E-C7)
+#: variables for the slope of Y (C-23; not a row of Table 2, E-C7)
 SLOPE_VARIABLES = ("T1", "T3", "T4", "T6-T8", "T7-T9")
 #: Eq. 6 (C-22): the cold profile of Y, um for y in mm (E-C5)
 EQ6 = np.polynomial.Polynomial(1e3 * np.array([2.424e-4, 3.096e-4, -3.571e-6, 1.474e-8, -2.662e-11, 1.738e-14]))
-#: Eq. 8 (C-24; T7-T9 by E-C4): the slope of Y, um/m per degC (E-C6)
+#: Eq. 8 (C-24; T7-T9 according to E-C4): slope of Y, um/m per degC (E-C6)
 EQ8 = {"T3": 0.465, "T4": 2.705, "(T6-T8)": 3.675, "(T7-T9)": -5.589}
 
-#: R2 from which a model counts as fitting closely: the smaller of the two the paper prints (.988, .973; C-19, E-C2)
+#: minimum R2 for a close fit: the smaller of the two values printed in the paper (.988, .973; C-19, E-C2)
 CLOSELY = 0.973
-#: ratio of two errors up to which methods count as equally good: the paper calls 8.9 and 6.5 um very close (C-31)
+#: maximum ratio of the errors of equally good methods: the paper calls 8.9 and 6.5 um very close (C-31)
 COMPETITIVE = 1.5
-#: part of the RMS that must vanish where the paper sees a good prediction; its headline asks for nine tenths (C-35)
+#: minimum reduction of the RMS for a good prediction; the headline requires nine tenths (C-35)
 WELL = 0.8
-#: the headline: accuracy improved by a factor of ten (C-35)
+#: headline: accuracy improved by a factor of ten (C-35)
 TENFOLD = 10.0
 
 
 def recordings(experiment: str, seed: int, sensor_noise: float | None = None) -> list[Recording]:
-    """Run one of Chen's experiments; T1 to T9, x, y, z where they were recorded, speed, then all other channels.
+    """Run one of Chen's experiments; channels: T1 to T9, x, y, z if recorded, speed, then all others.
 
     Parameters
     ----------
     experiment : str
     seed : int
     sensor_noise : float, optional
-        Noise of the temperatures [degC]. Default: that of the sensors.
+        Noise of the temperatures [degC]. Default: as defined for each sensor.
 
     Returns
     -------
@@ -78,12 +78,12 @@ def recordings(experiment: str, seed: int, sensor_noise: float | None = None) ->
 
 
 def with_differences(recording: Recording) -> Recording:
-    """Return the recording with those differences of temperatures as channels that the slope depends on (C-23).
+    """Return the recording with additional channels: the temperature differences for the slope (C-23).
 
     Parameters
     ----------
     recording : Recording
-        From `recordings`.
+        Result of `recordings`.
 
     Returns
     -------

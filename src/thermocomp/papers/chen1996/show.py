@@ -23,7 +23,7 @@ EQ5 = {
 
 
 def tables(found: LearnedDrift) -> list[StudyTable]:
-    """Return Tables 1 and 2, the fits, Eq. 5 next to ours, the logs of Fig. 2 and the sweep."""
+    """Return Tables 1 and 2, the fits, Eq. 5 next to our coefficients, the logs of Fig. 2 and the sweep."""
     first = [
         [name, SENSORS.get(name, "mean of T6 to T9"), *(f"{r:.2f}" for r in row)]
         for name, row in screening(found).items()
@@ -62,14 +62,14 @@ def _sweep_row(nets: Sequence[LearnedNet]) -> list[str]:
 
 
 def beside(what: str, equation: str, ours: Mapping[str, float], paper: Mapping[str, float]) -> StudyTable:
-    """Arrange coefficients by their terms, ours next to the paper's.
+    """Return a table of coefficients by term, ours next to those of the paper.
 
     Parameters
     ----------
     what : str
-        Quantity that the coefficients describe, and their unit.
+        Quantity described by the coefficients, and their unit.
     equation : str
-        The paper's, such as ``Eq. 5``.
+        Equation of the paper, such as ``Eq. 5``.
     ours, paper : mapping of str to float
 
     Returns
@@ -90,7 +90,7 @@ def _log(regression: SecondOrderRegression, target: str) -> StudyTable:
 
 
 def figures(found: LearnedDrift) -> list[Figure]:
-    """Return Figs. 3 to 5 and 10 to 12: what was measured, and the fits."""
+    """Return Figs. 3 to 5 and 10 to 12: measurements and fits."""
     samples, drawn = found.samples, []
     for kind, first, models in (("MRA", 3, found.models), ("net", 10, found.typical.models)):
         for number, (target, model) in enumerate(models.items(), start=first):
@@ -105,13 +105,13 @@ def figures(found: LearnedDrift) -> list[Figure]:
 
 
 def figure(number: int, text: str, axes: tuple[str, str], curves: Sequence[PlotCurve]) -> Figure:
-    """Return a figure with one panel, like the paper's figure of that number.
+    """Return a figure with one panel, corresponding to a figure of the paper.
 
     Parameters
     ----------
     number : int
     text : str
-        Text of the caption.
+        Text of the caption after the number.
     axes : tuple of str
         Labels of x and y.
     curves : sequence of PlotCurve

@@ -1,4 +1,4 @@
-"""Chen, Yuan, Ni 1996, sections 3.3 and 4.3: the positioning error of Y, cold profile plus a slope that drifts."""
+"""Chen, Yuan, Ni 1996, sections 3.3 and 4.3: positioning error of Y as a cold profile plus a drifting slope."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -22,33 +22,33 @@ from thermocomp.recordings.profiles import Profiles
 from thermocomp.recordings.readers.profiles import from_recording
 from thermocomp.volumetric.models.position import PositionFit, PositionOptions, fit_position, slope_samples
 
-#: sets, unscreened and screened coefficients (C-23)
+#: numbers of sets, unscreened and screened coefficients (C-23)
 SETS, CANDIDATES = 51, 20
 #: error of a dimension along Y before and after compensation [um] (C-35)
 LATERAL = (92.4, 7.2)
-#: how often the 5-8-1 net is trained (C-27)
+#: number of trainings of the 5-8-1 net (C-27)
 STARTS = 5
-#: share of the thermal part beside its straight line up to which the line is enough (C-05)
+#: maximum nonlinear share of the thermal part for a straight line to be sufficient (C-05)
 STRAIGHT = 0.1
 NONE, MRA, NET, DYNAMIC, MEASURED = "no compensation", "MRA", "net", "dynamic (ours)", "measured slope"
 
 
 @dataclass(frozen=True, eq=False)
 class LearnedPositioning:
-    """Models learned from the profiles of one test, and from those of another day.
+    """Models learned from the profiles of one test, and profiles of another day.
 
     Parameters
     ----------
     learned, other : Profiles
-        EYY: the 51 sets, and the same test on another day.
+        EYY: the 51 training sets, and the same test on another day.
     pitch : Profiles
-        EAY, measured with the former.
+        EAY, measured together with `learned`.
     fits : mapping of str to PositionFit
-        Fits of `learned`, one of each method; of the nets the one with the median error after training.
+        Fits to `learned` by method; for the nets the one with the median error after training.
     nets : sequence of PositionFit
-        5-8-1, each from another start.
+        5-8-1 nets, each from other starting weights.
     linear : PositionFit
-        By stepwise regression on first-order terms alone.
+        Stepwise regression on first-order terms only.
     law : Law
         Recovery of a known (synthetic) law.
     """
@@ -63,46 +63,46 @@ class LearnedPositioning:
 
     @property
     def regression(self) -> Any:
-        """The SecondOrderRegression behind its fit."""
+        """The fitted `SecondOrderRegression`."""
         return self.fits[MRA].trained[0].estimator
 
     @cached_property
     def net_r2(self) -> FloatArray:
-        """R2 of the nets about zero, shape (n_starts,)."""
+        """R2 about zero of the nets, shape (n_starts,)."""
         return np.array([r2_about_zero(self.k1, n.trained[0].estimator.predict(n.samples.frame())) for n in self.nets])
 
     def geometric(self, day: Profiles) -> FloatArray:
-        """Return the cold profile of `learned`, by its polynomial, shape (n_points,) [um] (C-07, C-22)."""
+        """Return the polynomial cold profile of `learned`, shape (n_points,) [um] (C-07, C-22)."""
         return self.fits[MRA].profile.profile.at(day.points)
 
     def slope(self, day: Profiles) -> FloatArray:
-        """Return the slope k1 of what comes on top, through position 0, shape (n_states,) [um/m] (C-04, E-C6)."""
+        """Return the slope k1 of the thermal part, through position 0, shape (n_states,) [um/m] (C-04, E-C6)."""
         thermal = day.values - self.geometric(day)
         return 1e3 * (thermal @ day.position) / (day.position @ day.position)
 
     def predicted(self, fit: PositionFit, day: Profiles) -> FloatArray:
-        """Return the slope predicted by a model from the readings of a day, shape (n_states,) [um/m]."""
+        """Return the slope predicted by a model for a day, shape (n_states,) [um/m]."""
         model = fit.model.slopes[0]
         samples, _ = slope_samples([day], PositionOptions(inputs=[i.name for i in model.inputs]))
         return common.predict_deviation(model, samples)
 
     def left(self, fit: PositionFit) -> float:
-        """Return the RMS of what a model leaves of the slope on the other day [um/m]."""
+        """Return the RMS residual of the slope with a model on the other day [um/m]."""
         return rms(self.slope(self.other) - self.predicted(fit, self.other))
 
     @cached_property
     def elsewhere(self) -> dict[str, float]:
-        """The same by method [um/m]."""
+        """RMS residuals of the slope on the other day, by method [um/m]."""
         return {m: self.left(fit) for m, fit in self.fits.items()}
 
     @property
     def k1(self) -> FloatArray:
-        """Slope on the day that was learned [um/m]."""
+        """Slope on the training day [um/m]."""
         return self.slope(self.learned)
 
 
 def learn(seed: int, other_seed: int) -> LearnedPositioning:
-    """Run the test on two days and fit what the paper fits to the first.
+    """Run the test on two days and fit the models of the paper to the first.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def learn(seed: int, other_seed: int) -> LearnedPositioning:
     (first,), (second,) = (map(with_differences, recordings("chen1996-slope", s)) for s in (seed, other_seed))
     learned, other = (from_recording(day, "EYY") for day in (first, second))
     paper = PositionOptions(order=EQ6.degree(), inputs=setup.TEMPERATURES, support=PAPERS_SUPPORT)
-    # The two regressions differ in their candidates only.
+    # The two regressions differ only in their candidates.
     chens = partial(SecondOrderRegression, differences=setup.DIFFERENCES, subset=SLOPE_VARIABLES)
     regression, linear = (
         fit_position(learned, replace(paper, method=chens(second_order=second))) for second in (True, False)
@@ -147,7 +147,7 @@ def _net(fit: PositionFit) -> Any:
     return fit.trained[0].estimator
 
 
-# -- claims --------------------------------------------------------------------------------------------------------
+# -- claims ------------------------------------------------------------------------------------------------------------
 
 
 claims = Claims[LearnedPositioning]()
@@ -261,12 +261,12 @@ def residuals(found: LearnedPositioning, day: Profiles) -> dict[str, FloatArray]
 
 
 def largest_length_error(found: LearnedPositioning) -> dict[str, float]:
-    """Return the largest error of a length of the whole travel on the other day, per method [um]."""
+    """Return the largest length error over the whole travel on the other day, by method [um]."""
     return {m: float(np.abs(e[:, -1] - e[:, 0]).max()) for m, e in residuals(found, found.other).items()}
 
 
 def numbers(found: LearnedPositioning) -> dict[str, float]:
-    """Return the figures that a page can assert."""
+    """Return the numbers asserted by the documentation."""
     short = {NONE: "none", MRA: "mra", NET: "net", DYNAMIC: "dynamic", MEASURED: "measured"}
     r = found.regression
     made = {"slope_sets": float(r.n_rows_), "slope_candidates": float(len(r.candidates_)), "slope_r2_mra": r.r_squared_}
@@ -275,14 +275,14 @@ def numbers(found: LearnedPositioning) -> dict[str, float]:
     return made | law.numbers(found.law)
 
 
-# -- tables and figures --------------------------------------------------------------------------------------------
+# -- tables and figures ------------------------------------------------------------------------------------------------
 
 
 def tables(found: LearnedPositioning) -> list[StudyTable]:
-    """Return Eq. 6 and Eq. 8 next to ours, the known law, and the error without and with compensation."""
+    """Return Eq. 6 and Eq. 8 next to our coefficients, the known law, and the errors with and without compensation."""
     learned = found.learned
     ours = dict(zip(found.regression.terms_, found.regression.coef_.tolist(), strict=True))
-    # in plain mm, as the paper's
+    # in powers of mm, as in the paper
     cold = np.polynomial.polynomial.polyfit(learned.position, found.geometric(learned), EQ6.degree())
     eq6 = [
         [f"y^{k}", f"{1e-3 * c:.3e}", f"{1e-3 * p:.3e}"]

@@ -1,4 +1,4 @@
-"""Chen, Yuan, Ni 1996, section 5: new observations, noise, and a sensor that is cut off."""
+"""Chen, Yuan, Ni 1996, section 5: new observations, noise, and a cut-off sensor."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,28 +18,28 @@ from thermocomp.papers.pictures import curves
 from thermocomp.papers.study import Claims, Figure, FloatArray, Ours, StudyTable
 from thermocomp.recordings.samples import Samples
 
-#: C-33, E-C9: level of the noise [degC], and how often it is drawn
+#: level of the noise [degC] and number of draws (C-33, E-C9)
 NOISE, DRAWS = 0.4, 20
 #: printed: depth difference before and after compensation [um] (C-35)
 DEPTH = (196.0, 8.0)
-#: the tests of new observations (C-32)
+#: tests of new observations (C-32)
 TESTS = ("1250 1/min", "random speed")
 NONE, MRA, NET, DYNAMIC = "no compensation", "MRA", "net", "dynamic (ours)"
-#: `dynamic` leaves less than this share of what the paper's models leave: then it is memory that they lack
+#: if the RMS ratio of `dynamic` to the paper's models is below this, the latter lack memory
 BETTER = 0.7
 
 
 @dataclass(frozen=True, eq=False)
 class Unseen:
-    """The two tests that nothing was learned from, and what the models make of them.
+    """The two tests not used for training, and the predictions of the models.
 
     Parameters
     ----------
     tests : sequence of Samples
-        At 1250 1/min, and at random speeds.
+        Tests at 1250 1/min and at random speeds.
     learned : LearnedDrift
     dynamic : mapping of str to ErrorModel
-        Ours, learned from the same 810 rows, the spindle speed included.
+        Our `dynamic` models, trained on the same 810 rows, including the spindle speed.
     """
 
     tests: Sequence[Samples]
@@ -48,12 +48,12 @@ class Unseen:
 
     @property
     def models(self) -> dict[str, Mapping[str, ErrorModel]]:
-        """One of each method; of the nets the typical one."""
+        """Models by method; for the nets the typical one."""
         return {MRA: self.learned.models, NET: self.learned.typical.models, DYNAMIC: self.dynamic}
 
     @cached_property
     def residuals(self) -> list[dict[str, dict[str, FloatArray]]]:
-        """Per test, drift and method, no compensation among them [um]."""
+        """Residuals per test, by drift and method, including no compensation [um]."""
         return [
             {
                 t: {NONE: common.take_measured(test, t)}
@@ -64,31 +64,31 @@ class Unseen:
         ]
 
     def errors(self, test: int, target: str, method: str) -> Errors:
-        """Return the residuals of a method in one of the tests."""
+        """Return the error figures of a method in a test."""
         return Errors.of(self.residuals[test][target][method])
 
     def nets(self, target: str, samples: Samples) -> FloatArray:
-        """Return the RMS that each of the nets leaves, shape (n_starts,) [um]."""
+        """Return the RMS residual of each net, shape (n_starts,) [um]."""
         return np.array([rms(n.models[target], samples) for n in self.learned.nets])
 
     def left(self, target: str, samples: Samples) -> dict[str, float]:
-        """Return the RMS that each method leaves, of the nets the median [um]."""
+        """Return the RMS residual of each method; the median for the nets [um]."""
         net = float(np.median(self.nets(target, samples)))
         return {m: net if m == NET else rms(models[target], samples) for m, models in self.models.items()}
 
     @cached_property
     def cut(self) -> Samples:
-        """The test at 1250 1/min, with the sensor of the spindle cut off."""
+        """The test at 1250 1/min with the spindle sensor cut off."""
         return common.cut_off(self.tests[0], "T2")
 
     @cached_property
     def noisy(self) -> dict[str, float]:
-        """See `noise`; uniform."""
+        """Result of `noise` for uniform noise."""
         return noise(self, "uniform")
 
 
 def rms(model: ErrorModel, samples: Samples) -> float:
-    """Return the RMS of what a model leaves [um]."""
+    """Return the RMS residual of a model [um]."""
     return Errors.of(common.residual(model, samples)).rms
 
 
@@ -99,7 +99,7 @@ def observe(learned: LearnedDrift, seed: int) -> Unseen:
     ----------
     learned : LearnedDrift
     seed : int
-        Another one than that of the five tests, else the weather would be one that was learned from.
+        Random seed other than that of the five tests, so that the weather is unseen.
 
     Returns
     -------
@@ -109,7 +109,7 @@ def observe(learned: LearnedDrift, seed: int) -> Unseen:
     return Unseen([drift_samples([test]) for test in recordings("chen1996-new", seed)], learned, ours)
 
 
-# -- claims --------------------------------------------------------------------------------------------------------
+# -- claims ------------------------------------------------------------------------------------------------------------
 
 
 claims = Claims[Unseen]()
@@ -253,7 +253,7 @@ def _depth(found: Unseen) -> Ours:
 
 
 def noise(found: Unseen, law: Literal["uniform", "normal"]) -> dict[str, float]:
-    """Return the RMS that each method leaves of z at 1250 1/min with noise, mean over the draws [um].
+    """Return the RMS residual of each method for z at 1250 1/min with noise, mean over the draws [um].
 
     Parameters
     ----------
@@ -263,19 +263,19 @@ def noise(found: Unseen, law: Literal["uniform", "normal"]) -> dict[str, float]:
     Returns
     -------
     dict of str to float
-        Median of the nets.
+        RMS by method; the median for the nets.
     """
     noisy = [found.left("z", common.with_noise(found.tests[0], NOISE, law, k)) for k in range(DRAWS)]
     return {m: float(np.mean([left[m] for left in noisy])) for m in found.models}
 
 
 def largest_error(found: Unseen) -> dict[str, float]:
-    """Return the largest length of (x, y, z) in both tests, per method [um]."""
+    """Return the largest length of the vector (x, y, z) in both tests, by method [um]."""
     return {m: max(float(_length(r, m).max()) for r in found.residuals) for m in (NONE, *found.models)}
 
 
 def largest_depth(found: Unseen) -> dict[str, float]:
-    """Return the larger peak-to-peak of z in the two tests, per method [um]."""
+    """Return the larger peak-to-peak value of z in the two tests, by method [um]."""
     return {m: max(found.errors(k, "z", m).peak_to_peak for k in range(len(TESTS))) for m in (NONE, *found.models)}
 
 
@@ -286,17 +286,17 @@ def _since_change(found: Unseen, method: str) -> float:
     test, row = found.tests[k], int(lengths[k].argmax())
     speed = test.values[: row + 1, [c.quantity for c in test.inputs].index("spindle_speed")]
     changed = int(np.flatnonzero(np.diff(speed, prepend=0.0)).max(initial=0))
-    # a row tells the speed that led to it: it changed at the row before
+    # the speed in a row is that of the preceding interval: it changed at the row before
     return float(test.time[row] - test.time[max(changed - 1, 0)]) / 3600.0
 
 
 def _length(residuals: Mapping[str, Mapping[str, FloatArray]], method: str) -> FloatArray:
-    """Return the length of the error of the tool point, row by row [um]."""
+    """Return the magnitude of the tool-point error for each row [um]."""
     return np.sqrt(sum((residuals[t][method] ** 2 for t in DRIFTS), start=np.zeros(1)))
 
 
 def numbers(found: Unseen) -> dict[str, float]:
-    """Return the figures that a page can assert: RMS, of the nets the median, and largest errors."""
+    """Return the numbers asserted by the documentation: RMS, medians for the nets, and largest errors."""
     short = {NONE: "none", MRA: "mra", NET: "net", DYNAMIC: "dynamic"}
     made: dict[str, float] = {}
     for t in DRIFTS:
@@ -311,7 +311,7 @@ def numbers(found: Unseen) -> dict[str, float]:
     return made
 
 
-# -- tables and figures --------------------------------------------------------------------------------------------
+# -- tables and figures ------------------------------------------------------------------------------------------------
 
 
 def tables(found: Unseen) -> list[StudyTable]:

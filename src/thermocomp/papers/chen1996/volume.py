@@ -1,4 +1,4 @@
-"""Chen, Yuan, Ni 1996, section 2: the components of the whole machine, learned from lasers, levels and probes."""
+"""Chen, Yuan, Ni 1996, section 2: components of the whole machine, learned from lasers, levels and probes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -21,25 +21,25 @@ from thermocomp.volumetric.models.position import PositionFit, PositionOptions, 
 
 STRUCTURE = "w X' b Z Y (C1) t"
 METHOD = "dynamic"
-#: a round of the lasers takes 20 min: every so many rows of the recording
+#: a round of laser measurements takes 20 min: number of rows per round
 ROUND = 4
-#: rounds before anything turns or moves: they tell the cold profiles
+#: rounds before any movement, which define the cold profiles
 COLD = (0, 1)
 
 
 @dataclass(frozen=True, eq=False)
 class LearnedVolume:
-    """A machine that was measured, and what its components were learned from.
+    """A measured machine and the fits of its components.
 
     Parameters
     ----------
     machine : Machine
-        18 components of the axes as position models, three squareness errors, five drifts of the spindle. The shifts of
-        the axes' references are in the latter: the probes see their sum.
+        18 axis components as position models, three squareness errors, five spindle drifts. The drifts include the
+        shifts of the axes' references, as the probes measure the sum.
     fits : mapping of str to PositionFit
-        By code of the component.
+        Fits by component code.
     flat : PositionFit
-        EYX as if it depended on X alone (C-06).
+        EYX as a function of X only (C-06).
     """
 
     machine: Machine
@@ -79,14 +79,14 @@ def every(test: Recording, step: int) -> Recording:
 
 
 def _component(code: str, rounds: Sequence[Recording], inputs: Sequence[str], coordinates: str | None) -> PositionFit:
-    """Fit a component of an axis, by as many powers of the position as its own profiles ask for."""
+    """Fit a component of an axis with the number of powers that its own profiles require."""
     code, _, flat = code.partition(" ")
     options = PositionOptions(
         method=METHOD,
         inputs=inputs,
         coordinates=coordinates,
         reference=COLD,
-        rezero=False,  # the machine is not the same every morning
+        rezero=False,  # the cold state differs from morning to morning
         reference_position=float(TEST_POSITION[code[2].lower()]),
     )
     profiles = [_profiles(code, test, flat=bool(flat)) for test in rounds]
@@ -95,7 +95,7 @@ def _component(code: str, rounds: Sequence[Recording], inputs: Sequence[str], co
 
 
 def _profiles(code: str, test: Recording, *, flat: bool) -> Profiles:
-    """Return the profiles of a component; of EYX with Z at both ends of its travel too."""
+    """Return the profiles of a component; for EYX also with Z at both ends of its travel."""
     axis, unit = code[2], BY_CODE[code].unit
     stations = STATIONS[axis.lower()]
     lines: list[tuple[str, dict[str, float]]] = (
@@ -120,7 +120,7 @@ def _profiles(code: str, test: Recording, *, flat: bool) -> Profiles:
 
 
 def _spindle(tests: Sequence[Recording], inputs: Sequence[str]) -> dict[str, Source]:
-    """Learn the drifts at the test position from the nest of probes: of spindle, axes and their references together."""
+    """Learn the drifts at the test position from the probe nest: sum of spindle, axes and their references."""
     tilts = (f"A0C=y1_um:y2_um:{PROBE_DISTANCE:g}m", f"B0C=x1_um:x2_um:{PROBE_DISTANCE:g}m")
     tests, _ = with_tilts(tests, tilts)
     channels = {"X0C": "x1_um", "Y0C": "y1_um", "Z0C": "z_um", "A0C": "A0C", "B0C": "B0C"}

@@ -27,20 +27,20 @@ if TYPE_CHECKING:
 Name = Literal["chen1996", "wessel2004", "hwang", "precompensation", "stepwise2017", "cross"]
 Names = Annotated[list[Name], Parameter(show_default=False)]
 Measured = Annotated[list[Path], Parameter(name="--with", show_default=False)]
-#: not a paper's study but the table of all methods on all experiments (X-03)
+#: not a study of a paper, but the table of all methods on all experiments (X-03)
 CROSS = "cross"
 
-#: width of the tables of cross [characters]
+#: width of the tables of `cross` [characters]
 TABLE_WIDTH = 120
 
 _TONES = {"yes": "good", "no": "grave", "-": "soft"}
 
 
 def papers(
-    names: Names = [],  # noqa: B006 - never changed
+    names: Names = [],  # noqa: B006 - never modified
     /,
     *,
-    measured: Measured = [],  # noqa: B006 - never changed
+    measured: Measured = [],  # noqa: B006 - never modified
     mapping: Path | None = None,
     target: list[str] | None = None,
     models: list[str] | None = None,
@@ -147,15 +147,15 @@ def _check_numbers(seed: int, repeats: int, jobs: int) -> None:
 
 
 def _tried(name: str, run: "Callable[[Told], Study]", progress: "Told") -> "Study":
-    """Return a study, or one with the reason if it fails, so that the other studies still run."""
+    """Return a study, or if it fails one with the reason, so that the other studies still run."""
     from thermocomp.judging.pieces import explain
     from thermocomp.papers.studies import not_redone
 
     try:
         return run(progress)
-    except InputError:  # what was asked for cannot be
+    except InputError:  # invalid input
         raise
-    except Exception as e:  # noqa: BLE001 - whatever fails in one study, the others have their results
+    except Exception as e:  # noqa: BLE001 - a failure of one study does not affect the others
         return not_redone(name, explain(e))
 
 
@@ -195,7 +195,7 @@ def _show(study: "Study", seconds: float) -> None:
             if c.finding:
                 console.print(f"{marked(Toned(', '.join(c.ids), _holds(c).tone))} {words(c.finding)}")
     if study.name == CROSS:
-        # Numbers must not be cut: a narrow terminal wraps whole lines instead.
+        # Numbers must not be truncated: a narrow terminal wraps whole lines instead.
         wide = make_console(width=max(console.width, TABLE_WIDTH))
         for t in study.tables:
             print_table(_laid_out(t), wide)

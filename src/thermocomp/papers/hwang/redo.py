@@ -1,4 +1,4 @@
-"""Hwang, Lee, Yang redone: correlation grouping, successive regression, collinearity and noise (H-01 to H-18)."""
+"""Reproduction of Hwang, Lee, Yang: correlation grouping, successive regression, collinearity, noise (H-01 to H-18)."""
 
 from collections.abc import Sequence
 
@@ -16,7 +16,7 @@ TABLE_1 = [[k - 1 for k in g] for g in setup.TABLE_1]
 
 
 def run(seed: int, progress: Progress) -> Study:
-    """Redo the study.
+    """Reproduce the study.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
 """Computation of the study of Hwang, Lee and Yang; `thermocomp.papers.hwang.redo` presents it.
 
-One test of six hours in three states drawn by lot, 14 sensors, drift Z. T14 (bed) is the reference: every variable is
-``T_i - T14``, temperatures as they are, not from the start of the test (H-08). The paper's threshold is not known
-(E-H1): the one taken gives as many groups as its Table 1, or next to as many; all others stand in the sweep. How the
-models fare on new tests, with other orders of the states and other weather, is told besides.
+One test of six hours in three states drawn at random, 14 sensors, drift Z. T14 (bed) is the reference: each variable is
+``T_i - T14``, with absolute temperatures, not relative to the start of the test (H-08). The threshold of the paper is
+unknown (E-H1): the one used gives as many groups as its Table 1, or the nearest number; the sweep includes all others.
+The performance on new tests, with other orders of the states and other weather, is reported in addition.
 """
 
 from collections.abc import Sequence
@@ -26,43 +26,43 @@ from thermocomp.recordings.samples import Samples
 from thermocomp.virtual.datasets import record
 from thermocomp.virtual.kits import HWANG_PLACES
 
-#: of the temperatures in `HWANG_PLACES` (H-08)
+#: names of the temperatures in `HWANG_PLACES` (H-08)
 NAMES = tuple(f"T{k}" for k in range(1, 15))
 REFERENCE = "T14"
 TARGET = "z_um"
-#: the paper's groups (Table 1, H-10), R2 and standard error [um] of its two models (Table 2, H-12, H-13)
+#: groups of the paper (Table 1, H-10); R2 and standard error [um] of its two models (Table 2, H-12, H-13)
 TABLE_1 = ((7,), (9, 10, 11, 12), (13,), (8, 4), (5,), (2,), (1, 6), (3,))
 TABLE_2 = {"optimal": (0.9704, 6.39), "judgement": (0.9697, 6.72)}
-#: eigenvalues of its Table 3 (H-16): with grouping, and without
+#: eigenvalues in Table 3 of the paper (H-16): with and without grouping
 TABLE_3 = ((1.1e4, 155.8, 18.6, 3.3), (8861.812, 76.397, 19.835, 2.359, 1.129, 0.114, 0.019))
 #: Eq. 9 (H-17)
 EQUATION_9 = {"T7": 0.9599, "T8": 0.9526, "T2": 0.8064, "T6": 0.8066}
-#: the engineering judgement model takes these and their squares (H-13)
+#: temperatures of the engineering judgement model, which also uses their squares (H-13)
 JUDGEMENT = ("T6", "T7", "T13")
-#: sizes of the sensors' error [degC] and its laws (E-H8)
+#: magnitudes of the sensor error [degC] and its distributions (E-H8)
 NOISES = (0.1, 0.2, 0.4, 0.8)
 LAWS: tuple[Literal["uniform", "normal"], ...] = ("uniform", "normal")
 DRAWS = 100
-#: new tests the models have not seen
+#: number of new, unseen tests
 NEW = 5
 #: names of the models
 OPTIMAL, JUDGED, SINGLE = "optimal selection", "engineering judgement", "without grouping"
 NONE = "no compensation"
-#: the models of Fig. 6, and what the quadratic one is without its squares
+#: the models of Fig. 6, and the quadratic one without its squares
 LINEAR, QUADRATIC, PLAIN = "linear", "quadratic", "quadratic without its squares"
-#: "nearly the same" of Table 2, criterion: a standard error at most so many times the other's
+#: criterion for "nearly the same" in Table 2: maximum ratio of the standard errors
 SAME = 1.1
 
 
 @dataclass(frozen=True)
 class PaperFit:
-    """A model with how well it fits.
+    """A model and its goodness of fit.
 
     Parameters
     ----------
     model : ErrorModel
     r_squared, error : float
-        R2 about the mean and standard error of estimate [um], in the rows it was fitted to.
+        R2 about the mean and standard error of estimate [um] in the training rows.
     """
 
     model: ErrorModel
@@ -71,18 +71,18 @@ class PaperFit:
 
 
 def samples_of(tests: Sequence[Recording]) -> Samples:
-    """Return tests with the paper's names, temperatures as they are."""
+    """Return samples with the names of the paper and absolute temperatures."""
     names = {f"t_{p}_C": n for p, n in zip(HWANG_PLACES, NAMES, strict=True)} | {TARGET: TARGET}
     return stacked([rename_channels(r, names) for r in tests], [TARGET], NAMES, rezero=False)
 
 
 def nearest(found: Sequence[Interval], groups: int) -> Interval:
-    """Return the interval of thresholds that gives a number of groups, or next to it; of several the widest."""
+    """Return the threshold interval whose number of groups is nearest to `groups`; the widest of several."""
     return min(found, key=lambda i: (abs(len(i.groups) - groups), i.low - i.high))
 
 
 def polynomial(samples: Samples, names: Sequence[str], degree: int) -> PaperFit:
-    """Fit powers of differences from the reference: with degree 2 the engineering judgement model (H-13).
+    """Fit powers of differences from the reference; degree 2 gives the engineering judgement model (H-13).
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def polynomial(samples: Samples, names: Sequence[str], degree: int) -> PaperFit:
 
 
 def agreement(groups: Groups) -> float:
-    """Return the share of pairs of sensors that are together, or apart, as in Table 1."""
+    """Return the share of sensor pairs that are together, or apart, as in Table 1."""
     ours = {n: k for k, g in enumerate(groups) for n in g}
     paper = {n - 1: k for k, g in enumerate(TABLE_1) for n in g}
     pairs = [(a, b) for a in paper for b in paper if a < b]
@@ -124,17 +124,17 @@ class Computed:
     Parameters
     ----------
     fit, new : Samples
-        The test that is learned from, and new ones.
+        Training test and new tests.
     grouped, single : CorrelationGrouping
-        At the threshold taken, and without groups: every temperature a group of its own.
+        At the selected threshold, and without grouping, i.e. with each temperature as a separate group.
     interval : Interval
         Thresholds that give the same groups.
     swept : list of (Interval, CorrelationGrouping)
-        At all thresholds.
+        Results at all thresholds.
     fits : dict of str to PaperFit
         The three models, by name.
     shaken : dict of (str, float) to dict of str to Sensitivity
-        R2 under random sensor error, by its law and size [degC].
+        R2 under random sensor error, by distribution and magnitude [degC].
     dynamic : ndarray of shape (n_new,)
         Residuals of `dynamic` in the new tests [um].
     """
@@ -151,7 +151,7 @@ class Computed:
 
     @property
     def drift(self) -> FloatArray:
-        """Deviation of Z in the rows that were fitted to [um]."""
+        """Deviation of Z in the training rows [um]."""
         return self.fit.deviations[:, 0]
 
     @cached_property
@@ -165,7 +165,7 @@ class Computed:
         return self.fit.values[:, :-1] - self.fit.values[:, -1:]
 
     def fitted(self, name: str) -> FloatArray:
-        """Return the output of a model for the rows it was fitted to [um]."""
+        """Return the output of a model for the training rows [um]."""
         return predict_deviation(self.fits[name].model, self.fit)
 
     @cached_property
@@ -177,7 +177,7 @@ class Computed:
 
 
 def compute(seed: int, progress: Progress) -> Computed:
-    """Run the tests and do what the paper does.
+    """Run the tests and the computations of the paper.
 
     Parameters
     ----------
@@ -234,12 +234,12 @@ def _fit_of(g: CorrelationGrouping, samples: Samples) -> PaperFit:
 
 
 def _dynamic(tests: Sequence[Recording]) -> FloatArray:
-    """Return the residuals of `dynamic` in the new tests, fitted to the first one; relative to the start of a test."""
+    """Return the residuals of `dynamic` in the new tests; trained on the first test, relative to each start."""
     inputs = [*(f"t_{p}_C" for p in HWANG_PLACES), "spindle_rpm"]
     learned, new = (stacked(r, [TARGET], inputs) for r in (tests[:1], tests[1:]))
     return new.deviations[:, 0] - predict_deviation(trained("dynamic", learned), new)
 
 
 def named(columns: Sequence[int]) -> str:
-    """Write columns as the names of their sensors."""
+    """Return the sensor names of columns."""
     return " ".join(NAMES[k] for k in columns) or "none"

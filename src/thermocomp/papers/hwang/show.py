@@ -115,5 +115,5 @@ def figures(c: Computed) -> tuple[Figure, ...]:
 
 
 def _unseen(grouping: CorrelationGrouping, c: Computed) -> float:
-    """Return the RMS that the model of a threshold leaves of the new tests [um]."""
+    """Return the RMS residual of the model of a threshold in the new tests [um]."""
     return rms(c.new.deviations[:, 0] - grouping.predict(c.new.frame()))

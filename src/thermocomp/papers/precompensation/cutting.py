@@ -1,4 +1,4 @@
-"""The cutting tests with NC programs on the virtual machine: what is milled, and in which state of machine and room."""
+"""Cutting tests with NC programs on the virtual machine: milled surfaces by thermal state of machine and room."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -20,21 +20,21 @@ from thermocomp.virtual.protocol import Experiment
 from thermocomp.virtual.segments import Feed, Stretch
 
 HOUR = 3600.0
-#: what a wrong start state is wrong by: the spindle ran for so long [s], at the speed of milling [1/min]
+#: wrong initial state: preceding run of the spindle [s] at the speed of milling [1/min]
 BEFORE, BEFORE_SPEED = 0.5 * HOUR, 2000.0
-#: what the room changes by, in the hour between the surfaces [K]
+#: change of the room temperature in the hour between the surfaces [K]
 ROOM = 2.0
-#: time between two rows of the drift: the longest step of the machine [s]
+#: interval of the rows of the drift: the longest step of the machine [s]
 OFTEN = 20.0
-#: states of machine and room that are true
+#: true states of machine and room
 COLD, WARM, WARMER, COLDER = "cold", "warm", "warmer", "colder"
-#: what is true, and what the revision takes for true; warm: it ran for `BEFORE`
+#: cases: true state, and state assumed by the revision; warm: after a run of `BEFORE`
 RIGHT = "cold"
 UNKNOWN = "warm, taken for cold"
 CARRIED = "warm, carried over"
 FALSE = "cold, taken for warm"
 WARMS, COOLS = f"the room warms by {ROOM:g} degC", f"the room cools by {ROOM:g} degC"
-#: which is true in each case, and whether the revision begins warm
+#: true state of each case, and whether the revision assumes a warm start
 CASES: Mapping[str, tuple[str, bool]] = {
     RIGHT: (COLD, False),
     UNKNOWN: (WARM, False),
@@ -43,24 +43,24 @@ CASES: Mapping[str, tuple[str, bool]] = {
     WARMS: (WARMER, False),
     COOLS: (COLDER, False),
 }
-#: models that are tried in all cases, as the paper revises
+#: models tested in all cases, as the revision in the paper
 TRIED = (NET, LEAST)
-#: methods of the house that can do with the speed alone
+#: methods of thermocomp that can use the speed alone
 HOUSE = ("arx-free-run", "dynamic")
 
 
 @dataclass(frozen=True)
 class Changing(Climate):
-    """A room that gets warmer or colder during the test, in addition to the usual changes of its air.
+    """A room that becomes warmer or colder during the test, in addition to the usual changes of its air.
 
     Parameters
     ----------
     change : float
-        [K]
+        Change of the temperature [K].
     since : float
-        Since the start of the test [s].
+        Start of the change, since the start of the test [s].
     takes : float
-        [s]; steadily.
+        Duration of the change, which is linear in time [s].
     """
 
     change: float = 0.0
@@ -70,7 +70,7 @@ class Changing(Climate):
     def air(
         self, state: FloatArray, start: float, step: float, n_steps: int, rng: np.random.Generator
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the air at the end of each of some equal steps, as `Climate.air` does.
+        """Return the air at the end of each of several equal steps, see `Climate.air`.
 
         Parameters
         ----------
@@ -95,14 +95,14 @@ class Changing(Climate):
 
 @dataclass(frozen=True, eq=False)
 class Surfaces:
-    """Surfaces of all tests, milled with programs that were revised by one method.
+    """Surfaces of all tests, milled with programs revised by one method.
 
     Parameters
     ----------
     depth : ndarray of shape (n_tests, n_positions)
         Height of the mean of the second surface above that of the first [um].
     unevenness : ndarray of shape (n_tests, 2, n_positions)
-        From the lowest to the highest place within a surface [um].
+        Largest minus smallest height within a surface [um].
     """
 
     depth: FloatArray
@@ -115,17 +115,17 @@ class Surfaces:
 
     @property
     def most(self) -> float:
-        """Greatest magnitude of it [um]."""
+        """Largest magnitude of the depth difference [um]."""
         return float(np.abs(self.depth).max())
 
     @property
     def by_test(self) -> FloatArray:
-        """Mean magnitude of it over the positions, (n_tests,) [um]."""
+        """Mean magnitude of the depth difference over the positions, (n_tests,) [um]."""
         return np.asarray(np.abs(self.depth).mean(axis=1))
 
     @property
     def signed(self) -> FloatArray:
-        """Mean of it over the positions, (n_tests,) [um]."""
+        """Mean depth difference over the positions, (n_tests,) [um]."""
         return np.asarray(self.depth.mean(axis=1))
 
 
@@ -136,13 +136,13 @@ class Milled:
     Parameters
     ----------
     surfaces : dict of (str, str, str) to Surfaces
-        By case, model and way of revising; not revised: `NONE` and no way.
+        Surfaces by case, model and revision method; unrevised: `NONE` and an empty method.
     turning : float
-        Share of the time in which the programs have the spindle speed of the recorded tests.
+        Share of the time during which the spindle speed of the programs equals that of the recorded tests.
     lines : int
         Number of lines of the first program.
     first : dict of str to list of (Face, ndarray)
-        Of the first test, cold: faces, and where their surfaces lie [um]; by the way of revising, with the net.
+        Faces of the first test, cold, with their surface positions [um]; by revision method, with the net.
     """
 
     surfaces: dict[tuple[str, str, str], Surfaces] = field(default_factory=dict)
@@ -151,7 +151,7 @@ class Milled:
     first: dict[str, list[tuple[program.FacedSurface, FloatArray]]] = field(default_factory=dict)
 
     def without(self, case: str) -> Surfaces:
-        """Return the surfaces milled by the unrevised programs."""
+        """Return the surfaces milled with the unrevised programs."""
         return self.surfaces[case, NONE, ""]
 
     def paper(self, case: str, model: str = NET) -> Surfaces:
@@ -160,7 +160,7 @@ class Milled:
 
 
 def house_models(learn: Samples) -> dict[str, list[ErrorModel]]:
-    """Fit the default methods of thermocomp for machines without sensors to the identification.
+    """Fit the default methods of thermocomp for machines without sensors to the identification data.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ def house_models(learn: Samples) -> dict[str, list[ErrorModel]]:
     Returns
     -------
     dict of str to list of ErrorModel
-        By the name of the method, one per position.
+        Models by method, one per position.
     """
     timed: dict[str, Any] = {"dt": learn.dt(), "cycle": learn.cycle}
     targets = [c.name for c in learn.targets]
@@ -185,9 +185,9 @@ def compute(models: Mapping[str, Sequence[ErrorModel]], seed: int, progress: Pro
     Parameters
     ----------
     models : mapping of str to sequence of ErrorModel
-        One per position.
+        Models by name, one per position.
     seed : int
-        Random seed of the first test; the others have the next ones.
+        Random seed of the first test; the following tests have consecutive seeds.
     progress : callable
 
     Returns
@@ -216,7 +216,7 @@ def compute(models: Mapping[str, Sequence[ErrorModel]], seed: int, progress: Pro
 
 
 def make_true_test(what: str) -> Experiment:
-    """Return the cutting test as it truly is: no noise, and the machine or the room in one of four states."""
+    """Return the cutting test without noise, with machine and room in one of four states."""
     experiment = find_experiment("precompensation-cut")
     (plan,) = experiment.tests
     plan = replace(plan, sampling=OFTEN, perfect=True, places=())
@@ -231,7 +231,7 @@ def make_true_test(what: str) -> Experiment:
 
 
 def _turns(lines: Sequence[str], test: Recording) -> float:
-    """Return the share of the rows between which a program has the spindle speed of a test."""
+    """Return the share of the intervals in which a program has the spindle speed of a test."""
     speed = test.table[SPEED].to_numpy(dtype=np.float64)[1:]
     middle = (test.time[1:] + test.time[:-1]) / 2
     return float(np.mean(program.turning(lines, middle) == speed))
@@ -245,7 +245,7 @@ def _mill(
     way: str,
     cases: Sequence[str],
 ) -> None:
-    """Mill all tests with programs that were revised in one way, in some of the cases."""
+    """Mill all tests with programs revised by one method, for some of the cases."""
     cut = [program.faces(lines) for lines in programs]
     for case in cases:
         there = drifts[CASES[case][0]]

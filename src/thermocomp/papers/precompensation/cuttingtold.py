@@ -87,7 +87,7 @@ def _room(m: Milled) -> Ours:
 
 
 def tables(m: Milled) -> tuple[StudyTable, ...]:
-    """Return depth differences by model and way of revising, by test, and by what was true."""
+    """Return depth differences by model and revision method, by test, and by true state."""
     shown = [(NONE, ""), *((NET, way) for way in WAYS), (LEAST, EVERY)]
     return (
         StudyTable(
@@ -118,9 +118,9 @@ def tables(m: Milled) -> tuple[StudyTable, ...]:
 
 
 def figures(m: Milled) -> tuple[Figure, ...]:
-    """Return the surfaces of one test, and the depth differences of all."""
+    """Return the surfaces of one test, and the depth differences of all tests."""
     tests = np.arange(1.0, len(m.without(RIGHT).depth) + 1)
-    # continues to the right, where the legend then hides nothing
+    # extended to the right, where the legend hides nothing
     zero = PlotCurve("", np.array([1.0, 1.5 * len(tests)]), np.zeros(2), "dashed")
     ways: tuple[tuple[str, str, Style], ...] = (
         ("", "not revised", "line"),
@@ -166,14 +166,14 @@ def figures(m: Milled) -> tuple[Figure, ...]:
 
 
 def _surfaces(m: Milled, way: str, number: int) -> tuple[FloatArray, FloatArray]:
-    """Return times [min], and where the surfaces lie [um], with a break in the line between two faces."""
+    """Return times [min] and surface positions [um], with a break in the line between two faces."""
     faces = [(face.time / 60, lies) for face, lies in m.first[way] if face.number == number]
     x, y = (np.concatenate([np.append(part, np.nan) for part in parts]) for parts in zip(*faces, strict=True))
     return x, y
 
 
 def numbers(m: Milled) -> dict[str, float]:
-    """Return the figures by name."""
+    """Return the numbers by name."""
     short = {
         RIGHT: "cold",
         UNKNOWN: "warm_taken_for_cold",

@@ -1,7 +1,7 @@
-"""The NC program of a cutting test: written, revised, and read back as the machine will run it (P-04, P-06, P-07).
+"""NC program of a cutting test: written, revised, and read back as run by the machine (P-04, P-06, P-07).
 
-A stepped block with four faces, one at each position of Z that has a model, is face-milled cold and again, beside it,
-after an hour in which the spindle runs at other speeds and the axes move.
+A stepped block has four faces, one at each modelled position of Z. They are face-milled cold and again, next to the
+first surfaces, after an hour in which the spindle runs at other speeds and the axes move.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -28,54 +28,54 @@ from thermocomp.papers.study import FloatArray
 from thermocomp.recordings.recording import Recording
 
 MINUTE = 60.0
-#: length of the tool; the work coordinate system lies so much lower: words of Z are positions of the axis [mm]
+#: tool length; the work coordinate system is lower by this amount: Z words are axis positions [mm]
 TOOL = 120.0
-#: what stands at the controller
+#: settings at the controller
 SETUP = Setup(offsets={1: (0.0, 0.0, -TOOL)}, tools={1: TOOL})
 KINEMATICS = MotionLimits()
-#: the tool is up, above the highest face [mm]
+#: height of the retracted tool, above the highest face [mm]
 UP = 650.0
-#: a face is so many passes of X, from left to right and back [mm], so far apart [mm], at this feed [mm/min]
+#: number of passes of a face in X, back and forth, their length and spacing [mm], and the feed [mm/min]
 PASSES, LENGTH, APART, FEED = 5, 240.0, 25.0, 1200.0
-#: where the faces that are milled cold, and after the hour, begin in X; where the first position's does in Y [mm]
+#: start in X of the cold faces and of those after the hour; start in Y of the first position's face [mm]
 LEFT, LOWEST = (30.0, 330.0), 20.0
-#: from face to face in Y [mm]
+#: distance between faces in Y [mm]
 NEXT = 135.0
-#: in between the axes go to and fro between these (X, Y, Z) [mm], at this feed [mm/min]: 30 s a move
+#: end points (X, Y, Z) of the movements in between [mm], and their feed [mm/min]: 30 s per movement
 CORNERS = ((150.0, 25.0, 150.0), (450.0, 525.0, 450.0))
 ROUGHING = 1340.0
 ROUGHING_MOVE = 30.0
-#: how often a block's surface is looked at [s]
+#: sampling interval of the surface of a block [s]
 LOOK = 1.0
-#: most that a correction changes by in a cut, per block and 10 mm of way [um], as ``thermocomp revise`` has it
+#: largest change of a correction in a cut, per block and 10 mm of path [um], as in ``thermocomp revise``
 STEP = 1.0
-#: a correction is renewed as soon as the drift has moved by so much, likewise [um]
+#: change of the drift at which a correction is renewed [um], as in ``thermocomp revise``
 TOLERANCE = 1.0
-#: how a program is revised: as the paper does, as soon as it is needed, and at safe points only
+#: revision methods: as in the paper, as soon as needed, and at safe points only
 EVERY, NEEDED, SAFE = "every 10 min", f"by {TOLERANCE:g} um", f"work offset, by {TOLERANCE:g} um"
 WAYS = (EVERY, NEEDED, SAFE)
 
 
-# -- written -----------------------------------------------------------------------------------------------------------
+# -- writing -----------------------------------------------------------------------------------------------------------
 
 
 def write_program(test: Recording) -> list[str]:
-    """Write the NC program that a cutting test has been run with.
+    """Return the NC program of a cutting test.
 
     Parameters
     ----------
     test : Recording
-        With the spindle speed.
+        Recording with the spindle speed.
 
     Returns
     -------
     list of str
-        Lines. The spindle turns as in the recording, from its start on: what the moves leave of the time is dwell.
+        Lines. The spindle speed follows the recording from its start; time not needed for movements is spent in dwells.
 
     Raises
     ------
     ValueError
-        In some stretch the moves take longer than the test.
+        The movements of a period take longer than in the test.
     """
     lines = [f"(CUTTING TEST {test.name.upper()})", "G21 G90 G17 G94 G40 G54", "T1 M6", "G43 H1", f"G0 Z{UP:g}"]
     due: list[tuple[int, float]] = []
@@ -98,7 +98,7 @@ def write_program(test: Recording) -> list[str]:
 
 
 def milling(test: Recording) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return the times at which the cold faces and the other ones are milled, from and to [s]: see `MILLING`."""
+    """Return the periods [s] in which the cold faces and the later ones are milled: see `MILLING`."""
     running = np.flatnonzero(_speeds(test)[1:] > 0)
     begin, end = float(test.time[running[0]]), float(test.time[running[-1] + 1])
     return (begin, begin + MILLING * MINUTE), (end - MILLING * MINUTE, end)
@@ -109,9 +109,9 @@ def _speeds(test: Recording) -> FloatArray:
 
 
 def _stretches(test: Recording, borders: Sequence[float]) -> Iterator[tuple[float, float, float]]:
-    """Yield from when to when [s] the spindle turns at which speed [1/min]; no stretch goes over a border."""
+    """Yield start and end [s] of periods of constant spindle speed [1/min]; no period crosses a border."""
     speed, begin = _speeds(test), float(test.time[0])
-    for k in range(1, len(speed)):  # a row tells the speed that led to it
+    for k in range(1, len(speed)):  # the speed in a row is that of the preceding interval
         end = float(test.time[k])
         if k == len(speed) - 1 or speed[k + 1] != speed[k] or end in borders:
             yield begin, end, float(speed[k])
@@ -138,7 +138,7 @@ def _comment(number: int, z: float) -> str:
 
 
 def _roughing(seconds: float) -> Iterator[str]:
-    """Yield moves to and fro that take a little less."""
+    """Yield movements back and forth that take slightly less than the given time."""
     x, y, z = CORNERS[0]
     yield f"G0 X{x:g} Y{y:g}"
     yield f"G0 Z{z:g}"
@@ -149,7 +149,7 @@ def _roughing(seconds: float) -> Iterator[str]:
 
 
 def _filled(lines: list[str], due: Sequence[tuple[int, float]]) -> list[str]:
-    """Let each of some dwells, of 1 s so far, end when it is due [s]."""
+    """Return the lines with each dwell, initially 1 s, extended to end at its due time [s]."""
     ends = [t.end for t in run(lines)]
     longer = 0.0
     for k, when in due:
@@ -161,7 +161,7 @@ def _filled(lines: list[str], due: Sequence[tuple[int, float]]) -> list[str]:
     return lines
 
 
-# -- revised -----------------------------------------------------------------------------------------------------------
+# -- revising ----------------------------------------------------------------------------------------------------------
 
 
 def stations(models: Sequence[ErrorModel]) -> list[Station]:
@@ -170,7 +170,7 @@ def stations(models: Sequence[ErrorModel]) -> list[Station]:
 
 
 def warmed(models: Sequence[ErrorModel], seconds: float, speed: float) -> ThermalStart:
-    """Return the start state that is carried over from a job before: it began cold, and had one speed [1/min]."""
+    """Return the state carried over from a preceding job with a cold start and a constant speed [1/min]."""
     there = stations(models)
     before = Drift(there, begin_cold(there, {}))
     before.advance(seconds, speed)
@@ -186,12 +186,12 @@ def revise_program(
     ----------
     lines : iterable of str
     models : sequence of ErrorModel
-        One per position.
+        Model of each position.
     way : str
-        One of `WAYS`.
+        Revision method, one of `WAYS`.
     start : ThermalStart, optional
-        State of the machine when the program begins; cold without it. The drift counts from there: it is then that the
-        work is set up.
+        State of the machine at the start of the program. Default: cold. The drift is relative to this time, at which
+        the work is set up.
 
     Returns
     -------
@@ -209,19 +209,19 @@ def revise_program(
     return [text for became in revision.revise(lines) for text in became.texts]
 
 
-# -- read back ---------------------------------------------------------------------------------------------------------
+# -- reading back ------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)
 class FacedSurface:
-    """A face as the program has it cut, at every second of its passes.
+    """A face as commanded by the program, for each second of its passes.
 
     Parameters
     ----------
     number : int
-        1 is milled cold, 2 after the hour.
+        1: milled cold, 2: after the hour.
     position : float
-        Position of Z, in the drawing [mm].
+        Position of Z in the drawing [mm].
     time : ndarray of shape (n,)
         [s]
     z : ndarray of shape (n,)
@@ -249,12 +249,12 @@ class FacedSurface:
 
 
 def run(lines: Iterable[str]) -> Iterator[Timed]:
-    """Read a program as the machine runs it."""
+    """Yield the blocks of a program as run by the machine."""
     return time_blocks(follow_program(read_lines(lines, SETUP.controller), SETUP), KINEMATICS)
 
 
 def faces(lines: Iterable[str]) -> list[FacedSurface]:
-    """Return the faces that a program cuts; comments in the program mark the start of each face.
+    """Return the faces cut by a program; comments in the program mark the start of each face.
 
     Parameters
     ----------
@@ -263,7 +263,7 @@ def faces(lines: Iterable[str]) -> list[FacedSurface]:
     Returns
     -------
     list of FacedSurface
-        In the order they are milled.
+        In the order of milling.
     """
     begins = {_comment(n, z).strip("()"): (n, float(z)) for n in (1, 2) for z in POSITIONS}
     found: dict[tuple[int, float], list[FloatArray]] = {}
@@ -282,14 +282,14 @@ def _cuts(block: Block) -> bool:
 
 
 def _looked_at(block: Block, start: float, end: float, position: float) -> FloatArray:
-    """Return times [s], and commanded minus drawing [um], over a pass: an array of two rows."""
+    """Return times [s], and commanded minus drawing [um], over a pass: an array with two rows."""
     share = (np.arange(n := max(1, round((end - start) / LOOK))) + 0.5) / n
     z = np.interp(share, (0.0, 1.0), (block.moves[0].start[2], block.moves[-1].end[2]))
     return np.array([start + share * (end - start), 1e3 * (z - position)])
 
 
 def turning(lines: Iterable[str], times: FloatArray) -> FloatArray:
-    """Return the spindle speed of a program at some times [s], rising, shape (n,) [1/min]."""
+    """Return the spindle speed of a program at increasing times [s], shape (n,) [1/min]."""
     ends, speeds = np.array([(t.end, abs(t.block.speed)) for t in run(lines)]).T
     found: FloatArray = speeds[np.minimum(np.searchsorted(ends, times), len(ends) - 1)]
     return found

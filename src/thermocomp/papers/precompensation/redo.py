@@ -1,9 +1,9 @@
-"""Pre-compensation redone: the drift from the spindle speed alone, added to the NC program beforehand (P-01 to P-07).
+"""Reproduction of pre-compensation: drift from the spindle speed alone, added to the NC program (P-01 to P-07).
 
 The text is a fragment: figures and the equation are lost (E-P1). The model is identified in one test with the speeds of
-milling jobs, and judged in free run in another one with new speeds (P-05), at four positions of Z. The cutting tests
-are done twice: with the schedule of corrections applied to what was recorded, here, and with NC programs that are
-revised, read back and milled, in `thermocomp.papers.precompensation.cutting`.
+milling jobs, and judged in free run in another with new speeds (P-05), at four positions of Z. The cutting tests are
+simulated twice: here by applying the schedule of corrections to recordings, and in
+`thermocomp.papers.precompensation.cutting` with NC programs that are revised, read back and milled.
 """
 
 import numpy as np
@@ -16,16 +16,16 @@ from thermocomp.papers.precompensation.setup import CHOSEN, CUTS, LEAST, NET, PA
 from thermocomp.papers.study import Claims, Figure, Ours, Panel, Part, Progress, Study, StudyTable
 
 TITLE = "Pre-compensation of thermal errors by revising the NC program"
-#: "describes thermal errors well", criterion: share of the drift's variance that is described at every position
+#: criterion for "describes thermal errors well": minimum explained share of the variance at every position
 WELL = 0.9
-#: "errors at any z can be obtained", criterion: interpolated, the RMS is at most so many times that of a model there
+#: criterion for "errors at any z can be obtained": maximum ratio of the interpolated RMS to that of a local model
 AS_WELL = 1.1
-#: share of rows beyond what was identified that is worth telling
+#: minimum share of rows outside the identified range that is reported
 BEYOND = 0.02
 
 
 def run(seed: int, progress: Progress) -> Study:
-    """Redo the study.
+    """Reproduce the study.
 
     Parameters
     ----------

@@ -21,35 +21,35 @@ from thermocomp.virtual.datasets import find_experiment, record
 from thermocomp.virtual.protocol import Experiment
 
 SPEED = "spindle_rpm"
-#: where the drift of Z is modelled (P-04) [mm]
+#: positions of Z with a drift model (P-04) [mm]
 POSITIONS = (0, 200, 400, 600)
-#: the paper's orders (P-02), and the greatest ones tried
+#: orders of the paper (P-02), and largest orders tried
 PAPERS_ORDERS = (1, 0)
 GREATEST = 5
-#: "every 10 min" (P-06) [s], and other steps of time that are tried
+#: "every 10 min" (P-06) [s], and other intervals tried
 INTERVAL = 600.0
 INTERVALS = (60.0, 120.0, 300.0, 600.0, 1200.0)
-#: depth difference of the milled surfaces (P-07), without and with [um]
+#: depth difference of the milled surfaces (P-07), without and with compensation [um]
 PAPERS_DEPTHS = (7.0, 2.0)
-#: criterion of the cutting tests: what is left of the depth difference, at most the paper's share
+#: criterion of the cutting tests: maximum remaining share of the depth difference, as in the paper
 SHARE = PAPERS_DEPTHS[1] / PAPERS_DEPTHS[0]
-#: cutting tests
+#: number of cutting tests
 CUTS = 8
-#: a surface is milled in the first, and in the last, so many minutes of a cutting test in which the spindle runs
+#: duration of milling at the start and at the end of the spindle run of a cutting test [min]
 MILLING = 5.0
-#: names of what is compared
+#: names of the compared models
 NONE = "no compensation"
 NET, LEAST, CHOSEN = "net, k = 1, m = 0", "least squares, k = 1, m = 0", "least squares, orders by FPE"
 
 
 @dataclass(frozen=True, eq=False)
 class CuttingTest:
-    """A cutting test: how much deeper the second surface is than the first [um], per position of Z.
+    """A cutting test: depth of the second surface relative to the first [um], per position of Z.
 
     Parameters
     ----------
     without, scheduled : ndarray of shape (n_positions,)
-        Without compensation, and with the program corrected every ten minutes.
+        Without compensation, and with a program corrected every ten minutes.
     """
 
     without: FloatArray
@@ -57,7 +57,7 @@ class CuttingTest:
 
     @property
     def means(self) -> tuple[float, float]:
-        """Mean magnitudes of both over the positions [um]."""
+        """Mean magnitudes of both depth differences over the positions [um]."""
         return float(np.abs(self.without).mean()), float(np.abs(self.scheduled).mean())
 
 
@@ -68,7 +68,7 @@ class Warm:
     Parameters
     ----------
     hours, drift : ndarray of shape (n_rows,)
-        Since the job began [h], and the drift since then [um].
+        Time since the start of the job [h], and the drift since then [um].
     cold, carried : ndarray of shape (n_rows,)
         Residual [um] if the model starts cold, and if its state is carried over.
     """
@@ -86,24 +86,24 @@ class Computed:
     Parameters
     ----------
     learn, judge : Samples
-        Identification, and verification under new conditions; a target per position.
+        Identification data, and verification data under new conditions; one target per position.
     models : dict of str to list of ErrorModel
-        One per position.
+        Models by name, one per position.
     orders : list of tuple of Order
         Table of final prediction errors per position.
     hidden : list of int
         Hidden nodes of the nets.
     one_step : float
-        RMS of least squares with k = 1, m = 0, one step ahead, at all positions [um].
+        One-step-ahead RMS of least squares with k = 1, m = 0 over all positions [um].
     clocks : dict of float to (tuple of int, float, float)
-        By the interval [s], at the first position: orders by FPE, free-run RMS with them, and with k = 1, m = 0 [um].
+        By interval [s], at the first position: orders by FPE, free-run RMS with these, and with k = 1, m = 0 [um].
     cuts : list of CuttingTest
     warm : Warm
     room : float
-        How far Z of a machine drifts that stands still for a day, peak to peak [um]: none of it follows from the speed
+        Peak-to-peak drift of Z of a machine at rest for a day [um]: no part of it can be predicted from the speed
         (E-P6).
     workshop : float
-        RMS of what the nets leave of the same verification in a workshop that follows the day [um].
+        RMS residual of the nets in the same verification, but in a workshop with a daily temperature cycle [um].
     """
 
     learn: Samples
@@ -136,7 +136,7 @@ class Computed:
 
     @property
     def by_fpe(self) -> list[Order]:
-        """The orders with the smallest final prediction error, by position."""
+        """Orders with the smallest final prediction error, by position."""
         return [min((o for o in table if o.admissible), key=lambda o: o.fpe) for table in self.orders]
 
     @property
@@ -146,23 +146,23 @@ class Computed:
         return float(without), float(with_)
 
     def shares(self, name: str) -> list[float]:
-        """Return the share of the drift's variance that a model describes at each position."""
+        """Return the explained share of the variance of the drift at each position."""
         return [described(e, z) for e, z in zip(self.left[name].T, self.judge.deviations.T, strict=True)]
 
     @property
     def inner(self) -> tuple[int, ...]:
-        """Positions with a neighbour on either side, as indices."""
+        """Indices of the positions with a neighbour on either side."""
         return tuple(range(1, len(POSITIONS) - 1))
 
     def interpolated(self, k: int, name: str) -> FloatArray:
-        """Return the prediction for position k by the models at all other positions, linearly interpolated."""
+        """Return the prediction for position k by linear interpolation between the models of all other positions."""
         others = [j for j in range(len(POSITIONS)) if j != k]
         nodes = [float(POSITIONS[j]) for j in others]
         return np.array([np.interp(POSITIONS[k], nodes, row) for row in self.free_run[name][:, others]])
 
 
 def compute(seed: int, progress: Progress) -> Computed:
-    """Run the tests and do what the paper does.
+    """Run the tests and the computations of the paper.
 
     Parameters
     ----------
@@ -216,12 +216,12 @@ def compute(seed: int, progress: Progress) -> Computed:
 
 
 def samples_of(recording: Recording) -> Samples:
-    """Return the drift of Z at all positions, the spindle speed being the only input (P-01)."""
+    """Return samples of the drift of Z at all positions, with the spindle speed as the only input (P-01)."""
     return stacked([recording], [f"z_at_{p}_um" for p in POSITIONS], [SPEED])
 
 
 def in_a_workshop(experiment: Experiment) -> Experiment:
-    """Return the same tests in a workshop that is not air-conditioned, in place of a measuring room."""
+    """Return the same tests in a workshop that is not air-conditioned, instead of a measuring room."""
     return replace(experiment, tests=tuple(replace(plan, climate=Climate()) for plan in experiment.tests))
 
 
@@ -231,12 +231,12 @@ def at_positions(models: Sequence[ErrorModel], samples: Samples) -> FloatArray:
 
 
 def schedule_corrections(time: FloatArray, predictions: FloatArray) -> FloatArray:
-    """Return the values added to the programmed Z: computed every ten minutes, and held until the next time (P-06).
+    """Return the values added to the programmed Z: computed every ten minutes and held in between (P-06).
 
     Parameters
     ----------
     time : ndarray of shape (n_rows,)
-        Since the start of the program [s].
+        Time since the start of the program [s].
     predictions : ndarray of shape (n_rows, n_positions)
         Deviation, actual minus commanded [um].
 
@@ -251,7 +251,7 @@ def schedule_corrections(time: FloatArray, predictions: FloatArray) -> FloatArra
 
 
 def cut(recording: Recording, models: Sequence[ErrorModel]) -> CuttingTest:
-    """Mill a surface with the cold machine and another after an hour, without and with a corrected program (P-07)."""
+    """Simulate milling a surface cold and another after an hour, without and with a corrected program (P-07)."""
     samples = samples_of(recording)
     running = np.flatnonzero(samples.values[:, 0] > 0)
     minutes = samples.time / 60
@@ -263,7 +263,7 @@ def cut(recording: Recording, models: Sequence[ErrorModel]) -> CuttingTest:
 
 
 def warm_start(judge: Samples, model: ErrorModel) -> Warm:
-    """Begin a job in the middle of the verification: the part is probed there, so the drift counts from there."""
+    """Start a job in the middle of the verification: the part is probed then, so the drift is relative to that time."""
     late = np.arange(len(judge)) >= len(judge) // 2
     job = judge.take(late)
     job = replace(job, time=job.time - job.time[0])
@@ -273,7 +273,7 @@ def warm_start(judge: Samples, model: ErrorModel) -> Warm:
 
 
 def _by_fpe_and_papers(interval: float) -> tuple[ARX, ARX]:
-    """Return least squares by a step of time [s]: with the orders that FPE will choose, and with the paper's."""
+    """Return least squares for an interval [s]: with orders chosen by FPE, and with those of the paper."""
     k, m = PAPERS_ORDERS
     step: dict[str, Any] = {"inputs": (SPEED,), "time": "routed", "interval": interval}
     return ARX(**step, k_max=GREATEST, m_max=GREATEST), ARX(**step, k=k, m=m)

@@ -1,4 +1,4 @@
-"""The studies of the papers: their claims as text, their figures, and one page with all of it."""
+"""Report of the studies of the papers: claims as text, figures, and a page with everything."""
 
 import re
 import textwrap
@@ -16,22 +16,22 @@ from thermocomp.report.drawing import add_legend, drawing, svg
 from thermocomp.report.figures import COLOURS, POINTS, thin_points
 from thermocomp.report.html import environment
 
-#: a cell that is a number, alone or with what stands for none
+#: cell with a number, or a substitute for a missing one
 _NUMBER = re.compile(r"[-+]?[\d.,]+(e[-+]?\d+)?( ?%)?|nan|inf|[-–]")
 WIDTH = 9.6
 PANEL_HEIGHT = 2.7
-#: of plain text
+#: line width and indentation of plain text
 COLUMNS, INDENT = 88, "    "
 
 
 def count_verdicts(study: Study) -> dict[str, int]:
-    """Return the number of claims by verdict: ``yes``, ``no``, ``some`` (runs do not agree) and ``-``."""
+    """Return the number of claims by verdict: ``yes``, ``no``, ``some`` (runs disagree) and ``-``."""
     words = [c.verdict if c.verdict in ("yes", "no", "-") else "some" for c in study.claims]
     return {word: words.count(word) for word in ("yes", "no", "some", "-")}
 
 
 def headline(study: Study) -> str:
-    """Return one line about a study: how many of its claims hold."""
+    """Return a summary line of a study: the number of claims that hold."""
     n = count_verdicts(study)
     runs = max((1 + len(c.again) for c in study.claims), default=1)
     line = f"{n['yes']} of {n['yes'] + n['no'] + n['some']} claims hold on the virtual machine"
@@ -43,13 +43,13 @@ def headline(study: Study) -> str:
 
 
 def text(study: Study, *ids: str) -> str:
-    """Return claims as plain text, a paragraph each.
+    """Return claims as plain text, one paragraph each.
 
     Parameters
     ----------
     study : Study
     *ids : str
-        Those with one of these ids; all of them, under the study's title, without it.
+        Select the claims with these ids. Default: all, under the title of the study.
 
     Returns
     -------
@@ -68,7 +68,7 @@ def text(study: Study, *ids: str) -> str:
 
 
 def format_table(table: StudyTable) -> str:
-    """Return a table as plain text: its caption, then columns side by side, numbers on the right."""
+    """Return a table as plain text: its caption, then the columns, with numbers right-aligned."""
     left, lines = words(table), [list(table.header), *rows(table)]
     widths = [max(len(line[k]) for line in lines) for k in range(len(table.header))]
 
@@ -80,7 +80,7 @@ def format_table(table: StudyTable) -> str:
 
 
 def words(table: StudyTable) -> list[int]:
-    """Return the text columns of a table: in the others most cells are numbers, and right-aligned."""
+    """Return the text columns of a table; in the other columns most cells are numbers, and right-aligned."""
     cells = [[row[k] for row in table.rows if row[k]] for k in range(len(table.header))]
     return [k for k, column in enumerate(cells) if column and 2 * sum(map(_is_number, column)) <= len(column)]
 
@@ -92,13 +92,13 @@ def rows(table: StudyTable) -> list[list[str]]:
 
 
 def paint(figure: Figure, canvas: Canvas) -> None:
-    """Draw a study's figure.
+    """Draw a figure of a study.
 
     Parameters
     ----------
     figure : thermocomp.papers.study.Figure
     canvas : matplotlib.figure.Figure
-        Empty; `size` tells how large it should be.
+        Empty; see `size` for its dimensions.
     """
     columns = figure.columns
     axes = canvas.subplots(-(-len(figure.panels) // columns), columns, squeeze=False).ravel()
@@ -141,7 +141,7 @@ def draw(figure: Figure) -> str:
 
 
 def render(studies: Sequence[Study], *, seed: int) -> str:
-    """Return studies as one HTML page that needs no network.
+    """Return studies as a self-contained HTML page.
 
     Parameters
     ----------
@@ -190,7 +190,7 @@ def _is_number(cell: str) -> bool:
 def _draw(ax: Axes, curve: PlotCurve, colour: str) -> None:
     known: dict[str, Any] = {"label": curve.label} if curve.label else {}
     if curve.style == "points":
-        # as a picture inside the page where there are many: one element each would make it slow
+        # many points are rasterised: separate elements would make the page slow
         ax.plot(curve.x, curve.y, ".", color=colour, ms=4, rasterized=len(curve.x) > POINTS, **known)
     else:
         ax.plot(*thin_points(curve.x, curve.y), "--" if curve.style == "dashed" else "-", color=colour, **known)

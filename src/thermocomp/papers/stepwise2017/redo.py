@@ -1,7 +1,7 @@
-"""stepwise2017 redone: of 24 temperatures the few that partial F keeps, judged on-line (T-01 to T-10).
+"""Reproduction of stepwise2017: few of 24 temperatures, selected by partial F and judged on-line (T-01 to T-10).
 
-Temperatures are counted from the start of the test, as the paper draws their variation (Fig. 2). Its own comparison
-(Fig. 6) is on-line, so methods are judged on a test of another day with other speeds, by the RMS of what they leave.
+Temperatures are relative to the start of the test, as in Fig. 2 of the paper. Its own comparison (Fig. 6) is on-line,
+so methods are judged by their RMS residual in a test on another day with other speeds.
 """
 
 from collections.abc import Callable
@@ -17,12 +17,12 @@ from thermocomp.papers.stepwise2017.setup import F_ENTER, LEAST, PAPERS_RESIDUAL
 from thermocomp.papers.study import Claims, Figure, Ours, Panel, Part, Progress, Study, StudyTable
 
 TITLE = "Open Mech. Eng. J. 11 (2017): Temperature measurement point optimization by stepwise regression"
-#: temperatures of the paper's Fig. 2, by their number
+#: numbers of the temperatures in Fig. 2 of the paper
 FIGURE_2 = (3, 11, 14)
 
 
 def run(seed: int, progress: Progress) -> Study:
-    """Redo the study.
+    """Reproduce the study.
 
     Parameters
     ----------

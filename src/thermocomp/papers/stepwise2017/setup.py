@@ -29,10 +29,10 @@ from thermocomp.virtual.datasets import record
 TARGET = "x1_um"
 #: F to enter and F to delete (T-03)
 F_ENTER, F_DELETE = 100.0, 50.0
-#: what the paper's model keeps of its 24 temperatures, by number (T-07), and its bound on the residual [um] (T-08)
+#: numbers of the temperatures kept in the paper's model, out of 24 (T-07); its bound on the residual [um] (T-08)
 PAPERS_CHOICE = (3, 9, 11, 18, 23)
 PAPERS_RESIDUAL = 5.0
-#: methods by the name in the study: the paper's and those it compares with (T-08), its neighbours (T-10), and ours
+#: methods by name in the study: the paper's and those compared (T-08), related methods (T-10), and ours
 METHODS = {
     "stepwise": "partial-f",
     "least squares, all temperatures": "ols",
@@ -43,17 +43,17 @@ METHODS = {
 }
 STEPWISE, LEAST, PURSUIT, COMPONENTS, SLICED, DYNAMIC = METHODS
 NONE = "no compensation"
-#: slices of the deviation, and directions that are kept: as many as the sensors that Zhang et al. keep
+#: number of slices of the deviation, and of directions kept: as many as the sensors kept by Zhang et al.
 SLICES, DIRECTIONS = 10, 5
 #: share of the largest variance below which a principal direction of the temperatures is noise
 NOISE_SHARE = 1e-4
-#: every so many rows, to see what the thresholds on F owe to the number of rows (E-T3)
+#: row intervals for the effect of the number of rows on the F thresholds (E-T3)
 THINNED = (1, 2, 4, 8, 16)
 
 
 @dataclass(frozen=True, eq=False)
 class Thinned:
-    """The selection from some of the rows.
+    """Selection from a subset of the rows.
 
     Parameters
     ----------
@@ -61,11 +61,11 @@ class Thinned:
     effective : float
         Number of independent rows equivalent to the residual.
     first : float
-        R2 that a first variable needs to enter.
+        R2 required for the first variable to enter.
     names : tuple of str
-        Temperatures chosen.
+        Selected temperatures.
     rms : float
-        On the on-line test [um].
+        RMS in the on-line test [um].
     """
 
     rows: int
@@ -82,15 +82,15 @@ class Computed:
     Parameters
     ----------
     fit, online : Samples
-        The test that is learned from, and the one on another day.
+        Training test, and test on another day.
     selection : PartialF
     models : dict of str to ErrorModel
-        By the names of `METHODS`.
+        Models by the names of `METHODS`.
     thinned : tuple of Thinned
     absolute : float
-        RMS of the stepwise model of temperatures as they are, not from the start of the test, on the on-line test [um].
+        RMS of the stepwise model with absolute temperatures in the on-line test [um].
     shaken : dict of str to Robustness
-        Stepwise and the two it is compared with, on the on-line test with noise and lost sensors.
+        Stepwise and the two compared methods in the on-line test with noise and lost sensors.
     """
 
     fit: Samples
@@ -103,7 +103,7 @@ class Computed:
 
     @cached_property
     def left_in_fit(self) -> dict[str, FloatArray]:
-        """Residuals of each model in the test it was fitted to [um]."""
+        """Residuals of each model in the training test [um]."""
         return _left(self.models, self.fit)
 
     @cached_property
@@ -113,7 +113,7 @@ class Computed:
 
     @cached_property
     def errors(self) -> dict[str, Errors]:
-        """The same as figures."""
+        """Error figures of each model in the on-line test."""
         return {name: Errors.of(e) for name, e in self.left.items()}
 
     @property
@@ -128,7 +128,7 @@ class Computed:
 
 
 def compute(seed: int, progress: Progress) -> Computed:
-    """Run the tests and do what the paper does.
+    """Run the tests and the computations of the paper.
 
     Parameters
     ----------
@@ -174,19 +174,19 @@ def compute(seed: int, progress: Progress) -> Computed:
 def sliced_inverse(samples: Samples) -> ErrorModel:
     """Fit least squares on the first directions of sliced inverse regression (Li 1991), the method of Zhang (T-10).
 
-    The rows are sorted by their deviation and cut into slices; the directions in which the slices' mean temperatures,
-    whitened, differ most are those the deviation depends on. Principal directions that are noise are left out first:
-    whitening would raise them to the size of the others.
+    Rows are sorted by deviation and divided into slices; the deviation depends on the directions in which the whitened
+    mean temperatures of the slices differ most. Principal directions that consist of noise are removed first, because
+    whitening would scale them up to the size of the others.
 
     Parameters
     ----------
     samples : Samples
-        With temperatures as inputs.
+        Samples with temperatures as inputs.
 
     Returns
     -------
     ErrorModel
-        Linear.
+        Linear model.
     """
     X, y = samples.change(), samples.deviations[:, 0]
     centred = X - X.mean(axis=0)

@@ -1,9 +1,9 @@
-"""Wessel et al. 2004 redone: optimal transformations of temperatures and displacements (W-01 to W-13).
+"""Reproduction of Wessel et al. 2004: optimal transformations of temperatures and displacements (W-01 to W-13).
 
-Four experiments: a spindle of finite elements (`thermocomp.papers.wessel2004.spindle`), the choice of temperatures on
-23 data sets (`thermocomp.papers.wessel2004.sets`), a resting tool that is heated and a tool of a working milling
-machine (`thermocomp.papers.wessel2004.tools`). What a claim is judged by stands at the top of these modules; it was set
-down before the first run.
+Four experiments: a finite-element spindle (`thermocomp.papers.wessel2004.spindle`), the choice of temperatures on
+23 data sets (`thermocomp.papers.wessel2004.sets`), a heated resting tool and a tool of a working milling machine
+(`thermocomp.papers.wessel2004.tools`). The criteria of the claims are at the top of these modules; they were defined
+before the first run.
 """
 
 from thermocomp.papers.study import Progress, Study
@@ -16,14 +16,14 @@ TITLE = "Wessel et al. 2004: Predicting thermal displacements in modular tool sy
 
 
 def run(seed: int, progress: Progress, physics: Physics | None = None) -> Study:
-    """Redo the study on the virtual machines.
+    """Reproduce the study on the virtual machines.
 
     Parameters
     ----------
     seed : int
         Random seed of weather and noise.
     progress : callable
-        Told the share done and what comes next.
+        Called with the completed fraction and the next step.
     physics : {'linear', 'nonlinear'}, optional
         Physics of the virtual machines. Default: as defined by the experiments.
 

@@ -1,4 +1,4 @@
-"""Wessel's Appendix B: which temperatures, by the maximal correlation of all sets on all data sets."""
+"""Wessel's Appendix B: choice of temperatures by the maximal correlation of all sets on all data sets."""
 
 import time
 from collections.abc import Sequence
@@ -18,17 +18,17 @@ from thermocomp.papers.study import Claims, FloatArray, Ours, Part, Progress, St
 from thermocomp.virtual.datasets import record
 from thermocomp.virtual.protocol import Physics
 
-#: sets of nine temperatures, models of all and of at most three, and the data sets behind them (W-10)
+#: numbers of temperature sets (nine temperatures), of models of all sets and of models of at most three (W-10)
 PAPER_SETS, PAPER_MODELS, PAPER_SMALL_SETS = 511, 35_259, 129
-#: equivalent sets for S1, S2, S3 and common ones; the sets they share; the one chosen, by places from 0 (W-11)
+#: numbers of equivalent sets for S1, S2, S3 and of common ones; the common sets; the chosen one, 0-based (W-11)
 PAPER_EQUIVALENT, PAPER_COMMON = (46, 7, 27), ((0, 1, 7), (1, 3, 7), (1, 4, 7), (1, 7, 8))
 PAPERS_OWN = (0, 1, 7)
-#: Psi that triples exceed, so that no more temperatures were looked at (W-12)
+#: Psi exceeded by triples, so that larger sets were not examined (W-12)
 ENOUGH_PSI = 0.99
-#: most temperatures in a set
+#: maximum number of temperatures in a set
 MOST = 3
-#: decrease of the error that counts as a failure, for the sets of at most three and for the larger ones, which the
-#: paper did not try; down to zero it takes five times as long and moves Psi by some 1e-5
+#: decrease of the error that counts as no decrease, for sets of at most three and for larger ones, which the paper did
+#: not try; with zero the computation takes five times as long and changes Psi by about 1e-5
 TOLERANCE, TOLERANCE_LARGER = 1e-6, 1e-5
 
 
@@ -39,14 +39,14 @@ class Selection:
     Parameters
     ----------
     psi, larger : MaximalCorrelations
-        Correlations of the sets of at most three, and of all larger ones.
+        Maximal correlations of the sets of at most three, and of all larger ones.
     small, holm, converged : Equivalents
-        Comparison of the sets of at most three: without correction for their number, by Holm's rule, and with sweeps to
-        the limit.
+        Comparison of the sets of at most three: without correction for their number, with Holm's correction, and with
+        fully converged sweeps.
     rows : sequence of int
-        Rows of the data sets.
+        Number of rows of each data set.
     seconds : float
-        All models took [s].
+        Computing time of all models [s].
     """
 
     psi: MaximalCorrelations
@@ -59,12 +59,12 @@ class Selection:
 
     @cached_property
     def chosen(self) -> tuple[int, ...]:
-        """Places of the temperatures that are chosen, from 0."""
+        """Indices of the chosen temperatures, from 0."""
         return _choice(self.small)
 
     @cached_property
     def by_size(self) -> dict[int, FloatArray]:
-        """Mean Psi of the best set, for each displacement, by the number of temperatures."""
+        """Mean Psi of the best set for each displacement, by the number of temperatures."""
         found: dict[int, FloatArray] = {}
         for psi in (self.psi, self.larger):
             sizes, means = np.array([len(s) for s in psi.subsets]), psi.psi.mean(axis=2)
@@ -82,7 +82,7 @@ class Selection:
 
 
 def appendix_b(seed: int, progress: Progress, physics: Physics | None = None) -> Selection:
-    """Redo Appendix B (W-10 to W-12).
+    """Reproduce Appendix B (W-10 to W-12).
 
     Parameters
     ----------
@@ -136,18 +136,18 @@ def told(s: Selection) -> Part:
 
 
 def _choice(small: Equivalents) -> tuple[int, ...]:
-    """Choose one set: the paper's last step was subjective, ours is the greatest sum of Psi over all displacements."""
+    """Return the chosen set: the paper's last step was subjective, ours is the largest sum of Psi."""
     equals = small.common or tuple(dict.fromkeys(small.subsets[k] for k in small.best))
     total = dict(zip(small.subsets, small.summed.sum(axis=0).tolist(), strict=True))
     return max(equals, key=lambda s: total[s])
 
 
 def name_set(places: Sequence[int]) -> str:
-    """Write a set as the paper does: ``{T1, T2, T8}``."""
+    """Return the name of a set as in the paper: ``{T1, T2, T8}``."""
     return "{" + ", ".join(f"T{j + 1}" for j in places) + "}"
 
 
-# -- claims --------------------------------------------------------------------------------------------------------
+# -- claims ------------------------------------------------------------------------------------------------------------
 
 claims = Claims[Selection]()
 
@@ -226,7 +226,7 @@ def _shared(s: Selection) -> Ours:
     return Ours(name_set(pair) if pair else "none", worse, note=why)
 
 
-# -- tables --------------------------------------------------------------------------------------------------------
+# -- tables ------------------------------------------------------------------------------------------------------------
 
 
 def _tables(s: Selection) -> tuple[StudyTable, ...]:

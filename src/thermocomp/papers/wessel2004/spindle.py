@@ -1,4 +1,4 @@
-"""Wessel's section III: the spindle of finite elements, learned in one regime of rotations, estimated in another."""
+"""Wessel's section III: the finite-element spindle, learned in one speed regime, estimated in another."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,15 +26,15 @@ from thermocomp.recordings.recording import Recording
 from thermocomp.virtual.datasets import record
 from thermocomp.virtual.protocol import Physics
 
-#: maximal correlation of the reference series, its rows and their interval [s] (W-06)
+#: maximal correlation of the reference series, number of its rows and their interval [s] (W-06)
 PAPER_PSI, PAPER_ROWS, PAPER_INTERVAL = 0.9994, 199, 100.0
-#: numbers of neighbours the paper tried (W-05)
+#: numbers of neighbours tried in the paper (W-05)
 NEIGHBOURS = range(1, 11)
 
-# What the claims are judged by, set down before the first run:
-#: a maximal correlation says that the model holds from here on; the paper's own mark for enough temperatures (W-12)
+# Criteria of the claims, defined before the first run:
+#: minimum maximal correlation for the model to hold; the paper's own limit for enough temperatures (W-12)
 GOOD_PSI = 0.99
-#: an estimate is quite close to the original: RMS as a share of the displacement's span
+#: maximum RMS for an estimate "quite close to the original", as a share of the displacement's span
 CLOSE = 0.05
 
 
@@ -45,10 +45,10 @@ class Spindle:
     Parameters
     ----------
     recordings : sequence of Recording
-        The one that is learned, and the one that is estimated.
+        Learned and estimated recording.
     found : MillingTrial
     peaked : MillingTrial
-        The wider series is the one that is estimated: `found`, or the two exchanged.
+        Trial with the wider series as the estimated one: `found`, or with the two series exchanged.
     """
 
     recordings: Sequence[Recording]
@@ -62,12 +62,12 @@ class Spindle:
 
     @property
     def span(self) -> float:
-        """Of the displacement that is estimated [um]."""
+        """Span of the estimated displacement [um]."""
         return float(np.ptp(self.found.measured))
 
     @cached_property
     def sweep(self) -> dict[int, tuple[float, float]]:
-        """By the number of neighbours, the RMS error and the RMS difference from the estimate with 2 [um]."""
+        """RMS error and RMS difference from the estimate with 2 neighbours, by the number of neighbours [um]."""
         learned, unseen, measured = self.found.learned, self.found.unseen, self.found.measured
         by_k = {k: ACE(neighbours=k, max_sweeps=SWEEPS) for k in NEIGHBOURS}
         estimates = {
@@ -77,7 +77,7 @@ class Spindle:
 
 
 def spindle(seed: int, progress: Progress, physics: Physics | None = None) -> Part:
-    """Redo section III (W-01 to W-07).
+    """Reproduce section III (W-01 to W-07).
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def spindle(seed: int, progress: Progress, physics: Physics | None = None) -> Pa
     target = len(recordings[0].displacements) - 1  # S4, at the front tip of the tool
     temperatures = range(len(recordings[0].temperatures))
     found = trial(recordings, target, temperatures)
-    exchanged = not found.beyond.any()  # the wider series must be the one that is estimated
+    exchanged = not found.beyond.any()  # the wider series must be the estimated one
     peaked = trial(recordings[::-1], target, temperatures, beside=False) if exchanged else found
     s = Spindle(recordings, found, peaked)
     tables = (
@@ -115,7 +115,7 @@ def spindle(seed: int, progress: Progress, physics: Physics | None = None) -> Pa
     return Part(claims(s), tables, _figures(s), numbers)
 
 
-# -- claims --------------------------------------------------------------------------------------------------------
+# -- claims ------------------------------------------------------------------------------------------------------------
 
 claims = Claims[Spindle]()
 
@@ -227,12 +227,12 @@ def _guarded(s: Spindle) -> Ours:
 
 
 def runs(rows: BoolArray) -> list[slice]:
-    """Return the stretches of consecutive rows that are true."""
+    """Return the runs of consecutive true rows."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]]).astype(np.int8)))
     return [slice(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
-# -- figures -------------------------------------------------------------------------------------------------------
+# -- figures -----------------------------------------------------------------------------------------------------------
 
 
 def _figures(spindle: Spindle) -> tuple[Figure, ...]:

@@ -1,4 +1,4 @@
-"""Wessel's sections IV and V: the resting tool that is heated, and the tool of a working milling machine."""
+"""Wessel's sections IV and V: the heated resting tool, and the tool of a working milling machine."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -29,21 +29,21 @@ from thermocomp.recordings.recording import Recording
 from thermocomp.virtual.datasets import record
 from thermocomp.virtual.protocol import Physics
 
-#: RMS in the independent test by multiple linear regression and by ACE: resting tool, milling machine [um] (W-08, W-09)
+#: RMS in the independent test by linear regression and by ACE: resting tool, milling machine [um] (W-08, W-09)
 PAPER_TOOL, PAPER_MILLING = (5.7, 1.0), (5.0, 2.2)
-#: greatest local gain over linear regression (E-W1); accuracy of the milling test without one episode [um] (E-W2)
+#: largest local gain over linear regression (E-W1); accuracy in the milling test without one episode [um] (E-W2)
 PAPER_GAIN, PAPER_ACCURACY = 10.0, 2.0
 
-# What the claims are judged by, set down before the first run:
-#: the test is cut into so many stretches to look for the greatest local gain
+# Criteria of the claims, defined before the first run:
+#: number of intervals of the test in which the largest local gain is sought
 STRETCHES = 10
-#: rows of the test that may lie outside what was learned when the range counts as sufficient
+#: maximum share of rows of the test outside the training range for this range to count as sufficient
 FEW = 0.05
-#: measuring points on each side of the worst one that make up its episode
+#: number of measuring points on each side of the worst one in its episode
 EPISODE = 5
-#: boxcar relative to the number of rows: that of N = 10 for the 199 rows of the finite-element spindle (E-W8)
+#: boxcar relative to the number of rows, equal to N = 10 for the 199 rows of the finite-element spindle (E-W8)
 WINDOW = 0.05
-#: measuring points between which linear regression over-estimates, and from which it under-estimates (W-09)
+#: range of measuring points with over-estimation by linear regression, and start of under-estimation (W-09)
 OVER, UNDER = (10, 40), 60
 
 
@@ -54,11 +54,11 @@ class Resting:
     Parameters
     ----------
     paper, own : MillingTrial
-        With the paper's set of temperatures, and with that of our own Appendix B.
+        Trials with the paper's set of temperatures, and with the set chosen by our own Appendix B.
     selection : Selection
         Selection of Appendix B.
     by_set : mapping of tuple of int to float
-        RMS of ACE in the unseen test with each set of at most three temperatures [um].
+        RMS of ACE in the unseen test for each set of at most three temperatures [um].
     """
 
     paper: MillingTrial
@@ -68,12 +68,12 @@ class Resting:
 
     @cached_property
     def order(self) -> list[tuple[int, ...]]:
-        """The sets by their RMS, the best first."""
+        """The sets in order of their RMS, the best first."""
         return sorted(self.by_set, key=lambda s: self.by_set[s])
 
 
 def resting_tool(seed: int, progress: Progress, selection: Selection, physics: Physics | None = None) -> Part:
-    """Redo section IV (W-08).
+    """Reproduce section IV (W-08).
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def resting_tool(seed: int, progress: Progress, selection: Selection, physics: P
 
 
 def milling_machine(seed: int, progress: Progress, physics: Physics | None = None) -> Part:
-    """Redo section V (W-09): four days are learned, the fifth is estimated.
+    """Reproduce section V (W-09): four days are learned, the fifth is estimated.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def milling_machine(seed: int, progress: Progress, physics: Physics | None = Non
     return Part(milling(found), tables, _milling_figures(recordings, found), numbers)
 
 
-# -- claims --------------------------------------------------------------------------------------------------------
+# -- claims ------------------------------------------------------------------------------------------------------------
 
 resting, milling = Claims[Resting](), Claims[MillingTrial]()
 
@@ -167,7 +167,7 @@ def _better_at_work(found: MillingTrial) -> Ours:
     f"up to {PAPER_GAIN:g}x; in total {PAPER_TOOL[0] / PAPER_TOOL[1]:.1f}x",
 )
 def _locally(r: Resting) -> Ours:
-    """Judge the abstract's "10-fold", which the totals are not (E-W1)."""
+    """Return our result for the "10-fold" of the abstract, which the overall RMS does not support (E-W1)."""
     found = r.own
     parts = np.array_split(np.arange(len(found.unseen)), STRETCHES)
     linear, ace = found.residual(MLR_NAME), found.residual(ACE_NAME)
@@ -255,7 +255,7 @@ def _without_episode(found: MillingTrial) -> Ours:
     "a figure",
 )
 def _systematic(found: MillingTrial) -> Ours:
-    """Judge the sign of the linear regression's error; over-estimated means: too much of the drift."""
+    """Return our result for the sign of the error of linear regression; over-estimated: too much drift predicted."""
     drift = np.sign(found.measured.mean()) or 1.0
     excess, ace = (-drift * found.residual(m) for m in (MLR_NAME, ACE_NAME))
     middle, late = float(excess[OVER[0] - 1 : OVER[1]].mean()), float(excess[UNDER - 1 :].mean())
@@ -267,13 +267,13 @@ def _systematic(found: MillingTrial) -> Ours:
     )
 
 
-# -- every set of temperatures -------------------------------------------------------------------------------------
+# -- every set of temperatures -----------------------------------------------------------------------------------------
 
 
 def _by_set(recordings: list[Recording], sets: Sequence[tuple[int, ...]]) -> dict[tuple[int, ...], float]:
-    """Return the RMS of ACE in the unseen test with each set of temperatures [um].
+    """Return the RMS of ACE in the unseen test for each set of temperatures [um].
 
-    With at most 300 sweeps, the default of `ACE`: so many sets, learned to the end, take a minute.
+    At most 300 sweeps, the default of `ACE`: full convergence for this many sets would take a minute.
     """
     n = len(recordings[0].temperatures)
     learned, unseen = (stacked(r, 0, range(n)) for r in (recordings[:-1], recordings[-1:]))
@@ -303,7 +303,7 @@ def _sets_table(r: Resting) -> StudyTable:
     )
 
 
-# -- figures -------------------------------------------------------------------------------------------------------
+# -- figures -----------------------------------------------------------------------------------------------------------
 
 
 def _estimated(found: MillingTrial) -> list[Panel]:

@@ -1,4 +1,4 @@
-"""Wessel's two steps: transformations are learned on some tests, displacements estimated in another (W-05)."""
+"""Wessel's two steps: transformations are learned from some tests, displacements estimated in another (W-05)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,11 +23,11 @@ from thermocomp.recordings.samples import Samples
 ACE_NAME = "ACE"
 MLR_NAME = "multiple linear regression"
 NONE_NAME = "no compensation"
-#: what such a method is called with temperatures counted from the start of each test
+#: name of a method with temperatures relative to the start of each test
 FROM_START = "{}, from each start"
-#: sweeps of the paper's rule: they end when the error fails to decrease, which may take long
+#: maximum number of sweeps by the paper's rule: they end when the error no longer decreases, which may take long
 SWEEPS = 20_000
-#: a difference is slight up to this share of the displacement's span: what the eye sees in a figure
+#: maximum slight difference as a share of the displacement's span: visible limit in a figure
 SLIGHT = 0.01
 
 
@@ -40,13 +40,13 @@ class MillingTrial:
     learned, unseen : Samples
         Temperatures as read [degC].
     ace : ACE
-        The paper's: boxcar of N = 10, k = 2.
+        ACE of the paper: boxcar of N = 10, k = 2.
     estimates : dict of str to ndarray of shape (n_unseen,)
-        By method, in the unseen test [um].
+        Estimates in the unseen test, by method [um].
     fits : dict of str to ndarray of shape (n_learned,)
-        The same in the tests that were learned.
+        Estimates in the training tests, by method [um].
     flagged : ndarray of bool of shape (n_unseen,)
-        A temperature lies outside what was learned: the guard of the frozen model.
+        Whether a temperature is outside the training range: the guard of the frozen model.
     """
 
     learned: Samples
@@ -68,7 +68,7 @@ class MillingTrial:
 
     @property
     def beyond(self) -> BoolArray:
-        """Rows of the unseen test whose displacement lies outside what was learned, by more than `SLIGHT` of it."""
+        """Rows of the unseen test with a displacement outside the training range by more than `SLIGHT` of it."""
         seen = self.learned.deviations[:, 0]
         margin = SLIGHT * np.ptp(seen)
         return np.asarray((self.measured < seen.min() - margin) | (self.measured > seen.max() + margin))
@@ -92,11 +92,11 @@ class MillingTrial:
         return rms(self.residual(method))
 
     def fit_rms(self, method: str) -> float:
-        """Return the root mean square of the residual of one of `fits` in the tests that were learned [um]."""
+        """Return the root mean square of the residual of one of `fits` in the training tests [um]."""
         return rms(self.learned.deviations[:, 0] - self.fits[method])
 
     def numbers(self, prefix: str) -> dict[str, float]:
-        """Return the reported results of every trial as numbers, each name with a prefix."""
+        """Return the numbers reported for every trial, with a prefix to their names."""
         return {
             f"{prefix}_psi": self.ace.psi_,
             f"{prefix}_falling_theta": self.ace.falling_theta_,
@@ -106,12 +106,12 @@ class MillingTrial:
         }
 
     def rms_by_method(self, prefix: str) -> dict[str, float]:
-        """Return `rms` by the short names of the methods, each with a prefix."""
+        """Return `rms` by the short names of the methods, with a prefix."""
         short = {"ace": ACE_NAME, "mlr": MLR_NAME, "ace_monotone": "ace-monotone", "dynamic": "dynamic"}
         return {f"{prefix}_{key}_rms_um": self.rms(method) for key, method in short.items()}
 
     def table(self, caption: str) -> StudyTable:
-        """Lay out the errors of all methods in the unseen test.
+        """Return a table of the errors of all methods in the unseen test.
 
         Parameters
         ----------
@@ -122,14 +122,14 @@ class MillingTrial:
         return errors_table(caption, {(name, NONE_NAME): self.measured} | residuals)
 
     def reach(self) -> FloatArray:
-        """Return the reach of the boxcar to one side, at the displacement of each row of the unseen test [um]."""
+        """Return the one-sided extent of the boxcar at the displacement of each row of the unseen test [um]."""
         known, n = np.sort(self.learned.deviations[:, 0]), self.ace.half_window_
         rank = np.searchsorted(known, self.measured).clip(max=len(known) - 1)
         above = known[(rank + n).clip(max=len(known) - 1)] - known[rank]
         return np.asarray(np.maximum(above, known[rank] - known[(rank - n).clip(min=0)]))
 
     def straight(self) -> str:
-        """Return the linearity of the transformations in words: if linear, linear regression is sufficient (W-01)."""
+        """Return the linearity of the transformations as text: if linear, linear regression is sufficient (W-01)."""
         curves = {f"theta({place(self.target)})": self.ace.theta_}
         curves |= {f"phi({place(c.name)})": phi for c, phi in zip(self.learned.inputs, self.ace.phi_, strict=True)}
         told = []
@@ -139,7 +139,7 @@ class MillingTrial:
         return f"Share of the variance of each curve that a straight line explains: {', '.join(told)}."
 
     def reasons(self) -> str:
-        """Return in numbers what limits the estimate by ACE, and the results of linear regression and a memory."""
+        """Return the limits of the estimate by ACE as text, and the results of linear regression and of a memory."""
         error, out, seen = self.residual(ACE_NAME), self.flagged, self.learned.deviations[:, 0]
         linear = float(np.corrcoef(seen, self.fits[MLR_NAME])[0, 1])
         text = (
@@ -171,17 +171,17 @@ class MillingTrial:
 def stacked(
     recordings: Sequence[Recording], displacement: int, temperatures: Sequence[int], *, rezero: bool = False
 ) -> Samples:
-    """Stack recordings with one displacement and some temperatures, given by their indices among the channels.
+    """Stack recordings with one displacement and some temperatures, given by their indices.
 
     Parameters
     ----------
     recordings : sequence of Recording
     displacement : int
-        Place among the displacements.
+        Index among the displacements.
     temperatures : sequence of int
-        Places among the temperatures.
+        Indices among the temperatures.
     rezero : bool
-        True: temperatures are counted from the start of each test; False: as read.
+        Whether temperatures are relative to the start of each test; False: as read.
 
     Returns
     -------
@@ -195,21 +195,21 @@ def stacked(
 def trial(
     recordings: Sequence[Recording], displacement: int, temperatures: Sequence[int], *, beside: bool = True
 ) -> MillingTrial:
-    """Learn on all recordings but the last and estimate the last.
+    """Learn from all recordings except the last, and estimate the last.
 
-    Temperatures are taken as read, as the paper does: its laptop is told temperatures. Where the tests do not begin
-    at equal ones, both methods are repeated with temperatures counted from each start, as the displacements are.
+    Absolute temperatures are used, as in the paper, whose laptop receives temperatures. If the tests do not start at
+    equal temperatures, both methods are repeated with temperatures relative to each start, like the displacements.
 
     Parameters
     ----------
     recordings : sequence of Recording
         At least two.
     displacement : int
-        Place among the displacements.
+        Index among the displacements.
     temperatures : sequence of int
-        Places among the temperatures.
+        Indices among the temperatures.
     beside : bool
-        Also our own methods, on the same temperatures.
+        Whether to add our own methods, with the same temperatures.
 
     Returns
     -------
@@ -235,7 +235,7 @@ def trial(
             also(FROM_START.format(ACE_NAME), ACE(max_sweeps=SWEEPS), zeroed)
             also(FROM_START.format(MLR_NAME), LeastSquares(), zeroed)
         also("ace-monotone", MonotoneACE(), zeroed)
-        # the same temperatures, and the spindle speed where there is one
+        # the same temperatures, and the spindle speed if there is one
         speeds = [c.name for c in recordings[0].of_quantity("spindle_speed")]
         timed = [common.stacked(r, [target], [*(c.name for c in learned.inputs), *speeds]) for r in parts]
         memory = DynamicRidge(speed=speeds, time="routed")
@@ -244,10 +244,10 @@ def trial(
 
 
 def loop_width(samples: Samples, steps: int = 20) -> float:
-    """Return the difference of the displacement at equal temperature, as a fraction of its span: the hysteresis loop.
+    """Return the range of the displacement at equal temperature, as a fraction of its span: the hysteresis loop.
 
-    The span of each temperature is cut into equal steps; the width is the greatest range of the displacement in a
-    step, after what a straight line explains there. Of several temperatures that of the narrowest loop counts.
+    The span of each temperature is divided into equal intervals; the width is the largest range of the displacement in
+    an interval after subtraction of a straight line. For several temperatures the narrowest loop is used.
 
     Parameters
     ----------
@@ -268,12 +268,12 @@ def loop_width(samples: Samples, steps: int = 20) -> float:
 
 
 def points(samples: Samples) -> FloatArray:
-    """Return the number of each measuring point."""
+    """Return the numbers of the measuring points."""
     return np.arange(1, len(samples) + 1, dtype=np.float64)
 
 
 def named(samples: Samples) -> dict[str, FloatArray]:
-    """Return the temperatures by their place, as the paper calls it."""
+    """Return the temperatures by their place names in the paper."""
     return {place(c.name): column for c, column in zip(samples.inputs, samples.values.T, strict=True)}
 
 
@@ -283,9 +283,9 @@ def recorded(recordings: Sequence[Recording], temperatures: Sequence[int]) -> li
     Parameters
     ----------
     recordings : sequence of Recording
-        One after the other.
+        Recordings, shown in sequence.
     temperatures : sequence of int
-        Places of those that are shown; displacements are all shown.
+        Indices of the temperatures shown; all displacements are shown.
 
     Returns
     -------
@@ -302,12 +302,12 @@ def recorded(recordings: Sequence[Recording], temperatures: Sequence[int]) -> li
 
 
 def loops(samples: Samples) -> list[Panel]:
-    """Return the displacement against each temperature: what is open in these curves is the hysteresis."""
+    """Return the displacement against each temperature: an open curve shows hysteresis."""
     axis, y = f"{place(samples.targets[0].name)} [um]", samples.deviations[:, 0]
     return [Panel("", f"{name} [degC]", axis, curves(x, {"": y})) for name, x in named(samples).items()]
 
 
 def place(channel: str) -> str:
-    """Return the place in a channel's name, as the paper calls it: ``t_t1_C`` is T1."""
+    """Return the name of the place in a channel name as in the paper: ``t_t1_C`` is T1."""
     short = channel.removeprefix("t_").rpartition("_")[0]
     return short.upper() if short[:1] in "ts" and short[1:].isdigit() else short

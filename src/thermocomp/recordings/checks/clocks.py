@@ -1,4 +1,4 @@
-"""Clocks that disagree: temperatures or displacements that lead or lag the spindle as heat cannot."""
+"""Inconsistent clocks: temperatures or displacements that lead or lag the spindle in a way that heat cannot cause."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -9,27 +9,27 @@ from thermocomp.core import lagbank
 from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.recordings.checks.findings import Finding, Signal
 
-#: time constants of what heat does behind the spindle [s]
+#: time constants of the thermal response to the spindle [s]
 _LAGS = (120.0, 400.0, 1200.0, 3600.0, 10800.0)
-#: farthest that a clock is looked for [s], and nearest that is told
+#: largest clock shift tested, and smallest one reported [s]
 _FAR, _NEAR = 2400.0, 480.0
-#: log-likelihood by which a shifted clock explains a group of channels better; sound tests reach 2 at shifts told
+#: minimum gain in log-likelihood of a shift of a group of channels; valid tests reach 2 at shifts that are reported
 _GAIN = 60.0
-#: the same for single channels that lag; sound ones reach 40
+#: the same for single channels that lag; valid ones reach 40
 _LATE = 100.0
 _LONGEST = 20_000
 
 
 @dataclass(frozen=True, eq=False)
 class _Fits:
-    """Fit of each channel to the spindle speed, by the shift of its clock.
+    """Fit of each channel to the spindle speed for each clock shift.
 
     Parameters
     ----------
     shifts : ndarray of shape (n_shifts,)
-        [s]; positive: the channel comes later than the spindle.
+        [s]; positive: the channel lags the spindle.
     gain : ndarray of shape (n_shifts, n_channels)
-        Log-likelihood beyond that without a shift.
+        Gain in log-likelihood relative to no shift.
     """
 
     shifts: FloatArray
@@ -37,29 +37,29 @@ class _Fits:
 
     @property
     def least(self) -> float:
-        """Smallest shift that is reported [s]: 8 min, and two steps."""
+        """Smallest shift that is reported [s]: 8 min, and at least two steps."""
         return max(_NEAR, 2 * float(self.shifts[1] - self.shifts[0]))
 
 
 def clocks(signals: Sequence[Signal], time: FloatArray, speed: FloatArray | None) -> Iterator[Finding]:
-    """Yield groups of channels whose clock differs from that of the spindle speed.
+    """Yield findings on groups of channels whose clock differs from the clock of the spindle speed.
 
     Heat follows the spindle through first-order lags: each channel's changes from minute to minute (or row to row)
-    are regressed on the changes of speed and squared speed behind lags of 2 min to 3 h, with the channel shifted by
-    -40 to 40 min. Sums of such lags make any slow answer, but neither one that comes before its cause nor a sharp
-    one that comes late. All temperatures, or all displacements, are asked together; trouble where a shift of 8 min and
-    two rows or more explains them better by a log-likelihood of over 60. Channels of a group that is sound are
-    told if they lead by as much; if they lag, only two or more together, by a log-likelihood of over 100 each, as
-    a far sensor may be late.
+    are regressed on the changes of speed and squared speed with lags of 2 min to 3 h, with the channel shifted by
+    -40 to 40 min. Sums of such lags can represent any slow response, but neither one that precedes its cause nor a
+    sharp one that comes late. All temperatures, or all displacements, are tested jointly; the result is trouble where a
+    shift of 8 min and two rows or more improves the log-likelihood by over 60. Channels of an otherwise sound group are
+    reported if they lead by as much; if they lag, only two or more together, each with a gain in log-likelihood of over
+    100, because a remote sensor may respond late.
 
-    Nothing is told of a test without speed or with fewer than two changes of it, of one shorter than 2 h 20 min, or of
-    channels that do not answer to the spindle. In a test whose speed repeats itself the shift told may be wrong by the
-    period.
+    No result is given for a test without speed or with fewer than two speed changes, for one shorter than 2 h 20 min,
+    or for channels that do not respond to the spindle. In a test with a periodic speed the reported shift may be wrong
+    by the period.
 
     Parameters
     ----------
     signals : sequence of Signal
-        Without spikes.
+        Channels without spikes.
     time : ndarray of shape (n_rows,)
         [s]
     speed : ndarray of shape (n_rows,) or None
@@ -78,7 +78,7 @@ def clocks(signals: Sequence[Signal], time: FloatArray, speed: FloatArray | None
         if group and (found := _disagree(group, _Fits(fits.shifts, fits.gain[:, mine]))):
             told[quantity] = found
     shifts = [shift for shift, _ in told.values()]
-    if len(told) == 2 and abs(shifts[0] - shifts[1]) <= _NEAR / 2:  # then it is the speed that has another clock
+    if len(told) == 2 and abs(shifts[0] - shifts[1]) <= _NEAR / 2:  # then the clock of the speed is the different one
         told = {"channel": (sum(shifts) / 2, [n for _, names in told.values() for n in names])}
         groups = {"channel": everyone}
     for quantity, (shift, names) in told.items():
@@ -88,14 +88,14 @@ def clocks(signals: Sequence[Signal], time: FloatArray, speed: FloatArray | None
             others > 0
         )
         moved: dict[str, object] = {"do": "shift", "channels": names, "by_s": -shift}
-        if others:  # only who was there knows which logger they belong to
+        if others:  # only the user knows which logger recorded these channels
             moved["reason"] = "clock; add the other channels of this logger"
         channel = names[0] if len(names) == 1 else ""
         yield Finding("trouble", channel, "clock", _text(who, shift) + rest, remedy={"clean": [moved]})
 
 
 def _usable(signals: Sequence[Signal], quantity: str) -> list[Signal]:
-    """Return the channels of a quantity that move and have most of their rows."""
+    """Return the channels of a quantity that vary and have values in most rows."""
     mine = (s for s in signals if s.channel.quantity == quantity and not s.probed)
     return [s for s in mine if 2 * s.good.sum() > len(s.good) and np.ptp(s.x) > 0]
 
@@ -126,7 +126,7 @@ def _fit(group: Sequence[Signal], time: FloatArray, speed: FloatArray) -> _Fits 
         part = causes[reach - shift : reach - shift + n]
         part = part - part.mean(axis=0)
         part /= np.maximum(np.linalg.norm(part, axis=0), 1e-300)
-        # ten columns: their normal equations are enough, and far quicker
+        # with ten columns the normal equations are accurate enough, and far faster
         size, turn = np.linalg.eigh(part.T @ part)
         kept = size > 1e-10 * size[-1]
         left[k] = moved - ((turn[:, kept].T @ (part.T @ answers)) ** 2 / size[kept, None]).sum(axis=0)
@@ -136,14 +136,14 @@ def _fit(group: Sequence[Signal], time: FloatArray, speed: FloatArray) -> _Fits 
 
 
 def _means(time: FloatArray, values: FloatArray, good: BoolArray, edges: FloatArray) -> FloatArray:
-    """Return the mean of a signal between edges."""
+    """Return the mean of a signal between consecutive edges."""
     x = np.interp(time, time[good], values[good])
     area = np.concatenate([[0.0], np.cumsum(0.5 * (x[1:] + x[:-1]) * np.diff(time))])
     return np.asarray(np.diff(np.interp(edges, time, area)) / np.diff(edges))
 
 
 def _disagree(group: Sequence[Signal], fits: _Fits) -> tuple[float, list[str]] | None:
-    """Return the shift [s] of a group of channels, and who of them shows it."""
+    """Return the clock shift [s] of a group of channels, and the channels that show it."""
     names = [s.channel.name for s in group]
     together = fits.gain.sum(axis=1)
     best = int(together.argmax())

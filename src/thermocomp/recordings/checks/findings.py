@@ -18,24 +18,24 @@ SEVERITIES: tuple[Severity, ...] = ("trouble", "warning", "info")
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing a user should know about a recording.
+    """A result of the checks of a recording.
 
     Parameters
     ----------
     severity : {'trouble', 'warning', 'info'}
-        ``trouble``: a model fitted to this would be wrong; mend it first.
+        ``trouble``: a model fitted to these data would be wrong; repair them first.
     channel : str
-        Empty if it concerns the whole recording.
+        Name of the channel; empty if the finding concerns the whole recording.
     kind : str
-        Such as ``gap`` or ``stuck``.
+        Kind of finding, such as ``gap`` or ``stuck``.
     text : str
-        One sentence: where, how much, what to do. Rows are counted from 0, as in the recording's table.
+        One sentence: location, size, and action. Rows are counted from 0, as in the table of the recording.
     rows : ndarray of int, optional
-        The rows it concerns, where the others are sound; None if it concerns the whole channel or recording.
+        Rows concerned, if the others are valid; None if the finding concerns the whole channel or recording.
     row : int, optional
-        Row where a lasting trouble begins, or a gap: a position for a mark in a figure.
+        Row where a persistent problem or a gap starts; position of a mark in a figure.
     remedy : Remedy, optional
-        Mapping entry that would repair it, with the recording's names of channels and its times; None: there is none.
+        Mapping entry that would repair it, with the channel names and times of the recording; None if there is none.
     """
 
     severity: Severity
@@ -49,17 +49,17 @@ class Finding:
 
 @dataclass(frozen=True, eq=False)
 class Signal:
-    """A channel with the rows that can be looked at.
+    """A channel with its usable rows.
 
     Parameters
     ----------
     channel : Channel
     values : ndarray of shape (n_rows,)
-        In the channel's unit.
+        Values in the unit of the channel.
     good : ndarray of bool of shape (n_rows,)
-        Rows with a finite, plausible number that is no code; later without spikes and what sticks too.
+        Rows with a finite, plausible number that is not an error code; later also without spikes and stuck values.
     probed : bool
-        Measured in probing cycles only, together with others.
+        The channel is measured in probing cycles only, together with others.
     """
 
     channel: Channel
@@ -69,7 +69,7 @@ class Signal:
 
     @cached_property
     def rows(self) -> IntArray:
-        """The good rows."""
+        """Row numbers of the good rows."""
         return np.flatnonzero(self.good)
 
     @cached_property
@@ -79,36 +79,36 @@ class Signal:
 
     @cached_property
     def span(self) -> float:
-        """Range of a running median over 21 good rows, or as many as there are; that of all of them if it is 0."""
+        """Range of a running median over 21 good rows, or all if fewer; range of the good values if this is 0."""
         width = min(21, (len(self.x) - 1) // 2 * 2 + 1)
         smooth = pd.Series(self.x).rolling(width, center=True, min_periods=(width + 1) // 2).median().to_numpy()
         return float(np.ptp(smooth)) or float(np.ptp(self.x))
 
     @cached_property
     def noise(self) -> float:
-        """Robust standard deviation of the noise from row to row, by second differences."""
+        """Robust standard deviation of the noise from row to row, from second differences."""
         return 1.4826 * float(np.median(np.abs(np.diff(self.x, n=2)))) / 6**0.5
 
     def without(self, rows: IntArray) -> "Signal":
-        """Return the same with fewer good rows."""
+        """Return the signal with some rows excluded from the good ones."""
         good = self.good.copy()
         good[rows] = False
         return replace(self, good=good)
 
 
 def runs(x: NDArray[np.generic]) -> tuple[IntArray, IntArray]:
-    """Return start and length of each stretch of equal values."""
+    """Return start and length of each run of equal values."""
     starts = np.concatenate([[0], np.flatnonzero(x[1:] != x[:-1]) + 1])
     return starts, np.diff(starts, append=len(x))
 
 
 def cut(name: str, rows: IntArray, time: FloatArray, reason: str) -> Remedy:
-    """Return the cleaning step that takes values of a channel out.
+    """Return the cleaning step that removes values of a channel.
 
     Parameters
     ----------
     name : str
-        The channel.
+        Name of the channel.
     rows : ndarray of int
     time : ndarray of shape (n_rows,)
         [s]
@@ -121,7 +121,7 @@ def cut(name: str, rows: IntArray, time: FloatArray, reason: str) -> Remedy:
 
 
 def cut_out(severity: Severity, channel: Channel, kind: str, text: str, rows: IntArray, time: FloatArray) -> Finding:
-    """Return a finding whose remedy is to take out the values that it concerns.
+    """Return a finding whose remedy is to remove the values concerned.
 
     Parameters
     ----------
@@ -140,17 +140,17 @@ def column(name: str, **keys: object) -> Remedy:
 
 
 def at_row(row: int, time: FloatArray) -> str:
-    """Return a row in words: its number and its time [s]."""
+    """Return a row as text: its number and its time [s]."""
     return f"row {row} ({time[row]:.10g} s)"
 
 
 def count(n: int, what: str) -> str:
-    """Return a number of things in words."""
+    """Return a number of items as text."""
     return f"{n} {what}{'' if n == 1 else 's'}"
 
 
 def speed_changes(speed: FloatArray | None, n: int) -> BoolArray:
-    """Return the steps from row to row, (n - 1,), in which the spindle speed changes by over 2 % of its largest."""
+    """Return a mask of row-to-row steps, (n - 1,), with a change of spindle speed of over 2 % of its maximum."""
     if speed is None or n < 2:
         return np.zeros(max(n - 1, 0), dtype=np.bool_)
     return np.asarray(np.abs(np.diff(speed)) > 0.02 * max(float(np.abs(speed).max()), 1e-9))

@@ -1,4 +1,4 @@
-"""Steps of one channel that nothing else of the machine shares, and two channels that change places."""
+"""Steps of a single channel without a common cause in the machine, and two channels that are exchanged."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -9,15 +9,15 @@ from numpy.lib.stride_tricks import sliding_window_view
 from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
 from thermocomp.recordings.checks.findings import Finding, Signal, at_row, cut_out
 
-#: smallest step that is told, by quantity [degC, um, urad]
+#: smallest step that is reported, by quantity [degC, um, urad]
 LEAST = {"temperature": 1.5, "displacement": 5.0, "angle": 20.0}
-#: a jump is as many times the largest move of the rows beside it
+#: minimum ratio of a jump to the largest change in the neighbouring rows
 RATIO = 4.0
-#: rows on each side that it is compared with
+#: number of neighbouring rows on each side used for comparison
 _BESIDE = 5
-#: usual moves over two rows that a jump exceeds
+#: minimum ratio of a jump to the usual change over two rows
 _NOISE = 8.0
-#: a channel that jumps more often is made so: a thermostat, a pump
+#: more jumps than this are regular behaviour of a channel: a thermostat, a pump
 _OFTEN = 4
 
 
@@ -29,11 +29,11 @@ class Edges:
     ----------
     signal : Signal
     before, after : ndarray of int of shape (n_jumps,)
-        Last row of the old level and first row of the new one, in the recording; one row may lie between them.
+        Last row of the old level and first row of the new one in the recording; one row may lie between them.
     height : ndarray of shape (n_jumps,)
-        In the channel's unit.
+        Height in the unit of the channel.
     clear : ndarray of bool of shape (n_jumps,)
-        Beyond doubt by itself; the others need a second channel that does the opposite.
+        Certain on its own; other jumps need a second channel with the opposite jump.
     """
 
     signal: Signal
@@ -43,16 +43,16 @@ class Edges:
     clear: BoolArray
 
     def near(self, row: int, *, clearly: bool = True) -> bool:
-        """Return whether the signal jumps at `row` or next to it."""
+        """Return whether the signal has a jump at `row` or an adjacent row."""
         return bool(((self.clear | (not clearly)) & (self.before <= row + 1) & (self.after >= row)).any())
 
 
 def find_edges(signal: Signal) -> Edges:
-    """Find jumps: from one row to the next but one, a change much larger than the neighbouring ones.
+    """Find jumps: changes over two rows that are much larger than the neighbouring ones.
 
-    Clear is one over 4 times the largest move from row to row among the five rows on each side, so that no exponential
-    of a warm-up is one, however coarsely it is sampled; and over 8 times the usual move over two rows (robust standard
-    deviation; 3 times the resolution where that is 0). Others are over half as much.
+    A jump is clear if it exceeds 4 times the largest row-to-row change among the five rows on each side, which excludes
+    the exponential of a warm-up at any sampling rate; and 8 times the usual change over two rows (robust standard
+    deviation; 3 times the resolution where it is 0). The other jumps exceed half of these limits.
     """
     x, rows = signal.x, signal.rows
     moves = np.abs(np.diff(x))
@@ -69,12 +69,12 @@ def find_edges(signal: Signal) -> Edges:
     size = np.abs(jump)
     limit = np.maximum(RATIO * beside, _NOISE * noise)
     found = 2 * size > limit
-    found[:2] = found[-2:] = False  # no level to compare with
-    # of neighbours that see the same jump the largest is kept
+    found[:2] = found[-2:] = False  # no level for comparison
+    # of neighbours that detect the same jump the largest is kept
     largest = sliding_window_view(np.pad(size * found, 1), 3).max(axis=1)
     first = np.flatnonzero(found & (size == largest))
     first = first[np.diff(first, prepend=-9) > 1]
-    # where the first or the last of the two moves is all of it, the row between belongs to a level
+    # if the first or the last of the two changes is the whole jump, the row between belongs to one of the levels
     early = np.abs(x[first + 1] - x[first]) > 0.8 * size[first]
     late = np.abs(x[first + 2] - x[first + 1]) > 0.8 * size[first]
     return Edges(
@@ -87,25 +87,25 @@ def find_edges(signal: Signal) -> Edges:
 
 
 def jumps(signals: Sequence[Signal], time: FloatArray, moved: BoolArray) -> Iterator[Finding]:
-    """Yield steps of a single channel, and two channels that change places.
+    """Yield findings on steps of a single channel, and on two channels that are exchanged.
 
-    A step: a jump (`find_edges`) of 1.5 degC, 5 um or 20 urad or more that no other channel shares within a row,
-    whatever it measures. Where the spindle speed changes, it is told only if it is over 3 times what the channel did
-    at all other such changes. A step that comes back is told with both its ends, and its rows. A channel with over
-    four jumps is taken for a thermostat. Steps across a gap in time are no steps.
+    A step is a jump (`find_edges`) of 1.5 degC, 5 um or 20 urad or more without a jump of any other channel within one
+    row, whatever its quantity. At a change of spindle speed, it is reported only if it exceeds 3 times the response of
+    the channel at all other such changes. A step that is later reversed is reported with both its ends, and its rows. A
+    channel with over four jumps is regarded as a thermostat. Steps across a gap in time are ignored.
 
-    Changed places: two channels of one quantity jump at the same row, and each continues where the other was, to within
-    a quarter of the jump, and no third channel jumps there. What two sensors say alike at that moment cannot be
-    told apart.
+    Exchanged channels: two channels of one quantity jump at the same row, each continues at the level of the other to
+    within a quarter of the jump, and no third channel jumps there. Two sensors with equal values at that time cannot be
+    distinguished.
 
     Parameters
     ----------
     signals : sequence of Signal
-        Without spikes.
+        Channels without spikes.
     time : ndarray of shape (n_rows,)
         [s]
     moved : ndarray of bool of shape (n_rows - 1,)
-        Steps from row to row in which the spindle speed changes.
+        Row-to-row steps with a change of spindle speed.
     """
     edges = [find_edges(s) for s in signals]
     usual = float(np.quantile(np.diff(time), 0.9)) if len(time) > 1 else 0.0
@@ -137,7 +137,7 @@ def jumps(signals: Sequence[Signal], time: FloatArray, moved: BoolArray) -> Iter
 
 
 def _explained(mine: Edges, k: int, moved: BoolArray) -> bool:
-    """Return whether the spindle speed changes at jump `k`, and the channel does a third as much elsewhere there."""
+    """Return whether the spindle speed changes at jump `k`, and other such changes move the channel a third as much."""
     near = np.convolve(moved, np.ones(7), mode="same") > 0
     if not near[mine.before[k] : mine.after[k]].any():
         return False
@@ -150,7 +150,7 @@ def _explained(mine: Edges, k: int, moved: BoolArray) -> bool:
 
 
 def _step(mine: Edges, lone: list[int], time: FloatArray) -> Finding:
-    """Return the finding of the largest step; two that cancel each other are reported as a stretch to be deleted."""
+    """Return the finding of the largest step; two that cancel each other are reported as a section to be deleted."""
     channel = mine.signal.channel
     k = max(lone, key=lambda j: abs(mine.height[j]))
     height, row = float(mine.height[k]), int(mine.after[k])
@@ -175,12 +175,12 @@ def _step(mine: Edges, lone: list[int], time: FloatArray) -> Finding:
 
 
 def _exchanged(a: Edges, b: Edges, row: int, height: float, moved: BoolArray) -> bool:
-    """Return whether `a`, which jumps by `height` to a new level at `row`, and `b` change places there."""
+    """Return whether `a`, which jumps by `height` to a new level at `row`, is exchanged with `b` there."""
     if a.signal.channel.quantity != b.signal.channel.quantity:
         return False
     for j in np.flatnonzero(b.after == row):
         k = int(np.flatnonzero(a.after == row)[0])
-        # a start of the spindle moves many at once: there both must be beyond doubt
+        # a spindle start moves many channels at once: then both jumps must be clear
         if moved[max(row - 4, 0) : row + 3].any() and not (a.clear[k] and b.clear[j]):
             return False
         before, first, second = int(b.before[j]), a.signal.values, b.signal.values
@@ -194,6 +194,6 @@ def _swap(a: Signal, b: Signal, row: int, time: FloatArray) -> Finding:
         f"changes places with {b.channel.name} at {at_row(row, time)}: each continues where the other was. Swap these "
         "columns back from there on, or leave both out"
     )
-    names = sorted([a.channel.name, b.channel.name])  # both tell the same step
+    names = sorted([a.channel.name, b.channel.name])  # both report the same step
     back = {"do": "swap", "channels": names, "at": float(time[row])}
     return Finding("trouble", a.channel.name, "swapped", text, row=row, remedy={"clean": [back]})

@@ -1,4 +1,4 @@
-"""Data-quality problems: gaps, dead, stuck and spiking sensors, codes, wrong units, steps, swaps, clocks."""
+"""Data-quality problems: gaps, dead, stuck and spiking sensors, error codes, wrong units, steps, swaps, clocks."""
 
 from collections.abc import Iterator, Sequence
 
@@ -29,18 +29,18 @@ from thermocomp.recordings.recording import Recording
 
 __all__ = ["Finding", "Severity", "check", "lasting_trouble", "troubled_rows"]
 
-#: numbers that instruments write instead of a value
+#: numbers that instruments write in place of a missing value
 CODES = (-9999.0, -999.0, 9999.0, 99999.0, -99999.0, -32768.0, 32767.0, 1e30, -1e30)
 #: the same for temperatures [degC]: absent thermistor, 0 K, DS18B20 unplugged and just switched on, open thermocouple
 TEMPERATURE_CODES = (-180.0, -273.15, -200.0, -127.0, 85.0, 850.0)
-#: what a machine tool can show [degC], [um], [urad]; wide for angles, which may be turns of a rotary axis
+#: plausible range on a machine tool [degC], [um], [urad]; wide for angles, which may be rotary axis positions
 PLAUSIBLE = {"temperature": (-60.0, 400.0), "displacement": (-1e5, 1e5), "angle": (-1e9, 1e9)}
-#: what a sensor's noise never lets stand still; a spindle speed or a position may well
+#: quantities whose sensor noise prevents constant values; a spindle speed or a position may be constant
 _SENSED = ("temperature", "displacement", "angle")
 
 
 def check(recording: Recording) -> tuple[Finding, ...]:
-    """Look for what makes a recording unfit for a model.
+    """Check a recording for problems that make it unsuitable for a model.
 
     Parameters
     ----------
@@ -49,12 +49,12 @@ def check(recording: Recording) -> tuple[Finding, ...]:
     Returns
     -------
     tuple of Finding
-        The gravest first; empty if nothing was found.
+        Sorted by severity, worst first; empty if there are none.
 
     Notes
     -----
-    Thresholds are set so that a sound recording of a real machine raises no trouble; each check's docstring names its
-    own.
+    Thresholds are set such that a sound recording of a real machine causes no trouble; the docstring of each check
+    specifies its thresholds.
     """
     time = recording.time
     found = [Finding("warning", "", "left out", note) for note in recording.notes if note.startswith("left out")]
@@ -62,7 +62,7 @@ def check(recording: Recording) -> tuple[Finding, ...]:
         found.append(Finding("trouble", "", "compensation", UNKNOWN))
     found += [*_sampling(time), *_no_cycle(recording), *_duplicates(recording)]
     speed = None
-    if recording.speed is not None:  # what is beyond is no speed, and its square no number
+    if recording.speed is not None:  # larger values are not speeds, and their squares would overflow
         speed = np.clip(np.nan_to_num(recording.table[recording.speed.name].to_numpy(dtype=np.float64)), -1e9, 1e9)
     moved = speed_changes(speed, len(time))
     probed = _probed(recording)
@@ -77,19 +77,19 @@ def check(recording: Recording) -> tuple[Finding, ...]:
 
 
 def troubled_rows(recording: Recording, findings: Sequence[Finding] | None = None) -> dict[str, BoolArray]:
-    """Return the rows in which a channel is in trouble, where others of its rows are sound.
+    """Return the rows in which a channel is in trouble while its other rows are sound.
 
     Parameters
     ----------
     recording : Recording
     findings : sequence of Finding, optional
-        Findings of `check`; it is called if they are not given.
+        Result of `check`. Default: `check` is called.
 
     Returns
     -------
     dict of str to ndarray of bool of shape (n_rows,)
-        By the channel's name; only channels with such rows: spikes, codes, implausible values, what is stuck, and a
-        step with its way back. See `lasting_trouble` for the rest.
+        By channel name; only channels with such rows: spikes, codes, implausible values, stuck values, and the section
+        between a step and its reversal. See `lasting_trouble` for other troubles.
     """
     rows: dict[str, BoolArray] = {}
     for f in check(recording) if findings is None else findings:
@@ -106,7 +106,7 @@ def lasting_trouble(findings: Sequence[Finding]) -> tuple[Finding, ...]:
 def _together(
     signals: Sequence[Signal], time: FloatArray, moved: BoolArray, speed: FloatArray | None, *, stamped: bool
 ) -> Iterator[Finding]:
-    """Yield joint findings of several channels, or of a channel and the clock; a time from stamps has no unit."""
+    """Yield joint findings of several channels, or of a channel and the clock; times from stamps have no unit."""
     of = {q: [s for s in signals if s.channel.quantity == q and s.good.any()] for q in _SENSED}
     yield from suspects.temperature_units(of["temperature"])
     yield from suspects.displacement_units(of["displacement"], of["temperature"])
@@ -116,7 +116,7 @@ def _together(
     whole = [s for s in signals if not s.probed and s.channel.quantity in _SENSED]
     leaps = list(jumps(whole, time, moved))
     yield from leaps
-    leaping = {f.channel for f in leaps}  # what such a step looks like to a regression is anyone's guess
+    leaping = {f.channel for f in leaps}  # the effect of such a step on the regression is undefined
     yield from clocks([s for s in signals if s.channel.name not in leaping], time, speed)
 
 
@@ -124,7 +124,7 @@ def _duplicates(recording: Recording) -> Iterator[Finding]:
     prints: dict[int, str] = {}
     for channel in recording.channels:
         values = recording.table[channel.name].to_numpy(dtype=np.float64)
-        if np.nanmax(values, initial=-np.inf) > np.nanmin(values, initial=np.inf):  # constant ones are told as such
+        if np.nanmax(values, initial=-np.inf) > np.nanmin(values, initial=np.inf):  # constants are reported separately
             other = prints.setdefault(hash(values.tobytes()), channel.name)
             if other != channel.name:
                 text = f"has the same value as {other} in every row; leave one of them out"
@@ -133,7 +133,7 @@ def _duplicates(recording: Recording) -> Iterator[Finding]:
 
 
 def _probed(recording: Recording) -> set[str]:
-    """Return the displacements that are measured in probing cycles: several have their few values in the same rows."""
+    """Return the displacements measured in probing cycles: several channels have their few values in the same rows."""
     rows: dict[bytes, list[str]] = {}
     for channel in (*recording.displacements, *recording.of_quantity("residual")):
         there = np.isfinite(recording.table[channel.name].to_numpy(dtype=np.float64))
@@ -154,7 +154,7 @@ def _channel(
     if wild.size:
         found.append(_wild_finding(channel, values, wild, time))
     found += _missing(channel.name, values, time, probed=probed)
-    # the other checks look at the rest: beside such values nothing else would stand out
+    # the other checks use the remaining values: with such outliers nothing else would be detected
     signal = Signal(channel, values, np.isfinite(values) & plausible & ~coded, probed)
     x = signal.x
     if probed or len(x) < 2:
@@ -192,9 +192,9 @@ def _constant_finding(channel: Channel, x: FloatArray) -> Finding:
 
 
 def _sampling(time: FloatArray) -> Iterator[Finding]:
-    """Yield too few rows, gaps, and irregular intervals.
+    """Yield findings on too few rows, gaps, and irregular intervals.
 
-    Few is: under 10. A gap: over 5 times the interval that 90 % of the rows keep. Irregular: varying by over 20 %.
+    Too few: under 10. Gap: over 5 times the 90 % quantile of the intervals. Irregular: intervals vary by over 20 %.
     """
     if len(time) < 10:
         text = f"has only {count(len(time), 'row')}, too few to say anything; record a whole warm-up and cool-down"
@@ -202,7 +202,7 @@ def _sampling(time: FloatArray) -> Iterator[Finding]:
     if len(time) < 3:
         return
     steps = np.diff(time)
-    # the 90 % quantile, not the median: probings that come in bursts are irregular, they have no gap every minute
+    # the 90 % quantile, not the median: bursts of probing are irregular, but not a series of gaps
     usual = float(np.quantile(steps, 0.9, method="lower"))
     gaps = np.flatnonzero(steps > 5 * usual)
     if gaps.size:
@@ -220,7 +220,7 @@ def _sampling(time: FloatArray) -> Iterator[Finding]:
             f"rows are {low:.4g} to {high:.4g} s apart (median {middle:.4g} s); "
             "resample for methods that need one interval"
         )
-        # so that every interval has a row
+        # long enough for a row in every interval
         even = {"clean": [{"do": "resample", "every_s": float(np.ceil(kept.max()))}]}
         yield Finding("warning", "", "irregular sampling", text, remedy=even)
 
@@ -245,12 +245,12 @@ def _no_cycle(recording: Recording) -> Iterator[Finding]:
 
 
 def _coded(channel: Channel, values: FloatArray, plausible: BoolArray) -> BoolArray:
-    """Return the rows with a known code, if it is apart from the other values by half their span and by 5 units."""
+    """Return the rows with a known code, if it differs from all other values by half their span and by 5 units."""
     none = np.zeros(len(values), dtype=np.bool_)
     if channel.quantity not in _SENSED:
         return none
     codes = CODES + (TEMPERATURE_CODES if channel.quantity == "temperature" else ())
-    # a change of unit may have rounded a code
+    # a unit conversion may have rounded a code
     hits = {c: np.abs(values - c) <= 1e-9 * abs(c) for c in codes}
     hits = {c: hit for c, hit in hits.items() if hit.any()}
     rest = values[plausible & ~np.logical_or.reduce([none, *hits.values()])]
@@ -283,7 +283,7 @@ def _code_finding(channel: Channel, values: FloatArray, coded: BoolArray, time: 
 
 
 def _missing(name: str, values: FloatArray, time: FloatArray, *, probed: bool) -> Iterator[Finding]:
-    """Yield missing values; trouble where they are more than a fifth, but between the cycles of a touch probe."""
+    """Yield findings on missing values; trouble if over a fifth, except between the cycles of a touch probe."""
     gone = ~np.isfinite(values)
     n = int(gone.sum())
     if not n:

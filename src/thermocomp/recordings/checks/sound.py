@@ -11,18 +11,18 @@ from thermocomp.recordings.samples import Samples
 
 
 def drop_unsound(samples: Samples, recordings: Sequence[Recording]) -> Samples:
-    """Return samples without what is in trouble.
+    """Return samples without the values in trouble.
 
     Parameters
     ----------
     samples : Samples
     recordings : sequence of Recording
-        Recordings from which they were stacked, in their order; the files that they continue from are checked, too.
+        Recordings from which the samples were stacked, in order; the files that they continue are checked as well.
 
     Returns
     -------
     Samples
-        Values in trouble are missing (nan); trouble of a whole channel or recording is listed in ``trouble``.
+        Values in trouble are missing (NaN); trouble of a whole channel or recording is listed in ``trouble``.
     """
     values, deviations = samples.values.copy(), samples.deviations.copy()
     trouble: list[tuple[str, str]] = []

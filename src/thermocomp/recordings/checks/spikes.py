@@ -1,4 +1,4 @@
-"""Spikes: single values, or a few in a row, that leave the curve and come back to it."""
+"""Spikes: single values, or a few in a row, that deviate from the curve and return to it."""
 
 from collections.abc import Iterator
 
@@ -8,19 +8,19 @@ from numpy.lib.stride_tricks import sliding_window_view
 from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.recordings.checks.findings import Finding, Signal, at_row, count, cut_out
 
-#: most rows of one spike; what stays away longer is told as two steps
+#: maximum number of rows of one spike; longer deviations are reported as two steps
 LONGEST = 10
-#: rows on each side that a spike of several rows is compared with
+#: number of rows on each side used for comparison with a spike of several rows
 _BESIDE = 5
 
 
 def spikes(signal: Signal, time: FloatArray, moved: BoolArray) -> Iterator[Finding]:
-    """Yield values far outside their neighbours (a Hampel filter that steps and kinks do not trip).
+    """Yield findings on values far outside their neighbours (Hampel filter, insensitive to steps and kinks).
 
-    Far is, for a single value: over 8 robust standard deviations of a value against its four neighbours, over the
-    neighbours' own range, and over 2 % of the channel's span. For 2 to 10 rows in a row it is the same against five
-    neighbours on each side, and over 4 times the largest move among these. Trouble where a spike is higher than the
-    span. The span is that of a running median over 21 rows, which no such spike reaches.
+    A single value is a spike if it deviates from its four neighbours by over 8 robust standard deviations, over the
+    range of these neighbours, and over 2 % of the span of the channel. For 2 to 10 consecutive rows the same applies to
+    five neighbours on each side, plus over 4 times the largest change among them. Trouble where a spike is higher than
+    the span. The span is the range of a running median over 21 rows, which excludes spikes of this length.
 
     Parameters
     ----------
@@ -29,8 +29,8 @@ def spikes(signal: Signal, time: FloatArray, moved: BoolArray) -> Iterator[Findi
     time : ndarray of shape (n_rows,)
         [s]
     moved : ndarray of bool of shape (n_rows,)
-        Rows around a change of the spindle speed. A short run is no spike: there, several rows in a row must be farther
-        off than the span.
+        Rows around a change of the spindle speed. There a short run of the spindle must not count as a spike: several
+        consecutive rows must deviate by more than the span.
     """
     x, rows = signal.x, signal.rows
     span = signal.span
@@ -38,7 +38,7 @@ def spikes(signal: Signal, time: FloatArray, moved: BoolArray) -> Iterator[Findi
     leaping: BoolArray = np.asarray(moved[rows])
     hit = height > limit
     leaps = np.count_nonzero(np.abs(np.diff(x)) > max(8 * off, 0.02 * span))
-    longest = min(LONGEST, len(x) - 2 * _BESIDE) if leaps > 1 else 0  # there and back
+    longest = min(LONGEST, len(x) - 2 * _BESIDE) if leaps > 1 else 0  # one jump up and one back
     for m in range(2, longest + 1):
         there, above = _bursts(x, m, off, span)
         for first in np.flatnonzero(there):
@@ -61,13 +61,13 @@ def spikes(signal: Signal, time: FloatArray, moved: BoolArray) -> Iterator[Findi
 
 
 def _singles(x: FloatArray, span: float) -> tuple[float, FloatArray, FloatArray]:
-    """Return the usual noise, each value's height over its four neighbours, and the height that makes a spike."""
-    padded = np.concatenate([x[[4, 3]], x, x[[-4, -5]]])  # the ends have their neighbours on one side
+    """Return the usual noise, the deviation of each value from its four neighbours, and the spike threshold."""
+    padded = np.concatenate([x[[4, 3]], x, x[[-4, -5]]])  # at the ends, all neighbours are on one side
     around = np.sort(np.stack([padded[:-4], padded[1:-3], padded[3:-1], padded[4:]]), axis=0)
     low, high = around[0], around[3]
     off = np.abs(x - 0.5 * (around[1] + around[2]))
     scale = 1.4826 * float(np.median(off))
-    if scale == 0 and off.any():  # steps coarser than the noise
+    if scale == 0 and off.any():  # resolution coarser than the noise
         scale = float(np.median(off[off > 0]))
     return scale, np.maximum(x - high, low - x), np.maximum(high - low, max(8 * scale, 0.02 * span))
 
@@ -76,7 +76,7 @@ def _bursts(x: FloatArray, m: int, scale: float, span: float) -> tuple[BoolArray
     """Return the first rows of spikes of m rows, (n,), and the height of each of their rows, (m, n)."""
     sides = sliding_window_view(x, _BESIDE)
     moves = np.abs(np.diff(sides, axis=1)).max(axis=1)
-    n = len(x) - m - 2 * _BESIDE + 1  # places with neighbours on both sides
+    n = len(x) - m - 2 * _BESIDE + 1  # positions with neighbours on both sides
     after = slice(_BESIDE + m, _BESIDE + m + n)
     low = np.minimum(sides.min(axis=1)[:n], sides.min(axis=1)[after])
     high = np.maximum(sides.max(axis=1)[:n], sides.max(axis=1)[after])

@@ -1,4 +1,4 @@
-"""A constant value although its sensor should move, and the resolution steps of a channel."""
+"""Constant values of a sensor that should vary, and the resolution of a channel."""
 
 import math
 from collections.abc import Iterator
@@ -8,19 +8,20 @@ import numpy as np
 from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.recordings.checks.findings import Finding, Severity, Signal, at_row, cut_out, runs
 
-#: rows that a value must stand still for
+#: minimum number of constant rows
 SHORTEST = 30
-#: chance in the whole recording that noise and resolution alone let a value stand as long
+#: accepted probability per recording that noise and resolution alone keep a value constant for this long
 _CHANCE = 1e-3
 
 
 def stuck(signal: Signal, time: FloatArray) -> Iterator[Finding]:
-    """Yield stretches of 30 or more rows with a constant value although the sensor should move.
+    """Yield findings on 30 or more rows with a constant value although the sensor should vary.
 
-    It should if its noise shakes it right before and after, or if it was moving fast and stops dead. A sensor that
-    creeps to rest, or whose noise is finer than its resolution, may well stand still: noise of a single step makes it a
-    warning, and only over a tenth of the test. So does noise of a few steps, if it leaves a value in the middle of a
-    step as long by chance (once in a thousand recordings). How coarse the steps are is told as an info.
+    It should vary if there is noise right before and after, or if a fast change stops abruptly. A sensor that
+    approaches steady state slowly, or with noise below its resolution, may be constant: noise of a single resolution
+    step gives only a warning, and only for over a tenth of the test. The same applies to noise of a few steps, if it
+    keeps a value in the middle of a step constant for this long by chance (once in a thousand recordings). A coarse
+    resolution is reported as an info.
 
     Parameters
     ----------
@@ -49,7 +50,7 @@ def stuck(signal: Signal, time: FloatArray) -> Iterator[Finding]:
             f"{at_row(last, time)}{more}, while it moves from row to row right beside; check the sensor, then delete "
             "the values or leave the channel out"
         )
-        # the first value of each stretch may have been measured
+        # the first value of each section may be a real measurement
         concerned = np.concatenate([rows[starts[j] + 1 : starts[j] + lengths[j]] for j in sorted(hits)])
         yield cut_out(severity, channel, "stuck", text, concerned, time)
     if coarse:
@@ -58,19 +59,19 @@ def stuck(signal: Signal, time: FloatArray) -> Iterator[Finding]:
 
 
 def _by_chance(x: FloatArray, step: float, lively: BoolArray) -> float:
-    """Return the number of rows for which noise may hold a value within a step by chance, anywhere in `x`."""
+    """Return the number of rows for which noise may keep a value within a step by chance, anywhere in `x`."""
     moves = np.diff(x)[lively[1:]]
     moving = moves[np.abs(moves) <= max(8 * float(np.median(np.abs(moves))), 2 * step)] if moves.size else moves
     if moving.size < 8:
         return 0.0
-    # a difference has twice the noise's variance and twice that of the rounding
+    # a difference has twice the variance of the noise and twice that of rounding
     variance = float(np.var(moving)) / 2 - step**2 / 12
     stay = math.erf(step / math.sqrt(8 * variance)) if variance > 0 else 1.0
     return len(x) if stay == 1 else math.log(_CHANCE / len(x)) / math.log(stay) if stay > 0 else 0.0
 
 
 def _why(x: FloatArray, start: int, length: int, step: float, possible: float) -> Severity | None:
-    """Judge one standing stretch of `length` rows by the 50 rows on each side of it."""
+    """Return the severity of a constant section of `length` rows, from the 50 rows on each side; None if harmless."""
     before, after = x[max(start - 50, 0) : start + 1], x[start + length - 1 : start + length + 50]
     sides = [np.diff(side) for side in (before, after) if len(side) > 30]
     if not sides:
@@ -79,7 +80,7 @@ def _why(x: FloatArray, start: int, length: int, step: float, possible: float) -
     for moves in sides:
         real = moves[moves != 0]
         drifting = real - np.median(real) if real.size else real
-        # noise on a slope does not turn the signal, but the moves go up and down by more than rounding explains
+        # noise on a slope does not reverse the signal, but its changes vary by more than rounding explains
         turns = max(_turns(real), _turns(drifting[np.abs(drifting) > 1.01 * step]))
         noisy = noisy and real.size >= 8 and turns >= real.size / 5 and length * (real.size + 1) >= 20 * moves.size
         fine = fine and bool(np.abs(real).max(initial=0) > 1.5 * step)
@@ -94,7 +95,7 @@ def _turns(moves: FloatArray) -> int:
 
 
 def _resolution(x: FloatArray) -> float:
-    """Return the smallest step of a channel that is not constant, rounding errors apart."""
+    """Return the smallest step of a channel that is not constant, ignoring rounding errors."""
     moves = np.diff(x)
     steps = np.abs(np.concatenate([moves, np.diff(moves)]))
     return float(steps[steps > 1e-9 * np.abs(x).max()].min(initial=np.ptp(x)))

@@ -1,4 +1,4 @@
-"""Units that cannot be right, and displacements that do not start at their zero."""
+"""Implausible units, and displacements that do not start at their zero."""
 
 from collections.abc import Iterator, Sequence
 
@@ -10,24 +10,24 @@ from thermocomp.recordings.checks.findings import Finding, Severity, Signal, col
 _ABSOLUTE = 273.15
 
 
-#: a displacement beyond that in a whole test is no drift [um]
+#: a larger displacement in a whole test cannot be drift [um]
 FAR = 5000.0
 
 
 def temperature_units(signals: Sequence[Signal]) -> Iterator[Finding]:
-    """Yield temperatures that are Kelvin or degrees Fahrenheit, although the heading specifies degC.
+    """Yield findings on temperatures in Kelvin or degrees Fahrenheit although the heading specifies degC.
 
-    Kelvin: 98 % of the values lie between 240 and 400, so that the sensor never cooled to below 240 degC, which is
-    hotter than any part of a machine stays. Fahrenheit: nothing in the whole test is ever below 50 (1 % quantile of
-    every sensor that is not Kelvin), but no hall is at 50 degC; 50 degF are 10 degC, so that in a colder hall it is
-    not noticed. Of single sensors among others: it is always warmer than all others ever are, taken as degF it lies
-    between the others' lowest less 3 degC and their highest plus 5 degC, and it moves with one of them (rank
-    correlation over 0.7), which a part held hot does not.
+    Kelvin: 98 % of the values lie between 240 and 400; as degC, the sensor would never cool below 240 degC, which is
+    hotter than any part of a machine remains. Fahrenheit: no value in the whole test is below 50 (1 % quantile of every
+    sensor that is not Kelvin), but no hall is at 50 degC; 50 degF are 10 degC, so that the error is not detected in a
+    colder hall. A single sensor is reported if it is always warmer than all others ever are, if as degF it lies between
+    the lowest value of the others less 3 degC and their highest plus 5 degC, and if it moves with one of them (rank
+    correlation over 0.7), unlike a part that is kept hot.
 
     Parameters
     ----------
     signals : sequence of Signal
-        The temperatures, without spikes.
+        Temperatures, without spikes.
     """
     ranges = {s.channel.name: np.quantile(s.x, (0.01, 0.99)) for s in signals if len(s.x) >= 5}
     known = [s for s in signals if s.channel.name in ranges]
@@ -45,7 +45,7 @@ def temperature_units(signals: Sequence[Signal]) -> Iterator[Finding]:
 
 
 def _follows(signal: Signal, others: Sequence[Signal]) -> bool:
-    """Return whether a warm sensor, taken as degF, behaves as the others do."""
+    """Return whether a warm sensor, read as degF, behaves like the others."""
     converted = (signal.x - 32) / 1.8
     low = min(float(s.x.min()) for s in others)
     high = max(float(s.x.max()) for s in others)
@@ -71,19 +71,19 @@ def _wrong_unit(signal: Signal, low: float, high: float, unit: str, coldest: flo
 
 
 def displacement_units(signals: Sequence[Signal], temperatures: Sequence[Signal]) -> Iterator[Finding]:
-    """Yield displacements that must be in mm, although the heading specifies um, or um labelled as mm.
+    """Yield findings on displacements in mm although the heading specifies um, or in um although it specifies mm.
 
     No machine drifts by `FAR`.
 
-    A probe whose values lie within 0.3 um in the whole test, noise and all, is quieter than any: 0.3 mm is more than
-    machines drift. And where the probe that moves most makes less than 0.05 um per degC of the sensor that moves
-    most, all of them are: 100 mm of steel grow by 1.1 um per degC. Only a warning where no temperature moves
-    by 1 degC: a still machine may move as little.
+    A probe with values within 0.3 um in the whole test, including noise, is implausibly quiet, and 0.3 mm exceeds the
+    drift of any machine. If the probe with the largest range moves by less than 0.05 um per degC of the sensor with the
+    largest range, all probes are reported: 100 mm of steel grow by 1.1 um per degC. This is only a warning where no
+    temperature changes by 1 degC, because a machine at rest may move as little.
 
     Parameters
     ----------
     signals, temperatures : sequence of Signal
-        Without spikes.
+        Channels without spikes.
     """
     spans = {s.channel.name: s.span for s in signals if len(s.x) >= 5}
     moving = {s.channel.name: width for s in signals if s.channel.name in spans and (width := float(np.ptp(s.x))) > 0}
@@ -111,20 +111,20 @@ def displacement_units(signals: Sequence[Signal], temperatures: Sequence[Signal]
 
 
 def time_unit(time: FloatArray, temperatures: Sequence[Signal]) -> Iterator[Finding]:
-    """Yield a time that must be in ms, although the heading specifies s.
+    """Yield a finding on a time that must be in ms although the heading specifies s.
 
-    Rows over an hour apart (median) tell nothing of a warm-up; nobody records one so. With rows of a second or two,
-    read as 17 or 33 min, the sensors tell it: the time in which a temperature moves by half its span, where it does so
-    fastest, is minutes to hours on a machine. Over a day for three quarters of the sensors is trouble. Sensors that
-    move by less than 1 degC, or less than 10 times their noise, are not asked; if none is left, ms are noticed only
-    where rows are over 3.6 s apart.
+    Intervals of over an hour (median) do not resolve a warm-up and are not used in practice. If intervals of one or two
+    seconds are read as 17 or 33 min, the sensors reveal it: the shortest time in which a temperature moves by half its
+    span is minutes to hours on a machine. Over a day for three quarters of the sensors is trouble. Sensors that change
+    by less than 1 degC, or less than 10 times their noise, are ignored; if none is left, ms are detected only at
+    intervals of over 3.6 s.
 
     Parameters
     ----------
     time : ndarray of shape (n_rows,)
         [s]
     temperatures : sequence of Signal
-        Without spikes.
+        Temperatures, without spikes.
     """
     if len(time) < 10:
         return
@@ -162,10 +162,11 @@ def _half_span_time(signal: Signal, time: FloatArray) -> float | None:
 
 
 def zeros(signals: Sequence[Signal], time: FloatArray) -> Iterator[Finding]:
-    """Yield displacements and tilts that do not start near their zero: a continued recording, or a probe not zeroed.
+    """Yield findings on displacements and tilts with an offset at the start: continued recording, or probe not zeroed.
 
-    The start is the value nearest to 0 among the first and the median of the first three. Far is over 2 um or 2 urad,
-    over 5 % of the span and over 6 times the noise. A warning, as the numbers are sound; but models count from zero.
+    The start is the value nearest to 0 of the first value and the median of the first three. It is reported if it
+    exceeds 2 um or 2 urad, 5 % of the span and 6 times the noise. This is a warning: the numbers are valid, but models
+    are relative to zero.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Contents of the cells of a column, regardless of its heading: numbers, dates, times of day, or both in one."""
+"""Contents of the cells of a column, regardless of its heading: numbers, dates, times of day, or timestamps."""
 
 import re
 from collections.abc import Callable, Sequence
@@ -9,40 +9,40 @@ import pandas as pd
 from thermocomp.recordings.readers.layout import is_stamp
 from thermocomp.recordings.readers.numbers import is_number_like
 
-#: a time of day, or one that has passed: hh:mm:ss beyond 24 h, with days before it
+#: a time of day, or an elapsed time: hh:mm:ss beyond 24 h, optionally with days
 CLOCK = re.compile(
     r"(?:(?P<days>\d+)(?: days?,? |\.))?(?P<hours>\d+):(?P<minutes>\d\d)(?::(?P<seconds>\d\d(?:[.,:]\d+)?))?"
 )
 #: a time of day with AM or PM
 HALF = re.compile(r"\d{1,2}:\d\d(?::\d\d(?:\.\d+)?)? ?[AaPp]\.?[Mm]\.?")
-#: midnight, that a spreadsheet gives a date; the day from which it counts, that it gives a time of day
+#: midnight that a spreadsheet adds to a date; the epoch day that it adds to a time of day
 _MIDNIGHT = re.compile(r"[ T]00:00(?::00(?:\.0+)?)?$")
 _FIRST_DAY = re.compile(r"^1(?:899-12-3[01]|904-01-01)[ T]")
-#: a day of the week before a date
+#: a weekday before a date
 _WEEKDAY = re.compile(r"^[^\W\d_]{2,10}\.?,? +(?=\d{1,4}[-./]|\d{1,2}\.? +[^\W\d_]{3,})")
-#: a date of digits alone
+#: a date that consists of digits only
 _COMPACT = re.compile(r"(?:19|20)\d\d(?:0[1-9]|1[0-2])(?:0[1-9]|[12]\d|3[01])")
 
-#: ``compact``: dates of digits alone, which may be numbers
-#: ``passed``: hours beyond a day, or days before them; ``other``: words; empty: nothing
+#: ``compact``: dates of digits only, which may be numbers
+#: ``passed``: elapsed times of over 24 h or with days; ``other``: words; empty: no contents
 Kind = Literal["number", "compact", "date", "clock", "passed", "stamp", "other", ""]
-#: what the column of a number holds
+#: kind of contents of the column with a given number
 Kinds = Callable[[int], Kind]
 
 
 def find_kind(cells: Sequence[str]) -> Kind:
-    """Return the kind of the cells' contents.
+    """Return the kind of contents of cells.
 
     Parameters
     ----------
     cells : sequence of str
-        The first filled ones of a column.
+        The first non-empty cells of a column.
 
     Returns
     -------
     Kind
-        What most of them hold; ``date`` also of dates of which a spreadsheet made midnights. Stamps that are all the
-        same are no time of the rows, and count as words.
+        The kind of most cells; ``date`` also applies to dates that a spreadsheet extended by midnight. Timestamps that
+        are all equal are not the times of the rows, and count as words.
     """
     if not cells:
         return ""
@@ -63,12 +63,12 @@ def find_kind(cells: Sequence[str]) -> Kind:
 
 
 def is_compact_date(cells: Sequence[str]) -> bool:
-    """Return whether all cells are dates of digits alone, the year first: 20240313."""
+    """Return whether all cells are dates that consist of digits only, the year first: 20240313."""
     return bool(cells) and all(_COMPACT.fullmatch(cell.strip().removesuffix(".0")) for cell in cells)
 
 
 def plain_dates(cells: "pd.Series[Any]") -> "pd.Series[str]":
-    """Return dates without a day of the week, a midnight of a spreadsheet, and with signs between their parts."""
+    """Return dates without a weekday or a spreadsheet's midnight, and with separators between their parts."""
     plain = cells.astype(str).str.strip().str.replace(_MIDNIGHT, "", regex=True).str.replace(_WEEKDAY, "", regex=True)
     if is_compact_date([plain.iloc[0]]):
         return plain.str.replace(r"^(\d{4})(\d\d)(\d\d)(?:\.0)?$", r"\1-\2-\3", regex=True)
@@ -76,5 +76,5 @@ def plain_dates(cells: "pd.Series[Any]") -> "pd.Series[str]":
 
 
 def plain_clocks(cells: "pd.Series[Any]") -> "pd.Series[str]":
-    """Return times of day, to which a spreadsheet may have given the day from which it counts."""
+    """Return times of day without the epoch day that a spreadsheet may have added."""
     return cells.astype(str).str.strip().str.replace(_FIRST_DAY, "", regex=True)

@@ -1,4 +1,4 @@
-"""Columns of a wide table that are called after components: EXX_250_um, EYX_z0_100_um."""
+"""Columns of a wide table that are named after components: EXX_250_um, EYX_z0_100_um."""
 
 import re
 
@@ -7,25 +7,25 @@ from thermocomp.core.machine import Channel
 from thermocomp.recordings.recording import Recording
 
 _NUMBER = r"-?\d+(?:\.\d+)?"
-#: code, positions of other axes, own position, unit
+#: code, positions of other axes, position of the axis itself, unit
 _NAME = re.compile(rf"(?P<code>E[XYZABC][XYZ])_(?P<others>(?:[xyz]{_NUMBER}_)*)(?P<own>{_NUMBER})_(?P<unit>um|urad)")
 
 
 def codes(recording: Recording) -> tuple[str, ...]:
-    """Return the components that have separate columns, in the order of `thermocomp.core.components`."""
+    """Return the components with separate columns, in the order of `thermocomp.core.components`."""
     return tuple(c.code for c in COMPONENTS if columns_of(recording, c.code)[0])
 
 
 def is_code_column(channel: Channel) -> bool:
-    """Return whether a column is called after a component."""
+    """Return whether a column is named after a component."""
     return _NAME.fullmatch(channel.name) is not None
 
 
 def columns_of(recording: Recording, code: str) -> tuple[dict[str, float], tuple[str, ...]]:
-    """Return the columns that are called after a component.
+    """Return the columns that are named after a component.
 
-    Columns whose name tells where another axis stood, ``EYX_z0_100_um``, are left out beside those that do not: what
-    was read there holds the turns of the axes times that way.
+    Columns with the position of another axis in their name, ``EYX_z0_100_um``, are left out if there are columns
+    without it: their values include the angles of the axes multiplied by that distance.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def columns_of(recording: Recording, code: str) -> tuple[dict[str, float], tuple
     Returns
     -------
     found : dict of str to float
-        Position by column [mm]; empty if none is called after the component.
+        Position by column [mm]; empty if none is named after the component.
     left_out : tuple of str
         Columns with positions of other axes.
     """

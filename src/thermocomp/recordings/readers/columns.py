@@ -17,18 +17,18 @@ from thermocomp.recordings.readers.mapping import ColumnMap, Mapping, Place
 from thermocomp.recordings.readers.tables import FileTable, tell_places
 from thermocomp.recordings.readers.timecolumns import TimePlan, find_position, find_time
 
-#: below this no absolute temperature of a machine lies [K]
+#: no absolute temperature of a machine is below this value [K]
 _COLDEST = 200.0
 _SCPI_INFINITY = 9.9e37
-#: what numbers may be that are too small for kelvins
+#: possible meanings of numbers that are too small for kelvins
 _DOUBTFUL = ({"unit": "degC"}, {"role": "ignore"})
-# A factor, such as the base of a level, turns one of these into another.
+# A factor, such as the length of a level's base, converts one of these to another.
 _GEOMETRY = ("displacement", "angle", "position")
 
 
 @dataclass(frozen=True)
 class PlannedColumn:
-    """A column of the file and the channel it becomes.
+    """A column of the file and its channel.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class PlannedColumn:
     rule: ColumnMap
 
     def refuse_doubtful(self, raw: FloatArray, heading: str, source: str) -> None:
-        """Refuse kelvins that are differences: nothing in a machine hall is colder than -73 degC."""
+        """Reject temperatures in kelvins that are differences: nothing in a machine hall is colder than -73 degC."""
         valid = np.abs(raw[np.isfinite(raw)])
         if self.unit.symbol == "K" and not self.rule.unit and valid.size and float(np.median(valid)) < _COLDEST:
             raise RecordingError(
@@ -61,14 +61,14 @@ class PlannedColumn:
     def convert(
         self, raw: FloatArray, missing: Sequence[float], place: Callable[[int], str]
     ) -> tuple[FloatArray, tuple[str, ...]]:
-        """Return the values in the internal unit, nan where missing, and notes on replaced values and their rows."""
+        """Return the values in the house unit, NaN where missing, and notes on replaced values and their rows."""
         notes = []
         codes = np.array([*self.rule.missing, *missing])
         absent = np.isin(raw, codes) if codes.size else np.zeros(len(raw), dtype=np.bool_)
         if absent.any():
             found = ", ".join(f"{c:g}" for c in np.unique(raw[absent]))
             notes.append(f"{self.channel.name}: missing-value code {found} in {absent.sum()} of {len(raw)} cells")
-        # SCPI: 9.9E37 stands for infinity, 9.91E37 for what is not a number
+        # SCPI: 9.9E37 denotes infinity, 9.91E37 denotes NaN
         infinite = (np.abs(raw) >= _SCPI_INFINITY) & ~absent
         if infinite.any():
             notes.append(f"{self.channel.name}: infinite, taken as missing, in {infinite.sum()} of {len(raw)} cells")
@@ -78,7 +78,7 @@ class PlannedColumn:
             values = values - values[valid[0]] if valid.size else values
         elif self.rule.zero:
             values = values - self.rule.zero
-        # Multiplying only where needed keeps the digits of the file, and its memory.
+        # Multiplying only where needed preserves the digits of the file, and saves memory.
         values = values if self.rule.scale == 1 else values * self.rule.scale
         if self.rule.valid is not None:
             low, high = self.rule.valid
@@ -106,19 +106,19 @@ class ColumnPlan:
     Parameters
     ----------
     times : TimePlan
-        The columns that hold the time.
+        Columns that contain the time.
     time_unit : str
-        A unit of time, ``timestamp``, or empty if neither heading nor mapping gives one.
+        Unit of time, ``timestamp``, or empty if neither heading nor mapping specifies one.
     beside : tuple of int
-        Positions of further columns that must hold the same times: one next to each channel.
+        Positions of further columns that must contain the same times: one next to each channel.
     cycle : int or None
         Position of the column of cycle labels.
     columns : tuple of PlannedColumn
         One per channel.
     left_out : tuple of int
-        Positions of the columns that neither a heading nor the mapping explains.
+        Positions of the columns that neither their heading nor the mapping defines.
     aliases : dict of str to str
-        Headings and names without unit to channel names.
+        Channel names by heading and by name without unit.
     notes : tuple of str
     """
 
@@ -133,15 +133,15 @@ class ColumnPlan:
 
 
 def plan(table: FileTable, mapping: Mapping) -> ColumnPlan:
-    """Decide which columns are read, and as what.
+    """Determine the columns to be read, and their meaning.
 
     Raises
     ------
     RecordingError
-        A heading or channel name comes twice; there is no time column or no channel; a mapped column is not there, or
-        is mapped twice.
+        A heading or channel name is duplicate; there is no time column or no channel; a mapped column does not exist,
+        or is mapped twice.
     UnitError
-        A unit is unknown, or the one in the heading cannot measure what the mapping states.
+        A unit is unknown, or the unit in the heading contradicts the quantity in the mapping.
     """
     headings, source = table.headings, str(table.path)
     kinds = cache(partial(find_column_kind, table))
@@ -171,7 +171,7 @@ def plan(table: FileTable, mapping: Mapping) -> ColumnPlan:
     _check_names(columns, headings, source)
     columns.sort(key=lambda c: c.index)
     is_stamp = kinds(time) in ("date", "clock", "passed", "stamp")
-    # what the cells hold goes before what a heading says
+    # the contents of the cells take precedence over the heading
     said = None if is_stamp else meanings[time]
     time_unit, note = _time_unit(headings[time], said, mapping, source)
     notes.extend([note] if note else [])
@@ -190,7 +190,7 @@ def plan(table: FileTable, mapping: Mapping) -> ColumnPlan:
 def _plan_mapped(
     mapping: Mapping, headings: Sequence[str], meanings: Sequence[Meaning | None], source: str
 ) -> tuple[list[PlannedColumn], set[int], list[str]]:
-    """Return the columns that a mapping takes, the numbers of all that it names, and notes."""
+    """Return the columns used by a mapping, the numbers of all columns that it names, and notes."""
     columns, used, notes = list[PlannedColumn](), set[int](), list[str]()
     tables: dict[int, str] = {}
     for name, rule in mapping.columns.items():
@@ -217,7 +217,7 @@ def _plan_mapped(
 
 
 def _meant(rule: ColumnMap, meaning: Meaning | None, where: str, heading: str) -> tuple[Unit, str]:
-    """Return the unit of a mapped column, the mapping's before the heading's, and a note where the two differ."""
+    """Return the unit of a mapped column (mapping before heading), and a note where the two differ."""
     meant = rule.conversion
     if meaning is None:
         if meant is None:
@@ -242,7 +242,7 @@ def _meant(rule: ColumnMap, meaning: Meaning | None, where: str, heading: str) -
 
 
 def _understand_all(headings: Sequence[str], mapping: Mapping, source: str) -> list[Meaning | None]:
-    """Understand every heading; a mistyped unit matters only where the mapping does not speak of the column."""
+    """Interpret every heading; a mistyped unit matters only if the mapping does not name the column."""
     mapped = _mapped(mapping) | {mapping.time.column}
     meanings: list[Meaning | None] = []
     for k, heading in enumerate(headings, start=1):
@@ -259,7 +259,7 @@ def _understand_all(headings: Sequence[str], mapping: Mapping, source: str) -> l
 
 
 def _time_unit(heading: str, meaning: Meaning | None, mapping: Mapping, source: str) -> tuple[str, str]:
-    """Return the unit of time, the mapping's before the heading's, and a note where the two differ."""
+    """Return the unit of time (mapping before heading), and a note where the two differ."""
     given = mapping.time.unit or ("timestamp" if mapping.time.format else "")
     if meaning is None:
         return given, ""
@@ -289,7 +289,7 @@ def _mapped(mapping: Mapping) -> set[Place]:
 
 
 def _refuse_twins(headings: Sequence[str], mapping: Mapping, source: str, time: str = "") -> None:
-    """Refuse columns of one heading, unless it is that of the time or the mapping names them by number."""
+    """Reject columns with equal headings, except the time column and columns that the mapping names by number."""
     numbered = {*_mapped(mapping), mapping.time.column, mapping.time.date}
     places: dict[str, list[int]] = {}
     for k, heading in enumerate(headings, start=1):
@@ -314,7 +314,7 @@ def _refuse_twins(headings: Sequence[str], mapping: Mapping, source: str, time: 
 
 
 def _numbered(heading: str, *places: int) -> dict[str, dict[str, object]]:
-    """Return tables for columns of one heading, by their numbers."""
+    """Return mapping tables for columns with equal headings, by their numbers."""
     meaning = understand(heading)
     if meaning is None:
         return {f"{'_'.join(heading.split())}_{k}": {"column": place} for k, place in enumerate(places, start=1)}
@@ -343,7 +343,7 @@ def _check_names(columns: Sequence[PlannedColumn], headings: Sequence[str], sour
 def _aliases(
     columns: Sequence[PlannedColumn], headings: Sequence[str], meanings: Sequence[Meaning | None]
 ) -> dict[str, str]:
-    """Headings, and names without a unit where only one channel has them, to channel names."""
+    """Return channel names by heading, and by name without unit where it is unique."""
     names = {c.channel.name for c in columns}
     aliases: dict[str, str] = {}
     for c in columns:

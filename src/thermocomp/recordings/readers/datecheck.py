@@ -1,4 +1,4 @@
-"""Dates that a file holds and that the time which was read does not know."""
+"""Check of the times of the rows against dates in the file that were not used."""
 
 import re
 from collections.abc import Sequence
@@ -19,10 +19,10 @@ from thermocomp.recordings.readers.tables import FileTable
 from thermocomp.recordings.readers.timecolumns import has_passed, is_ignored
 
 _DAY = 86_400.0
-#: clocks are set, for summer time too [s]
+#: tolerance for clock adjustments, including daylight saving [s]
 _SET = 5400.0
 
-#: a date somewhere in a line, whatever stands around it
+#: a date anywhere in a line, with any text around it
 _SOME_DATE = re.compile(
     r"(?<!\d)(?:\d{1,2}|\d{4}) ?([./-]) ?\d{1,2} ?\1 ?(?:\d{4}|\d{1,2})(?!\d)"
     r"|(?<!\d)(?:19|20)\d\d(?:0[1-9]|1[0-2])(?:0[1-9]|[12]\d|3[01])(?!\d)"
@@ -35,12 +35,12 @@ _SOME_DATE = re.compile(
 
 
 def holds_date(text: str) -> bool:
-    """Return whether a text holds a date, or a day, among other words."""
+    """Return whether a text contains a date or a day among other words."""
     return _SOME_DATE.search(text) is not None
 
 
 def holds_own_date(table: FileTable, number: int) -> bool:
-    """Return whether a row holds a date where other rows hold none, as one between the tests of several days.
+    """Return whether a row contains a date where other rows have none, such as a separator between daily tests.
 
     Parameters
     ----------
@@ -55,31 +55,31 @@ def holds_own_date(table: FileTable, number: int) -> bool:
 
 
 def check_dates(time: FloatArray, file: FileCells, others: Sequence[int] = ()) -> tuple[str, ...]:
-    """Refuse times without a date that are inconsistent with the dates of another column.
+    """Reject times without a date that are inconsistent with the dates of another column.
 
     Parameters
     ----------
     time : ndarray of shape (n_rows,)
-        Since the first row [s].
+        Time since the first row [s].
     file : FileCells
-        With the columns of dates that were not used.
+        Cells, including the columns of dates that were not used.
     others : sequence of int
-        Further columns of dates, in forms that no timestamp has (`thermocomp.recordings.readers.dayforms`).
+        Further columns of dates, in forms other than timestamps (`thermocomp.recordings.readers.dayforms`).
 
     Returns
     -------
     tuple of str
-        Notes on dates that the mapping leaves out.
+        Notes on dates that are ignored by the mapping.
 
     Raises
     ------
     TwoReadingsError
-        Tests of several days would become one.
+        Tests on several days would be merged.
     """
     notes = []
     heading, table, is_stamp, form = file.heading, file.table, file.is_stamp, file.mapping.time.format
     date = file.times.date
-    # a number has no date even where the mapping names the column of one
+    # a number has no date even if the mapping names a date column
     ignores = not is_stamp or (form and not has_day(form))
     more = (date,) if date is not None and ignores else ()
     clock = _find_clock(file) if is_stamp else None
@@ -115,7 +115,7 @@ def check_dates(time: FloatArray, file: FileCells, others: Sequence[int] = ()) -
 
 
 def _shown(cell: object) -> str:
-    return str(cell).removesuffix(".0")  # of a sheet
+    return str(cell).removesuffix(".0")  # added by a spreadsheet
 
 
 def _quoted(place: str | int) -> str:
@@ -123,11 +123,11 @@ def _quoted(place: str | int) -> str:
 
 
 def _find_contradiction(time: FloatArray, cells: "pd.Series[Any]", clock: float | None) -> int | None:
-    """Return the first row whose date no time of day at the first row explains; None if there is none."""
+    """Return the first row whose date contradicts every possible time of day of the first row; None if none does."""
     there = np.flatnonzero(cells.notna())
     texts = plain_dates(cells.iloc[there])
     if texts.nunique() < 2:
-        return None  # a date of the test, or of the sensor
+        return None  # date of the whole test, or of the sensor
     wrong = [_find_wrong(days, time[there], clock) for days in read_days(texts)]
     if not wrong:
         return int(there[np.flatnonzero(texts != texts.iloc[0])[0]])
@@ -137,7 +137,7 @@ def _find_contradiction(time: FloatArray, cells: "pd.Series[Any]", clock: float 
 def _find_other(
     time: FloatArray, cells: "pd.Series[Any]", heading: str, clock: float | None, *, is_stamp: bool
 ) -> int | None:
-    """Return the first row whose date, in a form that no timestamp has, goes not with the time."""
+    """Return the first row whose date, in a form other than a timestamp, contradicts the time."""
     filled = cells.notna() & ~cells.astype(str).map(is_filler)
     there = np.flatnonzero(filled)
     texts = cells.iloc[there].astype(str)
@@ -150,7 +150,7 @@ def _find_other(
 
 def _find_wrong(days: IntArray, t: FloatArray, clock: float | None) -> int | None:
     since = (days - days[0]) * _DAY - (t - t[0])
-    # what the first row may be after midnight at least, and at most
+    # bounds of the time of the first row after midnight
     wrong = np.maximum.accumulate(since) >= np.minimum.accumulate(since) + _DAY + _SET
     if clock is not None and not wrong.any() and not (clock <= _usual(t) and _runs_on(days, t)):
         wrong = days - days[0] != (clock + t) // _DAY - (clock + t[0]) // _DAY
@@ -163,12 +163,12 @@ def _usual(t: FloatArray) -> float:
 
 
 def _runs_on(days: IntArray, t: FloatArray) -> bool:
-    """Return whether no pause is where the date changes: times that begin with zero may have passed."""
+    """Return whether no pause coincides with a change of date: times that start at zero may then be elapsed times."""
     return bool((np.diff(t)[np.diff(days) != 0] <= 2 * _usual(t)).all())
 
 
 def _find_clock(file: FileCells) -> float | None:
-    """Return the time of day of the first row [s]; None where the times are not known to be of a day."""
+    """Return the time of day of the first row [s]; None where the times are not known to be times of day."""
     form, texts, date = file.mapping.time.format, file.cells[file.times.time].astype(str).str.strip(), file.times.date
     if has_passed(file.heading):
         return None

@@ -1,4 +1,4 @@
-"""Order of day, month and year: where dates alone are ambiguous, the continuity of the recording decides."""
+"""Order of day, month and year: where the dates are ambiguous, the continuity of the recording decides."""
 
 from collections.abc import Mapping
 from typing import Literal, NamedTuple
@@ -10,41 +10,42 @@ IntArray = NDArray[np.int64]
 
 _SECOND = 1_000_000_000
 _DAY = 86_400 * _SECOND
-#: rows so near to each other belong together, however often the others come; those further apart may not
+#: rows within the first limit are consecutive at any sampling rate; rows beyond the second may not be
 _NEAR, _FAR = 1800 * _SECOND, 6 * 3600 * _SECOND
-#: a step in days that only a wrong order makes: a month is 28 days at least, and a row may come early on its last one
+#: step in days caused only by a wrong order: a month has at least 28 days, minus a margin for its first and last day
 _MONTH = 26
 
 
 class DateChoice(NamedTuple):
-    """An order that was chosen."""
+    """The selected order."""
 
     order: str  #: empty if several are possible
     by: Literal["rising", "going on", ""]
-    why: str  #: what speaks against the others, in words
+    why: str  #: reason against the other orders, as text
 
 
 def find_order(readings: Mapping[str, IntArray]) -> DateChoice:
-    """Choose the order in which rows continue.
+    """Select the order of day, month and year in which rows are consecutive.
 
     Parameters
     ----------
     readings : mapping of str to ndarray of shape (n_rows,)
-        Instants under each order [ns], all of which are dates.
+        Times under each order [ns], all of which are valid dates.
 
     Notes
     -----
-    An order is taken if it is the only one
+    An order is selected if it is the only one
 
-    1. in which time rises; else
-    2. in which a row follows on the one before across a change of the date: at most half an hour or two usual steps
-       later, and six hours, where every other order puts about a month or more between them.
+    1. in which time increases; else
+    2. in which two rows are consecutive across a change of the date: at most half an hour or two usual steps apart, and
+       at most six hours, where every other order puts about a month or more between them.
 
-    Rows of one a day, and tests on days with a pause between them, may be a month apart as well: nothing tells.
+    Single rows per day, and tests on days with a pause between them, may also be a month apart: then no order is
+    selected.
     """
     begun, *others = readings.values()
     if all(np.array_equal(begun, t) for t in others):
-        return DateChoice(next(iter(readings)), "", "")  # the fifth of May
+        return DateChoice(next(iter(readings)), "", "")  # day and month are equal, as on the fifth of May
     rising = [order for order, t in readings.items() if rises(t)]
     if len(rising) == 1:
         return DateChoice(rising[0], "rising", "otherwise time would not rise")
@@ -66,10 +67,10 @@ def find_order(readings: Mapping[str, IntArray]) -> DateChoice:
 
 
 def rises(t: IntArray) -> bool:
-    """Return whether no instant is before the one above it."""
+    """Return whether no time is earlier than the one before."""
     return bool((np.diff(t) >= 0).all())
 
 
 def find_longest_step(t: IntArray) -> float:
-    """Return the longest time between neighbouring rows, in days."""
+    """Return the longest step between consecutive rows, in days."""
     return float(np.diff(t).max(initial=0)) / _DAY

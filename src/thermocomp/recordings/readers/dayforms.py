@@ -1,4 +1,4 @@
-"""Dates in forms that no timestamp has: digits alone, counts of days or seconds, weeks, dates without a year."""
+"""Dates in forms other than timestamps: digits only, counts of days or seconds, weeks, dates without a year."""
 
 import re
 from collections.abc import Sequence
@@ -15,17 +15,17 @@ from thermocomp.recordings.readers.numbers import is_filler
 from thermocomp.recordings.readers.stamps import parse, read_days
 from thermocomp.recordings.readers.tables import FileTable
 
-#: columns of numbers by their type that are looked into
+#: maximum number of numeric columns examined
 _MOST = 100
 _DAY = 86_400
-#: digits behind yyyymmdd: none, hh, hhmm, hhmmss, milliseconds
+#: factors for digits after yyyymmdd: none, hh, hhmm, hhmmss, milliseconds
 _BEHIND = (1, 10**2, 10**4, 10**6, 10**9)
-#: seconds since 1970 between the years 2000 and 2100, in parts of a second; days that spreadsheets count between them
+#: seconds since 1970 in the years 2000 to 2100, in fractions of a second; spreadsheet day numbers of the same years
 _EPOCH, _PARTS = (946_684_800, 2_240_611_200), (1, 10**3, 10**6, 10**9)
 _SERIAL = (36_526, 73_050)
-#: the same from which Julian days are counted
+#: Julian days of the same years
 _JULIAN = (2_451_544, 2_488_070)
-#: headings of a date or a day, below which numbers may be one that are not dates at sight
+#: headings of a date or a day, under which numbers in other forms may also be dates
 _NAMED = re.compile(
     r"(?:^|[\W_])(?:\w*(?:date|datum|tag|day|stamp|stempel)|dat|doy|dow|m?jd|julian|fecha|jour|giorno|d[ií]a|dag|data)(?:$|[\W_])"
 )
@@ -35,14 +35,14 @@ _MONTH = re.compile(r"\d{1,2}[-. ]{1,2}[^\W\d_]{3,9}\.?|[^\W\d_]{3,9}\.?[- ]\d{1
 _COUNTED = re.compile(r"(?:day|tag|jour|giorno|d[ií]a|dag|dia|nap|den|dzień|gün)\W{0,3}\d{1,4}\.?", re.IGNORECASE)
 _DAY_WORD = re.compile(r"(?:day|tag|jour|giorno|d[ií]a|dia)\W+\w+", re.IGNORECASE)
 _WEEK_DAY = re.compile(r"^(?:KW|CW|W|wk|week) ?(\d\d?)[-/. ]?([1-7])$", re.IGNORECASE)
-#: full dates among other words
+#: complete dates among other words
 _WITHIN = (
     r"(?<!\d)(\d{4}([-./])\d{1,2}\2\d{1,2})(?!\d)",
     r"(?<!\d)(\d{1,2}([-./])\d{1,2}\2(?:\d{4}|\d\d))(?!\d)",
     r"(?<!\d)((?:19|20)\d{6})(?!\d)",
     r"(?<!\d)(\d{6})(?!\d)",
 )
-#: headings that name a day in one language and something else in another
+#: headings that name a day in one language and have another meaning in others
 _NO_DAY = ("tag", "data", "stamp", "stempel", "dag", "dat")
 _DAYS = (
     *("monday tuesday wednesday thursday friday saturday sunday", "mon tue wed thu fri sat sun"),
@@ -58,21 +58,21 @@ _DAYS = (
 )
 
 
-#: a number that is no date, unless the heading says so
+#: a number that is not a date, unless the heading names one
 _SMALL = re.compile(r"[-+]?\d{1,7}(?:[.,]\d+)?")
 _WEEKDAYS = frozenset(day for names in _DAYS for day in names.split())
 
 
 def find_day_columns(table: FileTable, columns: Sequence[int], *, beside_clock: bool = False) -> list[int]:
-    """Find the columns whose first cells are dates in a form that no timestamp has.
+    """Find the columns whose first cells are dates in a form other than timestamps.
 
     Parameters
     ----------
     table : FileTable
     columns : sequence of int
-        To look into.
+        Columns to be examined.
     beside_clock : bool
-        The times of the rows are not numbers: what then changes below a heading of a date may be one in any form.
+        The times of the rows are not numbers: then values that change under a date heading may be dates in any form.
     """
     found, typed = [], []
     for k in columns:
@@ -90,7 +90,7 @@ def find_day_columns(table: FileTable, columns: Sequence[int], *, beside_clock: 
 
 
 def find_column_kind(table: FileTable, column: int) -> Kind:
-    """Return the kind of a column's contents, also of one that holds numbers by its type."""
+    """Return the kind of a column's contents, including columns of a numeric type."""
     head = table.head(column)
     if not head and names_day(table.headings[column]) and table.is_number(column, empty=False):
         head = [str(cell).removesuffix(".0") for cell in table.load([], [column])[0][column].dropna().iloc[:100]]
@@ -113,13 +113,13 @@ def _read_filled(cells: Sequence[Any], heading: str, beside_clock: bool) -> list
 
 
 def _may_be_day(first: str) -> bool:
-    """Return whether a column's first cell may be a day: at once, for a file may have thousands of columns."""
+    """Return whether the first cell of a column may be a day: a fast check, as a file may have thousands of columns."""
     weekday = first.casefold().rstrip(".") in _WEEKDAYS
     return weekday or re.search(r"\d", first) is not None or _DAY_WORD.fullmatch(first) is not None
 
 
 def read_other_days(cells: "pd.Series[Any]", heading: str, *, beside_clock: bool = False) -> list[IntArray]:
-    """Return the days that cells may be, counted from any one, in each form that all of them have.
+    """Return the possible days of cells, relative to any origin, in each form that applies to all of them.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def read_other_days(cells: "pd.Series[Any]", heading: str, *, beside_clock: bool
         named and plain_name(heading) not in _NO_DAY and texts.str.contains(r"\d").all()
     )
     if not found and beside_clock and words:
-        # whatever form that is: where it changes another day begins
+        # in an unknown form each change of the text starts another day
         return [np.asarray((texts != texts.shift()).cumsum(), dtype=np.int64)]
     return found
 
@@ -179,7 +179,7 @@ def _read_texts(texts: "pd.Series[str]", *, named: bool, beside_clock: bool) -> 
     first = plain.iloc[0]
     if re.fullmatch(f"{_ORDINAL}|{_WEEK}", first):
         return _read_forms(plain.str.replace("-", "", regex=False), "%GW%V%u" if "W" in first else "%Y%j")
-    # a file may have thousands of columns: their first cells are looked at before all
+    # a file may have thousands of columns: their first cells are checked before all cells
     if _WEEK_DAY.match(texts.iloc[0]) and (week := texts.str.extract(_WEEK_DAY)).notna().to_numpy().all():
         return [_unwrap(d, 364) for d in _read_forms("2020W" + week[0].str.zfill(2) + week[1], "%GW%V%u")]
     if _NO_YEAR.fullmatch(first) and (named or first.endswith(".") or (beside_clock and not _are_parts(plain))):
@@ -202,7 +202,7 @@ def _read_dates_within(texts: "pd.Series[str]") -> list[IntArray]:
 
 
 def _read_digits(parts: "pd.Series[str]") -> list[IntArray]:
-    """Return the days of dates of digits alone; of six digits only those that rise within a year or so."""
+    """Return the days of dates that consist of digits only; six-digit dates must increase within about a year."""
     if len(parts.iloc[0]) == 8:
         return _read_forms(parts, "%Y%m%d")
     read = _read_forms(parts, "%y%m%d", "%d%m%y", "%m%d%y")
@@ -210,7 +210,7 @@ def _read_digits(parts: "pd.Series[str]") -> list[IntArray]:
 
 
 def _are_parts(texts: "pd.Series[str]") -> bool:
-    """Return whether texts count the parts of something: 1/3, 2/3, 3/3."""
+    """Return whether texts count parts: 1/3, 2/3, 3/3."""
     parts = texts.str.extract(r"^([1-9]\d?)/([1-9]\d?)$")
     return bool(parts[0].iloc[0] == "1" and parts[0].notna().all() and parts[1].nunique() == 1)
 
@@ -227,5 +227,5 @@ def _read_forms(texts: "pd.Series[str]", *forms: str) -> list[IntArray]:
 
 
 def _unwrap(days: IntArray, period: int) -> IntArray:
-    """Return days that continue to count where a week or a year begins again."""
+    """Return days that continue to increase where a week or a year starts again."""
     return np.concatenate([days[:1], days[0] + np.cumsum(np.diff(days) % period)])

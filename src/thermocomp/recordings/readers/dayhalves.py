@@ -1,4 +1,4 @@
-"""AM and PM in a separate column, next to a clock of twelve hours."""
+"""AM and PM in a separate column, next to a 12-hour clock."""
 
 import re
 from collections.abc import Sequence
@@ -11,12 +11,12 @@ from thermocomp.core.exceptions import RecordingError, Remedy, TwoReadingsError
 from thermocomp.recordings.readers.numbers import is_number_like
 from thermocomp.recordings.readers.tables import FileTable, skip_row
 
-#: words for the two halves of a day, in small letters without points and blanks: those that say nothing else first
+#: words for the two halves of a day, in lower case without points and blanks: first the unambiguous ones
 _CERTAIN = (
     ("am", "vorm", "vormittag", "vormittags", "πμ", "上午", "午前", "오전"),
     ("pm", "nachm", "nachmittag", "nachmittags", "μμ", "下午", "午後", "오후"),
 )
-#: and those that shifts are called by, too; letters alone
+#: then those that also denote shifts; then single letters
 _MAYBE = (
     ("früh", "morgens", "matin", "mattina", "mañana", "manhã", "dop", "morning"),
     ("abends", "après-midi", "soir", "pomeriggio", "tarde", "odp", "afternoon"),
@@ -27,7 +27,7 @@ _HEADING = re.compile(
     r"\ba[ ._]?m\.?[ /_|\\-]*p[ ._]?m\b|meridi[ea]m?|tageshälfte|half[ _]?(of[ _])?day",
     re.IGNORECASE,
 )
-#: and one that may, if two words stand below it
+#: headings that may also denote AM and PM, if the column contains two words
 _SHORT = re.compile(r"[ap]\.?m\.?|half", re.IGNORECASE)
 _HOUR = re.compile(r"(?<![\d:])(\d{1,2})(?=:\d\d)")
 
@@ -37,12 +37,12 @@ def _plain(cell: object) -> str:
 
 
 def are_halves(cells: Sequence[str], heading: str) -> bool:
-    """Return whether cells state which half of a day it is.
+    """Return whether cells specify the half of the day.
 
     Parameters
     ----------
     cells : sequence of str
-        The first filled ones of a column.
+        The first non-empty cells of a column.
     heading : str
     """
     words = {_plain(cell) for cell in cells}
@@ -53,32 +53,32 @@ def are_halves(cells: Sequence[str], heading: str) -> bool:
 
 
 def says_halves(heading: str) -> bool:
-    """Return whether a heading speaks of AM and PM."""
+    """Return whether a heading denotes AM and PM."""
     return _HEADING.search(heading) is not None
 
 
 def join_halves(
     clocks: "pd.Series[Any]", halves: "pd.Series[Any]", form: str, table: FileTable, names: tuple[str, str]
 ) -> "tuple[pd.Series[Any], tuple[str, ...]]":
-    """Return times of day followed by AM or PM from their column, and notes on how they were read.
+    """Return times of day with AM or PM from their column appended, and notes on how they were read.
 
     Parameters
     ----------
     clocks : Series
-        Times of day, or dates with one.
+        Times of day, or dates with a time of day.
     halves : Series
         AM or PM, or words for them.
     form : str
-        Format of the times that a mapping gives; empty: none.
+        Format of the times in the mapping; empty if not specified.
     table : FileTable
-        That the cells come from.
+        Source of the cells.
     names : tuple of str
         Headings of both columns.
 
     Raises
     ------
     RecordingError
-        A cell does not state which half; or it contradicts the time.
+        A cell does not specify the half of the day, or it contradicts the time.
     """
     time, half = names
     there = clocks.notna()
@@ -90,7 +90,7 @@ def join_halves(
     ignore: Remedy = {"columns": {half: {"role": "ignore"}}}
     unknown = np.flatnonzero(there & ~(after | before))
     if unknown.size and not certain:
-        return clocks, ()  # shifts
+        return clocks, ()  # the words denote shifts
     if unknown.size:
         row = int(unknown[0])
         says = "is empty" if pd.isna(halves.iloc[row]) else f"{str(halves.iloc[row])!r} is neither AM nor PM"
@@ -102,7 +102,7 @@ def join_halves(
         )
     texts = clocks.astype(str).str.strip()
     hours = pd.to_numeric(texts.str.extract(_HOUR, expand=False), errors="coerce")
-    whole_day = bool((hours > 12).any())  # written in 24 hours, with AM and PM beside them all the same
+    whole_day = bool((hours > 12).any())  # 24-hour times with a redundant AM or PM
     if whole_day or (form and "%p" not in form):
         wrong = np.flatnonzero(there & hours.notna() & (after != (hours >= 12)) & (before | after))
         if not wrong.size or (whole_day and not certain):

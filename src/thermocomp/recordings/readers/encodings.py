@@ -7,9 +7,9 @@ from pathlib import Path
 from thermocomp.core.exceptions import RecordingError
 from thermocomp.recordings.readers.limits import FileLimits
 
-#: tried in this order; the first under which most of the text makes sense is taken
+#: candidates in this order; the first under which most of the text is meaningful is used
 _ENCODINGS = ("cp1252", "cp850", "mac-roman", "shift_jis", "gb18030")
-#: what a recording's headings have besides ASCII: signs of units, and letters within words
+#: non-ASCII characters expected in headings: unit symbols, and letters within words
 _SENSE = re.compile(
     r"°(?= ?[CFK])|℃|[µμ](?=m|rad)|(?<=min)[⁻¯]¹"
     r"|(?<=[A-Za-z])[äöüßéèêàçñóíáô]|[äöüÄÖÜéèêàçñóíáô](?=[a-z])"
@@ -19,18 +19,18 @@ _LONE_CR = re.compile(rb"\r(?![\r\n])")
 
 
 def bring_to_utf8(path: Path, limits: FileLimits) -> tuple[bytes | None, tuple[str, ...]]:
-    """Return a file as UTF-8 with standard line ends, and notes on the conversion, if it has neither.
+    """Return a file as UTF-8 with standard line ends, and notes on the conversion, if it needs conversion.
 
     Returns
     -------
     data : bytes or None
-        None: the file can be read as it is, line by line.
+        None: the file can be read directly, line by line.
     notes : tuple of str
 
     Raises
     ------
     RecordingError
-        The file is too large for that, or holds no text.
+        The file is too large for conversion, or contains no text.
     """
     with path.open("rb") as f:
         head = f.read(_HEAD)
@@ -56,12 +56,12 @@ def bring_to_utf8(path: Path, limits: FileLimits) -> tuple[bytes | None, tuple[s
 
 
 def find_encoding(lines: Iterable[bytes]) -> str:
-    """Return in which encoding lines that are not UTF-8 make most sense.
+    """Return the encoding under which lines that are not UTF-8 are most meaningful.
 
     Returns
     -------
     str
-        Numbers are the same in all of them; it matters for headings and labels.
+        Encoding for headings and labels; numbers are the same in all candidates.
     """
     text = b"".join(lines)
     found = {}
@@ -74,7 +74,7 @@ def find_encoding(lines: Iterable[bytes]) -> str:
 
 
 def _find_utf16(head: bytes) -> str:
-    """Return the UTF-16 variant of the head of a file, with or without byte order mark; empty if it is none."""
+    """Return the UTF-16 variant of the head of a file, with or without byte order mark; empty if it is not UTF-16."""
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16-le" if head[0] == 0xFF else "utf-16-be"
     half = len(head) // 2

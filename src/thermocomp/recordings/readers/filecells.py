@@ -1,4 +1,4 @@
-"""`FileCells`: the cells that were read of a file, with all that is known of them."""
+"""`FileCells`: cells read from a file, with their source and meaning."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,20 +14,20 @@ from thermocomp.recordings.readers.timecolumns import TimePlan
 
 @dataclass(frozen=True)
 class FileCells:
-    """The cells that were read of a file, before they are times, numbers and labels.
+    """Cells read from a file, before conversion to times, numbers and labels.
 
     Parameters
     ----------
     source : Path
-        The file.
+        Path of the file.
     mapping : Mapping
     table : FileTable
-        That the cells come from.
+        Source of the cells.
     columns : ColumnPlan
     cells : DataFrame
         Columns named by their position in the file.
     is_stamp : bool
-        The times are timestamps, no numbers.
+        The times are timestamps, not numbers.
     """
 
     source: Path
@@ -39,27 +39,27 @@ class FileCells:
 
     @property
     def times(self) -> TimePlan:
-        """The columns that hold the time."""
+        """Columns that contain the time."""
         return self.columns.times
 
     @property
     def heading(self) -> str:
-        """Heading of the column of times."""
+        """Heading of the time column."""
         return self.table.headings[self.times.time]
 
     @property
     def time_keys(self) -> dict[str, str]:
-        """Mapping entries for the columns of the time: ``column``, and ``date`` where there is one."""
+        """Mapping entries for the time columns: ``column``, and ``date`` if there is one."""
         date = self.times.date
         return {"column": self.heading, **({"date": self.table.headings[date]} if date is not None else {})}
 
     def at(self, row: int, column: int | None = None) -> str:
-        """Return the location of a cell; that of the time where no column is given."""
+        """Return the location of a cell; of the time if no column is given."""
         heading = self.table.headings[self.times.time if column is None else column]
         return f"{self.source}: {self.table.place(row)}, column {heading!r}"
 
     def refuse_row(self, row: int, text: str, column: int | None = None, *, skip: bool = True) -> RecordingError:
-        """Return the error of a cell.
+        """Return the error for a cell.
 
         Parameters
         ----------
@@ -67,8 +67,8 @@ class FileCells:
         text : str
             Fault, and what to do.
         column : int, optional
-            The time without it.
+            Column of the cell. Default: the time column.
         skip : bool
-            To pass over the row is a remedy.
+            Skipping the row is a possible remedy.
         """
         return RecordingError(f"{self.at(row, column)}: {text}", [skip_row(self.table, row)] if skip else ())

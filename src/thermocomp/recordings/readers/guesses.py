@@ -17,9 +17,9 @@ from thermocomp.recordings.readers.tables import FileTable
 from thermocomp.recordings.readers.timecolumns import find_parts
 from thermocomp.recordings.readers.times import find_likely_units
 
-#: columns that are guessed about
+#: maximum number of columns with guesses
 MOST_GUESSES = 100
-#: words of a name, by what they mean
+#: words in names, by meaning
 _TEMPERATURE = re.compile(
     r"t\d*|tc\d*|pt\d+\w*|rtd\d*|ntc\d*|temp\w*|thermo\w*|lager|bearing|motor|ambient|umgebung|raum|room|air|luft|"
     r"coolant|k[uü]hl\w*|[oö]l|oil|housing|geh[aä]use|flansch|flange|nose|bett|bed|column|st[aä]nder|chamber"
@@ -29,33 +29,33 @@ _DISPLACEMENT = re.compile(
     r"d?[xyz]\d*|drift|disp\w*|displacement|weg\d*|verlagerung|taster\d*|probe\d*|error|fehler|abweichung|deviation|"
     r"deformation|lvdt\d*|eddy\d*|dial\d*|uhr\d*"
 )
-#: what is wanted of a machine, not measured
+#: words for setpoints, which are not measured
 _SET = re.compile(r"target|set|setpoint|soll\w*|sp|consigne")
-#: what a temperature of a machine is [degC], and what a spindle turns with at least at its fastest [1/min]
+#: range of temperatures of a machine [degC], and smallest plausible top speed of a spindle [1/min]
 _DEGREES = (-40.0, 200.0)
 _TURNING = 50.0
-#: a drift in mm spans less
+#: largest span of a drift in mm
 _MILLIMETRES = 0.5
-#: what else a column may be, after the guess
+#: other possible roles of a column, after the guess
 _ROLES = ("temperature", "displacement", "spindle_speed", "position")
 
 
 def guess(table: FileTable, mapping: Mapping) -> tuple[Remedy, ...]:
-    """Guess the time, and what the columns are that neither heading nor mapping explains.
+    """Guess the time, and the meaning of columns that neither heading nor mapping defines.
 
     Parameters
     ----------
     table : FileTable
     mapping : Mapping
-        Part of the mapping that is known already.
+        Known part of the mapping.
 
     Returns
     -------
     tuple of Remedy
-        With everything that can be guessed, one for each unit the time may have; empty if there is nothing.
+        Mappings with all guesses, one for each possible unit of the time; empty if there are none.
     """
     if find_parts(table.headings):
-        return ()  # none of them is the time alone
+        return ()  # no single column contains the time
     columns: dict[str, Any] = {}
     for _, options in guess_columns(table, mapping):
         columns.update(options[0]["columns"])
@@ -67,12 +67,12 @@ def guess(table: FileTable, mapping: Mapping) -> tuple[Remedy, ...]:
 
 
 def guess_columns(table: FileTable, mapping: Mapping) -> list[tuple[str, list[Remedy]]]:
-    """Guess what columns of numbers are that neither heading nor mapping explains.
+    """Guess the meaning of numeric columns that neither heading nor mapping defines.
 
     Returns
     -------
     list of (str, list of Remedy)
-        Heading with some values, and possible mapping entries for the column, the likeliest first.
+        Heading with some values, and possible mapping entries for the column, most likely first.
     """
     known = {rule.column or name for name, rule in mapping.columns.items()}
     known |= {mapping.time.column, mapping.time.date, mapping.cycles.column}
@@ -82,7 +82,7 @@ def guess_columns(table: FileTable, mapping: Mapping) -> list[tuple[str, list[Re
         if heading and known.isdisjoint((heading, k + 1)) and heading.casefold() != "cycle"
         if understand_or_none(heading) is None and table.is_number(k, empty=False)
     ]
-    days = set(find_day_columns(table, unknown[:MOST_GUESSES]))  # nobody may leave these out unasked
+    days = set(find_day_columns(table, unknown[:MOST_GUESSES]))  # left out only with the user's confirmation
     unknown = [k for k in unknown if k not in days]
     found = []
     for k, values in _numbers(table, unknown[:MOST_GUESSES]).items():
@@ -97,7 +97,7 @@ def guess_columns(table: FileTable, mapping: Mapping) -> list[tuple[str, list[Re
 
 
 def _table(heading: str, number: int, place: str | int, role: str, unit: str) -> Remedy:
-    """Return the mapping entry for a column that has a role, or none."""
+    """Return the mapping entry for a column with or without a role."""
     base = "_".join(re.sub(r"[^\w\s.-]", " ", heading).split()) or f"column_{number + 1}"
     name = f"{base}_{HOUSE_SUFFIX[HOUSE_UNITS[role]]}" if role else base
     said: dict[str, Any] = {} if name == place else {"column": place}
@@ -106,7 +106,7 @@ def _table(heading: str, number: int, place: str | int, role: str, unit: str) ->
 
 
 def understand_or_none(heading: str) -> Meaning | None:
-    """Return the meaning of a heading; None if it has none, or has an unknown unit."""
+    """Return the meaning of a heading; None if it is not understood, or has an unknown unit."""
     try:
         return understand(heading)
     except UnitError:
@@ -114,13 +114,13 @@ def understand_or_none(heading: str) -> Meaning | None:
 
 
 def _numbers(table: FileTable, columns: Sequence[int]) -> dict[int, FloatArray]:
-    """Return columns of numbers; those that hold more texts than numbers are left out."""
+    """Return the numeric columns; those with more texts than numbers are omitted."""
     if not columns:
         return {}
     try:
         cells, _ = table.load(columns, [])
         found = {k: cells[k].to_numpy(dtype=np.float64) for k in columns}
-    except InputError:  # one of them holds text
+    except InputError:  # a column contains text
         if len(columns) < 2:
             return _mostly_numbers(table, columns)
         half = len(columns) // 2
@@ -129,7 +129,7 @@ def _numbers(table: FileTable, columns: Sequence[int]) -> dict[int, FloatArray]:
 
 
 def _mostly_numbers(table: FileTable, columns: Sequence[int]) -> dict[int, FloatArray]:
-    """Return a column some cells of which are texts."""
+    """Return a column of which some cells are texts."""
     cells, _ = table.load([], columns)
     found = {}
     for k in columns:
@@ -141,7 +141,7 @@ def _mostly_numbers(table: FileTable, columns: Sequence[int]) -> dict[int, Float
 
 
 def _role(heading: str, values: FloatArray) -> tuple[str, str]:
-    """Return the quantity of a column and its unit, both empty if its name does not show them."""
+    """Return the quantity of a column and its unit, both empty if its name does not indicate them."""
     words = [w for w in re.split(r"[\W_]+", heading.casefold()) if w]
     good = values[np.isfinite(values)]
     low, middle, high = (float(v) for v in np.quantile(good, (0.02, 0.5, 0.98)))
@@ -161,7 +161,7 @@ def _role(heading: str, values: FloatArray) -> tuple[str, str]:
 
 
 def _guess_times(table: FileTable, mapping: Mapping) -> list[dict[str, Any]]:
-    """Return the first column that rises all the time, in its likely units, or holds dates, unless one is named."""
+    """Return the first column that always increases, in its likely units, or contains dates, unless one is named."""
     if mapping.time.column or any(_names_time(h) for h in table.headings):
         return []
     for k, heading in enumerate(table.headings):

@@ -1,4 +1,4 @@
-"""Position of the headings, the units, and the first and last row in a file: loggers write more than a table."""
+"""Position of the headings, the units, and the first and last row of the table in a file."""
 
 import re
 from collections import Counter
@@ -11,26 +11,26 @@ from thermocomp.recordings.headings import BRACKETS, find_date_order, is_foreign
 from thermocomp.recordings.readers.numbers import is_filler, is_number_like
 from thermocomp.recordings.words import split_words
 
-#: dates and times of day, in all their habits
+#: dates and times of day, in all usual forms
 _TIME = re.compile(
     r"'?(?:\d{1,4}[-./ ] ?(?:\d{1,2}|[^\W\d_]{3,9}\.?)[-./ ] ?\d{1,4}|[^\W\d_]{3,9}\.? \d{1,2},? \d{4}"
     r"|(?:\d+ days? )?\d{1,4}:\d\d)"
     r"(?!\d)[-\dT.,:+ ]*(?:[AaPp]\.?[Mm]\.?)?(?: ?[A-Z]{1,4})?(?:[+-]\d\d:?\d\d)?|\d{8}T\d{4,6}[\dZ.,+:-]*"
 )
-#: characters of a date with a time of day
+#: maximum number of characters of a date with a time of day
 _LONGEST = 60
-#: share of the columns of numbers that have one in a row of the table
+#: minimum fraction of the numeric columns with a value in a row of the table
 _ROW = 0.5
-#: what stands for no unit in a row of units, in small letters: of numbers that have none, and before the row
+#: words that denote no unit in a row of units, in lower case: for numbers without unit, and in the first cell
 _NO_UNIT = {""} | split_words(
     "-, --, ---, 1, n/a, na, none, unitless, ohne, rn, no, nr, #, count, index, unit, units, einheit",
     "einheiten, unité, unités, unità, unidad, unidades, eenheid, jednotka, jednostka, enhet, enhed, 单位, 単位",
 )
-#: text rows between the headings and the first row of numbers
+#: maximum number of text rows between the headings and the first row of numbers
 _MOST_BETWEEN = 12
-#: rows at the end of a file that may be none of its table
+#: maximum number of rows at the end of a file that are not part of the table
 MOST_REMARKS = 40
-#: words before a row of statistics, in small letters
+#: labels of rows of statistics, in lower case
 _STATISTICS = split_words(
     "min, max, avg, mean, std, stdev, std dev, sum, total, count, range, median, rms, minimum, maximum",
     "average, standard deviation, mittel, mittelwert, durchschnitt, summe, anzahl, spannweite",
@@ -40,18 +40,18 @@ _STATISTICS = split_words(
 
 
 class FileLayout(NamedTuple):
-    """Rows of a file, counted from 0 as they were given."""
+    """Row indices (0-based) in the rows examined."""
 
-    heading: int  #: of the headings
-    units: int  #: of their units; that of the headings if there are none
+    heading: int  #: row of the headings
+    units: int  #: row of the units; same as `heading` if there is none
     begin: int  #: first row of the table
 
 
 def find_layout(rows: Sequence[Sequence[str]]) -> FileLayout | None:
     """Find the headings of a table, its units, and its first row.
 
-    Above the first row of numbers stand rows of text. The headings are the first of those that name most columns of
-    numbers; a row of units is known by its units.
+    Above the first row of numbers there are rows of text. The headings are the first of those that name the largest
+    number of numeric columns; a row of units is recognised by its units.
 
     Parameters
     ----------
@@ -61,18 +61,18 @@ def find_layout(rows: Sequence[Sequence[str]]) -> FileLayout | None:
     Returns
     -------
     FileLayout or None
-        None if there is no such row.
+        None if there is no row of headings.
     """
     if len(rows) < 2:
         return None
-    # a preamble is over in the later half
+    # any preamble ends before the second half of the rows
     later = rows[len(rows) // 2 :]
     width, columns = find_columns(later)
     numbers = [k for k in columns if _holds_numbers(later, k)]
-    units_at = cache(lambda k: _is_units(rows[k], numbers))  # of a wide file only the rows that are needed
+    units_at = cache(lambda k: _is_units(rows[k], numbers))  # evaluated only as needed, because files may be wide
 
     def labels(k: int) -> bool:
-        """Return whether a row holds the numbers of channels, say, and none of the table: units follow it."""
+        """Return whether a row labels channels, for example by number, because a row of units follows."""
         return k + 1 < len(rows) and units_at(k + 1)
 
     for begin in range(1, len(rows)):
@@ -87,7 +87,7 @@ def find_layout(rows: Sequence[Sequence[str]]) -> FileLayout | None:
             if not _is_text(above, width):
                 break
             if any(k < len(above) and _is_value(above[k]) for k in columns) and not labels(first - 1):
-                break  # perhaps a row of the table with words in it, which is not passed over
+                break  # possibly a row of the table with words in it, which must not be skipped
             first -= 1
         block = range(first, begin)
         units = [k for k in block if units_at(k)]
@@ -96,8 +96,8 @@ def find_layout(rows: Sequence[Sequence[str]]) -> FileLayout | None:
             names = [units.pop(0)]
         if names:
             said = {k: sum(is_time_name(cell) or is_understood(cell) for cell in rows[k]) for k in names}
-            known = sorted((k for k in names if said[k]), key=lambda k: -said[k])  # of as many the first
-            # of rows that say nothing the first that is full; in two columns what stands above is a preamble
+            known = sorted((k for k in names if said[k]), key=lambda k: -said[k])  # ties: the first
+            # without known headings the first complete row; with two columns the last one, after the preamble
             order = 1 if width == 2 else -1
             heading = known[0] if known else max(names, key=lambda k: (_count_filled(rows[k], columns), order * k))
             return FileLayout(heading, units[-1] if units else heading, begin)
@@ -105,7 +105,7 @@ def find_layout(rows: Sequence[Sequence[str]]) -> FileLayout | None:
 
 
 def find_end(first: Sequence[Sequence[str]], last: Sequence[Sequence[str]]) -> int:
-    """Count the rows at the end of a file that are none of its table: remarks and statistics.
+    """Count the rows at the end of a file that are not part of its table: remarks and statistics.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def find_end(first: Sequence[Sequence[str]], last: Sequence[Sequence[str]]) -> i
     Returns
     -------
     int
-        A row that was cut off, or lacks its time, is not counted: it begins as one of the table.
+        Number of rows. A truncated row, or one without a time, is not counted: it starts like a row of the table.
     """
     if len(last) < 2:
         return 0
@@ -129,15 +129,15 @@ def find_end(first: Sequence[Sequence[str]], last: Sequence[Sequence[str]]) -> i
 
 
 def tell_layout(numbers: Sequence[int], layout: FileLayout, word: str) -> tuple[str, ...]:
-    """Return the lines that were skipped and those read as units, in words.
+    """Return notes on the lines that were skipped and the lines that were read as units.
 
     Parameters
     ----------
     numbers : sequence of int
-        Places of the rows in the file, from 1.
+        Row numbers in the file (1-based).
     layout : FileLayout
     word : str
-        Name of a row in such a file.
+        Word for a row in messages.
     """
     found = []
     above = [numbers[k] for k in range(layout.heading) if k != layout.units]
@@ -156,27 +156,27 @@ def tell_layout(numbers: Sequence[int], layout: FileLayout, word: str) -> tuple[
 
 
 def tell_again(lines: Sequence[int]) -> tuple[str, ...]:
-    """Return in words which lines repeat the headings."""
+    """Return a note on the lines that repeat the headings."""
     places = ", ".join(map(str, lines[:MOST_REMARKS])) + " ..." * (len(lines) > MOST_REMARKS)
     return (f"the headings come again, passed over, in line {places}",) if lines else ()
 
 
 def tell_end(numbers: Sequence[int], word: str) -> tuple[str, ...]:
-    """Return in words which rows at the end are left out."""
+    """Return a note on the rows omitted at the end."""
     what = "is no row" if len(numbers) == 1 else "are no rows"
     return (f"{tell_rows(numbers, word)} at the end {what} of the table, and left out",) if numbers else ()
 
 
 def tell_rows(numbers: Sequence[int], word: str) -> str:
-    """Return places of neighbouring rows in words: ``line 3``, ``lines 3 to 7``."""
+    """Return consecutive row numbers as text: ``line 3``, ``lines 3 to 7``."""
     return f"{word} {numbers[0]}" if len(numbers) == 1 else f"{word}s {numbers[0]} to {numbers[-1]}"
 
 
 def join_units(headings: Sequence[str], units: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Put the units of a row into the headings above them, where these have none.
+    """Add the units of a row to the headings above them that have none.
 
-    What a column holds decides: dates, times of day and words have no unit, whatever stands there (``Unit``,
-    ``hh:mm:ss``), but the order of a date (``mm/dd/yyyy``) is kept. In the first column may stand what the row is.
+    The contents of a column decide: dates, times of day and words have no unit, whatever the row contains (``Unit``,
+    ``hh:mm:ss``), but the order of a date (``mm/dd/yyyy``) is kept. The first column may contain a label of the row.
 
     Parameters
     ----------
@@ -202,7 +202,7 @@ def join_units(headings: Sequence[str], units: Sequence[str], rows: Sequence[Seq
 
 
 def name_stamps(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> tuple[list[str], tuple[str, ...]]:
-    """Name a first column without heading that holds dates, as the index of a data frame has, and report this."""
+    """Name a first column without heading that contains dates, such as a data frame's index, and report this."""
     first = next((row[0].strip() for row in rows if row and row[0].strip()), "")
     if headings and not headings[0] and is_stamp(first):
         return ["timestamp", *headings[1:]], ("column 1 has no heading and holds dates: taken as the time",)
@@ -210,12 +210,12 @@ def name_stamps(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> tuple
 
 
 def is_stamp(cell: str) -> bool:
-    """Return whether a cell holds a date or a time of day."""
+    """Return whether a cell contains a date or a time of day."""
     return len(cell) < _LONGEST and _TIME.fullmatch(cell.strip()) is not None
 
 
 def find_columns(rows: Sequence[Sequence[str]]) -> tuple[int, list[int]]:
-    """Return the commonest number of cells of some rows, and the columns that hold values in most of them."""
+    """Return the most frequent number of cells of some rows, and the columns with values in most of them."""
     counts = Counter(len(row) for row in rows)
     width = max(counts, key=lambda width: (counts[width], width))
     even = [row for row in rows if len(row) == width]
@@ -240,7 +240,7 @@ def _is_row(row: Sequence[str], columns: Sequence[int]) -> bool:
 
 
 def _is_remark(row: Sequence[str], columns: Sequence[int], width: int) -> bool:
-    """Return whether a row at the end is text or a statistic: no row of the table begins like this."""
+    """Return whether a row at the end is text or a statistic: no row of the table starts like this."""
     words = [k for k, cell in enumerate(row) if cell.strip() and not _is_value(cell) and not is_filler(cell)]
     if not words or not columns:
         return False
@@ -263,7 +263,7 @@ def _bare(unit: str) -> str:
 
 
 def _holds_numbers(rows: Sequence[Sequence[str]], column: int) -> bool:
-    """Return whether most values of a column are numbers, no dates or times of day."""
+    """Return whether most values of a column are numbers, not dates or times of day."""
     values = [row[column] for row in rows if column < len(row) and _is_value(row[column])]
     return 2 * sum(map(is_number_like, values)) > len(values)
 

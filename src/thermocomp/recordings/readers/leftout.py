@@ -1,4 +1,4 @@
-"""Columns that are left out, and those that may not be: what their headings lack."""
+"""Columns that are left out, and the information missing in their headings."""
 
 from collections.abc import Sequence
 from difflib import get_close_matches
@@ -9,18 +9,18 @@ from thermocomp.recordings.headings import BRACKETS, HOUSE_SUFFIX, SUFFIXES, fin
 
 
 def refuse_nameless(headings: Sequence[str], source: str) -> None:
-    """Refuse columns of numbers whose names suggest a temperature, a displacement or a speed but give no unit.
+    """Reject numeric columns whose names suggest a temperature, a displacement or a speed but have no unit.
 
     Parameters
     ----------
     headings : sequence of str
-        Headings of columns of numbers that would be left out.
+        Headings of numeric columns that would be left out.
     source : str
 
     Raises
     ------
     RecordingError
-        There is one.
+        There is such a column.
     """
     asked = {h: q for h in headings if not _says_unit(h) and (q := find_named_quantity(h))}
     if not asked:
@@ -37,7 +37,7 @@ def refuse_nameless(headings: Sequence[str], source: str) -> None:
 
 
 def why_left_out(heading: str) -> str:
-    """Return what a heading that `understand` cannot interpret lacks, and what to do."""
+    """Return the information that is missing in an uninterpretable heading, and the required action."""
     found = BRACKETS.fullmatch(heading.strip())
     symbol = (found["square"] or found["round"] or "").strip() if found else heading.rpartition("_")[2]
     mapped = f'a mapping [columns.NAME] with column = "{heading}" and'

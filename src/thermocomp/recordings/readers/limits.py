@@ -1,4 +1,4 @@
-"""Limits of the readers, all in one place, so that no file needs more time or memory than allowed."""
+"""Limits of the readers, defined in one place, so that no file needs more time or memory than allowed."""
 
 import stat
 from dataclasses import dataclass, field, fields
@@ -7,52 +7,52 @@ from typing import Final
 
 from thermocomp.core.exceptions import InputError, RecordingError
 
-#: bytes that a small file may become when it is unpacked: a few seconds of work
+#: unpacked size that is always allowed [byte]: a few seconds of work
 _UNPACKED_FREE: Final = 64 << 20
 
 
 def _limit(most: int, counts: str) -> int:
-    """Return the field of a limit, with what it counts, for messages."""
+    """Return the field of a limit, with the name of the counted items for messages."""
     return field(default=most, metadata={"counts": counts})
 
 
 @dataclass(frozen=True)
 class FileLimits:
-    """Table ``[limits]``: what is read of a file at most.
+    """Table ``[limits]``: maximum sizes of files that are read.
 
-    They stand far above what recordings need. Time and memory of reading grow with what they let pass.
+    The limits are far above the needs of recordings. Time and memory of reading grow with them.
 
     Parameters
     ----------
     file_bytes : int
-        Size of any file: beyond the memory of a workshop's computer.
+        Size of any file; larger ones exceed the memory of a workshop computer.
     recoded_bytes : int
-        Size of a text file that has to be converted to UTF-8, or to present line ends, in memory.
+        Size of a text file that has to be converted to UTF-8, or to standard line ends, in memory.
     line_bytes : int
         Size of a line of text, or of a text in a workbook: 10,000 columns of 400 characters.
     cell_characters : int
-        As many as a cell of a spreadsheet holds; no number and no name is longer.
+        Capacity of a spreadsheet cell; no number and no name is longer.
     heading_characters : int
-        Headings become names in tables, figures and messages.
+        Length of a heading; headings become names in tables, figures and messages.
     columns : int
-        Each becomes a separate object. A machine has some hundred sensors at most.
+        Number of columns; each becomes a separate object. A machine has at most some hundred sensors.
     rows : int
-        Three years at one a second.
+        Number of rows: three years at one row per second.
     cells : int
         Rows times columns: 8 bytes each in memory, so 4 GB.
     skipped_lines : int
-        Comments and blank lines: where they stand is kept, for messages.
+        Number of comments and blank lines; their positions are stored for messages.
     sheets : int
         Number of sheets of a workbook; each is opened to check whether it contains a table.
     sheet_rows : int
-        As many as a spreadsheet has; a workbook can claim any number in a few bytes.
+        Capacity of a spreadsheet; a workbook can declare any number in a few bytes.
     row_elements : int
-        Number of XML elements of a row, of a list of styles and the like: these are in memory at once.
+        Number of XML elements of a row, a list of styles or similar; they are in memory at the same time.
     growth : int
-        How many times larger than the file a workbook or a Parquet file may become when it is unpacked, after the
-        first 64 MiB. Recordings become 3 to 30 times larger, a zip bomb 1,000 times.
+        Maximum ratio of the unpacked size of a workbook or a Parquet file to its size, after the first 64 MiB.
+        Recordings become 3 to 30 times larger, a zip bomb 1,000 times.
     cycles : int
-        Thermal cycles take hours; a column that has more labels numbers something else.
+        Number of thermal cycles; they take hours, so that a column with more labels contains something else.
     """
 
     file_bytes: int = _limit(8 << 30, "bytes")
@@ -76,21 +76,21 @@ class FileLimits:
                 raise InputError(f"[limits]: {f.name} = {getattr(self, f.name)}: must be at least 1")
 
     def check(self, name: str, found: int, where: object) -> None:
-        """Refuse what exceeds a limit.
+        """Reject a value that exceeds a limit.
 
         Parameters
         ----------
         name : str
             Name of the limit.
         found : int
-            Present value, or the value counted until the limit was exceeded.
+            Value found, or the count at which the limit was exceeded.
         where : object
-            File and place, for the message.
+            File and location, for the message.
 
         Raises
         ------
         RecordingError
-            It is more than the limit.
+            The limit is exceeded.
         """
         most = getattr(self, name)
         if found > most:
@@ -101,13 +101,13 @@ class FileLimits:
             )
 
     def check_table(self, rows: int, columns: int, where: object) -> None:
-        """Refuse a table that is too large.
+        """Reject a table that is too large.
 
         Parameters
         ----------
         rows, columns : int
         where : object
-            File and place, for the message.
+            File and location, for the message.
 
         Raises
         ------
@@ -119,7 +119,7 @@ class FileLimits:
         self.check("cells", rows * columns, where)
 
     def check_unpacked(self, unpacked: int, path: Path) -> None:
-        """Refuse a small file that becomes a large one.
+        """Reject a small file that becomes a large one when unpacked.
 
         Parameters
         ----------
@@ -138,16 +138,16 @@ class FileLimits:
 
 
 def check_file(path: Path, limits: FileLimits) -> None:
-    """Refuse what is no file, such as a pipe or a device (also through a link), and a file that is too large.
+    """Reject a path that is not a regular file, such as a pipe or a device (also through a link), or a large file.
 
     Raises
     ------
     RecordingError
         See `FileLimits.check`.
     OSError
-        There is nothing of that name.
+        The path does not exist.
     """
     found = path.stat()
-    if not (stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)):  # opening a folder says what it is
+    if not (stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)):  # opening a folder raises a clear error
         raise RecordingError(f"{path}: is a pipe or a device, not a file; save its output to a file")
     limits.check("file_bytes", found.st_size, path)

@@ -1,4 +1,4 @@
-"""Error profiles from long tables: a row per position."""
+"""Error profiles from long tables: one row per position."""
 
 from pathlib import Path
 from typing import Any, Literal
@@ -13,9 +13,9 @@ from thermocomp.recordings.readers.mapping import Mapping
 from thermocomp.recordings.readers.recordings import make_recording, read_rows
 from thermocomp.recordings.rows import Rows
 
-#: names of the axis' own position, besides that of the axis
+#: column names of the position, in addition to the name of the axis
 _POSITIONS = ("position_mm", "pos_mm")
-#: columns that tell the thermal state of a row
+#: column names of the thermal state
 _STATES = ("state", "State", "profile", "Profile")
 
 
@@ -30,7 +30,7 @@ def read_long(
     position: str = "",
     state: str = "",
 ) -> Profiles:
-    """Read profiles from a table with a row per position.
+    """Read profiles from a table with one row per position.
 
     Parameters
     ----------
@@ -38,26 +38,26 @@ def read_long(
     mapping : Mapping or None
         Roles and units of columns whose headings do not give them.
     target : str
-        The component.
+        Code of the component.
     unit : {'um', 'urad'}
     axis : {'X', 'Y', 'Z'}
     error : str
-        Column of the error; empty: the only one of its kind.
+        Column of the error; empty: the only one of its quantity.
     position : str
-        Column of the axis' own position; empty: ``position_mm``, or that of the axis, such as ``y_mm``.
+        Column of the position of the axis; empty: ``position_mm``, or the axis column, such as ``y_mm``.
     state : str
-        Column that tells the state of a row; empty: one that is called state or profile, else the time, else a state
-        ends where a position comes again.
+        Column with the state of each row; empty: the column named state or profile, else the time, else a new state
+        starts where a position recurs.
 
     Returns
     -------
     Profiles
-        Profiles whose states have the means of the other channels over their rows.
+        Profiles with the means of the other channels over the rows of each state.
 
     Raises
     ------
     RecordingError
-        A column is not there, or rows are not in order; the message names the line.
+        A column does not exist, or rows are not in order; the message names the line.
     """
     rows = read_rows(path, mapping, rising=False, extra=(state,) if state else _STATES)
     owner = f"{rows.source}: {target}"
@@ -127,7 +127,7 @@ def _error_column(rows: Rows, wanted: str, unit: str, owner: str) -> str:
 
 
 def _refuse_mixed(rows: Rows, column: str, unit: str, owner: str) -> None:
-    """Refuse a twin of the column in the other unit that continues where the column itself has no value."""
+    """Reject a second column in the other unit that has values where the column itself has none."""
     other = "urad" if unit == "um" else "um"
     twin = f"{column.removesuffix(f'_{unit}')}_{other}"
     if twin not in rows.table:
@@ -141,7 +141,7 @@ def _refuse_mixed(rows: Rows, column: str, unit: str, owner: str) -> None:
 
 
 def _place_columns(rows: Rows, position: str, axis: str, owner: str) -> dict[str, str]:
-    """Return the columns of positions by axis, the own one first."""
+    """Return the position columns by axis, the measured axis first."""
     there = [c.name for c in rows.channels if c.quantity == "position"]
     own = rows.aliases.get(position, position)
     wanted = (own,) if own else (*_POSITIONS, f"{axis.lower()}_mm", f"{axis}_mm")
@@ -198,7 +198,7 @@ def _refuse_unsorted(rows: Rows, at: FloatArray, state: IntArray, own: int, colu
 
 
 def _in_order(at: FloatArray, axis: str) -> FloatArray:
-    """Return the points that were measured, line by line, the axis' own position rising."""
+    """Return the measured points, line by line, with the position of the axis itself increasing."""
     own = "XYZ".index(axis)
     keys = [at[:, own], *(at[:, k] for k in range(3) if k != own)]
     ordered = at[np.lexsort(keys)]
@@ -208,7 +208,7 @@ def _in_order(at: FloatArray, axis: str) -> FloatArray:
 
 
 def _mean(values: FloatArray, first: IntArray) -> FloatArray:
-    """Return the mean over the rows of each state; equal values stay what they are to the last bit."""
+    """Return the mean over the rows of each state; the mean of equal values is exact to the last bit."""
     out = np.full((len(first), values.shape[1]), np.nan)
     for k, rows in enumerate(np.split(values, first[1:])):
         for j, column in enumerate(rows.T):

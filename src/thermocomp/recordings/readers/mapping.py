@@ -19,7 +19,7 @@ from thermocomp.files.tomlfile import as_json, read_toml
 from thermocomp.recordings.cleaning import Cut, Resample, Rezero, Shift, Swap
 from thermocomp.recordings.readers.limits import FileLimits
 
-#: a column by its heading, or by its number from 1
+#: a column by its heading or 1-based number
 Place = str | int
 #: a table ``[[clean]]``
 CleaningStep = Annotated[Cut | Shift | Rezero | Swap | Resample, Field(discriminator="do")]
@@ -40,23 +40,23 @@ Role = Literal[
 
 @dataclass(frozen=True)
 class TimeColumn:
-    """Table ``[time]``: the column that holds the time.
+    """Table ``[time]``: the column that contains the time.
 
     Parameters
     ----------
     column : str or int
-        Its heading, or its number from 1; empty: found by its heading (``time_s``, ``timestamp`` ...).
+        Heading or 1-based number; empty: found by its heading (``time_s``, ``timestamp`` ...).
     unit : str
-        A unit of time, or ``timestamp`` for dates with a time of day; empty: from the heading and the cells.
+        Unit of time, or ``timestamp`` for dates with a time of day; empty: from the heading and the cells.
     format : str
         Format of timestamps, in the letters of `datetime.strptime`; empty: ISO 8601.
     start : str
-        ISO timestamp of the first row, for files that hold only relative times: it tells the days, and which
-        file continues from another.
+        ISO timestamp of the first row, for files that contain only relative times: it defines the dates, and the
+        order of files that continue each other.
     date : str or int
-        Column of the dates where `column` holds the time of day alone.
+        Column of the dates if `column` contains only the time of day.
     zone : str
-        Time zone of timestamps that contain none, such as ``Europe/Berlin``; ``UTC`` for a clock that is never set.
+        Time zone of timestamps without one, such as ``Europe/Berlin``; ``UTC`` for a clock without daylight saving.
     """
 
     column: Place = ""
@@ -69,18 +69,18 @@ class TimeColumn:
 
 @dataclass(frozen=True)
 class ColumnMap:
-    """Table ``[columns.NAME]``: one column that becomes the channel NAME.
+    """Table ``[columns.NAME]``: a column for the channel NAME.
 
     The value in the file's unit is ``scale * (number in the file - zero)``.
 
     Parameters
     ----------
     column : str or int
-        Its heading in the file, or its number from 1, for headings that come twice; empty: NAME itself.
+        Heading or 1-based number (for duplicate headings) in the file; empty: NAME itself.
     unit : str
-        Unit of the scaled value; empty: the internal unit of the role, or the unit in the heading.
+        Unit of the scaled value; empty: the house unit of the role, or the unit in the heading.
     role : str, optional
-        Measured quantity, or ``cycle`` (labels of thermal cycles), or ``ignore``; without it the unit decides.
+        Measured quantity, or ``cycle`` (labels of thermal cycles), or ``ignore``. Default: determined by the unit.
     scale : float
         Factor from the number in the file to `unit`.
     zero : float or 'first'
@@ -88,9 +88,9 @@ class ColumnMap:
     missing : tuple of float
         Numbers in the file that denote a missing value.
     place : str
-        Location of the sensor, in words.
+        Location of the sensor as text.
     valid : tuple of float, optional
-        Lowest and highest value that the channel can have, in `unit` after `scale` and `zero`; others are missing.
+        Minimum and maximum valid value, in `unit` after `scale` and `zero`; values outside are missing.
     """
 
     column: Place = ""
@@ -104,7 +104,7 @@ class ColumnMap:
 
     @property
     def conversion(self) -> Unit | None:
-        """Conversion to the internal unit; None if neither unit nor role defines it."""
+        """Conversion to the house unit; None if neither unit nor role defines it."""
         quantity = self.role if self.role in HOUSE_UNITS else None
         if self.unit:
             return find_unit(self.unit, quantity)
@@ -113,7 +113,7 @@ class ColumnMap:
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """Table ``[read]``: how the file is written; what is left empty is found out.
+    """Table ``[read]``: format of the file; empty entries are detected automatically.
 
     Parameters
     ----------
@@ -121,19 +121,19 @@ class ReadOptions:
         One character; a space denotes any white space.
     decimal : {'', '.', ','}
     encoding : str
-        Such as ``cp1252``; empty: UTF-8, or Latin-1 if it is not UTF-8.
+        Encoding, such as ``cp1252``; empty: UTF-8, or Latin-1 if it is not UTF-8.
     comment : str
-        Lines that begin with it are passed over; empty: there are none.
+        Start of lines that are skipped; empty: none.
     missing : tuple of float
         Numbers that denote a missing value in every column.
     only_mapped : bool
-        True: columns that have no table ``[columns.NAME]`` are left out.
+        True: columns without a table ``[columns.NAME]`` are left out.
     heading : int
-        Line or row of the headings, from 1; 0: it is looked for.
+        Line or row of the headings (1-based); 0: detected automatically.
     skip : tuple of int or pair of int
-        Lines or rows that are passed over, from 1, as errors name them; a pair is a stretch, both ends included.
+        Lines or rows to be skipped (1-based), as in error messages; a pair is a range that includes both ends.
     sheet : str
-        Sheet of a workbook; empty: the only one, or the only one that holds a table with a time.
+        Sheet of a workbook; empty: the only sheet, or the only one with a table that has a time.
     """
 
     delimiter: str = ""
@@ -147,20 +147,20 @@ class ReadOptions:
     sheet: str = ""
 
     def skips(self, place: int) -> bool:
-        """Return whether a line or row, counted from 1, is passed over."""
+        """Return whether a line or row (1-based) is skipped."""
         return any(place == s if isinstance(s, int) else s[0] <= place <= s[1] for s in self.skip)
 
 
 @dataclass(frozen=True)
 class CycleRule:
-    """Table ``[cycles]``: how the test is split into thermal cycles.
+    """Table ``[cycles]``: division of the test into thermal cycles.
 
     Parameters
     ----------
     column : str or int
         Column of labels; empty: a column named ``cycle``, else the spindle speed.
     min_run_s, min_stop_s : float
-        Shorter runs and stops of the spindle do not split [s].
+        Shorter runs and stops of the spindle do not split the test [s].
     """
 
     column: Place = ""
@@ -180,7 +180,7 @@ class Mapping:
     read : ReadOptions
     cycles : CycleRule
     clean : tuple of Step
-        Changes of the values that were read, in this order; see `thermocomp.recordings.cleaning`.
+        Changes of the values read, in this order; see `thermocomp.recordings.cleaning`.
     limits : FileLimits
     compensation : {'', 'off', 'known', 'unknown'}
         Whether a correction was in force at the machine; see `thermocomp.recordings.compensated`.
@@ -214,7 +214,7 @@ class Mapping:
         _check_encoding(self.read.encoding or "utf-8")
 
     def over(self, below: "Mapping") -> "Mapping":
-        """Return this mapping with the entries for time, compensation and columns that only `below` has."""
+        """Return this mapping, completed by the entries for time, compensation and columns that only `below` has."""
         time = below.time if self.time == TimeColumn() else self.time
         taken = {rule.column or name for name, rule in self.columns.items()}
         added = {name: rule for name, rule in below.columns.items() if (rule.column or name) not in taken}
@@ -222,7 +222,7 @@ class Mapping:
         return replace(self, time=time, columns={**added, **self.columns}, compensation=said)
 
 
-#: the one door for a mapping from outside; also used for the one that thermocomp writes into its own files
+#: only validator of external mappings; also used for the mapping that thermocomp writes into its own files
 ADAPTER = TypeAdapter(with_config(ConfigDict(strict=True, extra="forbid", allow_inf_nan=False))(Mapping))
 
 _STEPS: dict[str, type] = {step.do: step for step in (Cut, Shift, Rezero, Swap, Resample)}
@@ -236,7 +236,7 @@ _TABLES: dict[str, type] = {
 
 
 def read_mapping(path: str | Path) -> Mapping:
-    """Read a mapping TOML.
+    """Read a mapping file (TOML).
 
     Parameters
     ----------
@@ -249,13 +249,13 @@ def read_mapping(path: str | Path) -> Mapping:
     Raises
     ------
     InputError
-        No such file, not TOML, or a key or value that is not understood; the message names file, table and key.
+        The file does not exist, is not TOML, or has an invalid key or value; the message names file, table and key.
     UnitError
         A unit is unknown or does not belong to the role.
 
     Examples
     --------
-    A stepper's counts as a displacement, and a sensor that says -180 where there is none::
+    A stepper's counts as a displacement, and a sensor that reports -180 if it is not connected::
 
         [time]
         column = "time"
@@ -277,13 +277,13 @@ def read_mapping(path: str | Path) -> Mapping:
 
 
 def check_content(content: dict[str, Any], owner: str) -> Mapping:
-    """Return the mapping that TOML holds.
+    """Return the mapping defined by TOML content.
 
     Parameters
     ----------
     content : dict
     owner : str
-        The file, for messages.
+        Name of the file, for messages.
 
     Raises
     ------
@@ -299,13 +299,13 @@ def check_content(content: dict[str, Any], owner: str) -> Mapping:
 
 
 def _explain(failure: ValidationError) -> str:
-    """Return the table, the key and the nearest known key of pydantic's first error."""
+    """Return the table, the key and the nearest known key for the first error of pydantic."""
     errors = failure.errors()
     error = errors[0]
     if error["loc"][:1] == ("clean",):
         return _explain_step(error)
     depth = 3 if error["loc"][0] == "columns" else 2
-    loc = [str(part) for part in error["loc"][:depth]]  # what follows are members of a union, which no user wrote
+    loc = [str(part) for part in error["loc"][:depth]]  # the remaining parts are union members, not written by the user
     inside = _TABLES.get(loc[0]) if len(loc) == depth else None
     table = f"table [{'.'.join(loc[:-1])}]" if len(loc) > 1 else "top level"
     key = loc[-1]
@@ -316,7 +316,7 @@ def _explain(failure: ValidationError) -> str:
 
 
 def _explain_step(error: ErrorDetails) -> str:
-    """Return the fault of a table ``[[clean]]``."""
+    """Return the error of a table ``[[clean]]``."""
     loc = error["loc"]
     table = f"[[clean]] number {int(loc[1]) + 1}" if len(loc) > 1 else "[[clean]]"
     if len(loc) < 4:

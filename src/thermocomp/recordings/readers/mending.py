@@ -23,15 +23,15 @@ from thermocomp.recordings.readers.opening import open_table
 from thermocomp.recordings.readers.recordings import read
 from thermocomp.recordings.recording import Recording
 
-#: what may be asked about one file: rows that are passed over one by one, for the most part
+#: maximum number of questions on one file, mostly about individual rows to be skipped
 MOST_QUESTIONS = 60
-#: rows that are passed over for somebody: a file with more such rows is another kind of file
+#: maximum number of rows skipped automatically: a file with more such rows is of another kind
 MOST_SKIPPED = 5
-#: rounds of checking: a unit that is corrected shows what was hidden behind it
+#: maximum number of checks: correction of a unit may reveal further problems
 _ROUNDS = 5
-#: a heading of a table right below a line that is no comment
+#: a table heading directly below a line that is not a comment
 _TIGHT, _APART = re.compile(r"^([^#\n].*)\n(?=\[)", re.MULTILINE), r"\1\n\n"
-#: bytes of a file to which an error offers a mapping: it is read again for that
+#: maximum size of a file for which an error suggests a mapping [byte]: the file is read again for this
 _LARGE = 50_000_000
 
 
@@ -47,11 +47,11 @@ class Question:
     text : str
         Finding.
     options : tuple of Remedy
-        Parts of a mapping, the likeliest first.
+        Possible parts of a mapping, most likely first.
     severity : {'error', 'column', 'trouble', 'warning', 'info'}
-        Subject: the file cannot be read, a column is left out, or something that `check` finds.
+        Subject: the file cannot be read, a column is left out, or a finding of `check`.
     may_guess : bool
-        False: how long the recording took depends on the answer.
+        False: the duration of the recording depends on the answer.
     """
 
     text: str
@@ -61,18 +61,18 @@ class Question:
 
     @property
     def others(self) -> tuple[str, ...]:
-        """Other possible interpretations of a file that can be read in several ways, a line each."""
+        """Other possible interpretations of an ambiguous file, one per line."""
         return tuple(to_toml(r).replace("\n", " ") for r in self.options[1:]) if self.severity == "error" else ()
 
 
-#: what is decided: one of the options, or None to leave it as it is
+#: decision: one of the options, or None for no change
 Decide = Callable[[Question], Remedy | None]
 
 
 def take_best(question: Question) -> Remedy | None:
-    """Decide for the likeliest, but leave alone what is no trouble, and move no values: that takes who was there.
+    """Return the most likely option; None for warnings and infos, and where only the user can decide.
 
-    Nor is a time decided for where another one is as likely.
+    The user decides on steps that shift, offset or exchange values, and on times with several likely interpretations.
     """
     if not question.may_guess:
         return None
@@ -87,7 +87,7 @@ class Draft:
     Parameters
     ----------
     text : str
-        TOML to begin with; its comments stay.
+        Initial TOML; its comments are kept.
     """
 
     def __init__(self, text: str = "") -> None:
@@ -95,7 +95,7 @@ class Draft:
 
     @property
     def text(self) -> str:
-        """The TOML."""
+        """TOML of the mapping."""
         written = tomlkit.dumps(self.document).strip()
         return f"{re.sub(_TIGHT, _APART, written)}\n" if written else ""
 
@@ -105,12 +105,12 @@ class Draft:
         Raises
         ------
         InputError
-            A value does not go with another.
+            Values are inconsistent.
         """
         return check_content(self.document.unwrap(), owner)
 
     def add(self, remedy: Remedy) -> bool:
-        """Write a remedy into it; return False if it contained all of it."""
+        """Add a remedy; return False if it was contained already."""
         before = copy.deepcopy(self.document.unwrap())
         for key, content in remedy.items():
             if key == "clean":
@@ -127,7 +127,7 @@ class Draft:
         return bool(before != self.document.unwrap())
 
     def _named(self, name: str, said: Remedy) -> str:
-        """Return the table that speaks of a column already, or its name."""
+        """Return the name of the existing table for a column, or the suggested name."""
         place = said.get("column", name)
         tables = self.document.get("columns", {})
         return next((n for n, table in tables.items() if table.get("column", n) == place), name)
@@ -135,12 +135,12 @@ class Draft:
 
 @dataclass(frozen=True)
 class Mended:
-    """A mapping that was written, and what it makes of the file.
+    """A completed mapping, and the recording that results from it.
 
     Parameters
     ----------
     text : str
-        TOML.
+        TOML of the mapping.
     recording : Recording
     decided : tuple of (Question, Remedy or None)
     """
@@ -150,33 +150,33 @@ class Mended:
     decided: tuple[tuple[Question, Remedy | None], ...]
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write the mapping to a TOML file; return its path."""
+        """Write the mapping to a TOML file and return its path."""
         return write_text(self.text, path, overwrite=overwrite)
 
 
 def read_draft(mapping: str | Path | None) -> str:
-    """Return the text of a mapping to start from, after it has been validated; empty for None."""
+    """Return the text of an initial mapping, after validation; empty for None."""
     if mapping is None:
         return ""
-    read_mapping(mapping)  # says what is wrong with it
+    read_mapping(mapping)  # raises an error if it is invalid
     return read_text(Path(mapping), "mapping file", MOST)
 
 
 def mend(path: str | Path, text: str, decide: Decide) -> Mended:
-    """Write a mapping by which a file can be read, and that cleans it.
+    """Create a mapping with which a file can be read and is cleaned.
 
     Parameters
     ----------
     path : str or Path
     text : str
-        TOML to begin with.
+        Initial TOML.
     decide : callable
-        Answers a `Question`.
+        Function that answers a `Question`.
 
     Raises
     ------
     InputError
-        The file cannot be read, and no mapping helps.
+        The file cannot be read with any mapping.
     """
     owner = str(path)
     dialogue = _Dialogue(Draft(text), decide, path)
@@ -199,7 +199,7 @@ def mend(path: str | Path, text: str, decide: Decide) -> Mended:
 
 
 def read_or_offer(path: str | Path, mapping: Mapping | None = None) -> Recording:
-    """Read one test from a file; on an error, a note of the error suggests a filled-in mapping.
+    """Read one test from a file; on an error, a note on the exception suggests a filled-in mapping.
 
     Raises
     ------
@@ -215,23 +215,23 @@ def read_or_offer(path: str | Path, mapping: Mapping | None = None) -> Recording
 
 
 def located(finding: Finding, recording: Recording, mapping: Mapping, headings: Sequence[str]) -> Remedy:
-    """Return the remedy of a finding as a mapping of the file needs it.
+    """Return the remedy of a finding in the form required by a mapping of the file.
 
     Parameters
     ----------
     finding : Finding
-        With a remedy.
+        Finding with a remedy.
     recording : Recording
-        That it was found in.
+        Recording of the finding.
     mapping : Mapping
-        That the recording was read by.
+        Mapping with which the recording was read.
     headings : sequence of str
         Headings of the file.
 
     Returns
     -------
     Remedy
-        Columns by their headings, times since the first row of the file.
+        Remedy with columns by heading, and times since the first row of the file.
     """
     remedy: dict[str, Any] = copy.deepcopy(dict(finding.remedy or {}))
     for step in remedy.get("clean", ()):
@@ -245,7 +245,7 @@ def located(finding: Finding, recording: Recording, mapping: Mapping, headings: 
     for name, said in list(remedy.get("columns", {}).items()):
         heading = next((h for h in headings if recording.aliases.get(h, h) == name), name)
         if "missing" in said and finding.rows is not None and not _holds_as_it_is(mapping.columns.get(name), heading):
-            del remedy["columns"][name]  # the number in the file is another one: its places are known
+            del remedy["columns"][name]  # the number in the file differs, but its rows are known
             remedy |= cut(name, finding.rows, recording.time + recording.origin, finding.kind)
         elif name not in mapping.columns and heading != name:
             said["column"] = heading
@@ -260,32 +260,32 @@ def to_toml(remedy: Remedy) -> str:
 
 
 def _holds_as_it_is(rule: ColumnMap | None, heading: str) -> bool:
-    """Return whether the numbers of a column are those of its channel."""
+    """Return whether the numbers of a column equal the values of its channel."""
     rule, meaning = rule or ColumnMap(), understand_or_none(heading)
     unit = rule.conversion or (meaning.unit if meaning is not None else None)
     return unit is not None and (rule.scale, rule.zero, unit.scale, unit.shift) == (1.0, 0.0, 1.0, 0.0)
 
 
 class _Dialogue:
-    """A mapping that is written by questions and answers.
+    """A mapping that is created from questions and answers.
 
     Parameters
     ----------
     draft : Draft
     decide : callable
     path : str or Path
-        The file.
+        Path of the file.
     """
 
     def __init__(self, draft: Draft, decide: Decide, path: str | Path) -> None:
         self.draft = draft
         self.decide = decide
         self.path = path
-        self.first: RecordingError | UnitError | None = None  #: that a row would be passed over for
+        self.first: RecordingError | UnitError | None = None  #: first error for which a row would be skipped
         self.decided: list[tuple[Question, Remedy | None]] = []
 
     def ask(self, question: Question) -> bool:
-        """Have a question decided, once; return whether the mapping now has new entries."""
+        """Have a question decided, each question only once; return whether the mapping has new entries."""
         if any(q.text == question.text and q.options == question.options for q, _ in self.decided):
             return False
         answer = self.decide(question)
@@ -296,17 +296,17 @@ class _Dialogue:
         return sum(1 for _, answer in self.decided if answer is not None and _skips(answer))
 
     def _skips_date(self, error: InputError) -> bool:
-        """Return whether the likeliest remedy skips a row that contains the date of the next ones."""
+        """Return whether the most likely remedy skips a row that contains the date of the following rows."""
         if not _skips(error.remedies[0]):
             return False
         try:
             table, _ = open_table(self.path, self.draft.mapping(str(self.path)))
-        except InputError:  # a row of too many cells or too few, which the message holds
+        except InputError:  # a row with too many or too few cells, which the message contains
             return holds_date(str(error).removeprefix(str(self.path)))
         return holds_own_date(table, error.remedies[0]["read"]["skip"][-1])
 
     def until(self, action: Callable[[], _T]) -> _T:
-        """Run an action; the obstacles are asked about, one after the other."""
+        """Run an action repeatedly, and have each error decided."""
         for _ in range(MOST_QUESTIONS):
             try:
                 return action()
@@ -316,7 +316,7 @@ class _Dialogue:
                 if _skips(e.remedies[0]):
                     self.first = self.first or e
                     if self._skipped() >= MOST_SKIPPED:
-                        raise self.first from None  # as reading without a mapping tells it
+                        raise self.first from None  # same error as without a mapping
                 may_guess = not (isinstance(e, TwoReadingsError) or self._skips_date(e))
                 if not self.ask(Question(str(e), e.remedies, "error", may_guess)):
                     raise
@@ -324,12 +324,12 @@ class _Dialogue:
 
 
 def _skips(remedy: Remedy) -> bool:
-    """Return whether a remedy passes over a row."""
+    """Return whether a remedy skips a row."""
     return "skip" in remedy.get("read", {})
 
 
 def _offer(path: Path, mapping: Mapping, error: InputError) -> str:
-    """Return words that offer a mapping by which a file can be read; empty if there is none."""
+    """Return text that suggests a mapping with which a file can be read; empty if there is none."""
     if not error.remedies or path.stat().st_size > _LARGE:
         return ""
     begun = tomlkit.dumps(ADAPTER.dump_python(mapping, mode="json", exclude_defaults=True))
@@ -354,7 +354,7 @@ def _offer_choice(text: str, remedies: Sequence[Remedy], name: str) -> str:
 
 
 def _file_name(path: Path) -> str:
-    """Return a name of a mapping file that no shell takes amiss."""
+    """Return a name of a mapping file that needs no quoting in a shell."""
     return f"{re.sub(r'[^A-Za-z0-9_.-]+', '_', path.stem).lstrip('-.') or 'recording'}.toml"
 
 

@@ -1,4 +1,4 @@
-"""Number formats: the decimal sign, separators of thousands, and text in place of a number."""
+"""Number formats: decimal sign, thousands separators, and text in place of a number."""
 
 import re
 from collections import Counter
@@ -8,9 +8,9 @@ from typing import NamedTuple
 from thermocomp.core.exceptions import RecordingError
 from thermocomp.recordings.words import split_words
 
-#: texts that stand for a missing value, besides an empty cell
+#: texts that denote a missing value, besides an empty cell
 MISSING_TEXT = ("", "nan", "na", "n/a", "none", "null", "#n/a", "<na>", "-nan")
-#: what loggers and spreadsheets write where they have no number, in small letters
+#: placeholders of loggers and spreadsheets for a missing number, in lower case
 _FILLERS = split_words(
     "ol, +ol, -ol, over, +over, -over, under, overload, overflow, overrange, over range, underrange",
     "under range, ovld, ovl, ovrng, burnout, burn out, b.out, open, open tc, no sensor, sensor error, error",
@@ -19,7 +19,7 @@ _FILLERS = split_words(
     "#null!, #valeur!, nan(ind), -nan(ind), nan(snan), -1.#ind, 1.#ind, 1.#qnan, -1.#qnan, 1.#inf, -1.#inf",
 )
 _RUN = re.compile(r"([-+*?#.])\1*|err:\d+")
-#: separators of thousands besides point and comma
+#: thousands separators besides point and comma
 _SPACES = "'’\u00a0\u202f "
 _PLAIN = re.compile(r"[-+]? *(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][-+]?\d+)?")
 _GROUPED = re.compile(rf"[-+]?[1-9]\d{{0,2}}(?:([.,{_SPACES}])\d{{3}})(?:\1\d{{3}})*(?:(?!\1)[.,]\d*)?")
@@ -30,10 +30,10 @@ class Notation(NamedTuple):
     """Number format of a file."""
 
     decimal: str  #: point or comma
-    thousands: str = ""  #: separators that may stand between groups of three digits
+    thousands: str = ""  #: allowed separators between groups of three digits
 
     def read(self, cell: str) -> float | None:
-        """Return the number in a cell; None if it is none."""
+        """Return the number in a cell; None if it is not a number."""
         text = cell.strip()
         grouped = _GROUPED.fullmatch(text)
         if grouped and grouped[1] in self.thousands:
@@ -48,16 +48,16 @@ class Notation(NamedTuple):
 class Signs:
     """Evidence from the cells of a file for its decimal sign.
 
-    A sign that a zero or more than three digits precede, or that other than three digits follow, is a decimal sign; one
-    that comes twice separates thousands. ``1,234`` alone may be either.
+    A sign after a zero or more than three digits, or before a number of digits other than three, is a decimal sign; a
+    sign that occurs twice is a thousands separator. ``1,234`` alone is ambiguous.
     """
 
     def __init__(self) -> None:
         #: cells that prove a decimal sign
         self.proven: Counter[str] = Counter()
-        #: of each sign the first cell in which it may be either
+        #: first ambiguous cell for each sign
         self.open: dict[str, str] = {}
-        #: separators of thousands that were seen
+        #: thousands separators found
         self.groups: set[str] = set()
 
     def add(self, cells: Iterable[str]) -> None:
@@ -76,23 +76,23 @@ class Signs:
                 self.proven["." if "." in text else ","] += 1
 
     def proven_sign(self) -> str:
-        """Return the decimal sign that most cells prove; empty if none does."""
+        """Return the decimal sign proven by most cells; empty if there is no proof."""
         return self.proven.most_common(1)[0][0] if self.proven else ""
 
     def decide(self, stated: str, delimiter: str) -> Notation | None:
-        """Return the number format; None if no cell shows it.
+        """Return the number format; None if the cells do not determine it.
 
         Parameters
         ----------
         stated : str
-            The decimal sign, if it is known beforehand.
+            Decimal sign, if it is known beforehand.
         delimiter : str
-            Delimiter of the columns: where it is a comma, the decimal sign is a point unless a cell shows the opposite.
+            Column delimiter; if it is a comma, the decimal sign is a point unless a cell proves the opposite.
 
         Raises
         ------
         RecordingError
-            They can be read in two ways.
+            The numbers can be read in two ways.
         """
         decimal = stated or self.proven_sign()
         if not decimal and self.open:
@@ -120,12 +120,12 @@ def is_filler(cell: str) -> bool:
 
 
 def is_word(cell: str) -> bool:
-    """Return whether a cell holds a word of loggers or spreadsheets for a number that is not there."""
+    """Return whether a cell contains a word of loggers or spreadsheets for a missing number."""
     text = cell.strip().casefold()
     return text in _FILLERS or _RUN.fullmatch(text) is not None
 
 
 def is_number_like(cell: str) -> bool:
-    """Return whether a cell holds a number, in whatever notation."""
+    """Return whether a cell contains a number in any notation."""
     text = cell.strip()
     return _PLAIN.fullmatch(text) is not None or _GROUPED.fullmatch(text) is not None

@@ -21,7 +21,7 @@ _OPEN = {**dict.fromkeys(_TEXTS, open_csv), ".xlsx": open_workbook, ".ods": open
 
 
 def open_table(path: str | Path, mapping: Mapping) -> tuple[FileTable, str]:
-    """Open a file without understanding what its columns are.
+    """Open a file as a table without interpreting its columns.
 
     Returns
     -------
@@ -32,7 +32,7 @@ def open_table(path: str | Path, mapping: Mapping) -> tuple[FileTable, str]:
     Raises
     ------
     RecordingError
-        It cannot be read as a table.
+        The file cannot be read as a table.
     """
     path = Path(path)
     ending = path.suffix.lower()
@@ -51,12 +51,12 @@ def open_table(path: str | Path, mapping: Mapping) -> tuple[FileTable, str]:
         raise RecordingError(f"{path}: no such file{f'; did you mean {near[0]}?' if near else ''}") from e
     except OSError as e:
         raise RecordingError(f"{path}: cannot be read: {e.strerror or e}") from e
-    except ValueError as e:  # a name that no file can have
+    except ValueError as e:  # an invalid file name
         raise RecordingError(f"{str(path)!r}: cannot be read: {e}") from e
 
 
 def read_embedded(text: str, source: Path) -> tuple[Mapping, list[str]]:
-    """Return thermocomp's own description of the columns; nothing but a note if another program has damaged it."""
+    """Return the column description embedded by thermocomp; only a note if another program has damaged it."""
     try:
         return ADAPTER.validate_json(text), []
     except ValidationError as e:

@@ -1,4 +1,4 @@
-"""Parquet files: columns are read in batches, and only after the size stated in the file has been checked."""
+"""Parquet files: columns are read in batches, after the size stated in the file has been checked."""
 
 import json
 from collections.abc import Iterator, Sequence
@@ -30,12 +30,12 @@ if TYPE_CHECKING:
     from pyarrow.parquet import ParquetFile
 
 _TEXTS = ("string", "large_string", "binary", "large_binary")
-_FIRST = 100  # cells that tell whether a column holds numbers
-_BATCH = 65_536  # rows that are unpacked at a time
-_BUFFER = 1 << 18  # bytes of a column that are read at a time; else all of a row group are
-#: where pandas keeps what belongs to a table
+_FIRST = 100  # cells used to determine whether a column contains numbers
+_BATCH = 65_536  # rows unpacked at a time
+_BUFFER = 1 << 18  # bytes of a column read at a time; otherwise a whole row group is read
+#: keys of the metadata that pandas stores with a table
 _PANDAS, _ATTRIBUTES = b"pandas", b"PANDAS_ATTRS"
-#: what it calls an index without a name
+#: pandas name of an index without a name
 _INDEX = "__index_level_0__"
 
 
@@ -50,14 +50,14 @@ class ParquetTable:
         Names of the columns, as in the file.
     headings : tuple of str
     texts : tuple of str
-        Names of the columns that hold texts.
+        Names of the text columns.
     others : tuple of int
-        Positions of the columns that do not hold numbers by their type.
+        Positions of the columns without a numeric type.
     n_rows : int
     embedded : str
     limits : FileLimits
     decimal : str
-        Decimal sign of numbers that are texts, if it is known beforehand.
+        Decimal sign of numbers stored as text, if it is known beforehand.
     notes : tuple of str
     """
 
@@ -73,18 +73,18 @@ class ParquetTable:
     notes: tuple[str, ...] = ()
 
     def is_number(self, column: int, *, empty: bool = True) -> bool:
-        """Return whether the first filled cell of a column is a number; `empty` if there is none."""
+        """Return whether the first non-empty cell of a column is a number; `empty` if there is none."""
         found = self._first_cells.get(column)
         return column not in self.others if found is None else first_is_number(found, empty=empty)
 
     def head(self, column: int) -> list[str]:
-        """Return the first filled cells of a column; see `thermocomp.recordings.readers.tables.FileTable.head`."""
+        """Return the first non-empty cells of a column; see `thermocomp.recordings.readers.tables.FileTable.head`."""
         found = self._first_cells.get(column)
         return [] if found is None else first_texts(found)
 
     @cached_property
     def _first_cells(self) -> dict[int, "pd.Series[Any]"]:
-        """First filled cell of those of the `others` that have one among the first rows."""
+        """First non-empty cell of each of the `others` that has one among the first rows."""
         filled = {}
         with _translated(self.path):
             batch = next(self._batches(self.others), None) if self.others else None
@@ -121,7 +121,7 @@ class ParquetTable:
         return pd.DataFrame({k: data[k] for k in wanted}, copy=False), notes
 
     def place(self, row: int) -> str:
-        """Return the location of a row in the file, counted from 1."""
+        """Return the location of a row in the file (1-based)."""
         return f"row {row + 1}"
 
     def _batches(self, columns: Sequence[int]) -> Iterator["RecordBatch"]:
@@ -138,7 +138,7 @@ class ParquetTable:
 
 @contextmanager
 def _translated(path: Path) -> Iterator[None]:
-    """Make a `RecordingError` of whatever a damaged file makes of the library."""
+    """Convert any error that a damaged file causes in the library to a `RecordingError`."""
     try:
         yield
     except InputError:
@@ -155,7 +155,7 @@ def open_parquet(path: Path, options: ReadOptions, limits: FileLimits) -> FileTa
     Raises
     ------
     RecordingError
-        It is not a Parquet file, holds no recording, or is over a limit.
+        The file is not a Parquet file, contains no recording, or exceeds a limit.
     """
     try:
         from pyarrow.parquet import ParquetFile
@@ -174,7 +174,7 @@ def open_parquet(path: Path, options: ReadOptions, limits: FileLimits) -> FileTa
         embedded = str(json.loads((schema.metadata or {}).get(_ATTRIBUTES, b"{}")).get(EMBEDDED, ""))
         kind = str(schema.field(_INDEX).type) if _INDEX in names else ""
     timed = kind.startswith(("timestamp", "duration"))
-    # the numbers of rows that were sorted or chosen mean nothing
+    # numbers of sorted or selected rows have no meaning
     index = "timestamp" if timed else "" if kind.startswith(("int", "uint")) else "index"
     headings = [clean_heading(index if name == _INDEX else name) for name in names]
     check_headings(path, headings, about.num_rows, limits)
@@ -193,7 +193,7 @@ def open_parquet(path: Path, options: ReadOptions, limits: FileLimits) -> FileTa
 
 
 def _names(file: "ParquetFile") -> list[str]:
-    """Return the names of the columns, those that pandas keeps as an index in front, as it shows them."""
+    """Return the names of the columns as shown by pandas, index columns first."""
     names = list(file.schema_arrow.names)
     about = json.loads((file.schema_arrow.metadata or {}).get(_PANDAS, b"{}"))
     index = [name for name in about.get("index_columns", ()) if isinstance(name, str) and name in names]
@@ -207,7 +207,7 @@ def _is_number(kind: "DataType") -> bool:
 
 
 def _unpacked(column: "Array") -> int:
-    """Return the bytes that a column takes when each cell has its own text."""
+    """Return the size of an unpacked column in bytes if each cell had a separate text."""
     import pyarrow.compute as pc
     from pyarrow import DictionaryArray
 

@@ -1,4 +1,4 @@
-"""Error profiles from tables: wide, with a column per position, or long, with a row per position."""
+"""Error profiles from tables: wide, with one column per position, or long, with one row per position."""
 
 import re
 from collections.abc import Mapping as AbstractMapping
@@ -23,40 +23,40 @@ from thermocomp.recordings.readers.recordings import read as read_recording
 from thermocomp.recordings.readers.recordings import read_rows
 from thermocomp.recordings.recording import Recording
 
-#: a place by the axes that it tells, such as {"Y": 250.0} [mm]
+#: a position as coordinates by axis, such as {"Y": 250.0} [mm]
 Place = AbstractMapping[str, float]
 Layout = Literal["wide", "long"]
 
-#: how a note begins about columns of a component that could not be used
+#: start of a note on columns of a component that could not be used
 NOT_TAKEN = "not taken:"
 
-#: columns of a wide table, if nothing else is said: y_laser_250_um, a_y_-50_urad
+#: default column names of a wide table: y_laser_250_um, a_y_-50_urad
 _PLACED = re.compile(r"(?P<base>.+)_(?P<position>-?\d+(?:\.\d+)?)_(?:um|urad)")
 
 
 @dataclass(frozen=True, kw_only=True)
 class ProfileOptions:
-    """Content of a table of profiles.
+    """Definition of the contents of a table of profiles.
 
     Parameters
     ----------
     target : str
         Code of the component, such as ``EYY``, or any other name.
     axis : str
-        Along which; empty: that of the component.
+        Axis of the profiles; empty: the axis of the component.
     unit : str
-        um or urad; empty: that of the component.
+        um or urad; empty: the unit of the component.
     columns : str
-        Wide: names of the columns, ``*`` standing for the position in mm, such as ``y_laser_*``. Long: the column of
-        the error. Empty: those called after the component, such as ``EYY_250_um`` (see
+        Wide: names of the columns, with ``*`` in place of the position in mm, such as ``y_laser_*``. Long: the column
+        of the error. Empty: columns named after the component, such as ``EYY_250_um`` (see
         `thermocomp.recordings.readers.codecolumns`); if there are none, found by unit and position in the name.
     places : mapping of str to Place
         Wide: position of each column by its name, instead of `columns`; see `read_places`.
     position : str
-        Long: the column of the axis' own position; empty: ``position_mm``, or that of the axis, such as ``y_mm``.
+        Long: column of the position of the axis; empty: ``position_mm``, or the axis column, such as ``y_mm``.
     state : str
-        Long: the column that tells the state of a row; empty: one that is called state or profile, else the time, else
-        a state ends where a position comes again.
+        Long: column with the state of each row; empty: the column named state or profile, else the time, else a new
+        state starts where a position recurs.
     """
 
     target: str
@@ -69,12 +69,12 @@ class ProfileOptions:
 
     @property
     def about(self) -> tuple[str, Literal["um", "urad"]]:
-        """Axis and unit.
+        """Axis and unit of the profiles.
 
         Raises
         ------
         InputError
-            They are neither given nor defined by the component.
+            Axis or unit is neither given nor defined by the component.
         """
         component = BY_CODE.get(self.target)
         axis = self.axis or (component.depends_on if component else "") or ""
@@ -109,17 +109,17 @@ def read(
     mapping : Mapping, optional
         Roles and units of columns whose headings do not give them.
     layout : {'wide', 'long'}, optional
-        A row per thermal state and a column per position, or a row per position; found out if not given.
+        A row per thermal state and a column per position, or a row per position. Default: detected automatically.
 
     Raises
     ------
     RecordingError
-        The file cannot be read, or holds no profile of that kind; the message names line and column.
+        The file cannot be read, or contains no profile of this kind; the message names line and column.
     InputError
-        A column that was named is not there, or what it measures is not what the component is.
+        A named column does not exist, or its quantity differs from that of the component.
     """
     wanted = ProfileOptions(target=options) if isinstance(options, str) else options
-    wanted.about  # noqa: B018 - refuses before a long file is read
+    wanted.about  # noqa: B018 - raises an error before a long file is read
     if layout is None:
         rows = read_rows(path, mapping, rising=False)
         has_position = any(c.quantity == "position" for c in rows.channels)
@@ -139,14 +139,14 @@ def read_components(
     components: Sequence[str] = (),
     mapping: Mapping | None = None,
 ) -> dict[str, tuple[Profiles, ...]]:
-    """Read the profiles of several components from wide tables whose columns are called after them.
+    """Read the profiles of several components from wide tables whose columns are named after them.
 
     Parameters
     ----------
     paths : sequence of str or Path
         One file per test.
     components : sequence of str
-        Codes; all that have columns, if none is given.
+        Codes of the components; empty: all that have columns.
     mapping : Mapping, optional
         See `read`.
 
@@ -158,9 +158,9 @@ def read_components(
     Raises
     ------
     RecordingError
-        A file cannot be read, or has no column that is called after a component.
+        A file cannot be read, or has no column named after a component.
     InputError
-        There is no such component, or what a column measures is not what the component is.
+        A component does not exist, or the quantity of a column differs from that of the component.
     """
     recordings = [read_recording(path, mapping) for path in paths]
     wanted = components or list(dict.fromkeys(code for r in recordings for code in codes(r)))
@@ -176,20 +176,20 @@ def read_components(
 
 
 def from_recording(recording: Recording, options: ProfileOptions | str) -> Profiles:
-    """Extract profiles from a recording that has a column per position.
+    """Extract profiles from a recording with one column per position.
 
     Parameters
     ----------
     recording : Recording
-        A row per thermal state.
+        Recording with one row per thermal state.
     options : ProfileOptions or str
         Options of the profiles; a text is the code of the component.
 
     Returns
     -------
     Profiles
-        Whose states have the other channels, but for profiles of other components. Coordinates that no place tells are
-        0.
+        Profiles whose states contain the other channels, except profiles of other components. Unspecified coordinates
+        are 0.
 
     Raises
     ------
@@ -245,12 +245,12 @@ def read_places(path: str | Path) -> dict[str, Place]:
     Returns
     -------
     dict of str to Place
-        By column.
+        Positions by column.
 
     Raises
     ------
     InputError
-        No such file, no TOML, or a position without a length unit; the message names file and key.
+        The file does not exist, is not TOML, or has a position without a length unit; the message names file and key.
 
     Examples
     --------
@@ -284,7 +284,7 @@ def _read_place(value: Any, where: str) -> Place:
 
 
 def _matching(recording: Recording, pattern: str) -> list[tuple[Channel, float]]:
-    """Return the channels whose name, or another name they answer to, is like `pattern`, and their positions."""
+    """Return the channels whose name or alias matches `pattern`, and their positions."""
     shape = re.compile(re.escape(pattern).replace(r"\*", r"(-?\d+(?:\.\d+)?)", 1).replace(r"\*", ".*"))
     if "*" not in pattern:
         raise InputError(f"columns {pattern!r}: put * where the position is in the name, such as y_laser_*")
@@ -299,9 +299,9 @@ def _matching(recording: Recording, pattern: str) -> list[tuple[Channel, float]]
 
 
 def _by_name(recording: Recording, quantity: str, owner: str) -> list[tuple[Channel, float]]:
-    """Return the channels of a quantity that have a position in their name; all must be called alike.
+    """Return the channels of a quantity with a position in their name; all must have the same base name.
 
-    With them come those of another quantity that are called like them and continue where they end: a wrong unit.
+    Channels of another quantity with this base name that continue the positions are included: their unit is wrong.
     """
     placed = [(c, m) for c in recording.channels if (m := _PLACED.fullmatch(c.name))]
     found = [(c, m) for c, m in placed if c.quantity == quantity]
@@ -317,7 +317,7 @@ def _by_name(recording: Recording, quantity: str, owner: str) -> list[tuple[Chan
 
 
 def _refuse_another_axis(target: str, axis: str, found: Sequence[tuple[Channel, Place]], owner: str) -> None:
-    """Refuse columns found by name that are named after an axis without a part in the error."""
+    """Reject columns found by name that are named after an axis not involved in the error."""
     for c, _ in found[:1]:
         called = re.match(r"([xyz])(?:\d?_)", c.name)
         if called and target in BY_CODE and called[1].upper() not in (axis, target[1]):

@@ -1,4 +1,4 @@
-"""Recordings as files: CSV, XLSX and Parquet in, CSV and Parquet out."""
+"""Recordings as files: reading of CSV, XLSX, ODS and Parquet, writing of CSV and Parquet."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -31,7 +31,7 @@ from thermocomp.recordings.readers.times import read_times
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.rows import Rows
 
-#: notes of one recording, and characters of a note or an error
+#: maximum number of notes of one recording, and of characters of a note or an error
 _MOST_NOTES = 100
 _MOST_SAID = 2_000
 
@@ -39,7 +39,7 @@ _MOST_SAID = 2_000
 def read(path: str | Path, mapping: Mapping | None = None) -> Recording:
     """Read one test from a file.
 
-    Columns are understood by the unit in their heading (``time_s``, ``t1_C``, ``drift_um``, ``spindle_rpm``,
+    Columns are interpreted by the unit in their heading (``time_s``, ``t1_C``, ``drift_um``, ``spindle_rpm``,
     ``T1 [degC]``) or by `mapping`. Thermal cycles come from a column ``cycle``, else from the spindle speed.
 
     Parameters
@@ -52,14 +52,14 @@ def read(path: str | Path, mapping: Mapping | None = None) -> Recording:
     Returns
     -------
     Recording
-        Recording in internal units; `notes` lists what was left out or replaced.
+        Recording in house units; `notes` lists omitted columns and replaced values.
 
     Raises
     ------
     RecordingError
-        The file cannot be read, or not as a recording; the message names line and column.
+        The file cannot be read, or is not a recording; the message names line and column.
     UnitError
-        A unit is unknown, or the one in the heading cannot measure what the mapping states.
+        A unit is unknown, or the unit in the heading contradicts the quantity in the mapping.
     """
     rows = read_rows(path, mapping)
     return make_recording(rows, rows.time, rows.table, rows.labels)
@@ -77,7 +77,7 @@ def read_rows(
     rising : bool
         False: several rows may have the same time, as in a table with a row per position.
     extra : sequence of str
-        Headings of columns, whatever they hold, to be read too if they are there.
+        Headings of columns that are also read if they exist, whatever they contain.
 
     Raises
     ------
@@ -150,7 +150,7 @@ def _read_rows(source: Path, mapping: Mapping, *, rising: bool, extra: Sequence[
 def _load(
     source: Path, mapping: Mapping, table: FileTable, columns: ColumnPlan, extra: Sequence[int]
 ) -> tuple[FileCells, list[int], tuple[str, ...]]:
-    """Read the columns of a plan, and those that may hold dates; state which these are, and what was made of cells."""
+    """Read the planned columns and possible date columns; return the cells, the positions of the latter, and notes."""
     times = columns.times
     is_stamp = columns.time_unit == "timestamp" or not (columns.time_unit or table.is_number(times.time))
     clocks = [times.time, *columns.beside]
@@ -176,16 +176,16 @@ def _load(
 
 
 def make_recording(rows: Rows, time: FloatArray, table: pd.DataFrame, labels: Sequence[Any] | None) -> Recording:
-    """Make a recording of rows, or of what was made of them.
+    """Return a recording made from rows or their cleaned values.
 
     Parameters
     ----------
     rows : Rows
-        As read.
+        Rows as read.
     time : ndarray of shape (n,)
         [s]
     table : DataFrame of shape (n, n_kept)
-        Some of the channels.
+        Selected channels.
     labels : sequence of object, optional
         Thermal cycle of each row.
     """
@@ -211,8 +211,8 @@ def make_recording(rows: Rows, time: FloatArray, table: pd.DataFrame, labels: Se
 def write(recording: Recording, path: str | Path, *, overwrite: bool = False) -> None:
     """Write a recording so that `read` gives the same numbers, channels and cycles.
 
-    Channels whose name does not carry their unit are described in the file itself: in a comment line of a CSV file, in
-    an attribute of a Parquet file.
+    Channels whose name does not contain their unit are described in the file itself: in a comment line of a CSV file,
+    in an attribute of a Parquet file.
 
     Parameters
     ----------
@@ -224,7 +224,7 @@ def write(recording: Recording, path: str | Path, *, overwrite: bool = False) ->
     Raises
     ------
     InputError
-        Its ending is another one, or it cannot be there: see `thermocomp.files.draft.drafts`.
+        The extension is not supported, or the file cannot be written: see `thermocomp.files.draft.drafts`.
     """
     target = Path(path)
     if target.suffix not in (".csv", ".parquet"):
@@ -259,17 +259,17 @@ def write(recording: Recording, path: str | Path, *, overwrite: bool = False) ->
                     f.write(f"# {EMBEDDED}: {text}\n")
                 out.to_csv(f, index=False, lineterminator="\n")
         else:
-            out.attrs = {EMBEDDED: text} if text else {}  # pandas keeps these when it reads the file and writes another
+            out.attrs = {EMBEDDED: text} if text else {}  # pandas keeps these when it reads and rewrites the file
             out.to_parquet(started, index=False)
 
 
 def _as_written(name: str, *, as_text: bool) -> str:
-    """Return a heading or a label so that reading it gives the same; in text also so that no spreadsheet calculates."""
+    """Return a heading or a label such that reading restores it, and in text such that no spreadsheet evaluates it."""
     return defuse(name) if as_text or restore(name) != name else name
 
 
 def _zeroed(rows: Rows, columns: ColumnPlan) -> Rows:
-    """Let columns that count from their first value do so where that was cut."""
+    """Re-zero columns that are relative to their first value if the first rows were removed."""
     table = rows.table
     for name in (c.channel.name for c in columns.columns if c.rule.zero == "first"):
         x = table[name].to_numpy(dtype=np.float64)
@@ -280,18 +280,18 @@ def _zeroed(rows: Rows, columns: ColumnPlan) -> Rows:
 
 
 def _later(start: str, seconds: float) -> str:
-    """Return a timestamp some seconds later."""
+    """Return a timestamp offset by a number of seconds."""
     return (datetime.fromisoformat(start) + timedelta(seconds=seconds)).isoformat() if start and seconds else start
 
 
 @contextmanager
 def _guessing(table: FileTable, mapping: Mapping) -> Iterator[None]:
-    """Let errors about columns carry a guess of what these are."""
+    """Add guesses about the columns to errors about columns."""
     try:
         yield
     except RecordingError as e:
         e.remedies = e.remedies or guess(table, mapping)
-        # a unit of time says how long the recording took: nobody may guess which
+        # a unit of time determines the duration of the recording and must not be guessed
         if any(r.get("time", {}).get("unit") in ("ms", "s", "min", "h") for r in e.remedies):
             raise TwoReadingsError(str(e), e.remedies) from e
         raise
@@ -302,7 +302,7 @@ def _times(file: FileCells, *, rising: bool) -> tuple[FloatArray, str, tuple[str
     try:
         with np.errstate(over="ignore", invalid="ignore"):
             time, start, notes = read_times(file, rising=rising)
-    except (ValueError, OverflowError, TypeError) as e:  # a format that is none, a year that no clock has
+    except (ValueError, OverflowError, TypeError) as e:  # an invalid format, or a year out of range
         raise RecordingError(
             f"{where}: the times cannot be read ({e}); correct [time] format in the mapping or in the file's first line"
         ) from e
@@ -312,7 +312,7 @@ def _times(file: FileCells, *, rising: bool) -> tuple[FloatArray, str, tuple[str
 
 
 def _shorten(notes: Sequence[str], left_out: int) -> tuple[str, ...]:
-    """Return notes as far as a user can read them, and the number of the others."""
+    """Return notes limited in number and length, and the number of the omitted ones."""
     found = [n if len(n) <= _MOST_SAID else f"{n[:_MOST_SAID]} ..." for n in notes]
     more = max(len(found) - _MOST_NOTES, 0) + max(left_out - _MOST_NOTES, 0)
     return (*found[:_MOST_NOTES], *([f"left out or replaced: {more:,} more columns"] if more else []))

@@ -1,4 +1,4 @@
-"""Dates and times of day as people and programs write them: which of them can be read in one way only."""
+"""Dates and times of day in forms used by people and programs: detection of those with a single interpretation."""
 
 import re
 from typing import Any, NamedTuple
@@ -10,7 +10,7 @@ from thermocomp.recordings.headings import find_date_order
 from thermocomp.recordings.readers.dateorder import DateChoice, IntArray, find_longest_step, find_order, rises
 
 _CHUNK = 100_000
-#: steps of rows that only a wrong order makes [d]: of a day and month, of a day and year
+#: steps between rows caused only by a wrong order [d]: of day and month, of day and year
 _MONTH, _YEAR = 26, 300
 _DATE = (
     r"'?(?P<a>\d{1,4}|[^\W\d_]{3,9})(?P<sep>[./-]|\.? )(?P<b>\d{1,2}|[^\W\d_]{3,9})(?P<sep2>[./-]|[.,]? )(?P<c>\d{1,4})"
@@ -21,7 +21,7 @@ _STAMP = re.compile(rf"{_DATE}(?:(?P<join>T|[ ,;_-]+){_CLOCK}{_ZONE})?|(?P<clock
 _ISO = re.compile(
     r"\d{4}-\d\d-\d\d(?:[T ]\d\d:\d\d(?::\d\d(?:\.\d+)?)?(?:Z|[+-]\d\d:?\d\d)?)?|\d{8}T\d{4,6}(?:\.\d+)?Z?"
 )
-#: parts of a date in words of other languages than English, in small letters
+#: month names and similar words in languages other than English, in lower case
 _MONTHS = {
     word: str(number)
     for number, words in enumerate(
@@ -37,7 +37,7 @@ _MONTHS = {
     )
     for word in words.split()
 }
-#: names of zones that mean one offset from UTC wherever they are used
+#: names of time zones with a unique offset from UTC
 _ZONES = {
     **dict.fromkeys(("UTC", "GMT", "WET", "UT"), "+00:00"),
     **dict.fromkeys(("CET", "MEZ", "WEST"), "+01:00"),
@@ -48,22 +48,22 @@ _WORDS = {"dmy": "day/month/year", "mdy": "month/day/year", "ymd": "year/month/d
 
 
 class Parsed(NamedTuple):
-    """Timestamps, and how they were read."""
+    """Timestamps, and their interpretation."""
 
-    stamps: "pd.Series[pd.Timestamp]"  #: in UTC; NaT where a cell is none
-    start: str  #: the first one in ISO 8601, on its own clock
+    stamps: "pd.Series[pd.Timestamp]"  #: in UTC; NaT where a cell is not a timestamp
+    start: str  #: the first one in ISO 8601, in the local time of its clock
     notes: tuple[str, ...]
 
 
 class AmbiguousDatesError(ValueError):
-    """Dates can be read in several ways.
+    """Error for dates that can be read in several ways.
 
     Parameters
     ----------
     readings : dict of str to Series of Timestamp
-        By the format in the letters of `datetime.strptime`, the likeliest first.
+        Timestamps by format, in the letters of `datetime.strptime`, most likely first.
     orders : list of str
-        In words, of each.
+        Each order as text.
     """
 
     def __init__(self, readings: "dict[str, pd.Series[pd.Timestamp]]", orders: list[str]) -> None:
@@ -77,7 +77,7 @@ class AmbiguousDatesError(ValueError):
         return any((first != other).any() for other in others)
 
     def tell(self) -> str:
-        """Return from when to when the rows go in each order, and how long, in words."""
+        """Return the first and last time and the duration under each order, as text."""
         told = []
         for order, stamps in zip(self.orders, self.readings.values(), strict=True):
             begin, end = stamps.iloc[0].tz_localize(None), stamps.iloc[-1].tz_localize(None)
@@ -86,23 +86,23 @@ class AmbiguousDatesError(ValueError):
 
 
 def parse_stamps(text: "pd.Series[Any]", heading: str) -> Parsed | None:
-    """Read timestamps whose form is not known beforehand.
+    """Read timestamps in an unknown form.
 
     Parameters
     ----------
     text : Series of str
     heading : str
-        May state the order of day, month and year.
+        Heading, which may specify the order of day, month and year.
 
     Returns
     -------
     Parsed or None
-        None: the first cell is in no form that is known.
+        None: the form of the first cell is unknown.
 
     Raises
     ------
     AmbiguousDatesError
-        Day, month and year can be told apart neither by their numbers nor by how the rows continue
+        The order of day, month and year is determined neither by their values nor by the continuity of the rows
         (`thermocomp.recordings.readers.dateorder.find_order`).
     """
     first = text.iloc[0].strip()
@@ -130,7 +130,7 @@ def parse_stamps(text: "pd.Series[Any]", heading: str) -> Parsed | None:
         choice = _choose(shape, {o: _instants(read[o]) for o in whole})
         if not choice.order:
             possible = [o for o in whole if rises(_instants(read[o]))] or whole
-            # who writes AM and PM writes the month first, as a rule
+            # formats with AM and PM usually have the month first
             possible.sort(key=lambda o: not (shape["half"] and o == "mdy"))
             asked = {_shown_format(shape, o): read[o] for o in possible}
             raise AmbiguousDatesError(asked, [_WORDS[o] for o in possible])
@@ -148,7 +148,7 @@ def parse_stamps(text: "pd.Series[Any]", heading: str) -> Parsed | None:
 def _refuse_other_order(
     plain: "pd.Series[Any]", shape: re.Match[str], stated: str, found: "pd.Series[pd.Timestamp]"
 ) -> None:
-    """Refuse an order that the heading or the year states, where rows continue from one to the next only in another."""
+    """Reject an order given by the heading or the year if rows are consecutive only in another order."""
     if not (shape["a"].isdigit() and shape["b"].isdigit()) or not found.notna().all():
         return
     if not find_longest_step(_instants(found)) >= _MONTH:
@@ -161,24 +161,24 @@ def _refuse_other_order(
 
 
 def has_day(form: str) -> bool:
-    """Return whether a format reads the day, and not only the time of day."""
+    """Return whether a format contains the day, and not only the time of day."""
     return re.search(r"%[djxcDFeG]", form) is not None
 
 
 def parse(text: "pd.Series[Any]", form: str) -> "pd.Series[pd.Timestamp]":
-    """Read timestamps in a known form, in UTC; NaT where a cell is not in it."""
-    # in parts, and without a cache of the texts seen: pandas makes objects of them, far bigger than the times
+    """Return timestamps read in a known form, in UTC; NaT where a cell does not match."""
+    # in chunks, and without a cache of texts: pandas would store objects, which are far larger than the times
     parts = [text.iloc[k : k + _CHUNK] for k in range(0, len(text), _CHUNK)]
     found = [pd.to_datetime(p, format=form, utc=True, errors="coerce", cache=False) for p in parts]
     stamps = pd.concat(found)
-    if stamps.isna().any():  # a program may leave out a fraction of zero
+    if stamps.isna().any():  # programs may omit a zero fraction
         other = form.replace("%S.%f", "%S") if "%S.%f" in form else form.replace("%S", "%S.%f")
         stamps = stamps.fillna(pd.to_datetime(text, format=other, utc=True, errors="coerce"))
     return stamps
 
 
 def read_days(text: "pd.Series[Any]") -> list[IntArray]:
-    """Return the days on which stamps may be, counted from 1970, under each order in which all are dates."""
+    """Return the possible days of timestamps, counted from 1970, under each order in which all are valid dates."""
     plain = text.str.strip()
     if _ISO.fullmatch(plain.iloc[0]):
         read = [parse(plain, "ISO8601")]
@@ -197,7 +197,7 @@ def _parsed(stamps: "pd.Series[pd.Timestamp]", first: str, form: str, notes: tup
 
 
 def _simplify(text: "pd.Series[Any]", shape: re.Match[str]) -> "pd.Series[Any]":
-    """Convert parts that no format covers to one form: months in words, zones by name, signs before a fraction."""
+    """Convert parts that no format covers: month names, zone names, separators before a fraction."""
     plain = text.str.strip().str.lstrip("'")
     if not (shape["a"].isdigit() and shape["b"].isdigit()):
         plain = plain.str.replace(r"[^\W\d_]{3,}(?=[ ,./-])", _month, regex=True)
@@ -220,16 +220,16 @@ def _has_points(shape: re.Match[str]) -> bool:
 
 
 def _is_one_stretch(stamps: "pd.Series[pd.Timestamp]") -> bool:
-    """Return whether all are dates and rise without a gap that a wrong order would make."""
+    """Return whether all are valid dates and increase without a gap typical of a wrong order."""
     return bool(stamps.notna().all()) and rises(t := _instants(stamps)) and find_longest_step(t) < _MONTH
 
 
 def _choose(shape: re.Match[str], read: dict[str, IntArray]) -> DateChoice:
-    """Choose the order of dates that fit several."""
+    """Select the order of dates that are valid in several orders."""
     choice = find_order(read)
     if not _has_points(shape) or "dmy" not in read:
         return choice
-    day_first = DateChoice("dmy", "", "")  # as wherever dates are written with points
+    day_first = DateChoice("dmy", "", "")  # as is usual for dates with points
     if choice.order == "dmy":
         return day_first
     if choice.by == "going on":
@@ -282,6 +282,6 @@ def _shown_format(shape: re.Match[str], order: str) -> str:
 
 
 def _find_proof(text: "pd.Series[Any]", read: dict[str, "pd.Series[pd.Timestamp]"], order: str) -> str:
-    """Return the first cell that is a date in one order only."""
+    """Return the first cell that is a valid date in one order only."""
     others = np.logical_and.reduce([s.isna().to_numpy() for o, s in read.items() if o != order])
     return str(text.iloc[int(np.flatnonzero(others)[0])]) if others.any() else str(text.iloc[0])

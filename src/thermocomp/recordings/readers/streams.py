@@ -1,4 +1,4 @@
-"""Recordings that come as a stream of bytes: kept in a file while they are read."""
+"""Recordings from a byte stream, stored in a temporary file for reading."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,12 +11,12 @@ from thermocomp.recordings.readers.limits import FileLimits
 
 @contextmanager
 def spooled(stream: BinaryIO, owner: str) -> Iterator[Path]:
-    """Give a CSV file with what a stream holds; it is removed at the end.
+    """Provide a CSV file with the content of a stream; it is removed at the end.
 
     Raises
     ------
     RecordingError
-        It holds more than a file may.
+        The content exceeds the maximum size of a file.
     """
     with scratch() as folder:
         path = folder / "stdin.csv"

@@ -1,4 +1,4 @@
-"""Raw tables, their cells not yet understood: what all kinds of files share."""
+"""Raw tables with uninterpreted cells: common part of all file formats."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -14,27 +14,27 @@ from thermocomp.core.exceptions import RecordingError, Remedy
 from thermocomp.recordings.readers.limits import FileLimits
 from thermocomp.recordings.readers.numbers import Notation, Signs, is_filler, is_number_like, is_word
 
-#: before thermocomp's own description of the columns, as a comment line or a Parquet attribute
+#: key of the column description embedded by thermocomp, in a comment line or a Parquet attribute
 EMBEDDED = "thermocomp"
-#: cells that tell what a column holds
+#: maximum number of cells used to determine the kind of a column
 _HEAD = 100
-#: places of cells that are listed
+#: maximum number of cell locations listed
 _MOST_TOLD = 40
 _UNGROUPED = re.compile(r"[-+]?\d{4}")
 
-#: what a spreadsheet calculates, perhaps behind apostrophes
+#: start of a text that a spreadsheet evaluates, optionally after apostrophes
 _FORMULA = re.compile(r"'*[=+\-@\t\r\n\u240d\u240a]")
 _LINE_ENDS, _LINE_SIGNS = {13: "\u240d", 10: "\u240a"}, {0x240D: "\r", 0x240A: "\n"}
-#: heading of an index that had none
+#: heading that pandas gives to an index without one
 _NAMELESS = re.compile(r"Unnamed: \d+")
 
 
 class FileTable(Protocol):
-    """The cells of a file before anybody knows what its columns mean."""
+    """The cells of a file before the meaning of its columns is determined."""
 
     @property
     def path(self) -> Path:
-        """The file, for messages."""
+        """Path of the file, for messages."""
 
     @property
     def headings(self) -> tuple[str, ...]:
@@ -49,20 +49,20 @@ class FileTable(Protocol):
         """Notes for the user."""
 
     def is_number(self, column: int, *, empty: bool = True) -> bool:
-        """Return whether the first filled cell of a column is a number; `empty` if there is none."""
+        """Return whether the first non-empty cell of a column is a number; `empty` if there is none."""
 
     def head(self, column: int) -> list[str]:
-        """Return the first filled cells of a column, as texts; none of one that holds numbers by its type."""
+        """Return the first non-empty cells of a column as text; none for a column of a numeric type."""
 
     def load(self, numbers: Sequence[int], texts: Sequence[int]) -> tuple[pd.DataFrame, tuple[str, ...]]:
-        """Read some columns, as float64 and as text, and report the conversions.
+        """Read columns as float64 and as text, and return notes on the conversions.
 
-        The table's columns are named by position.
+        The columns of the returned table are named by position.
 
         Raises
         ------
         RecordingError
-            A cell of `numbers` holds text.
+            A cell of `numbers` contains text.
         """
 
     def place(self, row: int) -> str:
@@ -71,20 +71,20 @@ class FileTable(Protocol):
 
 @dataclass(frozen=True)
 class FrameTable:
-    """A sheet, which arrives as a whole.
+    """A sheet that is read as a whole.
 
     Parameters
     ----------
     path : Path
     headings : tuple of str
     frame : DataFrame
-        Cells as they are; columns named by position.
+        Unconverted cells; columns named by position.
     rows : sequence of int
-        Row in the file of each row of `frame`, from 1.
+        Row number in the file (1-based) of each row of `frame`.
     embedded : str
     notes : tuple of str
     decimal : str
-        Decimal sign of numbers that are texts, if it is known beforehand.
+        Decimal sign of numbers stored as text, if it is known beforehand.
     """
 
     path: Path
@@ -96,11 +96,11 @@ class FrameTable:
     decimal: str = ""
 
     def is_number(self, column: int, *, empty: bool = True) -> bool:
-        """Return whether the first filled cell of a column is a number; `empty` if there is none."""
+        """Return whether the first non-empty cell of a column is a number; `empty` if there is none."""
         return first_is_number(self.frame[column], empty=empty)
 
     def head(self, column: int) -> list[str]:
-        """Return the first filled cells of a column; see `FileTable.head`."""
+        """Return the first non-empty cells of a column; see `FileTable.head`."""
         return first_texts(self.frame[column])
 
     def load(self, numbers: Sequence[int], texts: Sequence[int]) -> tuple[pd.DataFrame, tuple[str, ...]]:
@@ -113,12 +113,12 @@ class FrameTable:
         return pd.DataFrame(data, copy=False), notes
 
     def place(self, row: int) -> str:
-        """Return the location of a row in the sheet or file, counted from 1."""
+        """Return the location of a row in the sheet or file (1-based)."""
         return f"row {self.rows[row]}"
 
 
 def first_is_number(cells: "pd.Series[Any]", *, empty: bool) -> bool:
-    """Return whether the first filled cell is a number.
+    """Return whether the first non-empty cell is a number.
 
     Parameters
     ----------
@@ -132,32 +132,32 @@ def first_is_number(cells: "pd.Series[Any]", *, empty: bool) -> bool:
 
 
 def first_texts(cells: "pd.Series[Any]") -> list[str]:
-    """Return the first cells of a column that hold something, as texts; none of a column of numbers."""
+    """Return the first non-empty cells of a column as text; none for a numeric column."""
     if pd.api.types.is_numeric_dtype(cells.dtype):
         return []
     return [text for text in map(str, cells.iloc[:_HEAD].dropna()) if not is_filler(text)]
 
 
 def as_floats(cells: "pd.Series[Any]") -> FloatArray:
-    """Return the cells of a column of numbers; nan where there is none."""
+    """Return the cells of a numeric column as floats; NaN where a cell is empty."""
     return cells.to_numpy(dtype=np.float64, na_value=np.nan)
 
 
 def clean_heading(cell: object) -> str:
-    """Return a heading as it was before other programs had it.
+    """Return a heading without the changes made by other programs.
 
-    White space at its ends is gone, the name that pandas gives an index without one, and the apostrophe before what a
-    spreadsheet would calculate (`defuse`).
+    Removed are white space at both ends, the pandas name of an index without heading, and the apostrophe before a text
+    that a spreadsheet would evaluate (`defuse`).
     """
     text = restore(str(cell).strip())
     return "" if _NAMELESS.fullmatch(text) else text
 
 
 def defuse(text: str) -> str:
-    """Return a text that no spreadsheet takes for a formula when it opens a CSV file, on one line.
+    """Return a single-line text that no spreadsheet evaluates as a formula when it opens a CSV file.
 
-    An apostrophe stands before ``=``, ``+``, ``-``, ``@``, a tab or a line's end; line ends become the signs for them.
-    `restore` turns it back.
+    An apostrophe is put before ``=``, ``+``, ``-``, ``@``, a tab or a line end; line ends are replaced by visible
+    symbols. `restore` reverses this.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def defuse(text: str) -> str:
 
 
 def restore(text: str) -> str:
-    """Turn back what `defuse` did.
+    """Reverse the changes of `defuse`.
 
     Parameters
     ----------
@@ -179,20 +179,20 @@ def restore(text: str) -> str:
 
 
 def check_headings(path: Path, headings: Sequence[str], n_rows: int, limits: FileLimits) -> None:
-    """Refuse a table that cannot be a recording, whatever its columns mean.
+    """Reject a table that cannot be a recording, whatever the meaning of its columns.
 
     Parameters
     ----------
     path : Path
     headings : sequence of str
     n_rows : int
-        Without that of the headings.
+        Number of rows without the headings.
     limits : FileLimits
 
     Raises
     ------
     RecordingError
-        No headings, numbers instead of headings, one column, no rows, or over a limit.
+        No headings, numbers in place of headings, one column, no rows, or a limit is exceeded.
     """
     limits.check_table(n_rows, len(headings), path)
     limits.check("heading_characters", max(map(len, headings), default=0), path)
@@ -255,7 +255,7 @@ def decide(signs: Signs, stated: str, delimiter: str, path: Path) -> Notation:
     Raises
     ------
     RecordingError
-        They can be read in two ways.
+        The numbers can be read in two ways.
     """
     try:
         return signs.decide(stated, delimiter) or Notation(".")
@@ -266,13 +266,13 @@ def decide(signs: Signs, stated: str, delimiter: str, path: Path) -> Notation:
 def convert_all(
     table: FileTable, columns: Mapping[int, "pd.Series[Any]"], decimal: str
 ) -> tuple[dict[int, FloatArray], tuple[str, ...]]:
-    """Read the numbers of columns whose cells are texts, all in one notation; see `convert`.
+    """Read the numbers of text columns, all in one notation; see `convert`.
 
     Parameters
     ----------
     table : FileTable
     columns : mapping of int to Series
-        By their position in `table`.
+        Cells by position of the column in `table`.
     decimal : str
         Decimal sign, if it is known beforehand.
     """
@@ -288,7 +288,7 @@ def convert_all(
 
 
 def tell_notation(notation: Notation) -> tuple[str, ...]:
-    """Return the number format in words, where it differs from Python's."""
+    """Return the number format as text if it differs from that of Python."""
     notes: tuple[str, ...] = ("the decimal sign is a comma",) if notation.decimal == "," else ()
     if notation.thousands:
         notes += (f"thousands are separated by {' or '.join(map(repr, notation.thousands))}",)
@@ -298,7 +298,7 @@ def tell_notation(notation: Notation) -> tuple[str, ...]:
 def convert(
     table: FileTable, column: int, cells: "pd.Series[Any]", notation: Notation
 ) -> tuple[FloatArray, tuple[str, ...]]:
-    """Read the numbers of a column whose cells are texts.
+    """Read the numbers of a text column.
 
     Parameters
     ----------
@@ -306,20 +306,20 @@ def convert(
     column : int
         Position of the column in `table`.
     cells : Series
-        Numbers, texts, and None where there is nothing.
+        Numbers, texts, and None in empty cells.
     notation : Notation
 
     Returns
     -------
     values : ndarray of shape (n_rows,)
-        nan where a word denotes a missing number.
+        NaN where a word denotes a missing number.
     notes : tuple of str
         Words found, and their locations.
 
     Raises
     ------
     RecordingError
-        A cell holds anything else; the message names it.
+        A cell contains any other text; the message names it.
     """
     values, odd = read_plain(cells, notation.decimal)
     words: dict[str, list[int]] = {}
@@ -345,19 +345,19 @@ def convert(
 
 
 def read_plain(cells: "pd.Series[Any]", decimal: str) -> tuple[FloatArray, BoolArray]:
-    """Return numbers without separators of thousands, and where a cell is filled with anything else."""
+    """Return numbers without thousands separators, and a mask of the cells with any other content."""
     filled = cells.notna().to_numpy()
     texts = cells.map(lambda c: isinstance(c, str)).to_numpy(dtype=np.bool_) if cells.dtype == object else filled
     plain = cells
     if decimal == "," and texts.any():
-        # a point is no part of a number where the comma is the decimal sign
+        # a point cannot be part of a number if the decimal sign is a comma
         swapped = cells[texts].astype("str").str.replace(".", "?", regex=False).str.replace(",", ".", regex=False)
         plain = cells.astype(object).where(~texts, swapped)
     good = pd.to_numeric(plain, errors="coerce").notna().to_numpy() & filled
     if cells.dtype == object:  # True counts as a number
         good &= ~cells.map(lambda c: isinstance(c, bool | np.bool_)).to_numpy(dtype=np.bool_)
     values = np.full(len(cells), np.nan)
-    # to the last digit, which pandas does not promise
+    # exact to the last digit, which pandas does not guarantee
     values[good] = plain[good].to_numpy(dtype=object).astype(np.float64)
     return values, filled & ~good
 
@@ -368,7 +368,7 @@ def tell_places(rows: Sequence[int], place: Callable[[int], str]) -> str:
 
 
 def _refuse_mixed(table: FileTable, column: int, cells: "pd.Series[Any]", grouped: int) -> None:
-    """Refuse thousands with and without separator in one column: the separator may be a decimal sign there."""
+    """Reject thousands with and without separator in one column, because the separator may be a decimal sign."""
     for row, cell in enumerate(cells):
         if isinstance(cell, str) and _UNGROUPED.match(cell.strip()):
             raise RecordingError(

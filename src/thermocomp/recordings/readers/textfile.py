@@ -1,4 +1,4 @@
-"""CSV files: how they are written is found out from the file, then pandas reads the columns asked for."""
+"""CSV files: the format is detected from the file, then pandas reads the selected columns."""
 
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
@@ -30,12 +30,12 @@ from thermocomp.recordings.readers.numbers import MISSING_TEXT, Notation, Signs,
 from thermocomp.recordings.readers.tables import check_headings, clean_heading, convert, decide, tell_notation
 from thermocomp.recordings.readers.textlines import Lines, count_cells, describe_ragged, is_utf8, open_lines, split_line
 
-#: lines that tell how the file is written; fewer if they are long
+#: maximum number of lines used to detect the format; fewer if they are long
 _SAMPLE_LINES = 100
 _SAMPLE_BYTES = 2 << 20
-_CHUNK = 100_000  # rows that are text in memory at a time
+_CHUNK = 100_000  # rows in memory as text at a time
 _MISSING = [text for t in MISSING_TEXT for text in {t, t.upper(), t.capitalize()}] + ["NaN", "-NaN"]
-# pandas before 3.1 may read the last digit wrong unless told
+# by default, pandas before 3.1 may read the last digit incorrectly
 _PANDAS = tuple(int(n) for n in pd.__version__.split(".")[:2])
 _EXACT: dict[str, Any] = {} if _PANDAS >= (3, 1) else {"float_precision": "round_trip"}
 
@@ -56,14 +56,14 @@ class CsvTable:
         Decimal sign, if it is known beforehand.
     encoding : str
     errors : {'strict', 'replace'}
-        Handling of bytes that are invalid in that encoding.
+        Handling of bytes that are invalid in the encoding.
     skipped : tuple of int
-        Lines that are no rows (headings, comments, blank ones), from 0.
+        Line numbers (0-based) of lines that are not rows: headings, comments, blank lines.
     n_rows : int
     embedded : str
     notes : tuple of str
     data : bytes or None
-        The whole file in UTF-8, where it had to be brought to that.
+        Content of the whole file in UTF-8, if conversion was necessary.
     """
 
     path: Path
@@ -80,13 +80,13 @@ class CsvTable:
     data: bytes | None = None
 
     def is_number(self, column: int, *, empty: bool = True) -> bool:
-        """Return whether the first filled cell of a column is a number; `empty` if the first rows have none."""
+        """Return whether the first non-empty cell of a column is a number; `empty` if the first rows have none."""
         cells = (row[column] for row in self.sample if column < len(row))
         first = next((c for c in cells if not is_filler(c)), None)
         return empty if first is None else is_number_like(first)
 
     def head(self, column: int) -> list[str]:
-        """Return the first filled cells of a column; see `thermocomp.recordings.readers.tables.FileTable.head`."""
+        """Return the first non-empty cells of a column; see `thermocomp.recordings.readers.tables.FileTable.head`."""
         return [row[column] for row in self.sample if column < len(row) and not is_filler(row[column])]
 
     def load(self, numbers: Sequence[int], texts: Sequence[int]) -> tuple[pd.DataFrame, tuple[str, ...]]:
@@ -101,14 +101,14 @@ class CsvTable:
                 frame = self._read_frame({**text, **dict.fromkeys(numbers, np.float64)}, decimal=decimal)
                 return frame, tell_notation(Notation(decimal))
         try:
-            # what pandas does not take for numbers stays text
+            # cells that pandas does not recognise as numbers stay text
             types = text if decimal else {**text, **dict.fromkeys(numbers, str)}
             frame = self._read_frame({**dict.fromkeys(numbers), **types}, decimal=decimal or ".")
         except ValueError as e:
             raise RecordingError(f"{self.path}: cannot be read as a table: {e}") from e
         written = [k for k in numbers if frame[k].dtype == bool or not pd.api.types.is_numeric_dtype(frame[k].dtype)]
         for k in written:
-            # pandas takes True for a number
+            # pandas reads True as a number
             frame[k] = frame[k].map(lambda cell: str(cell) if isinstance(cell, bool | np.bool_) else cell)
             signs.add(cell for cell in frame[k] if isinstance(cell, str))
         notation = decide(signs, decimal if self.decimal or signs.proven else "", self.delimiter, self.path)
@@ -120,13 +120,13 @@ class CsvTable:
         return frame, notes
 
     def _read_frame(self, types: dict[int, Any], **more: Any) -> pd.DataFrame:
-        """Read columns of some types, or of the one that pandas finds (None); a ValueError if they are not."""
+        """Read columns with given types, or with types detected by pandas (None); ValueError if a cell does not fit."""
         try:
             with pd.read_csv(
                 BytesIO(self.data) if self.data else self.path, **self._options(types), **more, **_EXACT
             ) as chunks:
                 frame: pd.DataFrame = pd.concat(chunks, ignore_index=True)
-        except IndexError as e:  # pandas meets an end of the file within a cell
+        except IndexError as e:  # the file ends within a cell
             raise ValueError("it contains no rows") from e
         except UnicodeDecodeError as e:
             raise RecordingError(
@@ -141,7 +141,7 @@ class CsvTable:
         return frame
 
     def place(self, row: int) -> str:
-        """Return the location of a row in the file, as a line counted from 1."""
+        """Return the location of a row in the file as a line number (1-based)."""
         line = row
         while (shifted := row + bisect_right(self.skipped, line)) != line:
             line = shifted
@@ -167,7 +167,7 @@ class CsvTable:
 
 
 def open_csv(path: Path, options: ReadOptions, limits: FileLimits) -> CsvTable:
-    """Find out how a text file is written: one pass over its lines, none of which is kept.
+    """Detect the format of a text file in a single pass over its lines, without storing them.
 
     Parameters
     ----------
@@ -179,7 +179,7 @@ def open_csv(path: Path, options: ReadOptions, limits: FileLimits) -> CsvTable:
     Raises
     ------
     RecordingError
-        Empty, binary, no heading line, no rows, one column, rows of unequal length, or over a limit.
+        Empty, binary, no heading line, no rows, one column, rows of unequal length, or a limit is exceeded.
     """
     data, told = bring_to_utf8(path, limits)
     lines = open_lines(path, data, options, limits)
@@ -236,22 +236,22 @@ def open_csv(path: Path, options: ReadOptions, limits: FileLimits) -> CsvTable:
 class _Head(NamedTuple):
     """Content of the first lines of a file."""
 
-    lines: list[tuple[int, bytes]]  #: with their numbers from 0
+    lines: list[tuple[int, bytes]]  #: with line numbers (0-based)
     delimiter: str
     layout: FileLayout
-    in_remark: bool  #: the headings stand in a comment, as numpy writes them
+    in_remark: bool  #: the headings are in a comment, as written by numpy
 
 
 class _Body(NamedTuple):
     """Result of a pass over all lines of a file."""
 
-    skipped: list[int]  #: lines that are no rows, from 0
+    skipped: list[int]  #: line numbers of lines that are not rows (0-based)
     width: int
     n_rows: int
     odd: list[bytes]  #: lines that are not UTF-8
-    again: list[int]  #: lines that repeat the headings, from 1
+    again: list[int]  #: line numbers of repeated headings (1-based)
     tail: list[tuple[int, bytes]]  #: the last rows
-    ragged: tuple[int, str] | None  #: first row of another width, and what is to be said of it
+    ragged: tuple[int, str] | None  #: first row with another number of cells, and the message about it
 
 
 def _read_head(lines: Lines) -> _Head:
@@ -268,7 +268,7 @@ def _read_head(lines: Lines) -> _Head:
 
 
 def _sample(content: Iterator[tuple[int, bytes]], top: int) -> list[tuple[int, bytes]]:
-    """Return the first lines; a few at least, however long they are."""
+    """Return the first lines: at least a few, whatever their length."""
     found: list[tuple[int, bytes]] = []
     size = 0
     for number, line in content:
@@ -290,7 +290,7 @@ def _scan(lines: Lines, head: _Head) -> _Body:
         if not line.isascii() and len(odd) < _SAMPLE_LINES and not is_utf8(line):
             odd.append(line)
         n_rows += number >= top
-        if n_rows <= 0 or line == heading:  # what stands above the rows; or of a logger that was started again
+        if n_rows <= 0 or line == heading:  # lines above the rows; headings repeated after a restart of the logger
             again += [number + 1] if n_rows > 0 else []
             n_rows -= n_rows > 0
             skipped.append(number)
@@ -318,17 +318,17 @@ def _scan(lines: Lines, head: _Head) -> _Body:
 def _find_table(
     path: Path, first: Sequence[tuple[int, bytes]], delimiter: str, limits: FileLimits
 ) -> tuple[str, FileLayout | None]:
-    """Choose the delimiter, unless it is given, under which most rows have as many cells as the headings."""
+    """Select the delimiter under which most rows have as many cells as the headings, unless it is given."""
     lines = [line.decode("utf-8" if is_utf8(line) else "latin-1") for _, line in first]
     best, best_layout, best_fit = delimiter or ",", None, (False, 0.0, 0)
     widest = 0
     for tried in delimiter or "\t;|, ":
-        if tried == " " and not delimiter:  # it stands inside headings and timestamps too: the last resort
+        if tried == " " and not delimiter:  # headings and timestamps contain spaces too: last resort
             if best_fit > (False, 0.0, 0):
                 continue
             limits.check("columns", widest, path)
         cells = max(line.count(tried) for line in lines) + 1
-        if cells > limits.columns + 1:  # one more may be empty
+        if cells > limits.columns + 1:  # the last cell may be empty
             widest = max(widest, cells)
             continue
         rows = [split_line(line, tried) for line in lines]

@@ -1,4 +1,4 @@
-"""Lines of text files: what is a row, what is none, and how a line is split into cells."""
+"""Lines of text files: recognition of rows and other lines, and splitting of lines into cells."""
 
 import csv
 import re
@@ -16,27 +16,27 @@ from thermocomp.recordings.readers.mapping import ReadOptions
 from thermocomp.recordings.readers.tables import EMBEDDED
 
 _BOM = b"\xef\xbb\xbf"
-_TAIL = 65536  # bytes at the end of a file in which remarks are looked for
-_BLANK = b' \t\r\n",;|'  # a spreadsheet's empty rows: ;;;;
+_TAIL = 65536  # bytes at the end of a file searched for remarks
+_BLANK = b' \t\r\n",;|'  # empty rows of a spreadsheet: ;;;;
 _SEPARATOR = re.compile(rb"(?:\xef\xbb\xbf)?\"?sep=([,;\t| ])\"?\r?\n", re.IGNORECASE)
-#: a spreadsheet puts quotation marks around the line
+#: start of the embedded column description; spreadsheets may put the line in quotation marks
 _OWN = (f"# {EMBEDDED}: ".encode(), f'"# {EMBEDDED}: '.encode())
 _KINDS = {b"PK\x03\x04": "a workbook or zip file", b"PAR1": "a Parquet file", b"\x1f\x8b": "a gzip file"}
 
 
 @dataclass(frozen=True)
 class Lines:
-    """The lines of a text file.
+    """Lines of a text file.
 
     Parameters
     ----------
     path : Path
     data : bytes or None
-        The whole file in UTF-8, where it had to be brought to that.
+        Content of the whole file in UTF-8, if conversion was necessary.
     options : ReadOptions
     limits : FileLimits
     returns : bool
-        There are carriage returns that end no line.
+        The file contains carriage returns that do not end a line.
     """
 
     path: Path
@@ -50,17 +50,17 @@ class Lines:
         return self.path.open("rb") if self.data is None else BytesIO(self.data)
 
     def content(self, skipped: list[int]) -> Iterator[tuple[int, bytes]]:
-        """Yield number, from 0, and text of each line that is neither blank nor a comment.
+        """Yield line number (0-based) and text of each line that is neither blank nor a comment.
 
         Parameters
         ----------
         skipped : list of int
-            The others are added to it.
+            List to which the numbers of the other lines are appended.
 
         Raises
         ------
         RecordingError
-            A line is longer than the limit, or holds a carriage return.
+            A line is longer than the limit, or contains a carriage return.
         """
         options, limits = self.options, self.limits
         comment, most = options.comment.encode(), limits.line_bytes
@@ -69,7 +69,7 @@ class Lines:
                 if len(raw) > most:
                     limits.check("line_bytes", len(raw), f"{self.path}: line {number + 1}")
                 line = raw.removeprefix(_BOM) if number == 0 else raw
-                # pandas would count lines otherwise than we do
+                # pandas would count lines differently
                 if self.returns and line.count(b"\r") > line.endswith(b"\r\n"):
                     raise RecordingError(
                         f"{self.path}: line {number + 1} contains a carriage return within the line, as in files of "
@@ -110,14 +110,14 @@ class Lines:
         return text.partition(": ")[2].strip()
 
     def read_tail(self, n_lines: int, skipped: list[int]) -> list[tuple[int, bytes]]:
-        """Return the last rows of the file with their numbers, without going through it again.
+        """Return the last rows of the file with their line numbers, without another pass over the file.
 
         Parameters
         ----------
         n_lines : int
-            Lines of the file.
+            Number of lines of the file.
         skipped : list of int
-            Those that are no rows.
+            Line numbers of lines that are not rows.
         """
         with self.open() as f:
             size = f.seek(0, SEEK_END)
@@ -128,14 +128,14 @@ class Lines:
         return [(number, line) for number, line in enumerate(lines, n_lines - len(lines)) if number not in passed]
 
     def separator(self) -> str:
-        """Return the delimiter that a spreadsheet writes into the first line of a file (``sep=;``), if it does."""
+        """Return the delimiter in the first line of a file, as written by spreadsheets (``sep=;``); empty if none."""
         with self.open() as f:
             found = _SEPARATOR.fullmatch(f.readline(16))
         return found[1].decode() if found else ""
 
 
 def open_lines(path: Path, data: bytes | None, options: ReadOptions, limits: FileLimits) -> Lines:
-    """Make sure that a file is text.
+    """Check that a file is text.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def open_lines(path: Path, data: bytes | None, options: ReadOptions, limits: Fil
     Raises
     ------
     RecordingError
-        It is something else.
+        The file is not text.
     """
     returns, last = 0, b""
     with path.open("rb") if data is None else BytesIO(data) as f:
@@ -167,10 +167,10 @@ def open_lines(path: Path, data: bytes | None, options: ReadOptions, limits: Fil
 def split_line(line: str, delimiter: str) -> list[str]:
     """Split a line into cells; a space as delimiter denotes any white space."""
     if delimiter == " ":
-        return re.split("[ \t]+", line.strip(" \t\r\n"))  # str.split takes more for white space than pandas
+        return re.split("[ \t]+", line.strip(" \t\r\n"))  # str.split accepts more characters as white space than pandas
     try:
         return next(csv.reader([line.rstrip("\r\n")], delimiter=delimiter, skipinitialspace=True))
-    except csv.Error:  # a cell is larger than the reader takes: no number and no name is
+    except csv.Error:  # a cell exceeds the limit of the reader, so that it is neither a number nor a name
         return line.rstrip("\r\n").split(delimiter)
 
 
@@ -182,15 +182,15 @@ def count_cells(line: bytes, delimiter: str) -> int:
 
 
 def describe_ragged(path: Path, number: int, cells: int, width: int, line: bytes, delimiter: str) -> str:
-    """Return the fault of a line that is too short or too long, and what to do.
+    """Return the fault of a line that is too short or too long, and the required action.
 
     Parameters
     ----------
     path : Path
     number : int
-        Number of the line, from 1.
+        Line number (1-based).
     cells, width : int
-        Number of its cells, and number of headings.
+        Number of cells of the line, and number of headings.
     line : bytes
     delimiter : str
     """

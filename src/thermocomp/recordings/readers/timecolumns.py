@@ -12,17 +12,17 @@ from thermocomp.recordings.readers.dayhalves import are_halves, says_halves
 from thermocomp.recordings.readers.mapping import Mapping, Place
 from thermocomp.recordings.readers.tables import FileTable
 
-#: headings of a time without unit, those that say more first
+#: headings of a time without unit, the more specific ones first
 _BARE = (
     *("timestamp", "datetime", "date_time", "date time", "date/time", "datum/uhrzeit", "datum/zeit", "datum uhrzeit"),
     *("datum und uhrzeit", "zeitstempel", "time stamp", "timestamps", "date and time", "date & time", "date&time"),
 )
-#: those that mean a time only beside a unit or another one
+#: headings that denote a time only with a unit or next to another time column
 _NEEDS_UNIT = ("t", "data", "tag", "day")
-#: headings of a date, and of the time of day beside it
+#: headings of a date, and of a time of day next to it
 _DATES = ("date", "datum", "fecha", "data", "tag", "day")
 _CLOCKS = ("time", "uhrzeit", "zeit", "heure", "hora", "ora", "clock", "time of day", "tijd", "čas", "czas")
-#: headings of year, month, day, hour, minute and second in columns of their own
+#: headings of separate columns for year, month, day, hour, minute and second
 _PARTS = (
     ("year", "jahr", "année", "anno", "año", "yyyy", "yr"),
     ("month", "monat", "mois", "mese", "mes", "mon", "mm"),
@@ -31,9 +31,9 @@ _PARTS = (
     ("minute", "minutes", "minuto", "min", "mi"),
     ("second", "seconds", "sekunde", "seconde", "secondo", "segundo", "sec", "ss"),
 )
-#: milliseconds beside a time of whole seconds
+#: headings of milliseconds in addition to a time in whole seconds
 _FRACTIONS = ("ms", "msec", "millisecond", "milliseconds", "millisekunden")
-#: names of a time that counts from the start of a test, even where it is written as a time of day
+#: names of a time since the start of a test, even if it is written as a time of day
 _PASSED = re.compile(
     r"elapsed|relativ|\brel\b|dauer|laufzeit|duration|dur[ée]e|durata|duraci|run[ _]?time|test[ _]?time|\bsince\b"
     r"|passed|verstrichen|vergangen|écoul|trascors"
@@ -41,18 +41,18 @@ _PASSED = re.compile(
 
 
 class TimePlan(NamedTuple):
-    """The columns that hold the time, by position."""
+    """Columns that contain the time, by position."""
 
     time: int
-    date: int | None  #: of the dates, where `time` holds a time of day
-    half: int | None  #: of AM and PM, where `time` holds times of day
-    fraction: int | None  #: of milliseconds that go with whole seconds
-    unused: tuple[int, ...]  #: further columns that hold dates
+    date: int | None  #: column of the dates, if `time` contains a time of day
+    half: int | None  #: column of AM and PM, if `time` contains times of day
+    fraction: int | None  #: column of milliseconds in addition to whole seconds
+    unused: tuple[int, ...]  #: further columns that contain dates
     notes: tuple[str, ...]
 
 
 def find_time(table: FileTable, meanings: Sequence[Meaning | None], mapping: Mapping, kinds: Kinds) -> TimePlan:
-    """Find the time column, and the column of dates where the time column holds only a time of day.
+    """Find the time column, and the column of dates if the time column contains only a time of day.
 
     Parameters
     ----------
@@ -61,12 +61,12 @@ def find_time(table: FileTable, meanings: Sequence[Meaning | None], mapping: Map
         Meanings of the headings.
     mapping : Mapping
     kinds : callable
-        Tells what a column holds.
+        Returns the kind of contents of a column.
 
     Raises
     ------
     RecordingError
-        There is no time column, or the mapping names one that is not there.
+        There is no time column, or the mapping names a column that does not exist.
     """
     notes: list[str] = []
     headings, source = table.headings, str(table.path)
@@ -92,22 +92,22 @@ def find_time(table: FileTable, meanings: Sequence[Meaning | None], mapping: Map
 
 
 def find_position(place: Place, headings: Sequence[str], table: str, source: str) -> int:
-    """Return the position of a column that a mapping names.
+    """Return the position of a column named in a mapping.
 
     Parameters
     ----------
     place : str or int
-        Its heading, or its number from 1.
+        Heading or 1-based number.
     headings : sequence of str
     table : str
         Table of the mapping, for messages.
     source : str
-        The file, for messages.
+        Name of the file, for messages.
 
     Raises
     ------
     RecordingError
-        There is no such column.
+        The column does not exist.
     """
     if isinstance(place, int):
         if 1 <= place <= len(headings):
@@ -128,14 +128,14 @@ def is_ignored(heading: str, index: int, mapping: Mapping) -> bool:
 
 
 def find_parts(headings: Sequence[str]) -> list[str]:
-    """Return the headings of columns that hold year, month, day, hour, minute and second of one time; or none."""
+    """Return the headings of separate columns for year, month, day, hour, minute and second; empty if none exist."""
     found = {next((k for k, words in enumerate(_PARTS) if _bare_name(h) in words), -1): h for h in reversed(headings)}
     parts = [found[k] for k in range(len(_PARTS)) if k in found]
     return parts if len(parts) > 2 or {3, 4} <= found.keys() else []
 
 
 def has_passed(heading: str) -> bool:
-    """Return whether a heading speaks of time that passed, no time of day."""
+    """Return whether a heading denotes an elapsed time, not a time of day."""
     return _PASSED.search(heading.casefold()) is not None
 
 
@@ -143,10 +143,10 @@ def _by_name(
     headings: Sequence[str], meanings: Sequence[Meaning | None], source: str, kinds: Kinds
 ) -> tuple[int, int | None, list[str]]:
     timed = {k: m for k, m in enumerate(meanings) if m is not None and m.unit.quantity == "time"}
-    # of two columns of one name the first is meant
+    # of two columns with one name the first is used
     plain = {plain_name(h): k for k, h in reversed(list(enumerate(headings)))}
     named = [k for k, m in timed.items() if is_time_name(m.base) and plain_name(headings[k]) not in _FRACTIONS]
-    clear = [k for k in named if timed[k].base != "T"]  # T_s may be the temperature of a surface
+    clear = [k for k in named if timed[k].base != "T"]  # T_s may be a surface temperature
     if clear:
         return clear[0], None, []
     date = next((plain[name] for name in _DATES if name in plain), None)
@@ -176,7 +176,7 @@ def _by_name(
 
 
 def _by_cells(headings: Sequence[str], kinds: Kinds) -> tuple[int, int | None, list[str]] | None:
-    """Find the only column of dates with a time of day, or the only ones of dates and of times of day."""
+    """Find the only column of dates with a time of day, or the only columns of dates and of times of day."""
     held = [kinds(k) for k in range(len(headings))]
     if held.count("stamp") == 1:
         time = held.index("stamp")
@@ -192,7 +192,7 @@ def _tell_pair(headings: Sequence[str], time: int, date: int) -> str:
 
 
 def _paired(time: int, headings: Sequence[str], mapping: Mapping, kinds: Kinds) -> tuple[int, int | None]:
-    """Return the column of the times of day and that of their dates, if one of them was found and both are there."""
+    """Return the columns of the times of day and of their dates, if one of them was found and both exist."""
 
     def others(kind: str, names: Sequence[str]) -> list[int]:
         found = [
@@ -200,7 +200,7 @@ def _paired(time: int, headings: Sequence[str], mapping: Mapping, kinds: Kinds) 
             for k, heading in enumerate(headings)
             if k != time and kinds(k) == kind and not is_ignored(heading, k, mapping) and not has_passed(heading)
         ]
-        # the next one, but first those of a name that says it
+        # the nearest column, but matching names first
         return sorted(found, key=lambda k: (plain_name(headings[k]) not in names, abs(k - time)))
 
     kind = kinds(time)

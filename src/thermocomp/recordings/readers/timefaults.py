@@ -1,4 +1,4 @@
-"""Times that cannot be those of a recording: they fall, or the clock was set."""
+"""Invalid times of a recording: decreasing times, or clock changes."""
 
 from typing import Any, NoReturn
 
@@ -18,16 +18,16 @@ _ZONE = (
 
 
 def refuse_falling(wrong: IntArray, time: FloatArray, shown: "pd.Series[Any]", start: str, file: FileCells) -> NoReturn:
-    """Refuse times that do not rise.
+    """Raise the error for times that do not increase.
 
     Parameters
     ----------
     wrong : ndarray of int
-        Rows that do not come after the one before them.
+        Rows that are not later than the previous row.
     time : ndarray of shape (n_rows,)
         [s]
     shown : Series
-        Times as the file has them.
+        Times as written in the file.
     start : str
         Date and time of the first row; empty if there is none.
     file : FileCells
@@ -35,7 +35,7 @@ def refuse_falling(wrong: IntArray, time: FloatArray, shown: "pd.Series[Any]", s
     Raises
     ------
     RecordingError
-        They do not, with the first row.
+        Always; the message names the first row.
     """
     is_stamp, table = file.is_stamp, file.table
     row, local = int(wrong[0]), is_stamp and pd.Timestamp(start).tzinfo is None
@@ -45,7 +45,7 @@ def refuse_falling(wrong: IntArray, time: FloatArray, shown: "pd.Series[Any]", s
     steps = np.diff(time)
     if len(steps) > 1 and (steps < 0).all():
         raise RecordingError(f"{text}: the newest row comes first; sort the rows by time, the oldest first")
-    # a clock that is set back falls by an hour less one interval
+    # setting a clock back causes a step of minus one hour plus one interval
     recorded = bool(abs(steps[row - 1] - np.median(steps) + 3600) < 300)
     if local and (recorded or _may_be_set_back(start, time, row)):
         when = "" if recorded else " while nothing was recorded"
@@ -69,7 +69,7 @@ def refuse_falling(wrong: IntArray, time: FloatArray, shown: "pd.Series[Any]", s
 
 
 def _may_be_set_back(start: str, time: FloatArray, row: int) -> bool:
-    """Return whether a row precedes another on a Sunday in the night on which clocks are set back."""
+    """Return whether a decrease between two rows falls on a Sunday in the night when clocks are set back."""
     if not start or time[row] < time[row - 1] - 3600:
         return False
     before, after = (pd.Timestamp(start) + pd.Timedelta(seconds=time[k]) for k in (row - 1, row))
@@ -77,7 +77,7 @@ def _may_be_set_back(start: str, time: FloatArray, row: int) -> bool:
 
 
 def refuse_passed(time: FloatArray, start: str, file: FileCells) -> None:
-    """Refuse times that begin with zero and continue across a change of date: they are elapsed times.
+    """Reject times that start at zero and continue across a change of date, because they are elapsed times.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def refuse_passed(time: FloatArray, start: str, file: FileCells) -> None:
     Raises
     ------
     TwoReadingsError
-        They do.
+        The times are elapsed times.
     """
     if file.times.date is None or file.mapping.time.format or not start:
         return
@@ -112,7 +112,7 @@ def refuse_passed(time: FloatArray, start: str, file: FileCells) -> None:
 
 
 def refuse_set_forward(time: FloatArray, start: str, file: FileCells) -> None:
-    """Refuse a gap of an hour where clocks are set forward: the file does not state whether an hour passed.
+    """Reject a gap of an hour at the time when clocks are set forward, because its real duration is unknown.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def refuse_set_forward(time: FloatArray, start: str, file: FileCells) -> None:
     Raises
     ------
     TwoReadingsError
-        There is one.
+        There is such a gap.
     """
     steps = np.diff(time)
     usual = float(np.median(steps)) if steps.size else np.inf

@@ -1,4 +1,4 @@
-"""Formats that fit times which are in no form that is known."""
+"""Suggested formats for times in an unknown form."""
 
 import re
 from itertools import product
@@ -17,17 +17,17 @@ _CLOCKS = (
     *("%I:%M:%S %p", "%I:%M %p"),
 )
 _ALONE = ("%M:%S.%f", "%H.%M.%S", "%H-%M-%S", "%Hh%M", "%Hh%Mm%Ss")
-#: what the letters stand for that are not of one or two digits
+#: patterns of format letters other than one or two digits
 _LETTERS = {
     **{"Y": r"\d{4}", "j": r"\d{3}", "f": r"\d+", "p": "[AaPp][Mm]"},
     **dict.fromkeys("bB", r"[^\W\d_]{3,9}"),
 }
-#: formats that are offered
+#: maximum number of formats suggested
 _MOST = 3
 
 
 def find_formats(cells: "pd.Series[str]") -> list[str]:
-    """Return formats in which all cells are times, in the letters of `datetime.strptime`."""
+    """Return formats that fit all cells as times, in the letters of `datetime.strptime`."""
     first = cells.iloc[0].strip()
     joined = (f"{date}{join}{clock}" for date, join, clock in product(_DATES, (" ", "T", "-", "_", ""), _CLOCKS))
     fitting = [form for form in (*_ALONE, *joined) if _fits(first, form)]
@@ -35,7 +35,7 @@ def find_formats(cells: "pd.Series[str]") -> list[str]:
 
 
 def _fits(cell: str, form: str) -> bool:
-    """Return whether a cell is written in a format, and nothing in it is read by half."""
+    """Return whether a cell matches a format completely, without digits lost in conversion."""
     if not re.fullmatch(
         re.sub(r"%(.)", lambda m: _LETTERS.get(m[1], r"\d\d?"), re.sub(r"[.-]", r"\\\g<0>", form)), cell
     ):

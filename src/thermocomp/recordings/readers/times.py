@@ -16,10 +16,10 @@ from thermocomp.recordings.readers.tables import tell_places
 from thermocomp.recordings.readers.timefaults import refuse_falling, refuse_passed, refuse_set_forward
 from thermocomp.recordings.readers.timehints import find_formats
 
-#: seconds since 1970 between the years 2000 and 2100, whole or in parts of a second
+#: seconds since 1970 in the years 2000 to 2100, in whole or fractional seconds
 _EPOCH = 946684800.0, 2240611200.0
 _PARTS = {1: "seconds", 1000: "milliseconds", 1000000: "microseconds", 1000000000: "nanoseconds"}
-#: days since 1899-12-30, as spreadsheets count, between the same years
+#: spreadsheet day numbers (days since 1899-12-30) of the same years
 _SERIAL = 36526.0, 73050.0
 _SERIAL_BEGIN = -25569 * 86400
 _DATE_WORDS = ("date", "datum", "dat", "stamp", "stempel", "fecha")
@@ -27,27 +27,27 @@ _DAY = 86_400_000_000_000  # [ns]
 
 
 def read_times(file: FileCells, *, rising: bool) -> tuple[FloatArray, str, tuple[str, ...]]:
-    """Read the times of a recording's rows.
+    """Read the times of the rows of a recording.
 
     Parameters
     ----------
     file : FileCells
     rising : bool
-        Each must be later than the one before; else it must not be earlier.
+        Each time must be later than the previous one; otherwise it must not be earlier.
 
     Returns
     -------
     time : ndarray of shape (n_rows,)
         Seconds since the first row [s].
     start : str
-        ISO timestamp of the first row; empty if it is not known.
+        ISO timestamp of the first row; empty if unknown.
     notes : tuple of str
-        Notes on how it was read, where that is not plain.
+        Notes on the interpretation, if it is not obvious.
 
     Raises
     ------
     RecordingError
-        A time is missing, cannot be read, can be read in two ways, or does not rise.
+        A time is missing, cannot be read, can be read in two ways, or does not increase.
     """
     times, beside, table, source = file.times, file.columns.beside, file.table, file.source
     shown, zone = file.cells[times.time], file.mapping.time.zone
@@ -91,7 +91,7 @@ def read_times(file: FileCells, *, rising: bool) -> tuple[FloatArray, str, tuple
 
 
 def _read_stamps(cells: "pd.Series[Any]", file: FileCells) -> tuple[FloatArray, str, tuple[str, ...]]:
-    """Read timestamps, times of day, or durations; mixed offsets (summer time) are brought to one clock."""
+    """Read timestamps, times of day, or durations; mixed UTC offsets (daylight saving) are converted to one clock."""
     wanted = file.mapping.time.format
     _refuse_missing(cells.isna().to_numpy(), file)
     if pd.api.types.is_timedelta64_dtype(cells.dtype):
@@ -128,7 +128,7 @@ def _read_stamps(cells: "pd.Series[Any]", file: FileCells) -> tuple[FloatArray, 
 
 
 def _join_dates(file: FileCells, date: int) -> "pd.Series[str]":
-    """Return dates followed by their times of day; where a format is given, as written in the file."""
+    """Return dates joined with their times of day; if a format is given, as written in the file."""
     dates, clocks, form = file.cells[date], file.cells[file.times.time], file.mapping.time.format
     lost = np.flatnonzero(dates.isna() & clocks.notna())
     if lost.size:
@@ -144,13 +144,13 @@ def _join_dates(file: FileCells, date: int) -> "pd.Series[str]":
 
 
 def _refuse_form(text: "pd.Series[str]", file: FileCells) -> NoReturn:
-    """Refuse times in a form that is not known, with formats that fit."""
+    """Raise the error for times in an unknown form, with formats that fit."""
     keys, forms, wanted = file.time_keys, find_formats(text), file.mapping.time.format
     ways = " or ".join(f'format = "{form}"' for form in forms) or "format, in the letters of strptime"
     hint = f"does not fit the format {wanted!r}" if wanted else "is not an ISO timestamp"
     if "date" in keys and not forms:
         ways += f'; if {keys["date"]!r} holds no dates, leave it out: role = "ignore"'
-    # minutes and seconds alone: the hours may be lost
+    # minutes and seconds only: the hours may be missing
     doubtful = len(forms) > 1 or not any(map(has_day, forms))
     raise (TwoReadingsError if doubtful and forms else RecordingError)(
         f"{file.at(0)}: {text.iloc[0].strip()!r} {hint}; state how it is written in a mapping: [time] {_told(keys)} "
@@ -187,7 +187,7 @@ def _read_clock(text: "pd.Series[Any]", file: FileCells) -> tuple[FloatArray, st
         )
         seconds = ((days * 24 + hours) * 60 + minutes) * 60 + rest
     _refuse_unlike(~np.isfinite(seconds), text, f"a time like {first!r}", file)
-    # exact where the file has no more than nanoseconds
+    # exact if the file has no finer resolution than nanoseconds
     whole = np.rint(seconds * 1e9).astype(np.int64)
     steps = np.diff(whole)
     usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
@@ -200,7 +200,7 @@ def _read_clock(text: "pd.Series[Any]", file: FileCells) -> tuple[FloatArray, st
 
 
 def _read_numbers(raw: FloatArray, file: FileCells) -> tuple[FloatArray, str, tuple[str, ...]]:
-    """Read times that are numbers: seconds that passed, or counted from 1970 or as spreadsheets count days."""
+    """Read numeric times: elapsed seconds, seconds since 1970, or spreadsheet day numbers."""
     heading = file.heading
     if file.columns.time_unit:
         unit = find_unit(file.columns.time_unit, "time")
@@ -223,7 +223,7 @@ def _read_numbers(raw: FloatArray, file: FileCells) -> tuple[FloatArray, str, tu
         note = f"{heading!r} is taken as days since 1899-12-30, as Excel counts"
         return (milliseconds - milliseconds[0]) / 1e3, start, (note,)
     ways: list[dict[str, str]] = [{"unit": unit} for unit in find_likely_units(raw)]
-    if compact := raw.min() > 19e12 and raw.max() < 21e12:  # written without signs: 20240305080010
+    if compact := raw.min() > 19e12 and raw.max() < 21e12:  # digits without separators: 20240305080010
         ways = [{"format": "%Y%m%d%H%M%S"}]
     raise (RecordingError if compact else TwoReadingsError)(
         f"{file.source}: column {heading!r} holds numbers from {raw[0]:.14g} to {raw[-1]:.14g} and has no unit: "
@@ -234,7 +234,7 @@ def _read_numbers(raw: FloatArray, file: FileCells) -> tuple[FloatArray, str, tu
 
 
 def find_likely_units(raw: FloatArray) -> tuple[str, ...]:
-    """Return the units that numbers may be times in: rows 50 ms to an hour apart, over a minute at least.
+    """Return the possible units of numeric times: rows 50 ms to an hour apart, total duration at least a minute.
 
     Parameters
     ----------
@@ -243,7 +243,7 @@ def find_likely_units(raw: FloatArray) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        The likeliest first; none where they are not times of a test.
+        Possible units, most likely first; empty if the numbers are not times of a test.
     """
     if len(raw) < 2 or not (np.diff(raw) > 0).all():
         return ()
@@ -253,11 +253,11 @@ def find_likely_units(raw: FloatArray) -> tuple[str, ...]:
 
 
 def _in_zone(time: FloatArray, start: str, zone: str, where: str) -> tuple[FloatArray, str]:
-    """Return times and the first timestamp of a clock that follows daylight saving."""
+    """Return times and the first timestamp of a clock with daylight saving."""
     local = pd.DatetimeIndex(pd.Timestamp(start) + pd.to_timedelta(time, unit="s"))
     try:
         zoned = local.tz_localize(zone, ambiguous="infer")
-    except ValueError as e:  # an hour that the zone does not have, or has twice without a way to tell
+    except ValueError as e:  # an hour that does not exist in the zone, or occurs twice and is ambiguous
         raise RecordingError(f"{where}: these are not times in {zone}: {e}; correct [time] zone in the mapping") from e
     return _seconds(pd.Series(zoned - zoned[0])), zoned[0].isoformat()
 
@@ -272,7 +272,7 @@ def _refuse_missing(missing: BoolArray, file: FileCells) -> None:
 
 
 def _refuse_unlike(odd: BoolArray, text: "pd.Series[str]", what: str, file: FileCells) -> None:
-    """Refuse cells that are not like the first one."""
+    """Raise the error for cells in a form different from the first one."""
     if odd.any():
         row = int(odd.argmax())
         raise file.refuse_row(row, f"{text.iloc[row]!r} is not {what}; correct or delete the row")

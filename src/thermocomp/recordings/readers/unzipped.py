@@ -1,4 +1,4 @@
-"""Size limits of a workbook when unzipped: all of it is counted before it is parsed."""
+"""Size limits of unzipped workbooks: the whole content is measured before it is parsed."""
 
 import zipfile
 from pathlib import Path
@@ -7,26 +7,26 @@ from xml.parsers import expat
 from thermocomp.core.exceptions import RecordingError
 from thermocomp.recordings.readers.limits import FileLimits
 
-#: what an element of XML counts, in bytes: it costs time, however short it is
+#: equivalent size of an XML element in bytes, because even a short one takes time
 _ELEMENT = 72
 _BLOCK = 1 << 16
-#: elements whose content is done with at their end, by the root of the part
+#: elements that are processed completely at their end, by root element of the part
 _DONE_WITH = {"worksheet": "row", "sst": "si", "document-content": "table-row"}
-#: longest name of a cell that a spreadsheet has
+#: length of the longest cell name in a spreadsheet
 _PLACE = len("XFD1048576")
 
 
 def check_unzipped(path: Path, limits: FileLimits) -> None:
-    """Refuse a zip bomb, and XML that would take much more memory or time than its size.
+    """Reject a zip bomb, and XML that would take much more memory or time than its size suggests.
 
-    What the zip file says of its sizes is not believed. Parts of a workbook never define entities.
+    Sizes stated in the zip file are not trusted. Parts of a valid workbook never define entities.
 
     Raises
     ------
     RecordingError
-        See `FileLimits.check`; or a part defines its own kind of XML.
+        See `FileLimits.check`; or a part contains a document type definition.
     zipfile.BadZipFile
-        It is no zip file.
+        The file is not a zip file.
     """
     unpacked = 0
     with zipfile.ZipFile(path) as parts:
@@ -40,7 +40,7 @@ def check_unzipped(path: Path, limits: FileLimits) -> None:
 
 
 class _Survey:
-    """Counts the elements of one part, and the longest text and row in it."""
+    """Counter of the elements of one part, and of the longest text and row in it."""
 
     def __init__(self, where: str, limits: FileLimits) -> None:
         self.where = where
@@ -53,7 +53,7 @@ class _Survey:
 
     @property
     def unpacked(self) -> int:
-        """Bytes, or what the elements count if that is more."""
+        """Unpacked size in bytes, or the equivalent size of the elements if larger."""
         return max(self.size, _ELEMENT * self.elements)
 
     def take(self, block: bytes) -> None:
@@ -63,7 +63,7 @@ class _Survey:
         try:
             self.parser.Parse(block)
         except expat.ExpatError:
-            self.parser = None  # a picture, or damaged: who reads it stops here as well
+            self.parser = None  # a picture, or damaged: the actual reader stops here as well
             return
         self.limits.check("line_bytes", self.size - self.last, self.where)
 

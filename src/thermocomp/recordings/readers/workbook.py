@@ -1,4 +1,4 @@
-"""Workbooks (XLSX, ODS): sheets are streamed, after a look at what they become when they are unzipped."""
+"""Workbooks (XLSX, ODS): sheets are streamed, after a check of their unzipped size."""
 
 import math
 import re
@@ -31,13 +31,13 @@ from thermocomp.recordings.readers.mapping import ReadOptions
 from thermocomp.recordings.readers.tables import FrameTable, check_headings, clean_heading
 from thermocomp.recordings.readers.unzipped import check_unzipped
 
-#: rows that tell where a table begins; fewer if they are wide, or if nothing stands in them
+#: maximum number of rows used to find the start of a table; fewer if they are wide or empty
 _SAMPLE = 100
 _SAMPLE_CELLS = 10_000
 _SAMPLE_PLACES = 10_000
-#: cells that are kept as objects; more become numbers first
+#: maximum number of cells stored as objects; further ones are converted to numbers
 _CHUNK = 200_000
-#: bits of a whole number that no float holds
+#: number of bits of an integer that is too large for a float
 _LARGE = 1024
 _OFFICE, _TABLE, _TEXT = (
     f"{{urn:oasis:names:tc:opendocument:xmlns:{part}:1.0}}" for part in ("office", "table", "text")
@@ -50,24 +50,24 @@ Sheets = dict[str, Callable[[], Generator[Row]]]
 
 
 def open_workbook(path: Path, options: ReadOptions, limits: FileLimits) -> FrameTable:
-    """Open the sheet of a workbook that holds a recording.
+    """Open the sheet of a workbook that contains a recording.
 
     Parameters
     ----------
     path : Path
-        Ending in .xlsx or .ods.
+        Path with extension .xlsx or .ods.
     options : ReadOptions
     limits : FileLimits
 
     Raises
     ------
     RecordingError
-        It is not a workbook, it is over a limit, it holds no recording, or several sheets may be it.
+        The file is not a workbook, exceeds a limit, contains no recording, or several sheets may be the recording.
     """
     try:
         check_unzipped(path, limits)
         with ExitStack() as stack:
-            stack.enter_context(warnings.catch_warnings(action="ignore"))  # of styles and the like
+            stack.enter_context(warnings.catch_warnings(action="ignore"))  # about styles and similar
             sheets = _ods_sheets(path, limits) if path.suffix.lower() == ".ods" else _xlsx_sheets(path, stack, limits)
             limits.check("sheets", len(sheets), path)
             name, notes = _choose(path, sheets, options)
@@ -76,7 +76,7 @@ def open_workbook(path: Path, options: ReadOptions, limits: FileLimits) -> Frame
         raise MissingExtraError("study", "openpyxl") from e
     except (InputError, OSError):
         raise
-    except Exception as e:  # whatever a damaged file makes of two parsers
+    except Exception as e:  # any error that a damaged file causes in two parsers
         raise RecordingError(
             f"{path}: is not a workbook, or a damaged one ({type(e).__name__}: {e}); save it again"
         ) from e
@@ -166,13 +166,13 @@ def _table(
 
 
 def _count_remarks(head: Sequence[Row], tail: Sequence[Row]) -> int:
-    """Count the rows at the end of a sheet that are none of its table."""
+    """Count the rows at the end of a sheet that are not part of its table."""
     width = max(map(len, (*head, *tail)), default=0)
     return find_end(*([[*map(_text, row), *[""] * (width - len(row))] for row in part] for part in (head, tail)))
 
 
 class _Body:
-    """The rows of a sheet, column by column; numbers are kept as numbers, not as objects."""
+    """Rows of a sheet, stored by column; numbers are stored as numbers, not as objects."""
 
     def __init__(self) -> None:
         self.rows: list[Row] = []
@@ -186,7 +186,7 @@ class _Body:
             self._pack()
 
     def close(self, before: list[Row]) -> list[Column]:
-        """Return the columns, with the rows that come before those that were added."""
+        """Return the columns, with the rows `before` at the start."""
         self._pack()
         self.rows = before
         self._pack()
@@ -216,7 +216,7 @@ def _column(cells: Row) -> Column:
 
 
 def _holds_cells(row: Row) -> bool:
-    """Return whether a row holds something, and is no remark (#)."""
+    """Return whether a row has contents and is not a remark (#)."""
     first = next((cell for cell in row if cell is not None), None)
     return first is not None and not (isinstance(row[0], str) and row[0].lstrip().startswith("#"))
 
@@ -233,7 +233,7 @@ def _trimmed(row: Sequence[Any]) -> Row:
 
 
 def _plain(cell: object) -> object:
-    """Return a cell as the text readers of times know it; numbers as they are, beyond the floats infinite."""
+    """Return a cell as text in the form expected by the time readers; numbers unchanged, infinite if too large."""
     if isinstance(cell, int):
         return cell if cell.bit_length() < _LARGE else (math.inf if cell > 0 else -math.inf)
     if isinstance(cell, datetime):
@@ -249,10 +249,10 @@ def _xlsx_sheets(path: Path, stack: ExitStack, limits: FileLimits) -> Sheets:
 
     def rows(name: str) -> Generator[Row]:
         sheet = book[name]
-        sheet.reset_dimensions()  # what a file says of its size may be wrong
+        sheet.reset_dimensions()  # the size stated in the file may be wrong
         cells = due = 0
         for row in sheet.iter_rows(values_only=True):
-            cells += len(row)  # empty ones, too
+            cells += len(row)  # including empty ones
             if cells > due:
                 limits.check_unpacked(8 * cells, path)
                 due = cells + _CHUNK
@@ -269,7 +269,7 @@ def _ods_sheets(path: Path, limits: FileLimits) -> Sheets:
 
 
 def _ods_rows(path: Path, wanted: int, limits: FileLimits) -> Generator[Row]:
-    """Yield the rows of a sheet; empty ones only where something comes after them."""
+    """Yield the rows of a sheet; empty rows only if other rows follow."""
     with zipfile.ZipFile(path) as parts, parts.open("content.xml") as content:
         number, table, empty = -1, None, 0
         for event, element in ElementTree.iterparse(content, ("start", "end")):
@@ -287,7 +287,7 @@ def _ods_rows(path: Path, wanted: int, limits: FileLimits) -> Generator[Row]:
                         for _ in range(times):
                             yield row
                     empty = 0 if row else empty + times
-                table.clear()  # of rows that are read nothing stays
+                table.clear()  # frees the memory of rows already read
 
 
 def _ods_cells(row: ElementTree.Element, most: int) -> Row:
@@ -298,7 +298,7 @@ def _ods_cells(row: ElementTree.Element, most: int) -> Row:
         if value is None:
             empty += times
             continue
-        # one more than may be read is told, not filled in
+        # one cell above the limit is enough to report an error; the others are not created
         cells += [None] * min(empty, most + 1)
         cells += [value] * min(times, most + 1)
         if len(cells) > most:

@@ -1,4 +1,4 @@
-"""From the 32 components to the error of the tool point by homogeneous transforms: no small angles."""
+"""From the 32 components to the error of the tool point by homogeneous transforms, without small-angle assumption."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,7 +12,7 @@ _UNIT = {"X": np.array([1.0, 0.0, 0.0]), "Y": np.array([0.0, 1.0, 0.0]), "Z": np
 
 
 def error(machine: Machine, values: FloatArray, points: FloatArray, tool: ArrayLike | None = None) -> FloatArray:
-    """Return the error of the tool's tip in the workpiece's frame.
+    """Return the error of the tool tip in the workpiece coordinate system.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ def error(machine: Machine, values: FloatArray, points: FloatArray, tool: ArrayL
     points : ndarray of shape (..., 3)
         Positions of the axes [mm].
     tool : array-like of shape (3,), optional
-        From the gauge point to the tip [mm]; the machine's own if not given.
+        Vector from the gauge point to the tip [mm]; default: that of the machine.
 
     Returns
     -------
@@ -31,9 +31,9 @@ def error(machine: Machine, values: FloatArray, points: FloatArray, tool: ArrayL
 
     Notes
     -----
-    Every body is turned about its reference point, which goes with it, and then moved by its position along its guide
-    and by its translations. Where the reference point stays with the workpiece's side, the body is moved by its
-    position first and then turned about that point.
+    Every body is rotated about its reference point, which moves with it, and then translated by its position along its
+    guide and by its translational errors. If the reference point is fixed on the workpiece side, the body is translated
+    by its position first and then rotated about that point.
     """
     tip = np.asarray(machine.tool if tool is None else tool, dtype=np.float64)
     shape = np.broadcast_shapes(values.shape[:-1], points.shape[:-1])
@@ -60,7 +60,7 @@ def error(machine: Machine, values: FloatArray, points: FloatArray, tool: ArrayL
 
 
 def _moved(machine: Machine, name: str, values: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the way along an axis, and what its guide, which is not square, and its three translations add [mm]."""
+    """Return the travel along an axis, and the additional effect of its squareness and translational errors [mm]."""
     position = points[..., "XYZ".index(name)]
     way = position - machine.axis(name).reference_position
     square = np.zeros((*position.shape, 3))
@@ -74,12 +74,12 @@ def _moved(machine: Machine, name: str, values: FloatArray, points: FloatArray) 
 
 
 def _three(values: FloatArray, first: str) -> FloatArray:
-    """Return three components that follow each other."""
+    """Return three consecutive components."""
     return values[..., INDEX[first] : INDEX[first] + 3]
 
 
 def _shifted(by: FloatArray) -> FloatArray:
-    """Return the transforms that shift by some mm, (..., 3) -> (..., 4, 4)."""
+    """Return the transforms for translations in mm, (..., 3) -> (..., 4, 4)."""
     matrix = np.zeros((*by.shape[:-1], 4, 4))
     matrix[..., range(4), range(4)] = 1.0
     matrix[..., :3, 3] = by
@@ -87,14 +87,14 @@ def _shifted(by: FloatArray) -> FloatArray:
 
 
 def _turned(about: FloatArray) -> FloatArray:
-    """Return the transforms that turn by a rotation vector in urad, (..., 3) -> (..., 4, 4), by Rodrigues' formula."""
+    """Return the transforms for rotation vectors in urad, (..., 3) -> (..., 4, 4), by Rodrigues' formula."""
     x, y, z = (1e-6 * about[..., k] for k in range(3))
     angle = np.sqrt(x * x + y * y + z * z)[..., None, None]
     cross = np.zeros((*about.shape[:-1], 3, 3))
     cross[..., 0, 1], cross[..., 0, 2], cross[..., 1, 2] = -z, y, -x
     cross[..., 1, 0], cross[..., 2, 0], cross[..., 2, 1] = z, -y, x
     matrix = np.zeros((*about.shape[:-1], 4, 4))
-    # (1 - cos) / angle^2 as a square of sinc: no loss of digits near zero
+    # (1 - cos) / angle^2 as a square of sinc avoids loss of digits near zero
     matrix[..., :3, :3] = (
         np.eye(3) + np.sinc(angle / np.pi) * cross + 0.5 * np.sinc(angle / 2.0 / np.pi) ** 2 * cross @ cross
     )

@@ -1,4 +1,4 @@
-"""`ErrorField`: a machine's error anywhere in its work volume, in one thermal state."""
+"""`ErrorField`: error of a machine anywhere in its work volume, in one thermal state."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,21 +14,21 @@ from thermocomp.runtime.geometry.kinematics import Kinematics
 
 FloatArray = NDArray[np.float64]
 
-#: a correction that has not settled by then never will: a step leaves some 1e-4 of the one before
+#: maximum number of iterations of a correction: each step leaves about 1e-4 of the previous change
 _STEPS = 10
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorField:
-    """Error components of a machine in one thermal state, and their effect at its tool point (C-08).
+    """Error components of a machine in one thermal state, and their effect at the tool point (C-08).
 
     Parameters
     ----------
     kinematics : Kinematics
-        The machine and its levers.
+        Machine with its levers.
     uniform : ndarray of shape (32,)
-        Components that are the same in the whole volume, in the order of `thermocomp.core.components.COMPONENTS`
-        [um, urad]; zero where one is in `varying`.
+        Components that are constant over the volume [um, urad], in the order of
+        `thermocomp.core.components.COMPONENTS`; zero for those in `varying`.
     varying : tuple of (int, PositionModel, sequence of float)
         Index of each other component, its model, and the outputs of that model's models of time.
     """
@@ -38,7 +38,7 @@ class ErrorField:
     varying: tuple[tuple[int, PositionModel, Sequence[float]], ...] = ()
 
     def components(self, points: ArrayLike) -> FloatArray:
-        """Return the components.
+        """Return the components at the given positions.
 
         Parameters
         ----------
@@ -57,7 +57,7 @@ class ErrorField:
         """
         places = check_finite("positions", points)
         xyz = coordinates(places)
-        # component by component in memory: each is computed at all points in one go
+        # component-major memory order: each component is computed at all points at once
         values = np.empty((len(self.uniform), *places.shape[:-1]))
         values[...] = self.uniform.reshape(-1, *(1,) * (places.ndim - 1))
         for k, model, factors in self.varying:
@@ -65,16 +65,16 @@ class ErrorField:
         return np.moveaxis(values, 0, -1)
 
     def error(self, points: ArrayLike, tool: ArrayLike | None = None, *, exact: bool = False) -> FloatArray:
-        """Return the error of the tool's tip.
+        """Return the error of the tool tip.
 
         Parameters
         ----------
         points : array-like of shape (..., 3)
             Positions of the axes [mm].
         tool : array-like of shape (3,), optional
-            From the gauge point to the tip [mm]; the machine's own if not given.
+            Vector from the gauge point to the tip [mm]; default: that of the machine.
         exact : bool
-            By homogeneous transforms instead of to first order in the angles.
+            True: homogeneous transforms; False: first order in the angles.
 
         Returns
         -------
@@ -95,7 +95,7 @@ class ErrorField:
         return self.kinematics.synthesize(values, places, tool)[0]
 
     def tilt(self, points: ArrayLike) -> FloatArray:
-        """Return the tilt of the tool against the workpiece, to first order.
+        """Return the tilt of the tool relative to the workpiece, to first order.
 
         Parameters
         ----------
@@ -118,32 +118,33 @@ class ErrorField:
     def correction(self, points: ArrayLike, tool: ArrayLike | None = None, *, tolerance: float = 0.01) -> FloatArray:
         """Return the value to add to the commanded position so that the tip is at its intended position.
 
-        Only axes that the machine has are corrected.
+        Only existing axes are corrected.
 
         Parameters
         ----------
         points : array-like of shape (..., 3)
             Commanded positions of the axes [mm].
         tool : array-like of shape (3,), optional
-            From the gauge point to the tip [mm]; the machine's own if not given.
+            Vector from the gauge point to the tip [mm]; default: that of the machine.
         tolerance : float
             Largest change in the last step of the iteration [um].
 
         Returns
         -------
         ndarray of shape (..., 3)
-            Along X, Y, Z; zero along an axis that is not there [um].
+            Along X, Y, Z; zero along a non-existent axis [um].
 
         Raises
         ------
         InputError
-            It does not settle within ten steps: the errors are no small ones. Or a position or the tool is not finite.
+            The iteration does not converge within ten steps (errors too large), or a position or the tool is not
+            finite.
 
         Notes
         -----
-        Moved by c the machine errs by e(P + c), not by e(P): c = -e(P + c), by exact transforms, solved by inserting.
-        Along an axis that is not there nothing moves: c is zero in each step, and what is left is e(P + c). Beyond the
-        travel the correction at its end is held: nothing was measured there, and levers and slopes must not continue.
+        At the position moved by c, the error is e(P + c), not e(P): c = -e(P + c) with exact transforms, solved by
+        iteration. Along a non-existent axis c is zero in each step, and e(P + c) remains. Outside the travel the
+        correction at its end is held: nothing was measured there, and levers and slopes must not be extrapolated.
         """
         machine = self.kinematics.machine
         places = np.clip(check_finite("positions", points), *self.kinematics.travel)
@@ -167,7 +168,7 @@ class ErrorField:
         point : array-like of shape (3,)
             Positions of the axes [mm].
         tool : array-like of shape (3,), optional
-            From the gauge point to the tip [mm]; the machine's own if not given.
+            Vector from the gauge point to the tip [mm]; default: that of the machine.
 
         Returns
         -------
@@ -185,7 +186,7 @@ class ErrorField:
 
 
 def check_finite(what: str, numbers: ArrayLike) -> FloatArray:
-    """Return an array of positions or a tool [mm]; raise `InputError` if a number in it is not finite."""
+    """Return an array of positions or a tool [mm]; raise `InputError` if a number is not finite."""
     found = np.asarray(numbers, dtype=np.float64)
     if not np.isfinite(found).all():
         raise InputError(f"{what}: must be finite numbers, found {found[~np.isfinite(found)][0]}")

@@ -1,9 +1,9 @@
 """From the 32 components to the error of the tool point, to first order (C-08).
 
-A machine is a chain from the workpiece to the tool. Every component is what the tool's side of its place in the chain
-does against the workpiece's side, actual minus commanded, in machine coordinates (ISO 841), whichever side moves: what
-an instrument between table and spindle reads. A turn e moves the tool's tip by e x lever; the lever goes from where the
-translations were measured to the tip.
+A machine is a chain from the workpiece to the tool. Every component is the motion of the tool side relative to the
+workpiece side at its place in the chain, actual minus commanded, in machine coordinates (ISO 841), regardless of which
+side moves: the value that an instrument between table and spindle reads. A rotation e moves the tool tip by e x lever;
+the lever is the vector from the point where the translations were measured to the tip.
 """
 
 from functools import cached_property
@@ -19,22 +19,22 @@ FloatArray = NDArray[np.float64]
 
 #: index of each component in the arrays of this package
 INDEX: dict[str, int] = {c.code: k for k, c in enumerate(COMPONENTS)}
-#: urad times mm are thousandths of a micrometre
+#: urad times mm are thousandths of a um
 _LEVER = 1e-3
 
 
 class Kinematics:
-    """The levers of a machine.
+    """Levers of a machine.
 
     Parameters
     ----------
     machine : Machine
-        Its structure, axes and reference points; its components play no part.
+        Machine with its structure, axes and reference points; its components are not used.
 
     Raises
     ------
     InputError
-        It has rotary axes: their errors and levers are not among the 32 components.
+        The machine has rotary axes: their errors and levers are not among the 32 components.
     """
 
     def __init__(self, machine: Machine) -> None:
@@ -50,14 +50,14 @@ class Kinematics:
 
     @cached_property
     def travel(self) -> tuple[FloatArray, FloatArray]:
-        """Lowest and highest positions, of shape (3,) each; infinite along an axis that is not there [mm]."""
+        """Lowest and highest positions, of shape (3,) each; infinite along a non-existent axis [mm]."""
         low, high = np.full(3, -np.inf), np.full(3, np.inf)
         for name, axis in self.axes.items():
             low["XYZ".index(name)], high["XYZ".index(name)] = axis.travel
         return low, high
 
     def lever(self, axis: str, points: FloatArray, tool: ArrayLike | None = None) -> FloatArray:
-        """Return the way from an axis' reference point to the tool's tip.
+        """Return the vector from the reference point of an axis to the tool tip.
 
         Parameters
         ----------
@@ -65,7 +65,7 @@ class Kinematics:
         points : ndarray of shape (..., 3)
             Positions of the axes [mm].
         tool : array-like of shape (3,), optional
-            From the gauge point to the tip [mm]; the machine's own if not given.
+            Vector from the gauge point to the tip [mm]; default: that of the machine.
 
         Returns
         -------
@@ -75,14 +75,14 @@ class Kinematics:
         return self._moving(axis) * points + (self._tool(tool) - self.reference(axis))
 
     def reference(self, axis: str) -> FloatArray:
-        """Return an axis' reference point from the gauge point with all axes at 0, of shape (3,) [mm]."""
+        """Return the reference point of an axis relative to the gauge point with all axes at 0, of shape (3,) [mm]."""
         found = self.axes[axis]
         return np.asarray(self._moving(axis) * np.asarray(found.measured_at) + np.asarray(found.measured_tool))
 
     def ways(self, axis: str) -> tuple[str, ...]:
-        """Return the axes whose ways since `Axis.measured_at` are levers of an axis.
+        """Return the axes whose travel from `Axis.measured_at` contributes to the lever of an axis.
 
-        Those beyond it; and itself, if the place where it was measured stays with the workpiece while it moves.
+        These are the axes beyond it, and the axis itself if its measuring point is fixed on the workpiece side.
         """
         itself = (axis,) if self.axes[axis].measured_on == "workpiece" else ()
         return (*itself, *self.structure.beyond(axis))
@@ -93,7 +93,7 @@ class Kinematics:
     def synthesize(
         self, values: FloatArray, points: FloatArray, tool: ArrayLike | None = None
     ) -> tuple[FloatArray, FloatArray]:
-        """Return error and tilt of the tool against the workpiece.
+        """Return the error of the tool tip and the tilt of the tool relative to the workpiece.
 
         Parameters
         ----------
@@ -102,7 +102,7 @@ class Kinematics:
         points : ndarray of shape (..., 3)
             Positions of the axes [mm].
         tool : array-like of shape (3,), optional
-            From the gauge point to the tip [mm]; the machine's own if not given.
+            Vector from the gauge point to the tip [mm]; default: that of the machine.
 
         Returns
         -------
@@ -127,7 +127,7 @@ class Kinematics:
         point : array-like of shape (3,)
             Positions of the axes [mm].
         tool : array-like of shape (3,), optional
-            From the gauge point to the tip [mm]; the machine's own if not given.
+            Vector from the gauge point to the tip [mm]; default: that of the machine.
 
         Returns
         -------
@@ -137,7 +137,7 @@ class Kinematics:
         return np.asarray(np.tensordot([1.0, *np.asarray(point, dtype=np.float64)], self._at_tool(tool), 1))
 
     def _at_tool(self, tool: ArrayLike | None) -> FloatArray:
-        """Return the effect of a component at the tip, per 1, x, y and z, of shape (4, 32, 3) [um per um, urad, mm]."""
+        """Return the effect of components at the tip, per 1, x, y and z, of shape (4, 32, 3) [um per um, urad, mm]."""
         if tool is None:
             return self._own
         maps = self._maps[:4].copy()
@@ -150,7 +150,7 @@ class Kinematics:
 
     @cached_property
     def _maps(self) -> FloatArray:
-        """Effect of a component at the tip, per 1, x, y, z and the three coordinates of the tool: (7, 32, 3)."""
+        """Effects of the components at the tip, per 1, x, y, z and the three coordinates of the tool: (7, 32, 3)."""
         maps = np.zeros((7, len(COMPONENTS), 3))
         once, position, tool = maps[0], maps[1:4], maps[4:]
         for name in self.axes:
@@ -182,7 +182,7 @@ def _turning(lever: FloatArray) -> FloatArray:
     return np.asarray(_LEVER * np.cross(np.eye(3), lever))
 
 
-#: what a component turns the tool by about X, Y and Z; a squareness moves a guide and turns nothing
+#: effect of each component on the tilt of the tool about X, Y and Z; a squareness turns a guide, not the tool
 _TILT = np.array(
     [
         [float(c.unit == "urad" and c.group != "squareness" and letter in c.code[:2]) for letter in "ABC"]

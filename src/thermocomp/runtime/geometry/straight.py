@@ -1,4 +1,4 @@
-"""Straight lines: what a controller that knows K0 + tanb (P - P0) per axis can correct, and what it leaves."""
+"""Straight lines: the part correctable by a controller with K0 + tanb (P - P0) per axis, and the remaining error."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,17 +16,17 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class StraightLine:
-    """The best straight line of one axis: least squares of the error along the axis over its travel.
+    """The best straight line of one axis: least squares fit of the error along the axis over its travel.
 
     Parameters
     ----------
     axis : {'X', 'Y', 'Z'}
     deviation : Deviation
-        The line; its reference position is that of the axis.
+        Fitted line; its reference position is that of the axis.
     along : Size
         Residual of the error along this axis, on the line through which it was fitted.
     volume : Size
-        The same over the work volume, when every axis is corrected by its own line.
+        The same over the work volume, with every axis corrected by its own line.
     """
 
     axis: str
@@ -42,16 +42,16 @@ class StraightLine:
 
 @dataclass(frozen=True)
 class StraightLines:
-    """The best straight line of every axis, and what they leave together.
+    """The best straight line of every axis, and the remaining error of all together.
 
     Parameters
     ----------
     at : tuple of float
         Positions of the other axes [mm].
     lines : tuple of StraightLine
-        One per axis of the machine, X first.
+        One line per axis of the machine, X first.
     before, after : Size
-        Length of the error vector over the work volume, without and with all lines.
+        Length of the error vector over the work volume, without and with the correction by all lines.
     """
 
     at: Vector
@@ -69,22 +69,22 @@ def straight_lines(
     grid: int = 9,
     exact: bool = False,
 ) -> StraightLines:
-    """Lay the best straight line through the error of every axis.
+    """Fit the best straight line to the error of every axis.
 
     Parameters
     ----------
     field : ErrorField
-        The machine in one thermal state.
+        Error field of the machine in one thermal state.
     at : array-like of shape (3,)
         Positions of the other axes while one moves [mm].
     tool : array-like of shape (3,), optional
-        From the gauge point to the tip [mm]; the machine's own if not given.
+        Vector from the gauge point to the tip [mm]; default: that of the machine.
     stations : int
-        Positions per axis, evenly over its travel, both ends included; at least 2.
+        Positions per axis, equally spaced over its travel including both ends; at least 2.
     grid : int
-        Points per axis of the grid over the work volume, borders included; at least 2.
+        Grid points per axis over the work volume including its borders; at least 2.
     exact : bool
-        By homogeneous transforms instead of to first order in the angles.
+        True: homogeneous transforms; False: first order in the angles.
 
     Returns
     -------
@@ -97,7 +97,7 @@ def straight_lines(
 
     Notes
     -----
-    What a correction c leaves at a position P is e(P + c) + c: the machine errs as it does where it then stands.
+    With a correction c at a position P, the remaining error is e(P + c) + c, since the machine moves to P + c.
     """
     machine = field.kinematics.machine
     place = check_finite("at", at)
@@ -138,7 +138,7 @@ def best_lines(
     stations: int = 41,
     exact: bool = False,
 ) -> dict[str, Deviation]:
-    """Lay the best straight line through the error of some axes, as `straight_lines`, without what they leave.
+    """Fit the best straight line to the error of selected axes, as `straight_lines`, without remaining errors.
 
     Parameters
     ----------
@@ -146,13 +146,13 @@ def best_lines(
     at : array-like of shape (3,)
         Positions of the other axes while one moves [mm].
     tool : array-like of shape (3,), optional
-        From the gauge point to the tip [mm]; the machine's own if not given.
+        Vector from the gauge point to the tip [mm]; default: that of the machine.
     axes : str
-        Axes to correct; those that the machine does not have are ignored.
+        Axes to correct; non-existent axes are ignored.
     stations : int
-        Positions per axis, evenly over its travel, both ends included; at least 2.
+        Positions per axis, equally spaced over its travel including both ends; at least 2.
     exact : bool
-        By homogeneous transforms instead of to first order in the angles.
+        True: homogeneous transforms; False: first order in the angles.
 
     Returns
     -------
@@ -171,7 +171,7 @@ def best_lines(
 
 
 def best_line(positions: FloatArray, errors: FloatArray, reference: float) -> Deviation:
-    """Return the straight line of least squares through errors.
+    """Return the least-squares straight line of errors against positions.
 
     Parameters
     ----------
@@ -200,7 +200,7 @@ def find_remaining_error(
     *,
     exact: bool = False,
 ) -> FloatArray:
-    """Return the error that is left when some axes are corrected.
+    """Return the remaining error with corrections of selected axes.
 
     Parameters
     ----------
@@ -208,11 +208,11 @@ def find_remaining_error(
     points : ndarray of shape (..., 3)
         Commanded positions of the axes [mm].
     corrections : mapping of str to Correction
-        By axis.
+        Corrections by axis.
     tool : array-like of shape (3,), optional
-        From the gauge point to the tip [mm]; the machine's own if not given.
+        Vector from the gauge point to the tip [mm]; default: that of the machine.
     exact : bool
-        By homogeneous transforms instead of to first order in the angles.
+        True: homogeneous transforms; False: first order in the angles.
 
     Returns
     -------

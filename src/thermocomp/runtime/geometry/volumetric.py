@@ -1,4 +1,4 @@
-"""`VolumetricModel`: a machine's components stepped from reading to reading, or replayed over a recording."""
+"""`VolumetricModel`: the components of a machine, stepped reading by reading or replayed over a recording."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -17,28 +17,28 @@ from thermocomp.runtime.geometry.kinematics import INDEX, Kinematics
 
 FloatArray = NDArray[np.float64]
 
-#: all that a volumetric model remembers between two readings
+#: state of a volumetric model between two readings
 VolumetricState = StackState
 
 
 class VolumetricModel:
-    """The components of a machine in the course of time.
+    """The error components of a machine as functions of time.
 
     Parameters
     ----------
     machine : Machine
-        A component that it does not define is zero.
+        Machine; components that it does not define are zero.
 
     Attributes
     ----------
     machine : Machine
     stack : Stack
-        Every model of time in it.
+        All its models of time.
 
     Raises
     ------
     InputError
-        Two models take a channel of the same name for different quantities, or the do-no-harm gate refused one.
+        Two models use a channel of the same name for different quantities, or the do-no-harm gate refused a model.
     """
 
     def __init__(self, machine: Machine) -> None:
@@ -59,13 +59,13 @@ class VolumetricModel:
                 self._constants[INDEX[code]] = source
         self._of_time = [k for k, _ in uniform], [m for _, m in uniform]
         for model in models:
-            if model.honest_error is not None:  # what was never judged runs in no compensator; here nothing runs
+            if model.honest_error is not None:  # unjudged models are excluded from compensators only
                 model.check_may_run()
         self.stack = Stack(models)
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """Names of the channels that it needs."""
+        """Names of the required channels."""
         return self.stack.inputs
 
     def init(self) -> VolumetricState:
@@ -80,11 +80,11 @@ class VolumetricModel:
         Parameters
         ----------
         state : VolumetricState
-            From `init` or the previous `step`.
+            State from `init` or the previous `step`.
         values : mapping of str to float
-            By channel; those of `inputs` have to be there.
+            Values by channel; must contain those of `inputs`.
         dt : float
-            Time since the previous reading [s]; without meaning in the first step.
+            Time since the previous reading [s]; ignored in the first step.
 
         Returns
         -------
@@ -118,25 +118,25 @@ class VolumetricModel:
         return ErrorField(self._kinematics, uniform, tuple((k, m, factors[at]) for k, m, at in self._varying))
 
     def replay(self, time: FloatArray, table: Mapping[str, FloatArray]) -> "ThermalStates":
-        """Step through a recording, from the zero in its first row.
+        """Step through a recording, with the zero in its first row.
 
         Parameters
         ----------
         time : ndarray of shape (n,)
             [s]
         table : mapping of str to ndarray of shape (n,)
-            Readings by channel; those of `inputs` have to be there.
+            Readings by channel; must contain those of `inputs`.
 
         Returns
         -------
         ThermalStates
-            One per row. In a row with a missing number the last state is held, as the gate does it live; before the
-            first usable row all models of time say 0.
+            One state per row. In a row with a missing number the last state is held, as in the live gate; before the
+            first usable row all models of time give 0.
 
         Raises
         ------
         InputError
-            A channel is missing or has another length, or the time does not rise.
+            A channel is missing or has a wrong length, or the time does not increase.
         """
         times = np.asarray(time, dtype=np.float64)
         if not np.isfinite(times).all() or (np.diff(times) <= 0).any():
@@ -163,7 +163,7 @@ class VolumetricModel:
 
 @dataclass(frozen=True, eq=False)
 class ThermalStates:
-    """The thermal states of a machine in the rows of a recording: a sequence of `ErrorField`.
+    """Thermal states of a machine in the rows of a recording: a sequence of `ErrorField`.
 
     Parameters
     ----------

@@ -33,7 +33,7 @@ def _number(output: Path, tests: int) -> list[Path]:
     instead={"list_": "thermocomp.virtual.verbs:experiments"},
 )
 def simulate(found: list[Recording] | list[Experiment], face: CommandFace, *, list_: bool = False) -> int:  # noqa: ARG001 - asks for the other verb
-    """Show it.
+    """Write and show the recordings, or list the experiments.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ Switch = Annotated[bool | None, Parameter(negative="--no-offset")]
 
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
-class Fitting(PositionSettings):  # noqa: D101 - that of the settings, which the help is made from
+class Fitting(PositionSettings):  # noqa: D101 - docstring of the settings, from which the help is generated
     __doc__ = PositionSettings.__doc__
 
     offset: Switch = None
@@ -31,7 +31,7 @@ class Fitting(PositionSettings):  # noqa: D101 - that of the settings, which the
     reads={},
 )
 def position(found: Positioned, face: CommandFace) -> int:
-    """Show it.
+    """Save and show the results.
 
     Parameters
     ----------

@@ -15,14 +15,14 @@ from thermocomp.volumetric.models.positionoptions import Setting
 from thermocomp.volumetric.report import records
 from thermocomp.volumetric.verbs import Positioned
 
-#: largest number of cycles that are listed individually; of more, the `WORST`
+#: largest number of cycles listed individually; of more cycles, the `WORST` are listed
 FEW, WORST = 12, 5
-#: length of a formula as printed [characters]; --json has the full formula
+#: maximum length of a printed formula [characters]; --json has the full formula
 FORMULA = 300
 
 
 def show_positioned(result: Positioned, file: Path | None, console: Console) -> None:
-    """Print the results of one component or of several, and the path of the models."""
+    """Print the results of one or several components, and the path of the model file."""
     if result.several:
         show_all(result.found, result.tests, result.left_open, console)
     else:
@@ -169,7 +169,7 @@ def _orders(found: PositionStudy) -> str:
 
 
 def _shortened(formula: str) -> str:
-    """Return a formula of a few lines, cut between two terms."""
+    """Return a formula shortened to a few lines, cut between two terms."""
     if len(formula) <= FORMULA:
         return formula
     cut = max(formula.rfind(" + ", 0, FORMULA), formula.rfind(" - ", 0, FORMULA))

@@ -17,7 +17,7 @@ from thermocomp.volumetric.verbs import VolumetricErrors
     reads={"recording": read_one},
 )
 def volumetric(found: VolumetricErrors, face: CommandFace) -> int:
-    """Show it.
+    """Write and show the results.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Positioning tests as files: a long table, one row per approach of a target."""
+"""Files of positioning tests: a long table, one row per approach to a target."""
 
 import re
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ from thermocomp.volumetric.positioning import Positioning
 FloatArray = NDArray[np.float64]
 
 ENDINGS = (".csv", ".tsv", ".txt")
-#: what the columns may be called, without their unit
+#: accepted names of the columns, without their unit
 NAMES = {
     "position": ("position", "target", "pos"),
     "deviation": ("deviation", "error"),
@@ -42,7 +42,7 @@ def read(path: str | Path) -> tuple[Positioning, ...]:
 
     Columns: ``position_mm`` (or ``target_mm``), ``deviation_um`` (or ``error_um``; actual minus target; ``urad`` for an
     angle), ``direction`` (+ or -), ``run``, and if there are several ``state`` (thermal state) and ``axis``. Other
-    columns are passed over. Other units of length are converted; the unit stands in the heading.
+    columns are ignored. Other units of length are converted; the unit is given in the heading.
 
     Parameters
     ----------
@@ -57,10 +57,10 @@ def read(path: str | Path) -> tuple[Positioning, ...]:
     Raises
     ------
     RecordingError
-        There is no such file, a column is missing or comes twice in different units, a cell cannot be used, targets
-        of a run neither rise nor fall, a target is missing in a run, or there are too few targets.
+        File missing, a column missing or present twice in different units, an invalid cell, targets of a run that are
+        neither increasing nor decreasing, a target missing in a run, or too few targets.
     UnitError
-        A unit does not measure a length (or an angle).
+        A unit is not a unit of length (or angle).
     """
     source = Path(path)
     if source.suffix.lower() not in ENDINGS:
@@ -158,7 +158,7 @@ def _matrix(
 
 
 def _refuse_unsorted(table: CsvTable, column: int, rows: Sequence[int], position: FloatArray, run: str) -> None:
-    """Refuse a run whose targets turn back or come twice: a direction, a run or a position is wrong there."""
+    """Raise an error for a run with reversed or repeated targets: a direction, run or position is wrong there."""
     steps = np.diff(position[list(rows)])
     if not steps.size:
         return
@@ -176,10 +176,10 @@ def _refuse_unsorted(table: CsvTable, column: int, rows: Sequence[int], position
 
 
 def _find(table: CsvTable, role: str) -> int | None:
-    """Return the column that plays a role."""
+    """Return the column with a role."""
     fitting = [k for k, h in enumerate(table.headings) if _name(h) in NAMES[role]]
     if not fitting:
-        # x_mm, Y_mm: the position of an axis
+        # x_mm, Y_mm: position of an axis
         fitting = [k for k, h in enumerate(table.headings) if role == "position" and _axis(h)]
     if len(fitting) > 1:
         named = " and ".join(repr(table.headings[k]) for k in fitting)
@@ -200,12 +200,12 @@ def _name(heading: str) -> str:
 
 
 def _axis(heading: str) -> str:
-    """Return the axis that a heading such as ``y_mm`` names; empty if none."""
+    """Return the axis named by a heading such as ``y_mm``; empty if none."""
     return _name(heading).upper() if _name(heading) in ("x", "y", "z", "u", "v", "w") else ""
 
 
 def _unit(table: CsvTable, column: int, role: str) -> Unit:
-    """Return the unit that a heading states."""
+    """Return the unit stated in a heading."""
     heading = table.headings[column]
     found = re.search(r"[\[(](.*)[\])]\s*$", heading)
     symbol = found[1].strip() if found else heading.rpartition("_")[2] if "_" in heading else ""

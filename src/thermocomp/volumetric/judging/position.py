@@ -1,4 +1,4 @@
-"""Judge models of position-dependent errors: whole profiles, in thermal cycles that were not learned from."""
+"""Judging of models of position-dependent errors: whole profiles, in unseen thermal cycles."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -23,25 +23,25 @@ from thermocomp.volumetric.models.positionoptions import PositionOptions, Settin
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-#: with fewer thermal states there is nothing to learn from and to judge on
+#: minimum number of thermal states for training and judging
 FEWEST = 4
-#: fewer profiles of a cycle than this say nothing about it; each has many points, and they are far apart in time
+#: minimum number of profiles to judge a cycle by; each has many points, and profiles are far apart in time
 MIN_STATES = 8
-#: what a position model is held against
+#: baselines of a position model
 BESIDE = ("no compensation", "the cold profile alone")
 
 
 @dataclass(frozen=True)
 class CycleErrors:
-    """Errors of the profiles of one thermal cycle, or of a whole test that was left out.
+    """Errors of the profiles of one thermal cycle, or of a test left out as a whole.
 
     Parameters
     ----------
     cycle : str
     n_states : int
-        Profiles that were judged.
+        Number of judged profiles.
     none, geometric, model : float
-        RMS over their points [unit]: without compensation, with the cold profile alone, with the whole model.
+        RMS over their points [unit]: without compensation, with the cold profile alone, with the complete model.
     none_max, model_max : float
         Largest error [unit].
     """
@@ -62,15 +62,15 @@ class PositionAssessment:
     Parameters
     ----------
     protocol : str
-        Method by which they were chosen.
+        Method of choosing the unseen cycles.
     cycles : tuple of CycleErrors
     overall : CycleErrors
-        Errors of all of them together.
+        Errors over all cycles together.
     verdict : Verdict
-        Of the do-no-harm gate: beside no compensation and, if there is a thermal part, beside the cold profile alone;
-        by cycles or, if files were left out, by these.
+        Verdict of the do-no-harm gate: compared with no compensation and, if there is a thermal part, with the cold
+        profile alone; by cycles or, if files were left out, by files.
     factors : tuple of HonestError
-        Errors of each factor's model on the same states [unit/m^i]; verdict and reason are those of the whole.
+        Errors of the model of each factor on the same states [unit/m^i]; verdict and reason are those of the whole.
     unit : {'um', 'urad'}
     """
 
@@ -83,28 +83,28 @@ class PositionAssessment:
 
     @property
     def accepted(self) -> bool:
-        """True if it may run."""
+        """Whether the model may run."""
         return self.verdict.accepted
 
     @property
     def reason(self) -> str:
-        """Reason for the verdict, and the data that would decide it."""
+        """Reason for the verdict, and the additional data needed for a decision."""
         return self.verdict.told
 
 
 @dataclass(frozen=True, eq=False)
 class PositionStudy:
-    """A position model fitted to everything, with its error on what it had not seen.
+    """A position model fitted to all data, with its error on unseen data.
 
     Parameters
     ----------
     fit : PositionFit
-        The models of its factors carry the honest error.
+        The fit; the models of its factors carry the honest error.
     options : PositionOptions
-        With what was left open filled in.
+        Options, with open settings filled in.
     assessment : PositionAssessment
     dropped : str
-        Reason why the thermal part was dropped, if it was: its own verdict.
+        Reason why the thermal part was dropped, i.e. its own verdict; empty if it was not.
     """
 
     fit: PositionFit
@@ -122,11 +122,11 @@ def study(
     jobs: int = 1,
     progress: Callable[[str], None] = lambda _: None,
 ) -> PositionStudy:
-    """Judge how a position-dependent error is modelled on unseen cycles, then fit it to everything.
+    """Judge the modelling of a position-dependent error on unseen cycles, then fit it to all data.
 
-    In each split all is learned again: settings left open, cold profile, its order, slopes. The cold profile of a
-    test of which only a part is left out is its zero: it is used, and not judged. A left-out test is judged by the cold
-    profiles of the others.
+    In each split everything is learned again: open settings, cold profile, its order, slopes. If only part of a test is
+    left out, its cold profile is the zero of the test: it is used, and not judged. A test left out as a whole is judged
+    with the cold profiles of the other tests.
 
     Parameters
     ----------
@@ -134,13 +134,13 @@ def study(
         Profiles of one component, one per test.
     options : PositionOptions
     left_open : sequence of {'slopes', 'offset', 'reference_position'}
-        Settings that the profiles tell, in place of `options`; see
-        `thermocomp.volumetric.models.positionoptions.fill_options`. If it is open how many slopes there are and the
-        thermal part is refused, the cold profile alone is judged and taken.
+        Settings to be determined from the profiles instead of from `options`; see
+        `thermocomp.volumetric.models.positionoptions.fill_options`. If the number of slopes is open and the thermal
+        part is refused, the cold profile alone is judged and used.
     judging : callable
-        Makes splits of the states, such as those of `thermocomp.judging.splits`.
+        Function that splits the states, such as those of `thermocomp.judging.splits`.
     jobs : int
-        Processes to share the work among; -1 takes all cores.
+        Number of parallel processes; -1: one per core.
     progress : callable
         Called with a line of text after each fit.
 
@@ -151,9 +151,9 @@ def study(
     Raises
     ------
     InputError
-        There is nothing to leave out, or an option cannot be.
+        There is nothing to leave out, or an option is invalid.
     FitError
-        It cannot be fitted, to all states or to those of a split, or nothing is left to judge on.
+        The fit fails for all states or for those of a split, or nothing is left to judge on.
     """
     tests = (profiles,) if isinstance(profiles, Profiles) else profiles
     (found,) = study_all([tests], options, left_open=left_open, judging=judging, jobs=jobs, progress=progress)
@@ -169,12 +169,12 @@ def study_all(
     jobs: int = 1,
     progress: Callable[[str], None] = lambda _: None,
 ) -> tuple[PositionStudy, ...]:
-    """Do `study` for several components at once.
+    """Apply `study` to several components together.
 
     Parameters
     ----------
     components : sequence of sequence of Profiles
-        The tests of each.
+        Tests of each component.
     options, left_open, judging, jobs, progress
         See `study`; `n_pieces` gives the number of calls of `progress`.
 
@@ -223,12 +223,12 @@ def _studies(
 def n_pieces(
     components: Sequence[Sequence[Profiles]], options: PositionOptions, judging: Callable[[Samples], Judging]
 ) -> int:
-    """Return the number of pieces of work of `study_all`."""
+    """Return the number of tasks of `study_all`."""
     return sum(len(_splits(tests, options, judging)[1].splits) + 1 for tests in components)
 
 
 class _All(NamedTuple):
-    """A component: its tests, their states, and how they are split."""
+    """A component: its tests, their states, and the splits."""
 
     tests: tuple[Profiles, ...]
     samples: Samples
@@ -250,7 +250,7 @@ def _splits(
 def _piece(
     tests: tuple[Profiles, ...], options: PositionOptions, left_open: Sequence[Setting], split: Split | None
 ) -> tuple[str, Any]:
-    """Judge one split; or, without one, fit everything."""
+    """Judge one split; without a split, fit all data."""
     learn = None if split is None else split.learn
     chosen = fill_options(tests, options, left_open, learn=learn) if left_open else options
     fit = fit_position(tests, chosen, learn=learn)
@@ -274,10 +274,10 @@ def _study(one: _All, parts: Sequence["_Part"], options: PositionOptions, fit: P
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """Judged data of one split: errors of all points per state, and the predicted thermal parts."""
+    """Judged data of one split: errors of all points per state, and predicted thermal parts."""
 
     state: NDArray[np.intp]  # (n,) row of the samples
-    errors: tuple[tuple[FloatArray, FloatArray, FloatArray], ...]  # per state: none, cold profile alone, model
+    errors: tuple[tuple[FloatArray, FloatArray, FloatArray], ...]  # per state: no model, cold profile alone, model
     thermal: tuple[FloatArray, ...]  # per state, at all points of its test
 
 
@@ -302,9 +302,9 @@ def _judged(tests: Sequence[Profiles], fit: PositionFit, options: PositionOption
 
 
 def _factors(one: _All, parts: Sequence[_Part], options: PositionOptions) -> tuple[FloatArray, FloatArray]:
-    """Return factors, measured and predicted, (n, n_factors): the predicted ones from the model outputs everywhere.
+    """Return factors, measured and predicted, (n, n_factors); predictions are projected from the model output.
 
-    A split may have chosen other powers; its thermal part is written in those of the whole.
+    A split may use other powers; its thermal part is expressed in the powers of the complete model.
     """
     samples, _ = slope_samples(one.tests, options)
     turn = reference_position(one.tests, options)
@@ -377,7 +377,7 @@ def _together(one: _All, parts: Sequence[_Part], options: PositionOptions) -> Po
 
 
 def _unit(name: str, rms: FloatArray, unit: str, *, thermal: bool) -> do_no_harm.JudgedUnit:
-    """Measure a cycle by the RMS of its profiles, (n, 3): without compensation, with the cold profile alone, model."""
+    """Return a cycle with the RMS of its profiles, (n, 3): without compensation, with the cold profile alone, model."""
     none, geometric, left = np.sqrt(np.mean(rms**2, axis=0)).tolist()
     largest = float(rms[:, 0].max())
     return do_no_harm.JudgedUnit(

@@ -1,4 +1,4 @@
-"""The error of the tool point over time and over the work volume, before and after what a controller can correct."""
+"""Error of the tool point over time and over the work volume, before and after possible corrections."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -23,9 +23,9 @@ from thermocomp.volumetric import notes
 
 FloatArray = NDArray[np.float64]
 
-#: points of a grid along each axis; more take memory and tell nothing new
+#: maximum number of grid points along each axis; more need memory without adding information
 FINEST = 50
-#: rows in which the largest error is looked for
+#: maximum number of rows in which the largest error is searched
 _LOOKED_AT = 2000
 _START, _LARGEST, _END = "start", "largest", "end"
 _PICKED = (_START, _LARGEST, _END, f"{_START} = {_LARGEST}", f"{_END} = {_LARGEST}")
@@ -40,9 +40,9 @@ class PointCourse:
     point : tuple of float
         Positions of the axes [mm].
     tool : tuple of float
-        From the gauge point to the tip [mm].
+        Vector from the gauge point to the tip [mm].
     time : ndarray of shape (n_rows,)
-        Since the first row of the recording [s].
+        Time since the first row of the recording [s].
     values : ndarray of shape (n_rows, 32)
         Components at the point [um, urad].
     error : ndarray of shape (n_rows, 3)
@@ -63,7 +63,7 @@ class PointCourse:
 
     @property
     def largest(self) -> int:
-        """The row with the largest error."""
+        """Row with the largest error."""
         return int(np.argmax(np.linalg.norm(self.error, axis=-1)))
 
     def contributions(self, row: int) -> FloatArray:
@@ -82,14 +82,14 @@ class Moment:
     row : int
         Row of the course.
     time : float
-        Since the first row of the recording [s].
+        Time since the first row of the recording [s].
     field : ErrorField
     straight : StraightLines
-        The best straight line of each axis through the point of the course: what controllers take.
+        Best straight line of each axis through the point of the course, as accepted by controllers.
     tool : tuple of float
-        From the gauge point to the tip [mm].
+        Vector from the gauge point to the tip [mm].
     grid : ndarray of shape (..., 3)
-        Points at which the errors are judged [mm].
+        Points at which the errors are evaluated [mm].
     """
 
     label: str
@@ -102,7 +102,7 @@ class Moment:
 
     @property
     def name(self) -> str:
-        """The label, with its time if it is not the time itself."""
+        """Label, with the time unless the label is a time."""
         picked = self.label in _PICKED
         return f"{self.label}, {self.time / 3600:.2f} h" if picked else self.label
 
@@ -116,13 +116,13 @@ class Moment:
         return find_remaining_error(self.field, points, lines, self.tool, exact=True)
 
     def after_all(self, points: FloatArray) -> FloatArray:
-        """Return the residual after the whole correction, a vector at every point, of shape (..., 3) [um]."""
+        """Return the residual after the complete correction, a vector at each point, of shape (..., 3) [um]."""
         correction = self.field.correction(points, self.tool)
         return self.error(points + 1e-3 * correction) + correction
 
     @cached_property
     def sizes(self) -> dict[str, Size]:
-        """Length of the error vector on the grid by what is corrected."""
+        """Length of the error vector on the grid, by extent of the correction."""
         everything = self.after_all(self.grid.reshape(-1, 3))
         return {
             "nothing": self.straight.before,
@@ -132,7 +132,7 @@ class Moment:
 
     @cached_property
     def shares(self) -> FloatArray:
-        """Contribution of each component to the error on the grid: RMS of the vector's length, of shape (32,) [um]."""
+        """Contribution of each component to the error on the grid: RMS of the vector length, of shape (32,) [um]."""
         points = self.grid.reshape(-1, 3)
         values, shares = self.field.components(points), np.zeros(len(COMPONENTS))
         for k in np.flatnonzero(values.any(axis=0)):
@@ -155,7 +155,7 @@ class Volumetric:
     course : PointCourse
     moments : tuple of Moment
     missing : int
-        Rows of the recording in which an input is missing: the state before is held there, as it would be live.
+        Number of rows with a missing input: the previous state is held there, as in live operation.
     """
 
     machine: Machine
@@ -175,7 +175,7 @@ class Volumetric:
         return max(self.moments, key=lambda m: m.straight.before.largest)
 
 
-#: hears what is done, and how many rows of it
+#: called with a line of text and the number of rows processed
 Progress = Callable[[str, int], object]
 
 
@@ -189,22 +189,22 @@ def study(
     hours: Sequence[float] = (),
     progress: Progress | None = None,
 ) -> Volumetric:
-    """Replay a recording through a machine's models and look at its errors.
+    """Replay a recording through the models of a machine and evaluate its errors.
 
     Parameters
     ----------
     machine : Machine
     recording : Recording, optional
-        Without it the machine is taken in its reference state: constants and profiles.
+        Recording to replay. Default: none, the machine is in its reference state: constants and profiles.
     at : tuple of float, optional
-        The point that is followed over time [mm]; without it the middle of the travels, and the largest error is
-        looked for at the corners too.
+        Point followed over time [mm]. Default: the middle of the travels; the search for the largest error then
+        includes the corners.
     grid : int
-        Points along each axis.
+        Number of points along each axis.
     tool : tuple of float, optional
-        From the gauge point to the tip [mm]; the machine's own if not given.
+        Vector from the gauge point to the tip [mm]. Default: the tool of the machine.
     hours : sequence of float, optional
-        Times to look at [h]; without them the start, the largest error and the end.
+        Times to evaluate [h]. Default: start, largest error and end.
     progress : callable, optional
 
     Returns
@@ -214,7 +214,7 @@ def study(
     Raises
     ------
     InputError
-        A point or a time is outside, the recording lacks a channel, or measures something else by it.
+        A point or a time is out of range, or a channel of the recording is missing or of another quantity.
     """
     tip = machine.tool if tool is None else tool
     if grid > FINEST:
@@ -255,7 +255,7 @@ def study(
 
 
 def in_reference_state(machine: Machine) -> Machine:
-    """Return a machine whose models of time give zero: constants and profiles alone."""
+    """Return a machine whose time-dependent models are zero: only constants and profiles."""
     kept: dict[str, Source] = {}
     for code, source in machine.components.items():
         if isinstance(source, PositionModel):
@@ -271,7 +271,7 @@ def inputs_of(machine: Machine) -> dict[str, Input]:
 
 
 def models_of(source: Source | None) -> tuple[ErrorModel, ...]:
-    """Return the models of time in the source of a component."""
+    """Return the time-dependent models in the source of a component."""
     if isinstance(source, PositionModel):
         return source.models
     return (source,) if isinstance(source, ErrorModel) else ()
@@ -294,7 +294,7 @@ def middle(machine: Machine) -> Vector:
 
 
 def lay_grid(machine: Machine, n: int) -> FloatArray:
-    """Return a grid over the work volume, of shape (n_x, n_y, n_z, 3) [mm]; one point along an axis not there."""
+    """Return a grid over the work volume, of shape (n_x, n_y, n_z, 3) [mm]; one point along a missing axis."""
     along = [np.linspace(*machine.axis(a).travel, n) if a in machine.structure.axes else np.zeros(1) for a in "XYZ"]
     return np.stack(np.meshgrid(*along, indexing="ij"), axis=-1)
 
@@ -309,7 +309,7 @@ def _inside(machine: Machine, point: Vector) -> Vector:
 
 
 def _inputs(machine: Machine, recording: Recording) -> tuple[FloatArray, dict[str, FloatArray], int]:
-    """Return times, inputs, and in how many rows one of them is missing."""
+    """Return times, inputs, and the number of rows with a missing input."""
     wanted, table = inputs_of(machine), {}
     for name, model_input in wanted.items():
         channel = recording.channel(name)
@@ -328,14 +328,14 @@ def _inputs(machine: Machine, recording: Recording) -> tuple[FloatArray, dict[st
 
 
 def _largest(states: ThermalStates, tool: Vector) -> int:
-    """Return the row with the largest error at the corners of the volume; of a long recording every n-th is seen."""
+    """Return the row with the largest error at the corners of the volume; of a long recording every n-th is checked."""
     corners = lay_grid(states.model.machine, 2)
     rows = range(0, len(states), 1 + len(states) // _LOOKED_AT)
     return max(rows, key=lambda k: float(np.linalg.norm(states[k].error(corners, tool), axis=-1).max()))
 
 
 def _rows(time: FloatArray, largest: int, hours: Sequence[float]) -> Iterator[tuple[str, int]]:
-    """Yield the moments to look at with their labels, each row once."""
+    """Yield the moments to evaluate with their labels, each row once."""
     if len(time) == 1:
         yield "reference state", 0
         return

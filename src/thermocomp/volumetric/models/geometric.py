@@ -1,4 +1,4 @@
-"""The geometric part f_g of an error: a polynomial or a spline, its order chosen by points left out (C-04, C-06)."""
+"""Geometric part f_g of an error: a polynomial or a spline; its order is chosen by leaving points out (C-04, C-06)."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -15,24 +15,24 @@ from thermocomp.recordings.profiles import MIN_POSITIONS
 
 FloatArray = NDArray[np.float64]
 Kind = Literal["polynomial", "spline"]
-# of a polynomial: degree in the own coordinate and in the others; of a spline: inner knots and 0
+# polynomial: degree in the own coordinate and in the others; spline: number of inner knots and 0
 Order = tuple[int, int]
 
-#: beyond these no profile is told from noise
+#: limits of the orders, beyond which profiles cannot be distinguished from noise
 HIGHEST, HIGHEST_OTHER, MOST_KNOTS = 9, 3, 12
-#: so many positions between the ends are needed to judge by them alone
+#: minimum number of positions between the ends to judge by these alone
 FEW = 3
-#: A spline through all means takes over if its mean square at points left out is below this share of a polynomial's.
-#: With so few positions, leaving one out doubles the spacing and judges it too hard: a larger share holds, or against
-#: a constant, which only noise may call for, all of it.
+#: A spline through all means is used if its mean square at left-out points is below this share of a polynomial's. With
+#: few positions, leaving one out doubles the spacing and overestimates its error: a larger share is then allowed, and
+#: any share against a constant, which only noise can favour.
 CLEARLY, BARELY, FEW_POSITIONS = 0.5, 1.25, 8
-#: a fit that leaves more than repeated values differ is told from chance at this level
+#: significance level of the test whether a fit leaves more than the scatter of repeated values
 LEVEL = 0.01
 
 
 @dataclass(frozen=True)
 class Tried:
-    """A profile that was tried.
+    """A candidate profile.
 
     Parameters
     ----------
@@ -40,14 +40,14 @@ class Tried:
         Polynomial: degree in the axis' own coordinate and in the others. Spline: number of inner knots, and 0.
     n_terms : int
     left_out : float
-        RMS error at points that were left out, one after the other [unit]; inf if the others do not determine it.
+        RMS error at points left out in turn [unit]; inf if the remaining points do not determine the profile.
     margin : float
-        Standard error of its square [unit^2].
+        Standard error of the mean square [unit^2].
     misfit : float
-        Probability that a fit which leaves nothing but noise leaves so much beyond what repeated values differ by (F
-        test for lack of fit); nan where the noise is not known.
+        Probability that a fit whose residual is only noise exceeds the scatter of repeated values by this much (F test
+        for lack of fit); nan if the noise is unknown.
     through : bool
-        True for the natural spline through the means of all positions; its order is (positions - 2, 0).
+        True for the natural spline through the means of all positions, whose order is (positions - 2, 0).
     """
 
     order: Order
@@ -60,7 +60,7 @@ class Tried:
 
 @dataclass(frozen=True)
 class ProfileFit:
-    """A geometric profile, and what it was chosen from.
+    """A geometric profile and the candidates considered.
 
     Parameters
     ----------
@@ -68,15 +68,16 @@ class ProfileFit:
     order : (int, int)
         See `Tried`.
     tried : tuple of Tried
-        By rising number of terms; empty if the order was given.
+        Candidates by increasing number of terms; empty if the order was given.
     rms : float
-        Residual of the fit [unit], per degree of freedom; nan if there is none.
+        Residual of the fit per degree of freedom [unit]; nan without degrees of freedom.
     noise : float
-        Standard deviation of the values at one point [unit]; nan where none comes twice, or only with the same number.
+        Standard deviation of repeated values at one point [unit]; nan if no point is repeated, or only with equal
+        values.
     misfit : float
         See `Tried`.
     through : bool
-        True if it is the natural spline through the means of all positions.
+        True for the natural spline through the means of all positions.
     """
 
     profile: Profile
@@ -89,12 +90,12 @@ class ProfileFit:
 
     @property
     def leaves_more(self) -> bool:
-        """True if the fit leaves clearly more than the noise, which is known only where points come several times."""
+        """True if the residual clearly exceeds the noise, which is known only if points are repeated."""
         return self.misfit < LEVEL
 
     @property
     def words(self) -> str:
-        """Return cautions for the reader; empty if there are none."""
+        """Return cautions on the fit; empty if there are none."""
         if self.leaves_more:
             return (
                 f"leaves {self.rms:.3g} where repeated values differ by {self.noise:.3g}: it misses part of the shape"
@@ -113,33 +114,33 @@ def fit_profile(
 ) -> ProfileFit:
     """Fit the geometric profile f_g(x, y, z) by least squares (C-04, C-06, C-22).
 
-    Without an order, those are tried that leave a third of the points to spare: every point between the ends of the
-    axis' travel is left out in turn, with all values that were measured there, and told from the others; of the orders
-    whose mean square is within one standard error of the smallest, the one with the fewest terms is taken. The ends are
-    not left out: a profile is never used beyond them, and what an order does there would decide alone. Only where there
-    are fewer than three positions between them, too few to judge by, they are left out too.
+    Without a given order, the candidates are those with at most two thirds as many terms as points. Each point between
+    the ends of the axis' travel is left out in turn, with all its values, and predicted from the others; of the orders
+    whose mean square is within one standard error of the smallest, the one with the fewest terms is used. The ends are
+    not left out: a profile is never used beyond them, and extrapolation there would dominate the choice. Only with
+    fewer than three positions between them, too few to judge by, are the ends left out too.
 
-    Where points come several times, the noise is known: orders that leave clearly more are not taken (`LEVEL`).
+    If points are repeated, the noise is known: orders that leave clearly more are not used (`LEVEL`).
 
-    With 5 to 8 positions no order may follow the profile. Along one coordinate a natural spline through the means of
-    all positions therefore competes, from 4 positions on. It takes over if no order fits, or if it tells points that
-    were left out clearly better (`CLEARLY`); with few positions, where the noise is not known, already if about as well
-    (`BARELY`), or better than a constant. It follows the noise, but misses little of the shape.
+    With 5 to 8 positions there may be no order that follows the profile. Along one coordinate a natural spline through
+    the means of all positions therefore competes, from 4 positions on. It is used if no order fits, or if it predicts
+    left-out points clearly better (`CLEARLY`); with few positions and unknown noise also if about as well (`BARELY`),
+    or better than a constant. It follows the noise, but misses little of the shape.
 
     Parameters
     ----------
     points : ndarray of shape (n, 3)
-        x, y, z [mm]; a point may come several times.
+        x, y, z [mm]; points may be repeated.
     values : ndarray of shape (n,)
-        [unit]; nan where a point was missed.
+        [unit]; nan where a value is missing.
     axis : {'X', 'Y', 'Z'}
-        The own one.
+        Axis of the error component (own coordinate).
     kind : {'polynomial', 'spline'}
-        A polynomial in all coordinates, or a cubic spline along the own one.
+        Polynomial in all coordinates, or cubic spline along the own coordinate.
     order : int, (int, int) or 'auto'
-        Degree in the own coordinate, or that and the degree in the others; or the number of inner knots of a spline.
+        Degree in the own coordinate, or a pair with the degree in the others; or the number of inner knots of a spline.
     coordinates : str, optional
-        Axes that the profile may depend on, such as ``YX``; all whose position varies if not given.
+        Axes that the profile may depend on, such as ``YX``. Default: all axes whose position varies.
 
     Returns
     -------
@@ -148,7 +149,7 @@ def fit_profile(
     Raises
     ------
     InputError
-        Kind, order or coordinates cannot be.
+        Kind, order or coordinates are invalid.
     FitError
         There are too few points.
     """
@@ -193,7 +194,7 @@ def fit_profile(
 
 
 def _suited(points: FloatArray, axis: str, kind: Kind, coordinates: str | None) -> tuple[str, int]:
-    """Refuse what no profile can be fitted to; return the other axes it depends on, and its positions along its own."""
+    """Return the other axes of the profile and the number of positions along its own; raise an error for bad points."""
     varying = "".join(a for k, a in enumerate("XYZ") if points.size and np.ptp(points[:, k]) > 0)
     used = varying if coordinates is None else coordinates
     if axis not in varying:
@@ -212,7 +213,7 @@ def _suited(points: FloatArray, axis: str, kind: Kind, coordinates: str | None) 
 
 
 def _choose(tried: Sequence[Tried], n_own: int) -> Tried:
-    """Choose among what was tried, sorted by the number of terms."""
+    """Choose among candidates sorted by their number of terms."""
     through = next((t for t in tried if t.through), None)
     orders = [t for t in tried if not t.through and np.isfinite(t.left_out)]
     fitting = [t for t in orders if not t.misfit < LEVEL]
@@ -228,18 +229,18 @@ def _choose(tried: Sequence[Tried], n_own: int) -> Tried:
 
 
 def _noise(values: FloatArray, place: NDArray[np.intp]) -> tuple[float, int]:
-    """Return the variance of values at one place, and its degrees of freedom; nan and 0 if it is not known."""
+    """Return the variance of repeated values and its degrees of freedom; nan and 0 if unknown."""
     count = np.bincount(place)
     within = values - (np.bincount(place, values) / count)[place]
     spare = len(values) - len(count)
-    # the same numbers again are copies of one measurement, not repeated ones
+    # identical values are copies of one measurement, not repetitions
     if np.abs(within).max() <= 1e-9 * np.abs(values).max():
         return float("nan"), 0
     return float(within @ within / spare), spare
 
 
 def _misfit(left: FloatArray, values: FloatArray, place: NDArray[np.intp], n_terms: int) -> float:
-    """Return the probability of the F test for lack of fit, from what a fit leaves."""
+    """Return the probability of the F test for lack of fit, from the residual of a fit."""
     noise, spare = _noise(values, place)
     free = int(place.max()) + 1 - n_terms
     if not spare or free <= 0:
@@ -249,7 +250,7 @@ def _misfit(left: FloatArray, values: FloatArray, place: NDArray[np.intp], n_ter
 
 
 def _left_out(points: FloatArray, place: NDArray[np.intp], axis: str) -> NDArray[np.intp]:
-    """Return the places to leave out: those between the ends."""
+    """Return the places to leave out, which are those between the ends."""
     own = points[:, "XYZ".index(axis)]
     inside = (own > own.min()) & (own < own.max())
     return np.unique(place[inside] if len(np.unique(own[inside])) >= FEW else place)
@@ -258,7 +259,7 @@ def _left_out(points: FloatArray, place: NDArray[np.intp], axis: str) -> NDArray
 def _try(
     columns: FloatArray, values: FloatArray, place: NDArray[np.intp], points: FloatArray, axis: str, order: Order
 ) -> Tried:
-    """Leave out each point between the ends in turn; by the hat matrix, without fitting again."""
+    """Return the result of leaving out each point between the ends in turn, by the hat matrix without refitting."""
     n_terms = columns.shape[1]
     Q, R = np.linalg.qr(columns)
     sizes = np.abs(np.diag(R))
@@ -280,7 +281,7 @@ def _try(
 def _try_through(
     spline: "_Through", values: FloatArray, place: NDArray[np.intp], points: FloatArray, axis: str
 ) -> Tried:
-    """Leave out each point between the ends in turn, and lay the spline through the others."""
+    """Return the result of leaving out each point between the ends in turn, with a spline through the others."""
     squares = []
     for k in _left_out(points, place, axis):
         out = place == k
@@ -294,12 +295,12 @@ def _try_through(
 
 
 def _mean(squares: Sequence[float]) -> tuple[float, float]:
-    """Return the root of their mean, and the standard error of the mean."""
+    """Return the root of the mean of squares, and the standard error of the mean."""
     return float(np.mean(squares) ** 0.5), float(np.std(squares, ddof=1) / len(squares) ** 0.5)
 
 
 class _Polynomial:
-    """Terms u^i v^j w^k: i up to the own degree, j + k up to the others', i + j + k up to the larger of the two."""
+    """Terms u^i v^j w^k: i up to the own degree, j + k up to that of the others, i + j + k up to the larger degree."""
 
     def __init__(self, points: FloatArray, axis: str, others: str) -> None:
         low, high = self.low, self.high = points.min(axis=0), points.max(axis=0)
@@ -311,8 +312,8 @@ class _Polynomial:
         self.distinct = [len(np.unique(points[:, a])) for a in range(3)]
 
     def orders(self, n_places: int) -> Iterator[Order]:
-        """Yield the orders that leave a third of the points to spare, with degrees that each axis can determine."""
-        # Least squares on equidistant positions swings between them where the degree is above 2 sqrt(n).
+        """Yield the orders with at most two thirds as many terms as places, and degrees determined by each axis."""
+        # Least squares on equidistant positions oscillates between them if the degree exceeds 2 sqrt(n).
         n_own = self.distinct[self.own]
         highest = min(n_own - 2, int(2 * n_own**0.5), HIGHEST)
         other = min(max((self.distinct[a] - 1 for a in self.others), default=0), HIGHEST_OTHER)
@@ -347,7 +348,7 @@ class _Polynomial:
 
 
 class _Along:
-    """A profile along its own axis alone."""
+    """A profile along its own axis only."""
 
     def __init__(self, points: FloatArray, axis: str) -> None:
         self.axis = axis
@@ -356,10 +357,10 @@ class _Along:
 
 
 class _Spline(_Along):
-    """Cubic spline whose inner knots part the positions into equal numbers."""
+    """Cubic spline with inner knots that divide the positions into equal numbers."""
 
-    def orders(self, n_places: int) -> Iterator[Order]:  # noqa: ARG002 - only positions along the axis count
-        """Give the numbers of knots that leave two positions to spare."""
+    def orders(self, n_places: int) -> Iterator[Order]:  # noqa: ARG002 - only positions along the axis matter
+        """Yield the numbers of knots that leave two degrees of freedom."""
         for n in range(min(len(self.places) - 6, MOST_KNOTS) + 1):
             yield n, 0
 
@@ -380,12 +381,12 @@ class _Through(_Along):
     """Natural cubic spline through the means of all positions."""
 
     def through(self, values: FloatArray, rows: NDArray[np.bool_] | slice = slice(None)) -> CubicSpline:
-        """Return the spline through the means of some rows."""
+        """Return the spline through the means of selected rows."""
         places, which = np.unique(self.position[rows], return_inverse=True)
         means = np.bincount(which, values[rows]) / np.bincount(which)
         return CubicSpline(places, means, bc_type="natural")
 
-    def columns(self, order: Order) -> FloatArray:  # noqa: ARG002 - there is one
+    def columns(self, order: Order) -> FloatArray:  # noqa: ARG002 - there is only one order
         return np.asarray(self.position[:, None] == self.places, dtype=np.float64)
 
     def profile(self, order: Order, found: FloatArray) -> SplineProfile:  # noqa: ARG002
@@ -393,7 +394,7 @@ class _Through(_Along):
 
 
 def _pieces(axis: str, knots: FloatArray, falling: FloatArray) -> SplineProfile:
-    """Return a spline profile from the coefficients of its pieces by falling power [unit/mm^k], (4, n_pieces)."""
+    """Return a spline profile from the coefficients of its pieces in descending powers [unit/mm^k], (4, n_pieces)."""
     scaled = falling[::-1] * np.diff(knots) ** np.arange(4)[:, None]
     return SplineProfile(
         axis=axis,

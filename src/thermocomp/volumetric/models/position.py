@@ -1,4 +1,4 @@
-"""Position-dependent errors: cold profile, thermal slopes, and the models of both (Chen 1996, sections 2.2, 3.3)."""
+"""Position-dependent errors: cold profile, thermal slopes, and models of both (Chen 1996, sections 2.2, 3.3)."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -42,30 +42,30 @@ __all__ = ["PositionFit", "PositionOptions", "fit_position", "slope_samples"]
 
 @dataclass(frozen=True, eq=False)
 class PositionFit:
-    """A position model, and what it was made of.
+    """A position model and the results of its fit.
 
     Parameters
     ----------
     model : PositionModel
-        Frozen.
+        Frozen model.
     profile : ProfileFit
-        The cold profile: order and the errors at points left out.
+        Cold profile: its order and the errors at left-out points.
     slopes : tuple of Slopes
-        Factors of the thermal parts that were measured, one per test; k1 if none is modelled.
+        Measured factors of the thermal parts, one per test; k1 if none is modelled.
     samples : Samples
-        Inputs, and the factors as targets ``k0``, ``k1`` ...; one row per state.
+        Inputs, with the factors as targets ``k0``, ``k1`` ...; one row per state.
     trained : tuple of Trained
-        One per factor.
+        Trained model of each factor.
     coefficient_errors : tuple of mapping of str to float
-        Standard error of each coefficient of the factors' models, where they are polynomials of temperatures. Rows are
-        taken as independent but for the noise of the cold profile, which all of them share; terms as given, though they
-        were selected (E-C12).
+        Standard error of each coefficient of the factors' models, if these are polynomials of temperatures. Rows are
+        regarded as independent except for the noise of the cold profile, which is common to all; terms are regarded as
+        given, although they were selected (E-C12).
     remainders : mapping of int to float
-        Residual of the thermal part after powers up to m, RMS per degree of freedom, by m [unit] (C-05).
+        Residual of the thermal part after powers up to m, RMS per degree of freedom [unit], by m (C-05).
     offset_remainder : float
         Residual after the powers of the model with an offset k_0 [unit].
     thermal_rms : float
-        The thermal part itself, RMS over all states but the reference [unit].
+        RMS of the thermal part over all states except the reference [unit].
     """
 
     model: PositionModel
@@ -80,12 +80,12 @@ class PositionFit:
 
     @property
     def enough(self) -> int:
-        """The smallest m to which a higher one adds little: a tenth of the rest, or a twentieth of the thermal part."""
+        """Smallest m above which powers add little: below a tenth of the rest or a twentieth of the thermal part."""
         return choose_power(self.remainders, self.thermal_rms) or 1
 
     @property
     def shifts(self) -> bool:
-        """True if an offset would take away more than that: the profiles turn about another position, or shift."""
+        """True if adding an offset is worthwhile: the profiles tilt about another position, or shift."""
         rest = self.remainders.get(len(self.model.slopes), np.nan)
         return self.model.offset is None and is_worthwhile(rest, self.offset_remainder, self.thermal_rms)
 
@@ -98,8 +98,8 @@ def fit_position(
 ) -> PositionFit:
     """Fit d = f_g(x, y, z) + k_0(t) + k_1(t) q + k_2(t) q^2 ... (C-04, C-05, C-07).
 
-    f_g is fitted to the cold profiles; the factors are fitted to each profile minus the cold one of its test, and are
-    then a target like any other: the method learns them from the temperatures.
+    f_g is fitted to the cold profiles; the factors are fitted to each profile minus the cold one of its test. They are
+    then targets like any other: the method learns them from the temperatures.
 
     Parameters
     ----------
@@ -107,8 +107,8 @@ def fit_position(
         Profiles of one component, one per test.
     options : PositionOptions
     learn : ndarray of bool of shape (n_states,), optional
-        States that may be learned from, over all tests; all if not given. The reference states of a test are used
-        wherever one of its states is.
+        Training states, over all tests. Default: all. The reference states of a test are used if any of its states is
+        used.
 
     Returns
     -------
@@ -117,9 +117,9 @@ def fit_position(
     Raises
     ------
     InputError
-        The tests are not of one component, or an option cannot be.
+        The tests are not of one component, or an option is invalid.
     FitError
-        There is too little to fit to.
+        There are too few data to fit.
     """
     tests = set_cold_profiles((profiles,) if isinstance(profiles, Profiles) else tuple(profiles), options, learn)
     samples, slopes = slope_samples(tests, options, learn)
@@ -127,7 +127,7 @@ def fit_position(
     used = blank_unlearned(tests, options, learn)
     position = np.concatenate([test.position for test in used])
     _refuse_unreached(position, np.concatenate([test.cold(options.reference) for test in used]), tests[0])
-    # every cold state by itself: repeats tell the noise
+    # each cold state separately: repetitions show the noise
     rows = [test.values[test.reference_rows(options.reference)] for test in used]
     geometric = fit_profile(
         np.concatenate([np.tile(test.points, (len(r), 1)) for test, r in zip(used, rows, strict=True)]),
@@ -167,26 +167,26 @@ def fit_position(
 def slope_samples(
     tests: Sequence[Profiles], options: PositionOptions, learn: BoolArray | None = None
 ) -> tuple[Samples, tuple[Slopes, ...]]:
-    """Return the training data of the factors: one row per state, the measured factors as targets.
+    """Return the training data of the factors: one row per state, with the measured factors as targets.
 
     Parameters
     ----------
     tests : sequence of Profiles
     options : PositionOptions
     learn : ndarray of bool of shape (n_states,), optional
-        States that may be learned from; see `fit_position`.
+        Training states; see `fit_position`.
 
     Returns
     -------
     samples : Samples
-        Counted from the reference states. Units of its targets are those of the error, not per metre.
+        Samples relative to the reference states. Units of the targets are those of the error, not per metre.
     slopes : tuple of Slopes
         One per test.
 
     Raises
     ------
     InputError
-        The tests are not of one component, or there is nothing to predict from.
+        The tests are not of one component, or there are no inputs.
     """
     first = tests[0]
     for test in tests[1:]:
@@ -214,7 +214,7 @@ def slope_samples(
 
 
 def _refuse_unreached(position: FloatArray, cold: FloatArray, test: Profiles) -> None:
-    """Refuse a cold profile that ends before the others: beyond its ends it would be taken as constant."""
+    """Raise an error for a cold profile shorter than the others: it would be taken as constant beyond its ends."""
     there = position[np.isfinite(cold)]
     for end in (position.min(), position.max()):
         if end not in there:
@@ -225,7 +225,7 @@ def _refuse_unreached(position: FloatArray, cold: FloatArray, test: Profiles) ->
 
 
 def _with_factors(test: Profiles, slopes: Slopes, names: Sequence[str], options: PositionOptions) -> Recording:
-    """Return the thermal states, inputs and factors alone; a factor counts as an error at 1 m."""
+    """Return a recording of thermal states, inputs and factors only; a factor counts as an error at 1 m."""
     states = test.states
     if options.inputs is not None:
         inputs = [states.channel(name) for name in options.inputs]
@@ -254,7 +254,7 @@ def _cold_inputs(samples: Samples, rows: NDArray[np.intp]) -> FloatArray:
 def _coefficient_errors(
     model: ErrorModel, samples: Samples, target: int, seen: BoolArray, slopes: Sequence[Slopes]
 ) -> dict[str, float]:
-    """Return standard errors of coefficients that came by least squares; nothing for any others."""
+    """Return standard errors of coefficients fitted by least squares; empty for other models."""
     if not isinstance(model, Polynomial):
         return {}
     y = samples.deviations[:, target]
@@ -271,7 +271,7 @@ def _coefficient_errors(
     inverse = np.linalg.pinv(X)
     variance = float(residual @ residual) / (n_rows - n_terms) * (inverse**2).sum(axis=1)
     for k, s in enumerate(slopes):
-        # the noise of the cold profile shifts all factors of its test alike
+        # the noise of the cold profile shifts all factors of its test equally
         common = s.shared * float(np.nanmean(s.errors[:, target] ** 2))
         variance = variance + common * inverse[:, samples.test[rows] == k].sum(axis=1) ** 2
     return dict(zip(model.coefficients_by_name(), np.sqrt(variance).tolist(), strict=False))

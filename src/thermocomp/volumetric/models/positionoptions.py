@@ -1,4 +1,4 @@
-"""Model options of a position-dependent error, and those determined from its profiles."""
+"""Model options of a position-dependent error, and their determination from its profiles."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -16,11 +16,11 @@ from thermocomp.volumetric.models.geometric import Kind, Order
 BoolArray = NDArray[np.bool_]
 Setting = Literal["slopes", "offset", "reference_position"]
 
-#: all that profiles tell
+#: all settings that can be determined from profiles
 SETTINGS: tuple[Setting, ...] = ("slopes", "offset", "reference_position")
-#: powers whose remainder is told (C-05)
+#: powers for which the remainder is reported (C-05)
 POWERS = (1, 2, 3)
-#: one more power is worth it if it takes away this share of what is left, and this share of the thermal part
+#: minimum reduction for adding a power, as a share of the remainder and of the thermal part
 WORTH_OF_REST, WORTH_OF_THERMAL = 0.1, 0.05
 
 
@@ -33,23 +33,23 @@ class PositionOptions:
     method : str or ThermalRegressor
         Method for the slopes: any of `thermocomp.models.methods`, or a custom estimator.
     inputs : sequence of str, optional
-        Channels to predict the slopes from; all temperatures and the spindle speed if not given.
+        Input channels of the models of the slopes. Default: all temperatures and the spindle speed.
     slopes : int
-        m, the highest power of the position; Chen finds 1 enough (C-05). 0 without an offset: the cold profile alone.
+        Highest power m of the position; 1 is enough according to Chen (C-05). 0 without an offset: cold profile only.
     offset : bool
-        Model a k_0(t) too; without it the thermal part is zero at the reference position, as Chen's.
+        Whether to model k_0(t); without it the thermal part is zero at the reference position, as in Chen's model.
     profile : {'polynomial', 'spline'}
     order : int, (int, int) or 'auto'
         Order of the profile; see `thermocomp.volumetric.models.geometric.fit_profile`.
     coordinates : str, optional
-        Axes the profile may depend on (C-06).
+        Axes that the profile may depend on (C-06).
     reference : int or sequence of int
-        States that count as cold, in each test; of several, the mean (C-07). Temperatures are counted from them too.
+        States of each test that count as cold; the mean of several (C-07). Temperatures are relative to them too.
     reference_position : float, optional
-        Position at which q is zero [mm]. Default: the axis' zero, or the end of the measured travel that is next to it.
+        Position at which q is zero [mm]. Default: axis position 0, or the end of the measured travel nearest to it.
     rezero : bool
-        False: all tests count from one cold state, the mean of their reference states, and so does the model live:
-        temperatures are absolute. For a machine whose cold profile is not the same every morning.
+        False: all tests refer to one cold state, the mean of their reference states, and so does the live model:
+        temperatures are absolute. For a machine whose cold profile differs from morning to morning.
     support : Support
         Behaviour of the models of the slopes outside their training range.
     """
@@ -72,7 +72,7 @@ class PositionOptions:
 
     @property
     def powers(self) -> tuple[int, ...]:
-        """Powers of q whose factors are modelled."""
+        """Powers of q with modelled factors."""
         return tuple(range(0 if self.offset else 1, self.slopes + 1))
 
 
@@ -83,12 +83,12 @@ def fill_options(
     *,
     learn: BoolArray | None = None,
 ) -> PositionOptions:
-    """Fill in the options that the profiles determine; temperatures are not used.
+    """Determine open options from the profiles; temperatures are not used.
 
-    - Reference position: the measured one where the thermal part is smallest: powers that are zero there leave least. A
-      laser counts from where it was set to zero, a screw grows from its fixed bearing.
-    - Offset: if the thermal part is more than noise even there: one takes away a tenth of what powers alone leave.
-    - Slopes: the fewest powers to which one more adds little, as `PositionFit.enough`; none, if the thermal part is
+    - Reference position: the measured position where the thermal part is smallest, i.e. where powers that vanish there
+      leave least. A laser reads relative to its zeroing position, a screw grows from its fixed bearing.
+    - Offset: used if the thermal part exceeds the noise even there: it must remove a tenth of the powers' remainder.
+    - Slopes: the fewest powers to which one more adds little, as in `PositionFit.enough`; none if the thermal part is
       noise.
 
     Parameters
@@ -96,10 +96,10 @@ def fill_options(
     profiles : Profiles or sequence of Profiles
         Profiles of one component, one per test.
     options : PositionOptions
-        Options; those that are set stay unchanged.
+        Options; settings that are not open stay unchanged.
     left_open : sequence of {'slopes', 'offset', 'reference_position'}
     learn : ndarray of bool of shape (n_states,), optional
-        States that may be looked at; see `thermocomp.volumetric.models.position.fit_position`.
+        States that may be used; see `thermocomp.volumetric.models.position.fit_position`.
 
     Returns
     -------
@@ -108,7 +108,7 @@ def fill_options(
     Raises
     ------
     FitError
-        No state may be looked at.
+        No state may be used.
     """
     tests = set_cold_profiles((profiles,) if isinstance(profiles, Profiles) else tuple(profiles), options, learn)
     tests = blank_unlearned(tests, options, learn)
@@ -118,7 +118,7 @@ def fill_options(
         m = choose_power(shifted, thermal) or 1 if "slopes" in left_open else options.slopes
         options = replace(options, reference_position=_quietest(tests, options, m))
     if "offset" in left_open:
-        # beside all powers, lest a bent profile is taken for a shifted one
+        # with all powers, so that a curved profile is not mistaken for a shifted one
         known = [m for m in POWERS if np.isfinite(shifted[m])]
         m = max(known, default=1) if "slopes" in left_open else options.slopes
         without, with_it = (remainder(tests, replace(options, offset=o), m) for o in (False, True))
@@ -130,7 +130,7 @@ def fill_options(
 
 
 def reference_position(tests: Sequence[Profiles], options: PositionOptions) -> float:
-    """Return the reference position, where q is zero [mm]: see `PositionOptions`.
+    """Return the reference position, at which q is zero [mm]: see `PositionOptions`.
 
     Parameters
     ----------
@@ -146,19 +146,19 @@ def reference_position(tests: Sequence[Profiles], options: PositionOptions) -> f
 def set_cold_profiles(
     tests: Sequence[Profiles], options: PositionOptions, learn: BoolArray | None = None
 ) -> tuple[Profiles, ...]:
-    """Return the tests with the profile that counts as cold: each its own, or all the mean (`PositionOptions.rezero`).
+    """Return the tests with their cold profiles: its own for each, or the mean for all (`PositionOptions.rezero`).
 
     Parameters
     ----------
     tests : sequence of Profiles
     options : PositionOptions
     learn : ndarray of bool of shape (n_states,), optional
-        The mean is that of the tests of which a state may be learned from; see `blank_unlearned`.
+        Training states: the mean is taken over tests with at least one; see `blank_unlearned`.
 
     Raises
     ------
     InputError
-        There is to be one cold profile for tests that were not measured at the same points.
+        One cold profile is required for tests that were not measured at the same points.
     """
     if options.rezero:
         return tuple(tests)
@@ -174,15 +174,15 @@ def set_cold_profiles(
 def blank_unlearned(
     tests: Sequence[Profiles], options: PositionOptions, learn: BoolArray | None = None
 ) -> tuple[Profiles, ...]:
-    """Return the training data: the other states are blank, tests without training states are left out.
+    """Return the training data: states not used for training are blank, tests without training states are omitted.
 
     Parameters
     ----------
     tests : sequence of Profiles
     options : PositionOptions
-        Its reference states stay, wherever one state of the test may be learned from.
+        Reference states are kept if any state of their test is used for training.
     learn : ndarray of bool of shape (n_states,), optional
-        Over all tests; all if not given.
+        Training states over all tests. Default: all.
 
     Returns
     -------
@@ -191,7 +191,7 @@ def blank_unlearned(
     Raises
     ------
     FitError
-        None is left.
+        No test is left.
     """
     if learn is None:
         return tuple(tests)
@@ -213,7 +213,7 @@ def remainder(tests: Sequence[Profiles], options: PositionOptions, m: int) -> fl
     ----------
     tests : sequence of Profiles
     options : PositionOptions
-        Tells whether there is an offset too, and where q is zero.
+        Defines whether there is an offset, and where q is zero.
     m : int
         0 without an offset: no fit, the thermal part itself is used.
 
@@ -235,19 +235,19 @@ def remainder(tests: Sequence[Profiles], options: PositionOptions, m: int) -> fl
 
 
 def is_worthwhile(before: float, after: float, thermal: float) -> bool:
-    """Return whether a term is worth it that leaves less of a thermal part: a tenth of the rest, a twentieth of it."""
+    """Return whether a term is useful: it removes over a tenth of the remainder and a twentieth of the thermal part."""
     return before - after > max(WORTH_OF_REST * before, WORTH_OF_THERMAL * thermal)
 
 
 def choose_power(remainders: Mapping[int, float], thermal: float) -> int | None:
-    """Return the smallest m to which a higher one adds little; None if nothing is known.
+    """Return the smallest m to which higher powers add little; None if unknown.
 
     Parameters
     ----------
     remainders : mapping of int to float
         Residual after powers up to m [unit], by m.
     thermal : float
-        The thermal part itself [unit].
+        RMS of the thermal part [unit].
     """
     known = {m: rest for m, rest in remainders.items() if np.isfinite(rest)}
     return next(
@@ -256,7 +256,7 @@ def choose_power(remainders: Mapping[int, float], thermal: float) -> int | None:
 
 
 def _quietest(tests: Sequence[Profiles], options: PositionOptions, m: int) -> float:
-    """Return the measured position about which powers up to m leave least [mm]."""
+    """Return the measured position relative to which powers up to m leave least [mm]."""
     alone = replace(options, offset=False)
     places = np.unique(np.concatenate([test.position for test in tests])).tolist()
     return float(min(places, key=lambda p: remainder(tests, replace(alone, reference_position=p), m)))

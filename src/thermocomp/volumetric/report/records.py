@@ -1,4 +1,4 @@
-"""Results of position-dependent errors as plain numbers and words."""
+"""Results of position-dependent errors as plain numbers and text."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -8,7 +8,7 @@ from thermocomp.volumetric.models.positionoptions import Setting
 
 
 def position(found: PositionStudy, left_open: Sequence[Setting]) -> dict[str, Any]:
-    """Return all about one component, as plain numbers; its choices are those of the settings that were left open."""
+    """Return all results of one component as plain numbers, including the values chosen for open settings."""
     fit, judged = found.fit, found.assessment
     model = fit.model
     factors = []
@@ -55,7 +55,7 @@ def position(found: PositionStudy, left_open: Sequence[Setting]) -> dict[str, An
 
 
 def cycle(c: CycleErrors) -> dict[str, Any]:
-    """Return the errors of profiles that were not seen."""
+    """Return the errors of unseen profiles."""
     return {
         "cycle": c.cycle,
         "profiles": c.n_states,

@@ -1,4 +1,4 @@
-"""The volumetric error of a machine on one offline page."""
+"""The volumetric error of a machine as a single offline page."""
 
 from thermocomp.core.components import COMPONENTS
 from thermocomp.report.html import page
@@ -9,7 +9,7 @@ from thermocomp.volumetric.report import volumetric_tables as tables
 
 
 def render(study: Volumetric) -> str:
-    """Return the page as one HTML text that needs no network.
+    """Return the page as a self-contained HTML text.
 
     Parameters
     ----------

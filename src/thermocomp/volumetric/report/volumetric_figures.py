@@ -14,14 +14,14 @@ FloatArray = NDArray[np.float64]
 
 WIDTH = 9.6
 MAX_MOMENTS = 3
-#: errors below this are not enlarged any more [um]
+#: smallest error at which figures are still enlarged [um]
 SMALL = 0.1
-#: components that add less than this share of the largest one are not shown
+#: components below this share of the largest one are not shown
 NEGLIGIBLE = 0.01
 
 
 def over_time(study: Volumetric) -> str:
-    """Show how the error at the point runs over time; the moments of the other figures are marked."""
+    """Plot the error at the point over time; the moments of the other figures are marked."""
     course = study.course
     hours = course.time / 3600
     tilted = bool(np.abs(course.tilt).max() > 0)
@@ -62,7 +62,7 @@ def over_time(study: Volumetric) -> str:
 
 
 def curves(study: Volumetric) -> str:
-    """Show each position-dependent component along its axis in each state: what drifts, and how straight."""
+    """Plot each position-dependent component along its axis in each state: its drift and straightness."""
     machine = study.machine
     known = [c for c in COMPONENTS if c.depends_on and c.code in machine.components]
     axes_shown = [a for a in "XYZ" if any(c.depends_on == a for c in known)]
@@ -93,7 +93,7 @@ def curves(study: Volumetric) -> str:
 
 
 def scalars(study: Volumetric) -> str:
-    """Show each component that depends on time alone, over time."""
+    """Plot each component that depends on time only, over time."""
     course = study.course
     hours = course.time / 3600
     known = [c for c in COMPONENTS if c.is_scalar and c.code in study.machine.components]
@@ -119,7 +119,7 @@ def scalars(study: Volumetric) -> str:
 
 
 def contributions(study: Volumetric) -> str:
-    """Show which components the error comes from in each state: at the point, and all over the work volume."""
+    """Plot the contributions of the components to the error in each state: at the point, and over the work volume."""
     moments = choose_moments(study)
     parts = [study.course.contributions(m.row) for m in moments]
     lengths = np.max(
@@ -172,6 +172,6 @@ def contributions(study: Volumetric) -> str:
 
 
 def choose_moments(study: Volumetric) -> list[Moment]:
-    """Return the moments that find room on a page: the one with the largest error is always among them."""
+    """Return the moments shown on the page, which include the one with the largest error."""
     others = [m for m in study.moments if m is not study.worst][: MAX_MOMENTS - 1]
     return [m for m in study.moments if m is study.worst or m in others]

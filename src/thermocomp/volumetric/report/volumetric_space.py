@@ -1,4 +1,4 @@
-"""Figures of the work volume, as SVG text: how it is bent, and sections through it."""
+"""Figures of the work volume as SVG text: its deformation, and sections through it."""
 
 import itertools
 import math
@@ -22,20 +22,20 @@ from thermocomp.volumetric.report.volumetric_figures import SMALL, WIDTH, choose
 
 FloatArray = NDArray[np.float64]
 
-#: pale to dark, so that what is large stands out on white paper, in grey too
+#: light to dark, so that large values stand out on white paper, also in greyscale
 MAGNITUDE = ListedColormap(colormaps["inferno_r"](np.linspace(0.12, 0.88, 256)), name="magnitude")
-#: where the reader stands: to the right in front of the machine, above the table [degrees]
+#: viewpoint: to the right in front of the machine, above the table [degrees]
 AZIMUTH, ELEVATION = -58.0, 24.0
-#: share of the longest travel that the largest error is drawn as
+#: drawn size of the largest error as a share of the longest travel
 DRAWN = 0.2
-#: which points of a section get an arrow
+#: points of a section that get an arrow
 _EVERY = slice(2, None, 4)
 #: indices of the two axes, positions along them [mm], errors before and after [um]
 _Section = tuple[int, int, FloatArray, FloatArray, FloatArray, FloatArray]
 
 
 def boxes(study: Volumetric) -> str:
-    """Show how the work volume is bent in each state, and what the straight lines of the axes leave of it."""
+    """Draw the deformation of the work volume in each state, and its residual after the straight lines of the axes."""
     moments = choose_moments(study)
     travels = lay_grid(study.machine, 2).reshape(-1, 3)
     largest = max(SMALL, *(m.straight.before.largest for m in moments))
@@ -44,7 +44,7 @@ def boxes(study: Volumetric) -> str:
         if len(moments) > 1:
             figure = Figure(figsize=(WIDTH, 5.6), layout="constrained")
             axes = figure.subplots(2, len(moments), squeeze=False)
-        else:  # before and after side by side
+        else:  # before and after next to each other
             figure = Figure(figsize=(WIDTH, 3.9), layout="constrained")
             axes = figure.subplots(1, 2, squeeze=False).T
         magnified = _nice(DRAWN * float(np.ptp(travels, axis=0).max()) / (1e-3 * largest))
@@ -72,19 +72,19 @@ def boxes(study: Volumetric) -> str:
 
 
 def sections(study: Volumetric, moment: Moment) -> str:
-    """Show where in the work volume the error is large, and where it points to, in three sections through a point."""
+    """Draw size and direction of the error in the work volume, in three sections through a point."""
     machine, n = study.machine, 21
     planes = [p for p in ("XY", "XZ", "YZ") if set(p) <= set(machine.structure.axes)]
     spans = [[float(np.ptp(machine.axis(a).travel)) for a in p] for p in planes]
     with drawing("sections"):
-        # what labels and the colour bar leave, so that the panels fill the page's width
+        # remaining width after labels and colour bar, so that the panels fill the page
         per_mm = (WIDTH - 1.2 - 0.7 * len(planes)) / sum(s[0] for s in spans)
         height = min(per_mm * max(s[1] for s in spans), 3.5)
         axes: NDArray[np.object_]
         if len(planes) > 1:
             figure = Figure(figsize=(WIDTH, 1.2 + 2 * height), layout="constrained")
             axes = figure.subplots(2, len(planes), squeeze=False, width_ratios=[s[0] for s in spans])
-        else:  # before and after side by side
+        else:  # before and after next to each other
             figure = Figure(figsize=(WIDTH, 0.8 + height), layout="constrained")
             axes = figure.subplots(1, 2, squeeze=False).T
         keys = []
@@ -110,7 +110,7 @@ def sections(study: Volumetric, moment: Moment) -> str:
             mappable, shrink = ScalarMappable(norm, MAGNITUDE), 1.0 if len(planes) > 1 else 0.7
             bar = figure.colorbar(mappable, ax=panels, label="length of the error [um]", aspect=18, shrink=shrink)
             keys.append((ax, arrows, bar.ax, key))
-        figure.draw_without_rendering()  # where the bars stand is known once the figure is laid out
+        figure.draw_without_rendering()  # the positions of the bars are known only after the layout
         for ax, arrows, beside, key in keys:
             box = beside.get_position()
             ax.quiverkey(
@@ -128,7 +128,7 @@ def sections(study: Volumetric, moment: Moment) -> str:
 def _bent(
     ax: Axes, study: Volumetric, error: Callable[[FloatArray], FloatArray], magnified: float, norm: Normalize
 ) -> None:
-    """Draw the work volume, how an error bends it, and the error at its corners."""
+    """Draw the work volume, its deformation by an error, and the error at its corners."""
     for points, face in _lines(study):
         ax.plot(
             *_seen(points[[0, -1]]).T,
@@ -168,7 +168,7 @@ def _section(
     scale: float,
     levels: FloatArray,
 ) -> Quiver:
-    """Draw the length of the error in colour and its part in the plane as arrows, which are returned."""
+    """Draw the length of the error as colour and its in-plane part as arrows, which are returned."""
     (u, v), (first, second) = places, axes
     norm = BoundaryNorm(levels, MAGNITUDE.N)
     ax.contourf(u, v, np.linalg.norm(error, axis=-1), levels, cmap=MAGNITUDE, norm=norm)
@@ -194,20 +194,20 @@ def _section(
 
 
 def _plane_named(study: Volumetric, plane: str) -> str:
-    """Return the name of a section, and the position of the axis across it."""
+    """Return the name of a section, and the position of the axis normal to it."""
     across = next(a for a in "XYZ" if a not in plane)
     here = f" at {across} {study.course.point['XYZ'.index(across)]:g} mm"
     return f"{plane[0]}-{plane[1]}{here if across in study.machine.structure.axes else ''}"
 
 
 def _nice(value: float) -> float:
-    """Return the largest of 1, 1.5, 2, 3, 5, 10 ... that is not above a value."""
+    """Return the largest of 1, 1.5, 2, 3, 5, 10 ... that does not exceed a value."""
     power = 10.0 ** math.floor(math.log10(value))
     return max(f for f in (1.0, 1.5, 2.0, 3.0, 5.0) if f * power <= value * (1 + 1e-9)) * power
 
 
 def _seen(points: FloatArray) -> FloatArray:
-    """Return the positions of points on the figure, (..., 3) -> (..., 2): a parallel projection."""
+    """Return the positions of points in the figure by parallel projection, (..., 3) -> (..., 2)."""
     a, e = math.radians(AZIMUTH), math.radians(ELEVATION)
     right = np.array([-math.sin(a), math.cos(a), 0.0])
     up = np.array([-math.cos(a) * math.sin(e), -math.sin(a) * math.sin(e), math.cos(e)])
@@ -215,7 +215,7 @@ def _seen(points: FloatArray) -> FloatArray:
 
 
 def _lines(study: Volumetric) -> list[tuple[FloatArray, bool]]:
-    """Return lines to draw of the work volume: grids on the three faces at the back (True), then the edges."""
+    """Return lines of the work volume to draw: grids on the three rear faces (True), then the edges."""
     travel = [study.machine.axis(a).travel for a in "XYZ"]
     back = [travel[0][0], travel[1][1], travel[2][0]]
     found = []
@@ -233,7 +233,7 @@ def _lines(study: Volumetric) -> list[tuple[FloatArray, bool]]:
 
 
 def _bare(ax: Axes, room: FloatArray) -> None:
-    """Leave nothing but the drawing, in panels of the same size: room for points (n, 2) on the paper."""
+    """Remove axes and frame, and give all panels the same size: room for points (n, 2) on the paper."""
     low, high = room.min(axis=0), room.max(axis=0)
     beside = 0.1 * (high - low)
     ax.set_xlim(low[0] - beside[0], high[0] + beside[0])
@@ -243,7 +243,7 @@ def _bare(ax: Axes, room: FloatArray) -> None:
 
 
 def _triad(ax: Axes, study: Volumetric) -> None:
-    """Write the axes' letters at the ends of the edges that leave the corner in front."""
+    """Draw the letters of the axes at the ends of the edges that start at the front corner."""
     low, high = (np.array([study.machine.axis(a).travel[k] for a in "XYZ"]) for k in (0, 1))
     size = 0.07 * float((high - low).max())
     middle = 0.5 * (low + high)
@@ -257,7 +257,7 @@ def _triad(ax: Axes, study: Volumetric) -> None:
 
 
 def _scale(ax: Axes, study: Volumetric, magnified: float, largest: float) -> None:
-    """Draw how long an error of a round number of um is."""
+    """Draw a scale bar for an error of a round number of um."""
     size = _nice(0.7 * largest)
     length = 1e-3 * size * magnified
     corners = _seen(lay_grid(study.machine, 2).reshape(-1, 3))

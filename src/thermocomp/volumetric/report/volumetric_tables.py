@@ -1,4 +1,4 @@
-"""The volumetric error of a machine in numbers: tables for terminal and page, and plain numbers for programs."""
+"""Volumetric error of a machine in numbers: tables for terminal and page, and plain numbers for JSON."""
 
 from typing import Any
 
@@ -10,15 +10,15 @@ from thermocomp.report.layout import Column, Layout
 from thermocomp.runtime.geometry.kinematics import INDEX
 from thermocomp.volumetric.judging.volumetric import Moment, Volumetric, describe_source, models_of
 
-#: contributions that are told; --json has all
+#: number of contributions shown; --json has all
 TOLD = 8
 UM = Column("", 0, "um")
-#: to which the whole correction is iterated [um]
+#: convergence limit for the iteration of the complete correction [um]
 SETTLED = 0.01
 
 
 def headline(study: Volumetric) -> str:
-    """Return one line: the largest error in the work volume, and what corrections leave of it."""
+    """Return a summary line: the largest error in the work volume, and its residual after corrections."""
     sizes = study.worst.sizes
     none, lines, everything = (sizes[k] for k in ("nothing", "straight lines", "everything"))
     when = f"after {study.worst.time / 3600:.2f} h" if len(study.course.time) > 1 else "in the reference state"
@@ -31,7 +31,7 @@ def headline(study: Volumetric) -> str:
 
 
 def components(study: Volumetric, *, page: bool = False) -> Layout:
-    """Return the components with their values in each state: those that something is known of, on a page all."""
+    """Return the components with their values in each state: on a page all, else those with a source."""
     rows = [r for r in listed(study) if page or r["source"] != "nothing"]
     nothing = dict.fromkeys((k for k, r in enumerate(rows) if r["source"] == "nothing"), "soft")
 
@@ -67,7 +67,7 @@ def at_point(study: Volumetric, *, page: bool = False) -> Layout:
 
 
 def contributions(study: Volumetric, *, point: bool) -> Layout:
-    """Return the largest contributions, at the point and over the volume or over it alone."""
+    """Return the largest contributions: at the point and over the volume, or over the volume only."""
     course = study.course
     largest = max(study.moments, key=lambda m: float(course.error[m.row] @ course.error[m.row]))
     moment = largest if point else study.worst
@@ -90,7 +90,7 @@ def contributions(study: Volumetric, *, point: bool) -> Layout:
 
 
 def lines(study: Volumetric, *, page: bool = False) -> Layout:
-    """Return the best straight lines, and what they leave of the error; on a page over the volume too."""
+    """Return the best straight lines and the residual error after them, on a page also over the volume."""
     rows = [
         {"name": "" if k else m.name, **line}
         for m, state in zip(study.moments, states(study), strict=True)
@@ -118,7 +118,7 @@ def lines(study: Volumetric, *, page: bool = False) -> Layout:
 
 
 def volume(study: Volumetric) -> Layout:
-    """Return the errors over the work volume without correction and after it."""
+    """Return the errors over the work volume before and after correction."""
     rows = [
         ("" if k else m.name, name, size.rms, size.largest)
         for m in study.moments
@@ -135,7 +135,7 @@ def volume(study: Volumetric) -> Layout:
 
 
 def listed(study: Volumetric) -> list[dict[str, Any]]:
-    """Return all 32 components: the source of their value, and the value at the point in each moment."""
+    """Return all 32 components: the source of the value, and the value at the point at each moment."""
     return [
         {
             "code": c.code,
@@ -149,7 +149,7 @@ def listed(study: Volumetric) -> list[dict[str, Any]]:
 
 
 def content(study: Volumetric) -> dict[str, Any]:
-    """Return all about a machine's errors, for programs."""
+    """Return all errors of a machine for JSON."""
     course, recording = study.course, study.recording
     return {
         "machine": study.machine.name,
@@ -172,7 +172,7 @@ def content(study: Volumetric) -> dict[str, Any]:
 
 
 def states(study: Volumetric) -> list[dict[str, Any]]:
-    """Return the thermal states that are looked at: errors at the point, what adds up to them, and the volume."""
+    """Return the evaluated thermal states: errors at the point, their contributions, and the volume."""
     course = study.course
     return [
         {
@@ -204,7 +204,7 @@ def states(study: Volumetric) -> list[dict[str, Any]]:
 
 
 def contributed(study: Volumetric, moment: Moment) -> list[dict[str, Any]]:
-    """Return the contribution of every component at the point, the largest first, and over the volume."""
+    """Return the contribution of each component at the point, largest first, and over the volume."""
     course = study.course
     found = [
         {
@@ -222,7 +222,7 @@ def contributed(study: Volumetric, moment: Moment) -> list[dict[str, Any]]:
 
 
 def untested(study: Volumetric) -> list[str]:
-    """Return the components whose models were never judged on unseen cycles."""
+    """Return the components with models that were never judged on unseen cycles."""
     return [
         code
         for code, source in study.machine.components.items()
@@ -231,7 +231,7 @@ def untested(study: Volumetric) -> list[str]:
 
 
 def unproven(study: Volumetric) -> list[str]:
-    """Return the components whose models are taken although they are unproven, and by whom."""
+    """Return the components with unproven models approved for use, and who approved them."""
     found = {
         code: next((m.honest_error.taken for m in models_of(source) if m.honest_error and m.honest_error.taken), "")
         for code, source in study.machine.components.items()
@@ -240,5 +240,5 @@ def unproven(study: Volumetric) -> list[str]:
 
 
 def said(point: Vector) -> str:
-    """Return a point in words."""
+    """Return a point as text."""
     return "X {:g}, Y {:g}, Z {:g} mm".format(*point)

@@ -1,15 +1,16 @@
 #!/usr/bin/python3
-"""The end of thermocomp inside LinuxCNC: a HAL component that needs Debian's Python and nothing else.
+"""The thermocomp component inside LinuxCNC: a HAL component that needs only Debian's Python.
 
-``thermocomp linuxcnc setup`` copies this file beside the machine's configuration. What a correction is at a position,
-its rate and its magnitude are kept by HAL in the servo thread; this process only says where each line shall go. So it
-may die at any time: HAL continues with what it was told last, and a new process begins at what is in force.
+``thermocomp linuxcnc setup`` copies this file next to the machine's configuration. HAL evaluates a correction at the
+present position and limits its rate and magnitude in the servo thread; this process only sets the target of each line.
+It may therefore die at any time: HAL continues with the last targets, and a new process starts from those in force.
 
-It listens on a Unix socket, says what is in force, and answers JSON lines:
+The component listens on a Unix socket, reports the correction in force, and answers JSON lines:
 
     {"beat": 1, "axes": {"Z": [offset um, slope um/m, reference position mm]}, "magnitude": um, "rate": um/s}
 
-All but ``beat`` may be left out. Who says nothing for the timeout is dropped; the correction is held, then fades.
+All keys except ``beat`` are optional. A client that sends nothing for the timeout is disconnected; the correction is
+held, then fades.
 """
 
 import argparse
@@ -31,47 +32,47 @@ from typing import Any
 import hal  # type: ignore[import-not-found]
 
 NAME = "thermocomp"
-#: what is told of each axis, and what is heard
+#: pins of each axis: outputs and inputs of this component
 TOLD = ("offset-rate", "slope-rate", "offset", "slope")
 HEARD = ("offset-now", "slope-now", "away", "demand", "force")
-#: between two looks at the controller [s]
+#: interval between two checks of the controller [s]
 TICK = 0.01
-#: components that were killed, at most: then LinuxCNC has to be started again
+#: maximum number of killed components; beyond it LinuxCNC must be restarted
 MOST = 200
-#: bytes of a line; connections at a time, of which one is listened to
+#: maximum length of a line [bytes]; maximum number of pending connections (one is served at a time)
 LONGEST, WAITING = 4096, 4
-#: a correction that is not where it shall be by more than this [um], for so long [s], does not follow
+#: deviation from the demand [um] and its duration [s] beyond which the correction is reported as not following
 ASIDE, PATIENCE = 1.0, 1.0
-#: the servo thread stands still when it has not answered for so long; then LinuxCNC is gone [s]
+#: time without a response from the servo thread: regarded as stopped; LinuxCNC regarded as terminated [s]
 STILL, GONE = 1.0, 5.0
 
 
 class AxisLine:
-    """An axis: where its line shall go, in the machine's units about the middle of its travel."""
+    """An axis and the target of its correction line, in machine units relative to the middle of its travel."""
 
     def __init__(self, text: str, unit: float) -> None:
         letter, low, high = text.split(",")
         self.letter, self.low, self.high = letter.lower(), float(low), float(high)
         self.middle, self.half = (self.low + self.high) / 2.0, (self.high - self.low) / 2.0
-        self.unit = unit  # units of the machine in a millimetre
-        self.ends: list[float] | None = None  # what is demanded at both ends of the travel; none: what is in force
-        self.aside: float | None = None  # since when it does not follow
+        self.unit = unit  # machine units per millimetre
+        self.ends: list[float] | None = None  # demanded values at both ends of the travel; None: keep those in force
+        self.aside: float | None = None  # time from which the axis has not followed; None: it follows
 
     def demand(self, offset: float, slope: float, reference: float, magnitude: float) -> None:
-        """Process a line: um, um/m, mm, and the limit, um."""
+        """Set the target line: offset [um], slope [um/m], reference position [mm], largest magnitude [um]."""
         wanted = (offset + 1e-3 * slope * (p / self.unit - reference) for p in (self.low, self.high))
         self.ends = [1e-3 * self.unit * max(-magnitude, min(magnitude, v)) for v in wanted]
 
 
 class Server:
-    """Socket server that sets HAL as received."""
+    """Socket server that passes received corrections to HAL."""
 
     def __init__(self, options: argparse.Namespace) -> None:
         self.options = options
         self.unit = 1.0 if options.unit == "mm" else 1.0 / 25.4
         self.axes = {a.letter.upper(): a for a in (AxisLine(t, self.unit) for t in options.axis)}
         self.magnitude, self.rate = options.magnitude, options.rate
-        self.heard = time.monotonic()  # when the service spoke last; a new process gives it the whole time
+        self.heard = time.monotonic()  # time of the last message; a new process grants the full timeout
         self.ticks, self.echoed = 0, time.monotonic()
         self.client: socket.socket | None = None
         self.since, self.buffer = 0.0, b""
@@ -89,7 +90,7 @@ class Server:
             for key, _ in self.selector.select(max(0.0, due - time.monotonic())):
                 if key.fileobj is self.listener:
                     self.accept()
-                elif key.fileobj is self.client:  # it may have been dropped just now
+                elif key.fileobj is self.client:  # the client may just have been dropped
                     self.receive()
             now = time.monotonic()
             if now >= due:
@@ -123,7 +124,7 @@ class Server:
             axis.aside = None if follows else axis.aside or now
 
     def move(self, axis: AxisLine, fading: bool) -> None:
-        """Let the line of an axis go where it shall, straight, neither end faster than the rate."""
+        """Move the correction line of an axis to its target without bending it, both ends within the rate limit."""
         if fading:
             axis.ends = None
         elif axis.ends is None:
@@ -133,17 +134,17 @@ class Server:
         offset, slope = (low + high) / 2.0, (high - low) / (2.0 * axis.half)
         rate = micron * (min(self.rate, self.options.fade) if fading else self.rate)
         begin = self.get(axis, "offset-now"), self.get(axis, "slope-now")
-        if begin == (offset, slope):  # there: as fast as it has to come back after off and on, whoever lives then
+        if begin == (offset, slope):  # target reached: use the rate for returning from zero after off and on
             begin = 0.0, 0.0
         steps = abs(offset - begin[0]), abs(slope - begin[1])
-        seconds = (steps[0] + steps[1] * axis.half) / rate or 1.0  # of the end that moves more
-        letter = axis.letter  # the servo thread may run in between: never both too fast, never to a wrong place
+        seconds = (steps[0] + steps[1] * axis.half) / rate or 1.0  # for the end of the travel that moves further
+        letter = axis.letter  # the servo thread may interrupt: zero rates prevent a wrong movement
         self.pins[f"{letter}.offset-rate"] = self.pins[f"{letter}.slope-rate"] = 0.0
         self.pins[f"{letter}.offset"], self.pins[f"{letter}.slope"] = offset, slope
         self.pins[f"{letter}.offset-rate"], self.pins[f"{letter}.slope-rate"] = (v / seconds for v in steps)
 
     def why(self) -> str:
-        """Return the reason why nothing is in force; empty if something can be."""
+        """Return the reason why no correction can be in force; empty if one can."""
         if self.pins["on"]:
             return ""
         if not self.pins["homed"]:
@@ -151,7 +152,7 @@ class Server:
         return "in joint mode" if self.pins["enabled"] else "off"
 
     def report(self, beat: int) -> dict[str, Any]:
-        """Return the correction in force."""
+        """Return the report of the correction in force for a message."""
         now = time.monotonic()
         why, limited = self.why(), self.pins["limited"]
         micron = 1e-3 * self.unit
@@ -160,7 +161,7 @@ class Server:
             alarm = ""
             if not why and axis.aside is not None and now - axis.aside > PATIENCE:
                 alarm = "clipped at a soft limit" if limited else "does not follow: is OFFSET_AV_RATIO in the INI?"
-            share = 0.0 if why else 1.0  # LinuxCNC continues showing an offset that it has made part of the position
+            share = 0.0 if why else 1.0  # LinuxCNC continues to show an offset that is now part of the position
             axes[letter] = {
                 "offset": share * self.get(axis, "offset-now") / micron,
                 "slope": share * self.get(axis, "slope-now") * 1e6,
@@ -171,13 +172,13 @@ class Server:
                 "alarm": alarm,
             }
         known = {"beat": beat, "ticks": self.ticks, "timeout": self.options.timeout}
-        still = now - self.echoed > STILL  # what was in force is so, as far as anybody knows
+        still = now - self.echoed > STILL  # the correction in force is then the last known one
         return {**known, "suspended": why, "still": still, "limited": limited, "axes": axes}
 
     # -- the service ---------------------------------------------------------------------------------------------------
 
     def accept(self) -> None:
-        """Accept the service; a second one gets a message that the place is occupied."""
+        """Accept a connection of the service; if another service is connected, reply so and close."""
         connection, _ = self.listener.accept()
         if self.client is not None and self.left():
             self.drop()
@@ -193,7 +194,7 @@ class Server:
         self.since = time.monotonic()
 
     def left(self) -> bool:
-        """Return whether the service has hung up, which is read only after the one that knocks."""
+        """Return whether the connected service has hung up; checked only when another one connects."""
         assert self.client is not None
         try:
             return self.client.recv(1, socket.MSG_PEEK) == b""
@@ -203,14 +204,14 @@ class Server:
             return True
 
     def drop(self) -> None:
-        """Let the service go."""
+        """Disconnect the service."""
         if self.client is not None:
             self.selector.unregister(self.client)
             self.client.close()
             self.client = None
 
     def receive(self) -> None:
-        """Receive messages, and answer."""
+        """Receive messages and answer them."""
         client = self.client
         assert client is not None
         try:
@@ -226,11 +227,11 @@ class Server:
                 except (ValueError, TypeError, KeyError, AttributeError, RecursionError, OverflowError) as e:
                     answer = {"error": f"not understood: {type(e).__name__}: {e}"[:200]}
                 client.sendall(json.dumps(answer).encode() + b"\n")
-        except OSError:  # gone, or it does not listen to the answers
+        except OSError:  # disconnected, or not reading the answers
             self.drop()
 
     def take(self, message: dict[str, Any]) -> dict[str, Any]:
-        """Process a message: all of it or nothing."""
+        """Process a message completely or not at all."""
         limits = {}
         for name in ("magnitude", "rate"):
             value = float(message.get(name, getattr(self.options, name)))
@@ -248,25 +249,25 @@ class Server:
         self.magnitude, self.rate = limits["magnitude"], limits["rate"]
         for letter, (offset, slope, reference) in lines.items():
             self.axes[letter].demand(offset, slope, reference, self.magnitude)
-            self.move(self.axes[letter], False)  # at once, rather than with the next tick
+            self.move(self.axes[letter], False)  # immediately, not at the next tick
         return self.report(beat)
 
 
 def named(k: int) -> str:
-    """Return the name of the component after a number of killed ones."""
+    """Return the component name to use after `k` components were killed."""
     return f"{NAME}-{k}" if k else NAME
 
 
 def join(axes: list[AxisLine]) -> Any:
-    """Return a component whose pins hang on the signals of ``thermocomp.hal``; nothing moves by that.
+    """Return a component whose pins are linked to the signals of ``thermocomp.hal``; this moves nothing.
 
-    Pins are read and written without HAL's lock: a process that is killed while it holds that stops LinuxCNC.
+    Pins are read and written without HAL's lock: a process that is killed while holding the lock stops LinuxCNC.
     """
     for k in range(MOST + 1):
         try:
             component = hal.component(named(k))
             break
-        except hal.error:  # one that was killed: its name and pins stay
+        except hal.error:  # left by a killed component: its name and pins remain
             if k == MOST:
                 raise
     hal.set_msg_level(hal.MSG_NONE)
@@ -286,7 +287,7 @@ def join(axes: list[AxisLine]) -> Any:
                     component[pin] = 0.0
                 else:
                     component[pin] = hal.get_value(f"tc-{now.replace('.', '-')}")
-                for killed in range(k):  # a signal is told by one
+                for killed in range(k):  # a signal accepts one writer only
                     with contextlib.suppress(hal.error, RuntimeError):
                         hal.disconnect(f"{named(killed)}.{pin}")
             hal.connect(f"{named(k)}.{pin}", signal_name)
@@ -295,9 +296,9 @@ def join(axes: list[AxisLine]) -> Any:
 
 
 def listen(path: str, group: str) -> socket.socket:
-    """Return a socket that listens, for this user, and for the members of a group if one is named."""
+    """Return a listening socket, accessible to this user and to the members of the group, if one is named."""
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-    with contextlib.suppress(FileNotFoundError):  # a process that was killed leaves it
+    with contextlib.suppress(FileNotFoundError):  # left by a killed process
         Path(path).unlink()
     before = os.umask(0o177)
     try:
@@ -328,7 +329,7 @@ def keep(arguments: list[str]) -> None:
 
 
 def main() -> None:
-    """Run."""
+    """Run the component."""
     parser = argparse.ArgumentParser(description="The end of thermocomp inside LinuxCNC.")
     parser.add_argument("--pattern", choices=("offset", "drive"), required=True)
     parser.add_argument("--axis", action="append", required=True, help="letter,low,high: z,-200,100 [units of the INI]")
@@ -342,10 +343,10 @@ def main() -> None:
     if not options.once:
         keep(sys.argv[1:])
         return
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))  # LinuxCNC ends
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))  # LinuxCNC terminates
     try:
         server = Server(options)
-    except (hal.error, RuntimeError) as e:  # it would be started again without end
+    except (hal.error, RuntimeError) as e:  # a restart would fail again
         print(f"thermocomp: {e}: LinuxCNC does not run with thermocomp.hal", file=sys.stderr)
         return
     server.run()

@@ -1,4 +1,4 @@
-"""The HAL of a machine that is corrected: what is added to its configuration, and what has to be changed by hand."""
+"""HAL files for a corrected machine: additions to its configuration, and changes to be made by hand."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,9 +14,9 @@ from thermocomp.nc.linuxcnc.machineini import HalFiles, Ini, read_hal, read_ini
 Pattern = Literal["offset", "drive"]
 
 HAL_NAME, COMPONENT_NAME, SOCKET_NAME = "thermocomp.hal", "thermocomp_hal.py", "thermocomp.sock"
-#: share of the axis' speed and acceleration that a correction on the drive side may take
+#: share of the axis' speed and acceleration available to a drive-side correction
 SHARE = 0.1
-#: bytes of a path that a socket can have
+#: maximum length of a socket path [bytes]
 LONGEST = 107
 
 
@@ -27,7 +27,7 @@ class HalSettings:
     Parameters
     ----------
     pattern : {'offset', 'drive'}
-        Through external offsets, or between the controller and the drive.
+        Correction by external offsets, or between the controller and the drive.
     axes : str
         Letters of the axes that are corrected.
     magnitude : float
@@ -73,9 +73,9 @@ class HalSetup(NamedTuple):
 
     hal: str  #: text of the HAL file
     component: str  #: text of the component
-    todo: tuple[str, ...]  #: what is to be changed by hand, in words
-    socket: Path  #: where the service connects
-    files: tuple[Path, ...]  #: what is written
+    todo: tuple[str, ...]  #: changes to be made by hand, as text
+    socket: Path  #: socket to which the service connects
+    files: tuple[Path, ...]  #: files to be written
 
 
 def prepare(path: Path, folder: Path, settings: HalSettings) -> HalSetup:
@@ -141,24 +141,24 @@ def prepare(path: Path, folder: Path, settings: HalSettings) -> HalSetup:
 
 
 def set_up(path: Path, folder: Path, settings: HalSettings, *, overwrite: bool = False) -> HalSetup:
-    """Write what corrects a machine: a HAL file and the component that it starts.
+    """Write the files that correct a machine: a HAL file and the component that it starts.
 
     Parameters
     ----------
     path, folder, settings
         See `prepare`.
     overwrite : bool
-        Over files that are there.
+        Overwrite existing files.
 
     Returns
     -------
     HalSetup
-        The INI and the HAL files of the machine are not changed: the required changes are listed here.
+        Required changes; the machine's own INI and HAL files are left unchanged.
 
     Raises
     ------
     InputError
-        See `prepare`, or a file is there already.
+        See `prepare`, or a file exists already.
     """
     prepared = prepare(path, folder, settings)
     with drafts(prepared.files, overwrite=overwrite) as started:
@@ -198,7 +198,7 @@ def _axis(ini: Ini, letter: str, pattern: Pattern) -> HalAxis:
 
 
 def _joint(ini: Ini, letter: str) -> int:
-    """Return the joint that an axis is."""
+    """Return the joint number of an axis."""
     name, *rest = ini.get("KINS", "KINEMATICS").split()
     if name != "trivkins":
         raise InputError(f"{ini.path}: [KINS] {name}: on the drive side an axis must be a joint (trivkins)")

@@ -1,29 +1,29 @@
-"""The text of the HAL that keeps corrections in the servo thread: their rate, their magnitude, and their place."""
+"""HAL text that applies corrections in the servo thread: rate limit, magnitude limit and position dependence."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
 
 from thermocomp.nc.linuxcnc.machineini import HalFiles
 
-#: of an external offset: its counts [mm]
+#: size of one count of an external offset [mm]
 RESOLUTION = 1e-5
-#: joints that one table takes
+#: maximum number of joints per lookup table
 _INPUTS = 4
 
 
 class HalAxis(NamedTuple):
-    """An axis, in the units of the machine."""
+    """An axis, in machine units."""
 
     letter: str
-    joint: int  #: number of its joint; -1: not needed
+    joint: int  #: joint number; -1: not needed
     low: float
     high: float
-    speed: float  #: that a correction may take
-    acceleration: float  #: the same
+    speed: float  #: available to a correction
+    acceleration: float  #: available to a correction
 
 
 def load_modules(axes: Sequence[HalAxis], joints: int, pattern: str, files: HalFiles, todo: list[str]) -> list[str]:
-    """Return the lines that load modules; LinuxCNC loads each once.
+    """Return the lines that load HAL modules; LinuxCNC loads each module only once.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def load_modules(axes: Sequence[HalAxis], joints: int, pattern: str, files: HalF
     files : HalFiles
         HAL files of the machine.
     todo : list of str
-        Gets what has to be done where the machine loads a module itself.
+        Extended by the changes to be made by hand where the machine already loads a module.
     """
     letters = [a.letter for a in axes]
     homed = ["tc.homed" if k == 0 else f"tc.homed-{k}" for k in range(-(-joints // _INPUTS))]
@@ -74,13 +74,13 @@ def load_modules(axes: Sequence[HalAxis], joints: int, pattern: str, files: HalF
 
 
 def _net(files: HalFiles, source: str, *sinks: str) -> str:
-    """Return the line that hangs pins on the signal of a source: its own, if the machine has none."""
+    """Return the line that links pins to the signal of a source; a new signal is created if the machine has none."""
     own = "tc-" + source.replace(".", "-")
     return f"net {files.signals.get(source, own)} {source} => {' '.join(sinks)}"
 
 
 def make_gate(joints: int, pattern: str, files: HalFiles) -> list[str]:
-    """Return the HAL that knows whether a correction can be in force.
+    """Return the HAL lines that determine whether a correction can be in force.
 
     Parameters
     ----------
@@ -102,13 +102,13 @@ def make_gate(joints: int, pattern: str, files: HalFiles) -> list[str]:
         lines.append(f"net {before} {name}.out")
         lines.append(f"addf {name} servo-thread")
     lines += [f"net {before} => {n}.in-3" for n in ("tc.on", "tc.off", "tc.was")]
-    if pattern == "offset":  # and enabled, and coordinated or teleoperated: else an external offset does not move
+    if pattern == "offset":  # also enabled, and coordinated or teleop mode: otherwise an external offset does not move
         table = 0xA800
         for i, pin in enumerate(("motion-enabled", "coord-mode", "teleop-mode")):
             lines.append(_net(files, f"motion.{pin}", *(f"{n}.in-{i}" for n in ("tc.on", "tc.off", "tc.was"))))
     else:
         table = 0xFF00
-    # only if it was so a period ago: in the first one LinuxCNC sets an offset that it has kept to zero
+    # only if true in the previous period too: in the first one LinuxCNC resets a retained offset to zero
     lines += ["net tc-was tc.was.out => tc.on.in-4 tc.off.in-4", f"setp tc.was.function {table:#x}"]
     lines += [f"setp tc.on.function {table << 16:#x}", f"setp tc.off.function {0xFFFFFFFF ^ table << 16:#x}"]
     lines += ["net tc-on tc.on.out", "net tc-off tc.off.out"]
@@ -116,12 +116,12 @@ def make_gate(joints: int, pattern: str, files: HalFiles) -> list[str]:
     lines += [_net(files, "motion.motion-enabled", "tc.enabled.in-0"), "net tc-enabled tc.enabled.out"]
     lines += [_net(files, "motion.eoffset-limited", "tc.limited.in-0"), "net tc-limited tc.limited.out"]
     copying = ("tc.beat", "tc.alive", "tc.enabled", "tc.limited")
-    lines += [f"setp {n}.function 0x2" for n in copying]  # what comes in goes out
+    lines += [f"setp {n}.function 0x2" for n in copying]  # copy the input to the output
     return lines + [f"addf {n} servo-thread" for n in ("tc.on", "tc.off", "tc.was", *copying)]
 
 
 def make_line(axis: HalAxis, files: HalFiles, magnitude: float, micron: float) -> list[str]:
-    """Return the HAL that moves offset and slope of an axis to where they shall be, and works out the correction.
+    """Return the HAL lines that move offset and slope of an axis to their targets and compute the correction.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def make_line(axis: HalAxis, files: HalFiles, magnitude: float, micron: float) -
     magnitude : float
         Largest correction [um].
     micron : float
-        In units of the machine.
+        One micrometre in machine units.
     """
     a, most = axis.letter, magnitude * micron
     lines = [
@@ -160,10 +160,10 @@ def make_line(axis: HalAxis, files: HalFiles, magnitude: float, micron: float) -
 
 
 def make_offset(axis: HalAxis, files: HalFiles, micron: float) -> list[str]:
-    """Return the HAL that keeps an external offset where it shall be.
+    """Return the HAL lines that keep an external offset at its target.
 
-    Only changes of the counts add up, and some are lost: so what is added is what the controller's own request lacks.
-    While nothing can be in force the line begins at that request, so nothing is lacking.
+    Only changes of the counts accumulate, and some are lost: the difference from the controller's own request is
+    therefore added. While no correction can be in force the line starts from that request, so the difference is zero.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def make_offset(axis: HalAxis, files: HalFiles, micron: float) -> list[str]:
     files : HalFiles
         HAL files of the machine.
     micron : float
-        In units of the machine.
+        One micrometre in machine units.
     """
     a, scale = axis.letter, RESOLUTION * 1e3 * micron
     request = f"axis.{a}.eoffset-request"
@@ -193,13 +193,13 @@ def make_offset(axis: HalAxis, files: HalFiles, micron: float) -> list[str]:
 
 
 def make_drive(axis: HalAxis, files: HalFiles) -> list[str]:
-    """Return the HAL that adds a correction to the command of the drive, and subtracts it from its feedback.
+    """Return the HAL lines that add a correction to the drive command and subtract it from the feedback.
 
     Parameters
     ----------
     axis : HalAxis
     files : HalFiles
-        HAL files of the machine; functions that are added are in it afterwards.
+        HAL files of the machine; the added functions are appended to it.
     """
     a, command, feedback = axis.letter, f"joint.{axis.joint}.motor-pos-cmd", f"joint.{axis.joint}.motor-pos-fb"
     told, answered = files.signals[command], files.signals[feedback]
@@ -219,7 +219,7 @@ def make_drive(axis: HalAxis, files: HalFiles) -> list[str]:
         f"addf tc.{a}.drive.update-feedback servo-thread {at}",
     ]
     files.functions.insert(at - 1, f"tc.{a}.drive.update-feedback")
-    # straight after the planner: what is added is what is taken off the answer a period later
+    # directly after the planner: the correction added here is subtracted from the feedback one period later
     after = files.functions.index("motion-controller") + 2
     for name in ("update-output", "smooth"):
         function = f"tc.{a}.drive.{name}" if name == "update-output" else f"tc.{a}.{name}"

@@ -1,4 +1,4 @@
-"""Corrections to a LinuxCNC: what talks with the HAL component that ``thermocomp linuxcnc setup`` puts there."""
+"""Corrections to a LinuxCNC: client of the HAL component installed by ``thermocomp linuxcnc setup``."""
 
 import asyncio
 import contextlib
@@ -15,11 +15,11 @@ from thermocomp.core.ports import LinkStatus
 from thermocomp.core.shown import escape
 from thermocomp.live.adapters.connection import Connection
 
-#: between two signs of life, at most [s], and as a share of the time after which the component drops who is silent
+#: maximum interval between two keep-alive messages [s], and the same as a share of the component's timeout
 BEAT, SHARE = 0.5, 0.25
-#: it answers within so long, or it is lost [s]
+#: maximum time to an answer; then the connection counts as lost [s]
 ANSWER = 2.0
-#: a correction further from what is demanded is told as it is measured [um]
+#: difference from the demand above which the measured correction is reported instead [um]
 ASIDE = 1.0
 
 
@@ -27,9 +27,9 @@ class AxisReport(NamedTuple):
     """Correction in force at an axis."""
 
     correction: Correction
-    in_force: float  #: where the axis stands [um]
-    position: float  #: as commanded [mm]
-    alarm: str  #: why it is not where it shall be; empty if it is
+    in_force: float  #: correction at the present axis position [um]
+    position: float  #: commanded [mm]
+    alarm: str  #: reason why the demand is not reached; empty if it is
 
 
 @dataclass(kw_only=True)
@@ -41,23 +41,23 @@ class LinuxCncSink:
     path : Path
         Socket of the HAL component.
     axes : dict of str to str
-        Letter of the axis by target, such as ``{"z_um": "Z"}``; other targets are left out.
+        Letter of the axis by target, such as ``{"z_um": "Z"}``; other targets are ignored.
     magnitude : float or None
-        Largest correction [um], where that is less than the component was set up with.
+        Largest correction [um], if less than the limit of the component.
     rate : float or None
-        Fastest change [um/s], the same.
+        Fastest change [um/s], if less than the limit of the component.
 
     Raises
     ------
     SettingError
-        No axes, or two targets with the same.
+        No axes, or two targets for the same axis.
     """
 
     path: Path
     axes: dict[str, str]
     magnitude: float | None = None
     rate: float | None = None
-    ticks: int = field(default=-1, init=False)  #: of the component: it continues while that is alive
+    ticks: int = field(default=-1, init=False)  #: counter of the component: increases while it is alive
     _connection: Connection = field(default_factory=Connection, init=False, repr=False)
     _streams: tuple[asyncio.StreamReader, asyncio.StreamWriter] | None = field(default=None, init=False, repr=False)
     _beating: asyncio.Task[None] | None = field(default=None, init=False, repr=False)
@@ -137,7 +137,7 @@ class LinuxCncSink:
         return dict(self._reports)
 
     async def close(self) -> None:
-        """Close the connection; idempotent. What was applied stays in force."""
+        """Close the connection; idempotent. Applied corrections stay in force."""
         beating, self._beating = self._beating, None
         if beating is not None and beating is not asyncio.current_task():
             beating.cancel()
@@ -151,7 +151,7 @@ class LinuxCncSink:
         streams, self._streams = self._streams, None
         if streams is not None:
             streams[1].close()
-            with contextlib.suppress(OSError):  # it was lost before
+            with contextlib.suppress(OSError):  # connection lost earlier
                 await streams[1].wait_closed()
 
     def _fail(self, why: str) -> ThermocompError:
@@ -160,21 +160,21 @@ class LinuxCncSink:
         return ThermocompError(reason)
 
     async def _live(self) -> None:
-        """Give signs of life while the connection is there."""
+        """Send keep-alive messages while connected."""
         with contextlib.suppress(ThermocompError):
             while True:
                 await asyncio.sleep(min(BEAT, SHARE * self._timeout))
                 await self._ask({})
 
     async def _ask(self, message: dict[str, Any]) -> None:
-        """Send a message, and process the answer."""
+        """Send a message and process the answer."""
         async with self._lock:
             self._beat += 1
             limits = {n: v for n in ("magnitude", "rate") if (v := getattr(self, n)) is not None}
             await self._hear(json.dumps({"beat": self._beat, **limits, **message}).encode() + b"\n")
 
     async def _hear(self, line: bytes) -> None:
-        """Send a line, and process the answer: only a connection that answers in turn is kept."""
+        """Send a line and process the answer; close the connection unless the answer matches."""
         if self._streams is None:
             raise self._fail("not connected")
         reader, writer = self._streams
@@ -196,7 +196,7 @@ class LinuxCncSink:
             raise self._fail(str(e) or "no answer") from e
         except (RecursionError, ThermocompError) as e:
             raise self._fail(f"not the answer: {e}") from e
-        finally:  # also if it is cancelled: the answer would be taken for that of the next question
+        finally:  # also if cancelled: a late answer would be taken as the reply to the next message
             if not heard:
                 await self._hang_up()
 
@@ -209,5 +209,5 @@ def _read(one: Mapping[str, Any]) -> AxisReport:
 
 
 def _text(found: object) -> str:
-    """Return a text of the component, fit to be shown."""
+    """Return a text received from the component, escaped for display."""
     return escape(found, 200)

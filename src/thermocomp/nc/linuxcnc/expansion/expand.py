@@ -1,4 +1,4 @@
-"""Expands an NC program: loops, parameters, subprograms, cycles and G91 become plain lines; the result is proven."""
+"""Expansion of an NC program: loops, parameters, subprograms, cycles and G91 become plain lines; verified."""
 
 import re
 from array import array
@@ -21,17 +21,17 @@ from thermocomp.nc.rewrite.header import clean_comment
 
 _NO_CODE = re.compile(r"\([^)]*\)|<[^>]*>|;.*|\s")
 _ORIENTS = re.compile(r"M0*19(?:\.0*)?(?![0-9.])")
-#: diameters or radii for X: the interpreter makes no call of them, and plain lines are in radii
+#: diameter and radius mode of X, for which the interpreter makes no call; plain lines use radii
 _DIAMETERS = re.compile(r"G0*[78](?:\.0*)?(?![0-9.])")
-#: ends the main program as M2 does where it is read here, and begins it again at the machine
+#: codes that end the main program like M2 when read here, but repeat it on the machine
 _REPEATS = re.compile(r"M(?:0*99(?:\.0*)?(?![0-9.])|[-+]*[#\[])")
-#: seeds of the controllers that a program is written from, and that it is proved in
+#: seeds of the controllers in which a program is expanded, and in which it is verified
 _WRITTEN, _PROVED = (1, 2), (3, 4)
-#: lines after which it is told how many are written
+#: number of lines between progress reports
 _OFTEN = 1000
-#: of the program's name in a comment that old controls can read
+#: maximum length of the program's name in a comment, for old controls
 _NAME = 48
-#: lines that are written at most
+#: maximum number of lines written
 MOST = 2_000_000
 
 
@@ -43,9 +43,9 @@ class Expansion:
     ----------
     path : Path
     sources : array of int
-        For each line of the file, from the first: the line of the program it comes from; 0: of none.
+        For each line of the output file: number of its line in the program; 0 if it has none.
     acts : int
-        Moves, dwells, stops, tool changes ... that were compared with the program's.
+        Number of moves, dwells, stops, tool changes ... compared with those of the program.
     """
 
     path: Path
@@ -75,7 +75,7 @@ class _Around:
         left: dict[int, float] | None = None,
         opened: set[Path] | None = None,
     ) -> Generator[Canonical]:
-        """Run a program in it."""
+        """Run a program in this environment."""
         return read(
             path,
             stored,
@@ -89,7 +89,7 @@ class _Around:
         )
 
     def try_whether_it_ends(self, path: Path, stored: Stored) -> None:
-        """Run a program and look at nothing: a loop without end is refused before anything is made of its moves."""
+        """Run a program and discard its calls: endless loops are refused before its moves are used."""
         job = InterpreterJob(
             path=path,
             stored=stored,
@@ -104,7 +104,7 @@ class _Around:
                 pass
 
     def controller(self, seed: int) -> Stored:
-        """Return a controller that has nothing else in common with that of another seed."""
+        """Return a simulated controller; different seeds share only the specified settings."""
         stored = draw_controller(seed, self.startup or "")
         return replace(stored, diameters={**stored.diameters, **self.diameters}, system=self.systems[seed])
 
@@ -122,36 +122,35 @@ def expand(
     seconds: int = 600,
     progress: Callable[[int], object] = lambda _: None,
 ) -> Expansion:
-    """Write a program out in plain lines that do the same on every machine, whatever its origins and tool lengths.
+    """Write a program as plain lines that do the same on every machine, whatever its origins and tool lengths.
 
-    LinuxCNC's interpreter runs the program in two controllers with other origins, tool lengths, homes, parameters,
-    another tool in the spindle and another start, and what both runs have in common is written. Then program and result
-    are run in two more such controllers and have to make the same moves within 1e-6 mm, with the same feeds, spindle,
-    coolant, stops and tools, and to leave the same origins behind. Texts of ``(PRINT,...)`` and ``(LOG,...)`` are left
-    out.
+    LinuxCNC's interpreter runs the program in two controllers with different origins, tool lengths, homes, parameters,
+    tools in the spindle and start positions, and the result contains what both runs have in common. Then program and
+    result are run in two further controllers and must make the same moves within 1e-6 mm, with the same feeds, spindle,
+    coolant, stops and tools, and leave the same origins. Texts of ``(PRINT,...)`` and ``(LOG,...)`` are omitted.
 
     Parameters
     ----------
     path, out : Path
         `out` must not exist.
     inch : bool, optional
-        The unit in force at the start; if not given the program has to say it.
+        Unit in force at the start; if not given, the program must specify it.
     startup : str, optional
-        Codes in force at the start that the end of a program does not put back, such as ``G64 P0.01 G98`` [mm]. Canned
-        cycles need them; what is not given the program has to say (G61, G61.1 or G64; G98 or G99).
+        Codes in force at the start that the end of a program does not reset, such as ``G64 P0.01 G98`` [mm]. Canned
+        cycles need them; the program must specify those not given (G61, G61.1 or G64; G98 or G99).
     diameters : dict of int to float, optional
-        Of the tools [mm]: G41 and G42 are worked out for them. A program that uses another one, which is stored in the
+        Tool diameters [mm], used to compute G41 and G42. A program that uses a different diameter, stored in the
         controller, is refused.
     block_delete : bool
-        Leave out the lines that begin with ``/``.
+        Omit the lines that begin with ``/``.
     subroutines : sequence of Path
-        Folders of subprograms, at most 8; the program's own comes first anyway.
+        Folders of subprograms, at most 8; the folder of the program is always searched first.
     user_codes : bool
-        Keep M100 to M199; without it they are refused, for nobody knows what they do.
+        Keep M100 to M199; otherwise they are refused, because their effect is unknown.
     seconds : int
-        Processor time each run may take [s].
+        Maximum processor time of each run [s].
     progress : callable, optional
-        Told how many lines are written.
+        Called with the number of lines written.
 
     Returns
     -------
@@ -160,10 +159,10 @@ def expand(
     Raises
     ------
     ProgramError
-        The program does something that depends on what is stored in the machine, or that has no plain words; a file
-        that was run has M19.
+        The program depends on data stored in the machine, or has an operation without equivalent plain codes; or a file
+        that was run contains M19.
     InputError
-        `out` exists already or cannot be written, or the program is not there.
+        `out` already exists or cannot be written, or the program does not exist.
     """
     if not path.is_file():
         raise InputError(f"{path} is not a file")
@@ -208,7 +207,7 @@ def expand(
 
 
 def _lines(path: Path, around: _Around) -> Iterator[tuple[str, int]]:
-    """Yield the lines of the plain program, each with the line of the program it comes from."""
+    """Yield the lines of the plain program, each with the number of its line in the program."""
     percent = _first(path) == "%"
     if percent:
         yield "%", 0
@@ -242,11 +241,11 @@ def _lines(path: Path, around: _Around) -> Iterator[tuple[str, int]]:
 
 
 def _start_systems(program: Path, block_delete: bool) -> dict[int, int]:
-    """Return the work coordinate systems that are in force at the start, by seed.
+    """Return the work coordinate systems in force at the start, by seed.
 
-    The interpreter makes no call where one is chosen that is in force already. So a program is written where one is
-    that it does not name, and proved in two others, of which one is G54: what it chooses is seen, and what it leaves
-    as it is stays so.
+    The interpreter makes no call if the selected system is already in force. So the program is expanded with a system
+    that it does not name, and verified with two others, one of which is G54: all selections are seen, and a system that
+    the program does not change is preserved.
     """
     named = (
         any(_lines_with(re.compile(re.escape(code) + r"(?![0-9.])"), program, block_delete))
@@ -259,7 +258,7 @@ def _start_systems(program: Path, block_delete: bool) -> dict[int, int]:
 
 
 def _refuse_lost(file: Path, program: Path, block_delete: bool, *, radii: bool) -> None:
-    """Refuse what the interpreter passes over without a trace in a file that was run: M19 without R, G7 and G8."""
+    """Refuse codes of a run file that the interpreter silently ignores: M19 without R, G7 and G8."""
     own = file == program.resolve()
     reasons = {_ORIENTS: "it orients the spindle (M19), which plain lines would lose"}
     if not radii:
@@ -271,7 +270,7 @@ def _refuse_lost(file: Path, program: Path, block_delete: bool, *, radii: bool) 
 
 
 def _lines_with(code: re.Pattern[str], file: Path, block_delete: bool) -> Iterator[int]:
-    """Yield the numbers of the lines with a code."""
+    """Yield the numbers of the lines that contain a code."""
     with file.open(encoding="latin-1") as lines:
         for number, text in enumerate(lines, 1):
             words = _code(text)
@@ -291,7 +290,7 @@ def _first(path: Path) -> str:
 
 
 def _told(calls: Iterator[Canonical], side: Side) -> Iterator[Canonical]:
-    """Yield the calls without the interpreter's remarks; those before the first line give the start."""
+    """Yield the calls without the interpreter's remarks; apply calls before the first line to the initial state."""
     for call in calls:
         if call.line == 0:
             side.begin(call)
@@ -300,7 +299,7 @@ def _told(calls: Iterator[Canonical], side: Side) -> Iterator[Canonical]:
 
 
 class _Source:
-    """Text of a line; the file is read again from its start at each question, which is rare."""
+    """Text of a line by its number; the file is reread at each rare call."""
 
     def __init__(self, path: Path) -> None:
         self.path = path

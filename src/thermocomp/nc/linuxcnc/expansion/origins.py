@@ -8,7 +8,7 @@ from thermocomp.nc.linuxcnc.expansion.words import Side, Words, agree, format_nu
 from thermocomp.nc.linuxcnc.rs274 import AXES, Canonical, Place
 
 SYSTEMS = {1: "G54", 2: "G55", 3: "G56", 4: "G57", 5: "G58", 6: "G59", 7: "G59.1", 8: "G59.2", 9: "G59.3"}
-#: how the interpreter remarks that an origin is set
+#: interpreter's remark when an origin is set
 G10 = "interpreter: setting coordinate system origin"
 PLAIN_G10 = re.compile(r"(?:N\d+)?G10L2P[1-9](?:[XYZABCR][-+]?(?:\d+\.?\d*|\.\d+))+")
 _ACTIVE = re.compile(r"G10(?!\d).*P0+(?![\d.]*[1-9])")
@@ -27,16 +27,16 @@ def chosen_system(
     angles: tuple[float, float] | None,
     source: str,
 ) -> list[tuple[str, str]]:
-    """Return (kind, text) where a work coordinate system is chosen, or its origin or rotation set.
+    """Return (kind, text) of lines that select a work coordinate system, or set its origin or rotation.
 
     Parameters
     ----------
     sides, words, refuse
-        As for the writer.
+        See `Writer`.
     a, b : Canonical
-        The calls ``g5x`` of both runs.
+        Calls ``g5x`` of both runs.
     angles : tuple of float or None
-        Rotations told with them [deg].
+        Rotations reported with these calls [deg].
     source : str
         Line of the program.
     """
@@ -66,7 +66,7 @@ def chosen_system(
         if not agree(first.frame.rotation, second.frame.rotation):
             raise refuse(f"the rotation of the work coordinate system {DEPENDS}")
         fixed.append(f"R{format_number(first.frame.rotation)}")
-    # P0 is the system in force, whichever that is; what is chosen here may not be what the machine stands in
+    # P0 is the system in force; the system in force here may differ from that of the machine
     place = 0 if _ACTIVE.search(_bare(source)) else index
     result = [("g10", f"G10 {way} P{place} {' '.join(some)}") for way, some in (("L2", fixed), ("L20", here)) if some]
     if index != chosen or not result:
@@ -75,12 +75,12 @@ def chosen_system(
 
 
 def plain_g10(sides: Sides, words: Words, refuse: Refuse, source: str) -> str:
-    """Return the line that sets the origin of a system not in force: only the source line defines which.
+    """Return the line that sets the origin of a system not in force: only the source line specifies which.
 
     Parameters
     ----------
     sides, words, refuse
-        As for the writer.
+        See `Writer`.
     source : str
         Line of the program.
     """
@@ -108,14 +108,14 @@ def _bare(source: str) -> str:
 
 
 def shift(sides: Sides, words: Words, refuse: Refuse, old: tuple[Place, Place], source: str) -> str:
-    """Return the line of a new G92 offset: the place has got a name, a fixed shift (G52), or none is left.
+    """Return the line for a new G92 offset: a named position (G92), a fixed shift (G52), or cancellation.
 
     Parameters
     ----------
     sides, words, refuse
-        As for the writer; the offset has been applied to the sides.
+        See `Writer`; the offset has already been applied to the sides.
     old : tuple
-        Offsets before, of both runs.
+        Previous offsets of both runs.
     source : str
         Line of the program.
     """
@@ -139,7 +139,7 @@ def shift(sides: Sides, words: Words, refuse: Refuse, old: tuple[Place, Place], 
 
 
 def tool_length(sides: Sides, words: Words, refuse: Refuse) -> str:
-    """Return the line that brings the tool length into force that the sides have taken."""
+    """Return the line that puts the tool length of both sides into force."""
     first, second = (side.frame.length for side in sides)
     if not (any(first) or any(second)):
         return "G49"
@@ -149,7 +149,7 @@ def tool_length(sides: Sides, words: Words, refuse: Refuse) -> str:
             if agree(length, first[2]) and agree(two.lengths[tool], second[2]):
                 return f"G43 H{tool}"
         if agree(one.lengths[one.spindle], first[2]) and agree(two.lengths[two.spindle], second[2]):
-            return "G43"  # of the tool that was in the spindle at the start, whatever its number
+            return "G43"  # of the tool in the spindle at the start, whatever its number
     if all(agree(x, y) for x, y in zip(first, second, strict=True)) and not any(first[3:]):
         return f"G43.1 {' '.join(words.axis(i, first[i]) for i in range(3))}"
     raise refuse(f"the tool length in force {DEPENDS}")

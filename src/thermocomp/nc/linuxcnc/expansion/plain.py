@@ -1,8 +1,8 @@
-"""Writes a plain program from two runs of the same program in two controllers that have nothing stored in common.
+"""Plain program from two runs of the same program in two controllers without common stored data.
 
-What both runs have in common is what the program says: equal program coordinates are words in work coordinates, equal
-machine coordinates are moves in machine coordinates (G53), ends at each controller's own home are G28 and G30. Anything
-else depends on what is stored in the controller, and is refused.
+Data common to both runs come from the program: equal program coordinates become words in work coordinates, equal
+machine coordinates become moves in machine coordinates (G53), end positions at the controller's home become G28 and
+G30. Anything else depends on data stored in the controller, and is refused.
 """
 
 from collections.abc import Callable, Iterator
@@ -13,7 +13,7 @@ from thermocomp.nc.linuxcnc.expansion.words import STILL, Side, Words, agree, fo
 from thermocomp.nc.linuxcnc.rs274 import AXES, PLANE_AXES, Canonical, Stored
 
 CENTRES = {17: "IJ", 18: "KI", 19: "JK"}
-#: lines of calls without numbers, and with them
+#: lines for calls without and with numbers
 PLAIN = {
     "m0": "M0", "m1": "M1", "m3": "M3", "m4": "M4", "m5": "M5", "change": "M6", "end": "M2",
     "mist": "M7", "flood": "M8", "mistoff": "M9", "floodoff": "M9",
@@ -22,7 +22,7 @@ PLAIN = {
     "dwell": "G4 P{}", "select": "T{}", "toolnumber": "M61 Q{}", "plane": "G{}",
     "m62": "M62 P{}", "m63": "M63 P{}", "m64": "M64 P{}", "m65": "M65 P{}", "m67": "M67 E{} Q{}", "m68": "M68 E{} Q{}",
 }  # fmt: skip
-#: what a controller does by itself at the end of a program
+#: calls made by a controller at the end of a program
 RESETS = {
     "m5", "mistoff", "floodoff", "feedoverride", "speedoverride", "adaptive", "noadaptive", "feedhold", "g5x", "g92",
     "plane", "feedmode", "speedmode", "path", "length",
@@ -36,7 +36,7 @@ REFUSED = {
 
 
 class Writer:
-    """Turns pairs of canonical calls to lines of a plain program.
+    """Converter from pairs of canonical calls to lines of a plain program.
 
     Parameters
     ----------
@@ -45,14 +45,14 @@ class Writer:
     source : callable
         Text of a line of the program, by its number.
     inch : bool or None
-        The unit in force at the start; None: the program has to say it.
+        Unit in force at the start; None: the program must specify it.
     user_codes : bool
-        Keep M100 to M199, which run programs of the user's own.
+        Keep M100 to M199, which run user-defined programs.
 
     Attributes
     ----------
     line : int
-        The program's last line that did anything.
+        Last line of the program with any effect.
     ended : bool
         M2 or M30 was written.
     """
@@ -68,18 +68,18 @@ class Writer:
         self.line = 0
         self.feed: float | None = 0.0
         self.written_feed: float | None = None
-        self.pitch = 0.0  # of a thread [mm]
-        self.pieces = 0  # of this thread
+        self.pitch = 0.0  # pitch of a thread [mm]
+        self.pieces = 0  # number of sections of this thread
         self.arcs = self.ended = False
-        self.held: tuple[Canonical, Canonical] | None = None  # to see what follows it
-        self.waiting: list[tuple[str, str, int]] = []  # (kind, text, line): does the program end here?
+        self.held: tuple[Canonical, Canonical] | None = None  # pair held back until the next pair is known
+        self.waiting: list[tuple[str, str, int]] = []  # (kind, text, line) held back in case the program ends
 
     def refuse(self, reason: str, file: str = "") -> ProgramError:
-        """Return the error of the line that is run; of a subprogram in another file, of the line before it."""
+        """Return an error for the line being run; within a subprogram in another file, for the last line before it."""
         return ProgramError(max(self.line, 1), f"it cannot be expanded: {reason}" + (f" (in {file})" if file else ""))
 
     def write(self, first: Canonical, second: Canonical) -> Iterator[tuple[str, int]]:
-        """Yield the lines of a pair of calls, each with the line of the program it comes from."""
+        """Yield the lines for a pair of calls, each with the number of its line in the program."""
         before, self.held = self.held, None
         line = self.line if first.file or first.line < 1 else first.line
         if first.kind != second.kind or first.line != second.line:
@@ -103,38 +103,38 @@ class Writer:
                 yield from self.put(kind, text, self.line)
 
     def put(self, kind: str, text: str, line: int) -> Iterator[tuple[str, int]]:
-        """Hold back what the end of the program would do anyway, else write it."""
+        """Hold back actions that the end of the program performs anyway; write others."""
         if kind == "end":
             self.ended = True
             self.waiting = [w for w in self.waiting if w[2] != line]
         if kind in RESETS:
-            if text and (not self.waiting or self.waiting[-1][1] != text):  # M9 is two calls
+            if text and (not self.waiting or self.waiting[-1][1] != text):  # M9 makes two calls
                 self.waiting.append((kind, text, line))
             return
         yield from self.flush()
         yield text, line
 
     def flush(self) -> Iterator[tuple[str, int]]:
-        """Write what was held back."""
+        """Yield the lines held back."""
         yield from ((text, line) for _, text, line in self.waiting)
         self.waiting.clear()
 
     def release(  # noqa: PLR0911
         self, held: Canonical, other: Canonical, a: Canonical, b: Canonical
     ) -> tuple[list[tuple[str, str]], bool]:
-        """Return (kind, text) of a pair that was held back, and whether the pair after it belongs to it.
+        """Return (kind, text) of a pair held back, and whether the next pair belongs to it.
 
         Parameters
         ----------
         held, other : Canonical
-            The pair that was held back.
+            Pair held back.
         a, b : Canonical
-            The pair after it.
+            Next pair.
         """
         kind, close = held.kind, a.line == held.line
         if kind == "g5x":
             if a.kind == "g92" and close and self.unshifted(a, b):
-                self.held = held, other  # choosing a system tells of G92 again
+                self.held = held, other  # selecting a system also reports G92 again
                 return [], True
             merged = a.kind == "rotation" and close
             angles = (a.values[0], b.values[0]) if merged else None
@@ -160,7 +160,7 @@ class Writer:
         ], False
 
     def unshifted(self, a: Canonical, b: Canonical) -> bool:
-        """Return whether G92 stays."""
+        """Return whether G92 is unchanged."""
         old = (*self.sides[0].frame.shift, *self.sides[1].frame.shift)
         return all(agree(x, y) for x, y in zip((*a.values, *b.values), old, strict=True))
 
@@ -195,7 +195,7 @@ class Writer:
             yield from self.state(a)
 
     def state(self, call: Canonical) -> Iterator[tuple[str, str]]:
-        """Yield (kind, text) of a call that both runs make alike."""
+        """Yield (kind, text) of a call that is equal in both runs."""
         kind, values = call.kind, call.values
         if kind == "unit":
             if self.feed is not None:
@@ -211,7 +211,7 @@ class Writer:
             self.pitch, self.pieces = values[1], 0
         elif kind == "unsync":
             self.pitch = 0.0
-        elif kind == "user":  # -1: no word
+        elif kind == "user":  # -1: word not present
             words = (f" {letter}{format_number(v)}" for letter, v in zip("PQ", values[1:], strict=True) if v != -1)
             yield kind, f"M{format_number(values[0])}{''.join(words)}"
         elif kind in PLAIN:
@@ -221,7 +221,7 @@ class Writer:
 
     # --- moves ---
     def move(self, a: Canonical, b: Canonical) -> Iterator[str]:
-        """Yield the lines of a move; both runs go there."""
+        """Yield the lines of a move, and apply it to both runs."""
         first, second = self.sides
         if a.kind == "curve":
             yield self.curve(a, b)
@@ -231,7 +231,7 @@ class Writer:
             return
         pa, pb = a.program, b.program
         if a.kind == "rapid" and all(self.still(i, pa[i], pb[i]) for i in range(9)):
-            return  # G28 goes by way of where it stands
+            return  # G28 moves via the current position
         known = [agree(x, y) for x, y in zip(pa, pb, strict=True)]
         if all(k or self.still(i, pa[i], pb[i]) for i, k in enumerate(known)):
             if a.arc and b.arc:
@@ -247,7 +247,7 @@ class Writer:
         second.move(pb)
 
     def tap(self, a: Canonical, b: Canonical) -> str:
-        """Return G33.1; it comes back to where it began."""
+        """Return G33.1, which returns to its start."""
         words = ""
         for i, (first, second) in enumerate(zip(a.values[:3], b.values[:3], strict=True)):
             if agree(first, second):
@@ -294,7 +294,7 @@ class Writer:
                     yield code
                 elif all(agree(first.program[i], second.program[i]) for i in moved):
                     yield f"{code} {' '.join(self.words.axis(i, first.program[i]) for i in moved)}"
-                else:  # by way of here, wherever that is
+                else:  # via the current position, wherever that is
                     yield f"G91 {code} {' '.join(AXES[i] + '0' for i in moved)}"
                     yield "G90"
                 return
@@ -315,7 +315,7 @@ class Writer:
             starts = [side.program[axis] for side in self.sides]
             if not (known[axis] and agree(*starts) and agree(a.arc.centre[axis], b.arc.centre[axis])):
                 raise self.refuse(f"the start or end of this arc {DEPENDS}")
-            # from the start as it is written, so that the roundings do not add up
+            # relative to the start as written, so that rounding errors do not accumulate
             centre += f" {letter}{self.words.length(a.arc.centre[axis] - self.words.rounded(starts[0]))}"
         words = " ".join(self.words.axis(axis, a.program[axis]) for axis in range(9) if known[axis])
         turns = f" P{abs(a.arc.turns)}" if abs(a.arc.turns) > 1 else ""
@@ -325,7 +325,7 @@ class Writer:
         yield f"{'G3' if a.arc.turns > 0 else 'G2'} {words}{centre}{turns}{self.feed_word(a)}"
 
     def curve(self, a: Canonical, b: Canonical) -> str:
-        """Return G5 or G5.1: from the start, points that draw the curve, and the end."""
+        """Return G5 or G5.1, with offsets of the control points from start and end."""
         order, points = int(a.values[0]), [a.values[k : k + 3] for k in range(1, len(a.values), 3)]
         start = self.sides[0].program[:2], self.sides[1].program[:2]
         agreed = all(agree(x, y) for x, y in zip((*a.values, *start[0]), (*b.values, *start[1]), strict=True))
@@ -343,7 +343,7 @@ class Writer:
         return f"{'G5.1' if order == 3 else 'G5'} {' '.join(words)}{self.feed_word(a)}"
 
     def feed_word(self, call: Canonical) -> str:
-        """Return F if it has changed."""
+        """Return F if the feed has changed, else an empty text."""
         if call.kind == "rapid" or self.pitch:
             return ""
         if self.feed is None:

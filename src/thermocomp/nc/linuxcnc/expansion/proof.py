@@ -1,4 +1,4 @@
-"""Proves that two programs make a machine do the same."""
+"""Verification that two programs have the same effect on a machine."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -8,8 +8,8 @@ from typing import NamedTuple
 from thermocomp.core.exceptions import ProgramError
 from thermocomp.nc.linuxcnc.rs274 import ORIGIN, PLANE_AXES, Canonical, Place, ProgramFrame
 
-TOLERANCE = 1e-6  #: [mm]
-#: calls that set a state, and its name
+TOLERANCE = 1e-6  #: of positions [mm]
+#: calls that set a state, with the name of the state
 STATES = {
     "feedmode": "feed mode", "speed": "speed", "speedmode": "speed mode", "select": "tool", "path": "path",
     "naive": "naive",
@@ -18,45 +18,45 @@ STATES = {
     "nofeedoverride": "feed override", "speedoverride": "speed override", "nospeedoverride": "speed override",
     "adaptive": "adaptive", "noadaptive": "adaptive", "feedhold": "feed hold", "nofeedhold": "feed hold",
 }  # fmt: skip
-#: calls that say nothing of what the machine does, or that what it does shows
+#: calls that have no effect on the machine, or whose effect is visible in the moves
 REMARKS = {"comment", "unit", "plane", "feedrate", "g5x", "g92", "rotation", "length"}
-#: parameters a controller keeps: homes, G92, work coordinate systems
+#: parameters that a controller stores: homes, G92, work coordinate systems
 KEPT = range(5161, 5391)
-#: of which the offsets of G92 and G52, and whether they are in force
+#: of these, the offsets of G92 and G52, and the flag that they are in force
 G92, G92_IN_FORCE = range(5211, 5220), 5210
 
 
 class Act(NamedTuple):
-    """Something the machine does, and the state it does it in."""
+    """Action of the machine, with the state in which it occurs."""
 
     line: int
     kind: str
-    numbers: tuple[float, ...]  #: of moves machine coordinates [mm, deg] and the feed
+    numbers: tuple[float, ...]  #: for moves: machine coordinates [mm, deg] and the feed
     state: tuple[tuple[str, str, tuple[float, ...]], ...]
     text: str
 
     def told(self) -> str:
-        """Return it in words."""
+        """Return the action as text."""
         return f"{self.kind} {' '.join(f'{n:.6f}' for n in self.numbers)} {self.text}".strip()
 
 
 def compare(asked: Iterator[Canonical], done: Iterator[Canonical]) -> int:
-    """Compare what two programs do in the same controller.
+    """Compare the actions of two programs in the same controller.
 
     Parameters
     ----------
     asked, done : iterator of Canonical
-        Calls of the program, and of the one that must do the same.
+        Calls of the program, and of the program that must have the same effect.
 
     Returns
     -------
     int
-        Number of acts, all of them equal: moves within 1e-6 mm, their feeds, spindle, coolant, tools, stops, dwells.
+        Number of actions, all equal: moves within 1e-6 mm, their feeds, spindle, coolant, tools, stops, dwells.
 
     Raises
     ------
     ProgramError
-        They differ: line of the program, and how.
+        The actions differ; the message gives the line of the program and the difference.
     """
     count, line = 0, 1
     for first, second in zip_longest(trace_acts(asked), trace_acts(done)):
@@ -75,7 +75,7 @@ def compare_parameters(asked: dict[int, float], done: dict[int, float]) -> None:
     shifted = any(left.get(number) for left in (asked, done) for number in G92)
     for number in KEPT:
         if number == G92_IN_FORCE and not shifted:
-            continue  # in force or not, nothing is shifted
+            continue  # the shift is zero, whether in force or not
         if abs(asked.get(number, 0.0) - done.get(number, 0.0)) > TOLERANCE:
             raise ProgramError(
                 1, f"the plain lines would leave a different value in parameter #{number} of the controller"
@@ -83,7 +83,7 @@ def compare_parameters(asked: dict[int, float], done: dict[int, float]) -> None:
 
 
 def trace_acts(calls: Iterator[Canonical]) -> Iterator[Act]:
-    """Yield what the machine does from the first line on, without moves that go nowhere."""
+    """Yield the actions of the machine from the first line on, without moves of zero length."""
     frame, here, feed = ProgramFrame(), ORIGIN, (0.0, 0.0)
     states: dict[str, tuple[str, str, tuple[float, ...]]] = {}
     state: tuple[tuple[str, str, tuple[float, ...]], ...] = ()
@@ -145,7 +145,7 @@ def _sweep(call: Canonical, start: Place) -> float:
     radius = math.hypot(start[i] - x, start[j] - y)
     angle = ((last - first) if call.arc.turns > 0 else (first - last)) % math.tau
     if min(angle, math.tau - angle) * radius < 2 * TOLERANCE:
-        # where start and end differ, but by less than the digits written, one controller turns and another does not
+        # if start and end differ by less than the written digits, a full turn or none depends on the controller
         angle = math.tau if math.dist((start[i], start[j]), (call.program[i], call.program[j])) < 1e-9 else angle
     return radius * (angle + (abs(call.arc.turns) - 1) * math.tau)
 
@@ -162,5 +162,5 @@ def _equal(asked: Act, done: Act) -> bool:
 
 
 def _near(first: float, second: float) -> bool:
-    # the digits of 1e-6 mm are beyond a double's in what is turned and summed, from a metre on
+    # above 1 m, rotated and summed coordinates exceed the precision of a double at 1e-6 mm
     return abs(first - second) <= TOLERANCE * max(1.0, abs(first) / 1000.0)

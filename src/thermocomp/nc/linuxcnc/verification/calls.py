@@ -1,4 +1,4 @@
-"""The calls of one run of LinuxCNC's interpreter as columns: where moves go in the machine, and how long they take."""
+"""Calls of one run of LinuxCNC's interpreter as columns: machine positions and durations of moves."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -11,40 +11,40 @@ from thermocomp.nc.linuxcnc.rs274 import ORIGIN, PLANE_AXES, ProgramFrame
 from thermocomp.nc.linuxcnc.rs274process import CallBlock, InterpreterRun
 from thermocomp.nc.linuxcnc.verification.ledger import Floats, Integers
 
-#: an axis that moves less does not move [mm, deg]
+#: an axis that moves less is at rest [mm, deg]
 STILL = 1e-6
-#: an arc of a smaller angle is a full circle to LinuxCNC [rad]
+#: LinuxCNC regards an arc of a smaller angle as a full circle [rad]
 FUZZ = 1e-6
-#: what changes places is judged by where the tool goes; comments and lines' own numbers may differ
+#: calls not compared: offsets are verified by the tool positions; comments and line numbers may differ
 PASSED = ("g5x", "g92", "length", "tooltable", "rotation", "comment", "message", "file", "centre", "done")
 FRAMES = ("g5x", "g92", "length", "rotation")
 STRAIGHT = ("rapid", "feed", "probe", "arc")
 MOVES = (*STRAIGHT, "tap", "curve")
-#: calls that are kept back for the rest of their line, at most
+#: maximum number of calls held back until their line is complete
 MOST = 1 << 16
 _SPINDLE = ("feedmode", "sync", "unsync", "speed")
 
 
 @dataclass
 class Calls:
-    """Columns, an entry per call.
+    """Columns with one entry per call.
 
     Parameters
     ----------
     kind, line, raw : array of int
-        Code of the kind; line of the original; line of the program that was run.
+        Code of the kind; line in the original; line in the program that was run.
     values : array, calls x 10
-        Numbers; of a curve or a tap the first one is its place in `Side.curves`.
+        Numbers of the call; for a curve or tap, the first is its index in `Side.curves`.
     start, end : array, calls x 9
         Start and end of moves: machine coordinates [mm, deg].
     centre : array, calls x 2
         Centre of arcs: machine coordinates in their plane [mm].
     plane, turns : array of int
-        Plane of arcs: 17, 18, 19; turns positive anticlockwise.
+        Plane of arcs: 17, 18, 19; number of turns, positive counterclockwise.
     sweep : array
         Angle of arcs [rad].
     seconds : array
-        Duration of a move in feed [s].
+        Duration of moves at feed rate [s].
     """
 
     kind: Integers
@@ -63,25 +63,25 @@ class Calls:
         return len(self.kind)
 
     def take(self, which: Any) -> "Calls":
-        """Return some of them."""
+        """Return a selection of the calls."""
         return Calls(**{name: column[which] for name, column in vars(self).items()})
 
     def then(self, others: "Calls") -> "Calls":
-        """Return them and others."""
+        """Return these calls followed by others."""
         pairs = zip(vars(self).items(), vars(others).values(), strict=True)
         return Calls(**{name: np.concatenate((mine, more)) for (name, mine), more in pairs})
 
 
 class Side:
-    """One run.
+    """One run of the interpreter.
 
     Parameters
     ----------
     run : InterpreterRun
     original : callable
-        Line of the original for lines of the program that is run.
+        Maps lines of the program that is run to lines of the original.
     drop : callable
-        Lines of the original whose feed is not compared as it is written.
+        Selects lines of the original whose feed word is not compared.
 
     Attributes
     ----------
@@ -102,7 +102,7 @@ class Side:
         self._states = {"feed": np.zeros(2), "feedmode": np.zeros(2), "sync": np.zeros(2), "speed": np.zeros(2)}
 
     def chunks(self) -> Iterator[Calls]:
-        """Yield the calls that are compared, all of a line together."""
+        """Yield the calls to be compared, keeping those of one line together."""
         kept: Calls | None = None
         for block in self.run.blocks():
             calls = self._calls(block)
@@ -117,7 +117,7 @@ class Side:
             yield kept
 
     def is_kind(self, kinds: Integers, *names: str) -> "np.ndarray[Any, np.dtype[np.bool_]]":
-        """Return a mask of the calls of some kinds."""
+        """Return a mask of the calls of the given kinds."""
         table = np.zeros(len(self.run.codes), bool)
         table[[self.run.codes[name] for name in names]] = True
         return table[kinds]
@@ -165,10 +165,10 @@ class Side:
             calls = calls.take(np.flatnonzero(~(feeds & self.drop(calls.line))))
         return calls
 
-    # -- where -------------------------------------------------------------------------------------------------------
+    # -- positions ---------------------------------------------------------------------------------------------------
 
     def _ends(self, block: CallBlock, kind: Integers, values: Floats) -> tuple[Floats, "np.ndarray[Any, Any]"]:
-        """Return the ends of moves; the frame changes between some of them."""
+        """Return the ends of moves and a mask of moves; offsets may change between moves."""
         end = np.zeros((len(kind), 9))
         moving = self.is_kind(kind, *STRAIGHT)
         bent = self.is_kind(kind, "tap", "curve")
@@ -186,13 +186,13 @@ class Side:
         return end, moving | bent
 
     def _bend(self, block: CallBlock, i: int, kind: Integers, values: Floats, end: Floats) -> None:
-        """Insert a call defined by points: a tap, a curve."""
+        """Store the points of a tap or a curve, and set its end."""
         earlier = np.flatnonzero(self.is_kind(kind[:i], *MOVES))
         here = end[earlier[-1]] if len(earlier) else self._here
         there = self._frame.program(tuple(here.tolist()))
         if kind[i] == self.run.codes["tap"]:
             points = [(*values[i, :3].tolist(), *there[3:])]
-            values[i, 1], values[i, 2], values[i, 3] = values[i, 3], 0.0, 0.0  # scale of the speed
+            values[i, 1], values[i, 2], values[i, 3] = values[i, 3], 0.0, 0.0  # speed scale
         else:
             numbers = block.more[int(values[i, 0])]
             points = [(x, y, *there[2:]) for x, y in zip(numbers[1::3], numbers[2::3], strict=True)]
@@ -203,7 +203,7 @@ class Side:
         end[i] = here if kind[i] == self.run.codes["tap"] else places[-1]
 
     def _turned(self, kind: Integers, values: Floats) -> tuple[Integers, Integers]:
-        """Return plane and turns of arcs; the record before each of them gets its centre, as a place."""
+        """Return plane and turns of arcs; insert the centre of each arc, as a point, in its preceding record."""
         plane, turns = np.zeros(len(kind), int), np.zeros(len(kind), int)
         arcs = np.flatnonzero(kind == self.run.codes["arc"])
         if len(arcs):
@@ -214,10 +214,10 @@ class Side:
                 values[arcs[mine] - 1, i], values[arcs[mine] - 1, j] = first[mine], second[mine]
         return plane, turns
 
-    # -- when --------------------------------------------------------------------------------------------------------
+    # -- durations ---------------------------------------------------------------------------------------------------
 
     def _seconds(self, calls: Calls, moving: "np.ndarray[Any, Any]") -> Floats:
-        """Return the durations of feed moves; while F is per turn and the spindle is stopped, in minutes per 1/min."""
+        """Return the durations of feed moves [s]; with F per revolution and a stopped spindle, in minutes per 1/min."""
         feed = self._state("feed", calls, "feedrate")
         if self.is_kind(calls.kind, *_SPINDLE).any() or self._states["sync"][0] or self._states["feedmode"][1]:
             mode = self._state("feedmode", calls, "feedmode")[:, 1]
@@ -246,7 +246,7 @@ class Side:
         return np.where(fed, 60.0 * length / np.where(fed, rate, 1.0), 0.0)
 
     def _state(self, name: str, calls: Calls, *kinds: str) -> Floats:
-        """Return two numbers of the latest call of some kinds, for each call."""
+        """Return, for each call, two numbers of the latest call of the given kinds."""
         told = np.flatnonzero(self.is_kind(calls.kind, *kinds))
         if not len(told):
             return np.broadcast_to(self._states[name], (len(calls), 2))
@@ -259,7 +259,7 @@ class Side:
 
 
 def _arcs(plane: Integers, turns: Integers, start: Floats, end: Floats) -> tuple[Floats, Floats]:
-    """Return centre and angle of arcs; the row before an arc's end is its centre."""
+    """Return centre and angle of arcs; the row before the end of an arc contains its centre."""
     centre, sweep = np.zeros((len(plane), 2)), np.zeros(len(plane))
     if not plane.any():
         return centre, sweep

@@ -1,4 +1,4 @@
-"""Compares what two programs make of the same controller, call by call; the second one may divide moves."""
+"""Comparison of two programs in the same controller, call by call; the second one may divide moves."""
 
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
@@ -11,39 +11,39 @@ from thermocomp.nc.linuxcnc.rs274process import InterpreterRun
 from thermocomp.nc.linuxcnc.verification.calls import MOVES, STILL, Calls, Side
 from thermocomp.nc.linuxcnc.verification.ledger import Floats, Integers, Ledger, Shifts
 
-#: largest difference that is rounding [um]
+#: largest difference regarded as rounding [um]
 ROUNDING = 0.1
-#: how much longer or shorter a move may take: so much of it, or so long [s]
+#: allowed change in the duration of a move: relative, and absolute [s]
 SLOWER, PAUSE = 0.02, 0.005
-#: rounding of what is no length: numbers of other calls, the time of rotary axes alone
+#: relative rounding error of other quantities: numbers of other calls, durations of rotary moves
 _EXACT = 1e-9
 
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
 
 
 class RefusedError(Exception):
-    """The interpreter does not run the original."""
+    """Refusal of the original program by the interpreter."""
 
 
 class Found(NamedTuple):
-    """Findings of a comparison."""
+    """Results of a comparison."""
 
     moves: int
-    largest: float  #: largest difference between a move and what was asked for [um]
-    slower: float  #: largest change of the time of a move, of the larger of its time and 0.25 s [%]
+    largest: float  #: largest deviation of a move from the required shift [um]
+    slower: float  #: largest change in the duration of a move, relative to the larger of its duration and 0.25 s [%]
 
 
 class _Check(NamedTuple):
-    bad: Mask  #: of the calls
+    bad: Mask  #: mask of the calls that differ
     say: Callable[[int], str]
 
 
 class LineOrigins(NamedTuple):
-    """Origin of the lines of both programs, as the interpreter has them: lines of the original."""
+    """Mapping of the lines run by the interpreter to lines of the original, for both programs."""
 
-    first: Callable[[Integers], Integers]  #: of the original, or of its translation
-    second: Callable[[Integers], Integers]  #: of the revised program, or of its translation
-    divided: bool = True  #: a line that has become several may have divided its move
+    first: Callable[[Integers], Integers]  #: for the original, or its translation
+    second: Callable[[Integers], Integers]  #: for the revised program, or its translation
+    divided: bool = True  #: several lines with one original line may be pieces of a divided move
 
 
 def compare(
@@ -53,7 +53,7 @@ def compare(
     origin: LineOrigins,
     progress: Callable[[int], object],
 ) -> Found:
-    """Run the next job of both programs, side by side, and compare what they do.
+    """Run the next job of both programs in parallel, and compare their calls.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def compare(
         Expected shifts of the lines of the original.
     origin : LineOrigins
     progress : callable
-        Told lines of the original.
+        Called with line numbers of the original.
 
     Returns
     -------
@@ -72,7 +72,7 @@ def compare(
     Raises
     ------
     ProgramError
-        They differ: line of the original, and how; or the interpreter refuses the revised program.
+        The calls differ, with line of the original and difference; or the interpreter refuses the revised program.
     RefusedError
         The interpreter refuses the original.
     """
@@ -90,7 +90,7 @@ def compare(
         try:
             b = _joined(next(now, None), sides[1], divided=origin.divided) if b is None else b
         except ProgramError as e:
-            for _ in was:  # a program that is refused itself says nothing of its revision
+            for _ in was:  # a refusal of the original takes precedence
                 pass
             line = int(origin.second(np.array([e.line]))[0])
             raise ProgramError(line, f"it does not run the revised program: {e.reason}") from e
@@ -115,7 +115,7 @@ def _run(side: Side) -> Iterator[Calls]:
 
 
 def _joined(calls: Calls | None, side: Side, *, divided: bool) -> "_Joined | None":
-    """Return calls with the pieces of moves that were divided as one, and the pieces."""
+    """Return calls with the pieces of divided moves merged, and the pieces."""
     if calls is None:
         return None
     same = (calls.kind[1:] == calls.kind[:-1]) & (calls.line[1:] == calls.line[:-1]) & (calls.raw[1:] > calls.raw[:-1])
@@ -138,8 +138,8 @@ def _joined(calls: Calls | None, side: Side, *, divided: bool) -> "_Joined | Non
 
 
 class _Pieces(NamedTuple):
-    of: Integers  #: number of the move
-    calls: Calls  #: all but the last pieces of divided moves; their sweep counts from the move's start
+    of: Integers  #: index of the move
+    calls: Calls  #: all but the last pieces of divided moves; their sweep counts from the start of the move
 
 
 class _Joined(NamedTuple):
@@ -147,7 +147,7 @@ class _Joined(NamedTuple):
     pieces: _Pieces | None
 
     def part(self, first: int, last: int) -> "_Joined":
-        """Return some of them."""
+        """Return a range of the moves."""
         calls = self.calls.take(slice(first, last))
         if self.pieces is None:
             return _Joined(calls, None)
@@ -156,14 +156,14 @@ class _Joined(NamedTuple):
 
 
 class _Comparison:
-    """Compares calls of two sides."""
+    """Comparison of the calls of two sides."""
 
     def __init__(self, first: Side, second: Side, ledger: Ledger) -> None:
         self.sides, self.ledger = (first, second), ledger
         self.moves, self.largest, self.slower = 0, 0.0, 0.0
 
     def compare(self, was: Calls, joined: _Joined) -> None:
-        """Compare as many calls of both; raise `ProgramError` at the first one that is another."""
+        """Compare an equal number of calls of both; raise `ProgramError` at the first difference."""
         now, pieces = joined
         moving = self.sides[0].is_kind(was.kind, *MOVES)
         shifts = self.ledger.of(was.line)
@@ -191,7 +191,7 @@ class _Comparison:
         )
 
     def _numbers(self, was: Calls, now: Calls, moving: Mask) -> Iterator[_Check]:
-        """Compare the numbers of calls that are no moves."""
+        """Compare the numbers of calls other than moves."""
         other = ~moving
         if other.any():
             apart = np.abs(now.values - was.values) > _EXACT * np.maximum(1.0, np.abs(was.values))
@@ -203,7 +203,7 @@ class _Comparison:
 
             yield _Check(apart.any(axis=1) & other, say)
 
-    # -- where -------------------------------------------------------------------------------------------------------
+    # -- positions ---------------------------------------------------------------------------------------------------
 
     def _places(self, was: Calls, now: Calls, moving: Mask, shifts: Shifts) -> Iterator[_Check]:
         last = self._last(was.line, moving)
@@ -215,7 +215,7 @@ class _Comparison:
                 off = np.where(on_the_way[:, None], np.minimum(off, np.abs(found - other)), off)
             for other in shifts.others[1:]:
                 off = np.minimum(off, np.abs(found - other))
-        # a tap ends where it began: what counts is how deep it goes
+        # a tap ends at its start: compare its depth
         straight = moving & ~self.sides[0].is_kind(was.kind, "tap")
         self._note(off[straight])
 
@@ -229,11 +229,11 @@ class _Comparison:
         stands, moves = (np.abs(c.end[:, :3] - c.start[:, :3]).max(axis=1) for c in (was, now))
         turning = np.abs(was.end[:, 3:6] - was.start[:, 3:6]).max(axis=1) > STILL
         still = (stands < STILL) & (was.plane == 0) & straight
-        # a rapid to where the tool may stand already, or not: the program leaves it open
+        # the program does not determine whether a rapid moves at all: the tool may already be at its end
         still &= shifts.placed | turning | (was.kind != self.sides[0].run.codes["rapid"])
-        # in machine coordinates the axes give back what they carry, also where the tool is there already
+        # a move to machine coordinates removes the shift of the axes, even if the tool is already there
         still &= ~shifts.machine | turning
-        # beside a rotary axis anything that moves takes its feed; else it is how numbers are rounded in inches and mm
+        # with a rotary axis, any linear motion changes the meaning of the feed; else allow for rounding
         least = np.where(turning, STILL, 1e-3 * ROUNDING)
         yield _Check(
             still & (moves >= least),
@@ -256,7 +256,7 @@ class _Comparison:
         yield _Check(bad, lambda i: f"makes another {self.sides[0].name(was.kind[i])}")
 
     def _last(self, line: Integers, moving: Mask) -> Mask:
-        """Return a mask of the moves that are the last ones of their lines."""
+        """Return a mask of the last move of each line."""
         where = np.flatnonzero(moving)
         group = np.concatenate(([0], np.cumsum(line[1:] != line[:-1])))[where]
         last = np.zeros(len(line), bool)
@@ -287,7 +287,7 @@ class _Comparison:
                 near = np.minimum(off, np.abs(found - other[:, [i, j]]))
                 off = np.where((~last)[:, None], near, off)
             ends = (now.end - was.end)[:, [i, j]] * 1e3
-            for other in shifts.others[1:]:  # the arc as a whole, with its end
+            for other in shifts.others[1:]:  # the whole arc, including its end
                 whole = other[:, [i, j]]
                 off = np.minimum(off, np.maximum(np.abs(found - whole), np.abs(ends - whole)))
             self._note(off[mine])
@@ -298,10 +298,10 @@ class _Comparison:
                 return f"moves {axes[k]} of an arc's centre by {found[n, k]:.2f} um instead of {wanted:.2f} um"
 
             yield _Check(mine & ~(off <= ROUNDING).all(axis=1), say)
-        # a circle that has become no way at all, or the other way round
+        # a full circle that vanished, or vice versa
         yield _Check(arcs & (np.abs(was.sweep - now.sweep) > np.pi), lambda _: "turns by a different angle")
 
-    # -- when --------------------------------------------------------------------------------------------------------
+    # -- durations ---------------------------------------------------------------------------------------------------
 
     def _times(self, was: Calls, now: Calls, moving: Mask, shifts: Shifts) -> Iterator[_Check]:
         change = np.abs(now.seconds - was.seconds)
@@ -311,7 +311,7 @@ class _Comparison:
         turning_alone = way[:, 3:6].any(axis=1) & ~linear
         exact, near = _EXACT * np.maximum(was.seconds, 1.0), np.maximum(SLOWER * was.seconds, PAUSE)
         allowed = np.where(turning_alone, exact, near)
-        # on the way to machine coordinates what the axes give back takes the time that it needs at the same feed
+        # removing the shift on a move to machine coordinates may take the time needed at the same feed
         goes, went = ((c.end - c.start)[:, :3] for c in (now, was))
         far = np.linalg.norm(goes, axis=1)
         pace = now.seconds / np.where(far > STILL, far, np.inf)
@@ -327,7 +327,7 @@ class _Comparison:
     # -- pieces ------------------------------------------------------------------------------------------------------
 
     def _divided(self, was: Calls, pieces: _Pieces) -> Iterator[_Check]:
-        """Compare the pieces of divided moves: without what each should carry, they end on the way of the original."""
+        """Compare the pieces of divided moves: without their shifts, they must end on the path of the original."""
         of, calls = pieces
         first, way = was.start[of], was.end[of] - was.start[of]
         asked = np.full((len(of), 3), np.nan)
@@ -355,7 +355,7 @@ class _Comparison:
             centre = (calls.centre[mine] - about) * 1e3 - asked[mine][:, [i, j]]
             turned[mine] = ~(np.abs(centre) <= ROUNDING).all(axis=1) | (calls.turns[mine] != sense)
         found = (end - place[:, :3]) * 1e3
-        # rotary axes are as far as the others are, which is known to the rounding
+        # rotary axes must be at the same fraction of the move as the linear axes, within rounding
         loose = STILL + np.abs(way[:, 3:]) * (ROUNDING / 1e3 / np.sqrt(square))[:, None]
         beside = turned | ~(np.abs(found) <= ROUNDING).all(axis=1)
         beside |= (np.abs(calls.end - place)[:, 3:] > loose).any(axis=1)

@@ -1,4 +1,4 @@
-"""Required shift of every line of a revised program, and the origin of its lines."""
+"""Required shift of every line of a revised program, and the original line of each of its lines."""
 
 from array import array
 from typing import Any, NamedTuple
@@ -13,35 +13,35 @@ Booleans = np.ndarray[Any, np.dtype[np.bool_]]
 Integers = np.ndarray[Any, np.dtype[np.int64]]
 
 _INVERSE_TIME = 93
-#: of lines: it is not known where the axes stood that they name; they go to machine coordinates
+#: flags of lines: unknown previous position of an axis in the line; move to machine coordinates
 _UNPLACED, _MACHINE = 1.0, 2.0
 
 
 class LineShift(NamedTuple):
-    """By how much the moves of a line may be shifted [um, machine axes]."""
+    """Allowed shifts of the moves of a line [um, machine axes]."""
 
-    before: Vector  #: what the axes carry before it
-    after: Vector  #: what they carry behind it: its last move has to have this
-    inner: Vector  #: on the way, in a cycle
-    inverse: bool  #: G93: a way of another length gives another feed
-    knots: tuple[Vector, ...] = ()  #: at the inner ends of the pieces of a move that was divided
-    other: Vector | None = None  #: what they may carry instead, where the program leaves open which
+    before: Vector  #: shift in effect before the line
+    after: Vector  #: shift in effect after the line, required for its last move
+    inner: Vector  #: shift of intermediate moves of a cycle
+    inverse: bool  #: G93: a change in path length changes the feed
+    knots: tuple[Vector, ...] = ()  #: shifts at the inner ends of the pieces of a divided move
+    other: Vector | None = None  #: alternative shift, if the program does not determine which
 
 
 class Shifts(NamedTuple):
-    """The same of many lines."""
+    """Allowed shifts of many lines."""
 
-    before: Floats  #: lines x 3
+    before: Floats  #: array of lines x 3
     after: Floats
     inner: Floats
     inverse: Booleans
-    placed: Booleans  #: it is known where the axes stood that it names
-    machine: Booleans  #: it goes to machine coordinates, where the axes carry nothing
-    others: tuple[Floats, ...]  #: what may be carried instead before it, and behind it
+    placed: Booleans  #: previous positions of the axes in the line are known
+    machine: Booleans  #: move to machine coordinates, where the shift of the axes is zero
+    others: tuple[Floats, ...]  #: alternative shifts before and after the line
 
 
 class _Track:
-    """Numbers by line; as long as they stay the same they take no room."""
+    """Numbers by line, stored only where they change."""
 
     def __init__(self, width: int) -> None:
         self.lines, self.numbers, self.width = array("i"), array("d"), width
@@ -54,7 +54,7 @@ class _Track:
             self._last = numbers
 
     def at(self, lines: Integers) -> Floats:
-        """Return the numbers of lines, a row each."""
+        """Return the numbers for given lines, one row per line."""
         if not self.lines:
             return np.zeros((len(lines), self.width))
         k = np.searchsorted(np.frombuffer(self.lines, np.intc), lines, side="right") - 1
@@ -69,9 +69,9 @@ class Ledger:
     def __init__(self) -> None:
         self._carried, self._inner, self._other = _Track(3), _Track(3), _Track(3)
         self._inverse, self._loose = _Track(1), _Track(1)
-        #: by line whose move was divided: what is carried at the inner ends of its pieces
+        #: by line of a divided move: shifts at the inner ends of its pieces
         self.knots: dict[int, tuple[Vector, ...]] = {}
-        # lines that have become none or several, or the header: first line of the revised program, how many, original
+        # for lines that became none or several, and the header: first line in the revised program, count, original line
         self._first, self._count, self._original = array("i"), array("i"), array("i")
         self._written = 0
         self._last = 0
@@ -130,7 +130,7 @@ class Ledger:
         )
 
     def originals(self, lines: Integers) -> Integers:
-        """Return the lines of the original that lines of the revised program come from."""
+        """Return the lines of the original for lines of the revised program."""
         if not self._first:
             return lines
         first, count, original = (np.frombuffer(a, np.intc).astype(int) for a in self._tables())
@@ -143,5 +143,5 @@ class Ledger:
 
     @property
     def lines(self) -> int:
-        """Number of lines taken in."""
+        """Number of lines processed."""
         return self._last

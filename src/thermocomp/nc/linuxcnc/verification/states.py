@@ -1,4 +1,4 @@
-"""Possible states of a controller when a program starts: given settings are held, all others are drawn."""
+"""Possible states of a controller at the start of a program: given settings are fixed, all others are random."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -10,13 +10,13 @@ from thermocomp.nc.interpreter.block import Setup, system_name
 from thermocomp.nc.linuxcnc.rs274process import InterpreterJob
 from thermocomp.nc.linuxcnc.stored import SYSTEMS, Stored, draw_controller
 
-#: states a revised program is proved in
+#: number of states in which a revised program is verified
 STATES = 8
-#: seed of a start that is none of theirs
+#: seed of a start position that no state uses
 ELSEWHERE = 99
-#: what is there in half of the states only
+#: random settings present in only half of the states
 HALF = frozenset({"rotation", "G92"})
-#: what is drawn: how to state it
+#: random settings, with the way to specify them
 REMEDIES: Final[Mapping[str, str]] = MappingProxyType(
     {
         "rotation": "give --rotation none if none is stored, or state it, such as --rotation 'G54=0 deg'",
@@ -36,19 +36,19 @@ REMEDIES: Final[Mapping[str, str]] = MappingProxyType(
 
 
 class ControllerState(NamedTuple):
-    """A controller before the program starts."""
+    """Controller state before the program starts."""
 
     stored: Stored
     inch: bool
     block_delete: bool
 
     def job(self, program: InterpreterJob) -> InterpreterJob:
-        """Return the run of a program in it."""
+        """Return the job of running a program in this state."""
         return replace(program, stored=self.stored, inch=self.inch, block_delete=self.block_delete)
 
 
 def build_stored(setup: Setup) -> Stored:
-    """Return the state of the controller as far as it is stated; all else is 0."""
+    """Return the state of the controller with the given settings; all others are 0."""
     return Stored(
         origins={system: origin for system, origin in setup.offsets.items() if system in SYSTEMS},
         lengths=setup.tools,
@@ -59,7 +59,7 @@ def build_stored(setup: Setup) -> Stored:
 
 
 def list_unstated(setup: Setup) -> tuple[str, ...]:
-    """Return the parts of the state that are not stated and are therefore drawn."""
+    """Return the settings that are not given and are therefore random."""
     held = {
         "rotation": all(system in setup.rotations for system in SYSTEMS),
         "G92": setup.no_shift,
@@ -72,17 +72,17 @@ def list_unstated(setup: Setup) -> tuple[str, ...]:
 
 
 def state(setup: Setup, number: int, what: frozenset[str] | set[str]) -> ControllerState:
-    """Return a state.
+    """Return a controller state.
 
     Parameters
     ----------
     setup : Setup
         Given settings.
     number : int
-        Its bits tell of G98 or G99, of a rotation and of a G92; so that all of them meet among eight states.
+        Bits select G98 or G99, a rotation, and a G92 shift, so that eight states cover all combinations.
     what : set of str
-        What is drawn in it, see `REMEDIES`; all else is 0, but the machine never starts at a place that the program
-        could mean.
+        Random settings in this state, see `REMEDIES`; all others are 0, but the machine never starts at a position
+        that the program could contain.
     """
     base = replace(build_stored(setup), start=draw_controller(ELSEWHERE).start)
     one, two, four = number & 1, number >> 1 & 1, number >> 2 & 1
@@ -97,7 +97,7 @@ def state(setup: Setup, number: int, what: frozenset[str] | set[str]) -> Control
     if "system in force" in what:
         changes["system"] = 1 + number
     if "origins" in what:
-        # the rotary axes' origins are never stated
+        # origins of rotary axes can never be specified
         given = {s: (*origin[:3], *other.origins[s][3:]) for s, origin in base.origins.items()}
         changes["origins"] = {**other.origins, **given}
     if "tool lengths" in what:
@@ -108,7 +108,7 @@ def state(setup: Setup, number: int, what: frozenset[str] | set[str]) -> Control
         changes["home28"] = (*(setup.home or other.home28[:3]), *other.home28[3:])
         changes["home30"] = other.home30
     if "parameters" in what:
-        # not all five thousand: reading them would take as long as a short program
+        # not all 5000 parameters: reading them would take as long as a short program
         changes["parameters"] = {number: other.parameters[number] for number in range(31, 131)}
     if "start" in what and other.start is not None:
         x, y, z, *more = other.start
@@ -123,7 +123,7 @@ def state(setup: Setup, number: int, what: frozenset[str] | set[str]) -> Control
 
 
 def describe_setup(setup: Setup) -> tuple[str, ...]:
-    """Return the stated parts, in words."""
+    """Return the given settings as text."""
     said = [] if setup.inch is None else ["inch" if setup.inch else "mm"]
     said += [f"{system_name(system)} at {_point(origin)}" for system, origin in sorted(setup.offsets.items())]
     said += [f"tool {tool} = {length:g} mm" for tool, length in sorted(setup.tools.items())]

@@ -1,7 +1,7 @@
-"""A Fanuc's program in LinuxCNC's words, so that LinuxCNC's interpreter can judge what a revision did to it.
+"""Translation of a Fanuc program for LinuxCNC, whose interpreter can then verify its revision.
 
-Only where the two controls do the same: G68 becomes an offset and a rotation, K becomes L, a dwell gets seconds, and
-what moves nothing is left out. What a LinuxCNC does otherwise, or cannot do, is not translated, and says so.
+Only equivalent functions are translated: G68 becomes an offset and a rotation, K becomes L, a dwell is converted to
+seconds, and codes without motion are omitted. Anything that LinuxCNC does differently or cannot do raises an error.
 """
 
 import math
@@ -16,13 +16,13 @@ from thermocomp.nc.interpreter.cycles import KEPT
 from thermocomp.nc.interpreter.interpret import Follower
 from thermocomp.nc.parser.tokens import read_lines
 
-#: diameter of all cutters under G41 and G42: so little that every contour has room for it [mm]
+#: diameter of all cutters under G41 and G42: small enough for every contour [mm]
 DIAMETER: Final = 0.02
-#: LinuxCNC's systems that G54.1 P1 and its like become
+#: LinuxCNC systems used for G54.1 P1 etc.
 _SPARE: Final = (7, 8, 9)
 _MOST_M: Final = 4
 
-#: codes that are the same; in the order that LinuxCNC does them in
+#: identical codes, in LinuxCNC's order of execution
 _SAME: Final = (
     *("G93", "G94", "G95", "G97", "G17", "G18", "G19", "G40", "G61", "G64"),
     *(f"G{n}" for n in range(54, 60)),
@@ -30,7 +30,7 @@ _SAME: Final = (
 )
 _OTHER: Final = {"G61": "G61.1"}
 _SAME_M: Final = frozenset({"M0", "M1", "M2", "M3", "M4", "M5", "M6", "M7", "M8", "M9", "M30", "M48", "M49"})
-#: they move nothing, and state how a Fanuc smooths, or take back what is not in force; G98 and G99 go with each cycle
+#: codes without motion, for path smoothing or cancelling inactive modes; G98 and G99 are written with each cycle
 _LEFT_OUT: Final = frozenset(
     {
         "G98",
@@ -57,12 +57,12 @@ _AXES: Final = "XYZABC"
 
 
 class UntranslatableError(InputError):
-    """A line cannot be translated into LinuxCNC code.
+    """Error for a line that cannot be translated into LinuxCNC code.
 
     Parameters
     ----------
     line : int
-        From 1.
+        Line number (1-based).
     reason : str
     """
 
@@ -80,51 +80,51 @@ def translate(lines: Iterable[str], setup: Setup) -> Iterator[tuple[str, int]]:
     lines : iterable of str
         Plain lines, see `thermocomp.nc.expansion.unroll`.
     setup : Setup
-        That of the program.
+        Setup of the program.
 
     Yields
     ------
     str
-        A line of the translation, with its ending.
+        Line of the translation, with its ending.
     int
-        Line of the program it comes from, from 1.
+        Number of its line in the program (1-based).
 
     Raises
     ------
     UntranslatableError
-        LinuxCNC does it otherwise, or not at all.
+        LinuxCNC does this differently, or not at all.
     ProgramError
-        The program cannot be followed.
+        The program cannot be interpreted.
     """
     return Translator(setup).translate(lines)
 
 
 class Translator:
-    """Translates one program.
+    """Translator of one program.
 
     Parameters
     ----------
     setup : Setup
-        That of the program.
+        Setup of the program.
 
     Attributes
     ----------
     systems : dict of int to int
-        LinuxCNC's systems, by those of G54.1 (100 + P) that stand in the program.
+        LinuxCNC systems, by the systems of G54.1 (100 + P) in the program.
     """
 
     def __init__(self, setup: Setup) -> None:
         self.systems: dict[int, int] = {}
         self._setup = setup
         self._follower = Follower(setup)
-        self._stores: set[str] = set()  # G52, G68 and G92 share one in LinuxCNC
-        self._local: Point = (0.0, 0.0, 0.0)  # of G52 [mm]
+        self._stores: set[str] = set()  # G52, G68 and G92 share one stored offset in LinuxCNC
+        self._local: Point = (0.0, 0.0, 0.0)  # offset of G52 [mm]
         self._turned = False
         self._turning = 0
         self._length: int | None = None
 
     def translate(self, lines: Iterable[str]) -> Iterator[tuple[str, int]]:
-        """Yield the lines of the translation, see `translate`."""
+        """Yield the lines of the translation; see `translate`."""
         for line in read_lines(lines, "fanuc"):
             block = self._follower.step(line)
             if line.optional and self._setup.skip_optional:
@@ -136,10 +136,10 @@ class Translator:
                 return
 
     def setup(self) -> Setup:
-        """Return the state of a LinuxCNC that acts as the Fanuc does, after the whole program has been translated.
+        """Return the state of an equivalent LinuxCNC controller, after the whole program has been translated.
 
-        A Fanuc stores no rotation, and begins with G98 and without a tolerance of its path, where nothing else is
-        stated. Where the program uses G52 or G68, no G92 may be in force at its start: LinuxCNC has one store for all.
+        A Fanuc stores no rotation, and by default starts with G98 and without a path tolerance. If the program uses G52
+        or G68, no G92 may be in force at its start: LinuxCNC has one stored offset for all of them.
         """
         own = self._setup
         offsets = {self.systems.get(system, system): place for system, place in own.offsets.items()}
@@ -162,7 +162,7 @@ class Translator:
             return []
         codes = set(block.codes)
         self._check(block, codes)
-        # LinuxCNC reads an F beside G20 in the old unit
+        # LinuxCNC reads an F next to G20 in the previous unit
         first: list[str] = [code for code in ("G20", "G21") if code in codes]
         head = [_OTHER.get(code, code) for code in _SAME if code in codes]
         head += self._cutter(block, codes) + self._lengths(block, codes) + self._system(block, codes)
@@ -216,7 +216,7 @@ class Translator:
         return [system_name(self.systems[system])]
 
     def _speeds(self, block: Block, codes: set[str]) -> list[str]:
-        """F, S, T; F once more behind G94, which a Fanuc keeps and LinuxCNC forgets."""
+        """Return F, S, T words; F is repeated after G94, because LinuxCNC, unlike a Fanuc, resets it."""
         told = []
         state = self._follower.state
         if "F" in block.values or ({"G94", "G95"} & codes and state.feed_word):
@@ -226,7 +226,7 @@ class Translator:
         return told
 
     def _once(self, block: Block, once: str) -> str:
-        """Return the code that holds for this line only, and its words."""
+        """Return the non-modal code and its words."""
         values = block.values
         words = _words(values, _AXES)
         if once == "G10":
@@ -242,7 +242,7 @@ class Translator:
         return {"G4": f"G4 P{format_number(block.pause)}", "G92.1": once}.get(once, f"{once} {words}")
 
     def _move(self, block: Block, codes: set[str]) -> tuple[list[str], str, list[str]]:
-        """Return lines before, words on the line, and lines after it. Each move has its motion code."""
+        """Return lines before the line, words on the line, and lines after it; each move has its motion code."""
         if block.kind == "cycle":
             return self._cycle(block)
         if block.kind in ("line", "arc"):
@@ -266,7 +266,7 @@ class Translator:
         return f"G10 L2 P{target} {_words(values, _AXES)}"
 
     def _rotation(self, block: Block, codes: set[str]) -> list[str]:
-        """G68 and G69: the system turns about its origin in LinuxCNC, so that it has to be shifted, too."""
+        """Return the lines for G68 or G69: LinuxCNC rotates about the system's origin, hence the shift."""
         turned = block.modal.turned
         if "G68" not in codes and (turned or not self._turned):
             return []
@@ -278,7 +278,7 @@ class Translator:
             a, b = block.values["X"] * scale + x, block.values["Y"] * scale + y
             x += a * math.cos(angle) + b * math.sin(angle) - a
             y += b * math.cos(angle) - a * math.sin(angle) - b
-        # under a G52 LinuxCNC loses its place where a rotation changes
+        # under a G52 LinuxCNC changes the position when a rotation changes
         turn = f"G10 L2 P0 R{format_number(math.degrees(angle))}"
         return ["G52 X0 Y0", turn, f"G52 X{format_number(x / scale)} Y{format_number(y / scale)}"]
 
@@ -306,13 +306,13 @@ class Translator:
         scale, back = state.scale, f"G{modal.retract} " if modal.retract_stated else ""
         level, plane = state.level or 0.0, block.sticky["R"] * scale
         if modal.absolute and modal.retract == 98 and abs(block.start[across] - plane) < 1e-3 < level - plane:
-            # from R a Fanuc goes to the next hole at R; LinuxCNC goes up before, or does not, as numbers are rounded
+            # from R a Fanuc moves to the next hole at R; LinuxCNC moves up before or not, depending on rounding
             up = f"G0 {letter}{format_number(level / scale)}"
             return before, f"G99 {code} {_words(words, 'XYZRQPL')}", [up, *after]
         return before, f"{back}{code} {_words(words, 'XYZRQPL')}", after
 
     def _spindle(self, block: Block) -> tuple[list[str], list[str]]:
-        """Return the lines that start the spindle for a tap, and those after it: a Fanuc starts it by itself."""
+        """Return the lines that start the spindle before a tap and restore it after: a Fanuc does so automatically."""
         code, turning = block.modal.motion, self._turning
         if code not in ("G74", "G84", "G86"):
             return [], []
@@ -327,7 +327,7 @@ class Translator:
 
 
 def format_number(value: float) -> str:
-    """Return a number as LinuxCNC reads it."""
+    """Return a number in LinuxCNC format."""
     text = f"{value:.9f}".rstrip("0").rstrip(".")
     return "0" if text.strip("-0.") == "" else text
 

@@ -1,6 +1,6 @@
-"""A revised program is judged by LinuxCNC's own interpreter: its moves are the original's plus what was asked for.
+"""Verification of a revised program by LinuxCNC's interpreter: its moves are those of the original plus the shifts.
 
-It is run in eight stored controllers: what is stated is the same in all of them, what is not is drawn.
+It is run in eight controller states: given settings are the same in all of them, all others are random.
 """
 
 from array import array
@@ -23,28 +23,28 @@ from thermocomp.nc.parser.tokens import program_lines
 
 __all__ = ["Ledger", "LineShift", "Proof", "prove"]
 
-#: what a state may be without if the original does not run with it
+#: settings that a state may omit if the original does not run with them
 _SPARED = ("rotation", "tool diameters")
 
 
 class Proof(NamedTuple):
-    """Findings of the interpreter."""
+    """Results of the interpreter."""
 
-    moves: int  #: that were compared in each state
-    largest: float  #: largest difference between a move and what was asked for [um]
-    states: int  #: controllers both programs were run in
-    slower: float  #: largest change of the time a move takes, of the larger of it and 0.25 s [%]
-    held: tuple[str, ...]  #: what is stated, and the same in all states
-    drawn: tuple[str, ...]  #: what is not
+    moves: int  #: number of moves compared in each state
+    largest: float  #: largest deviation of a move from the required shift [um]
+    states: int  #: number of controller states in which both programs were run
+    slower: float  #: largest change in the duration of a move, relative to the larger of its duration and 0.25 s [%]
+    held: tuple[str, ...]  #: given settings, the same in all states
+    drawn: tuple[str, ...]  #: random settings
 
     @property
     def sentence(self) -> str:
-        """In which states it was proved."""
+        """Description of the states in which the program was verified."""
         return _say_states(self.states, self.held, self.drawn)
 
 
 class _Proving(NamedTuple):
-    """Two programs, and what is known of the controller."""
+    """Two programs, and the known settings of the controller."""
 
     original: Path
     revised: Path
@@ -55,7 +55,7 @@ class _Proving(NamedTuple):
     def run(
         self, wanted: Sequence[tuple[int, set[str]]], progress: Callable[[int], object] = lambda _: None
     ) -> Iterator[Found]:
-        """Compare them in states, one after the other."""
+        """Compare the programs in several states, one after the other."""
         jobs = [states.state(self.setup, number, drawn) for number, drawn in wanted]
         with (
             InterpreterRun(*[state.job(InterpreterJob(self.original)) for state in jobs]) as first,
@@ -69,7 +69,7 @@ class _Proving(NamedTuple):
                 yield compare(first, second, self.ledger, self.origin, told)
 
     def fails(self, number: int, drawn: set[str]) -> bool:
-        """Return whether they fail in a state as they have failed before."""
+        """Return whether the comparison fails in a state."""
         try:
             list(self.run([(number, drawn)]))
         except (ProgramError, RefusedError):
@@ -77,9 +77,9 @@ class _Proving(NamedTuple):
         return False
 
     def causes(self, number: int, drawn: set[str]) -> list[str]:
-        """Return the drawn parts that make them fail: each by itself, or those without which they do not fail.
+        """Return the random settings that cause the failure: each on its own, or those needed for it.
 
-        Nothing if they fail with nothing drawn as well.
+        The list is empty if the comparison also fails without random settings.
         """
         if self.fails(number, set()):
             return []
@@ -96,21 +96,21 @@ def prove(
 ) -> Proof:
     """Run the interpreter on both programs in eight controller states, and compare them call by call.
 
-    Every move has to be that of the original, shifted by what its line should carry, within 0.1 um, and has to take as
-    long, within 2 % or 5 ms; where the original moves no linear axis none may move. All else that the interpreter tells
-    (feeds, speeds, tools, dwells ...) has to be the same. A move may be divided: then its pieces lie on its way. A
-    Fanuc's programs are said in LinuxCNC's words first.
+    Every move must equal that of the original, shifted by the required shift of its line, within 0.1 um, and have the
+    same duration within 2 % or 5 ms; if no linear axis of the original moves, none may move. All other calls (feeds,
+    speeds, tools, dwells ...) must be equal. A move may be divided, with its pieces on the original path. Fanuc
+    programs are first translated for LinuxCNC.
 
     Parameters
     ----------
     original, revised : Path
-        The programs.
+        Original and revised program.
     ledger : Ledger
         Expected shifts of the lines of the original.
     setup : Setup
-        That of the revision.
+        Setup of the revision.
     progress : callable, optional
-        Told the line of the original, as if all states were one run.
+        Called with the line of the original, as if all states were one run.
 
     Returns
     -------
@@ -119,10 +119,10 @@ def prove(
     Raises
     ------
     ProgramError
-        A move is not where it should be, or the interpreter refuses the revised program: a fault of thermocomp, or it
-        depends on something that is stored in the controller and has not been stated.
+        A move is not at the required position, or the interpreter refuses the revised program: an error in thermocomp,
+        or a dependence on settings stored in the controller that are not given.
     Unprovable
-        The interpreter refuses the original, or it is not installed; what a Fanuc does LinuxCNC does otherwise.
+        The interpreter refuses the original, or is not installed; or a Fanuc function has no equivalent in LinuxCNC.
     """
     if (reason := rs274.find_obstacle()) is not None:
         raise Unprovable(reason)
@@ -153,11 +153,11 @@ def prove(
 
 
 def _assumed(setup: Setup, held: Sequence[str]) -> tuple[str, ...]:
-    """Return the parts that are the same in all states, marking those that are not stated."""
+    """Return the settings that are the same in all states, marking the assumed ones."""
     if setup.controller == "linuxcnc":
-        # all moves of X and all arcs would be others
+        # otherwise all X moves and all arcs would differ
         return (*held, "G8 and G91.1 at the start (assumed)")
-    # a Fanuc stores no rotation, but G68 may have been left on; and with G52 or G68 no G92 can be drawn
+    # a Fanuc stores no rotation, but G68 may still be on; and with G52 or G68 a random G92 is impossible
     assumed = {"no rotation": "no G68 at the start (assumed)"}
     if not setup.no_shift:
         assumed["no G92"] = "no G92 at the start (assumed)"
@@ -165,7 +165,7 @@ def _assumed(setup: Setup, held: Sequence[str]) -> tuple[str, ...]:
 
 
 def foresee_sentence(setup: Setup) -> str:
-    """Return a proof's description of its states, without the lines that do not run in all of them."""
+    """Return the description of the states for a proof in which the original runs in all of them."""
     drawn = setup if setup.controller == "linuxcnc" else Translator(setup).setup()
     return _say_states(states.STATES, _assumed(setup, states.describe_setup(drawn)), states.list_unstated(drawn))
 
@@ -183,7 +183,7 @@ def _same(lines: Integers) -> Integers:
 
 
 class _Translated(NamedTuple):
-    """A Fanuc's program in LinuxCNC's words."""
+    """Fanuc program translated for LinuxCNC."""
 
     path: Path
     setup: Setup
@@ -203,7 +203,7 @@ class _Translated(NamedTuple):
         return cls(path, translator.setup(), sources)
 
     def lines(self, lines: Integers) -> Integers:
-        """Return the lines of the program that lines of the translation come from."""
+        """Return the lines of the program for lines of the translation."""
         found = np.frombuffer(self.sources, np.intc).astype(int)
         return np.where(lines > 0, found[np.clip(lines, 1, len(found)) - 1], 0)
 
@@ -241,7 +241,7 @@ def _prove(proving: _Proving, progress: Callable[[int], object]) -> Proof:
 
 
 def _fault(proving: _Proving, number: int, drawn: set[str], error: ProgramError) -> ProgramError:
-    """Return the error of a difference: a fault in the stated state, else what it depends on."""
+    """Return the error for a difference: an error of thermocomp, or the random settings that cause it."""
     what = f"LinuxCNC's interpreter disagrees: {error.reason}"
     causes = proving.causes(number, drawn)
     if not causes:
@@ -257,7 +257,7 @@ def _fault(proving: _Proving, number: int, drawn: set[str], error: ProgramError)
 
 
 def _spared(proving: _Proving, number: int, drawn: set[str], error: RefusedError) -> str:
-    """Return the part that a state must not have for the original to run in it."""
+    """Return the setting that a state must omit so that the original runs in it."""
     line, reason = error.args
     neutral = InterpreterJob(
         proving.original, states.build_stored(proving.setup), bool(proving.setup.inch), proving.setup.skip_optional
@@ -271,7 +271,7 @@ def _spared(proving: _Proving, number: int, drawn: set[str], error: RefusedError
     causes = proving.causes(number, drawn)
     if len(causes) == 1 and causes[0] in _SPARED:
         return causes[0]
-    causes = causes or ["start"]  # the only thing that is drawn always
+    causes = causes or ["start"]  # the only setting that is always random
     raise Unprovable(
         f"line {line}: the tool position depends on what is stored in the controller "
         f"({_listed(causes)}), and the original does not run in all states of it: {reason}; "
