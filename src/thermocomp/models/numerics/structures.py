@@ -89,27 +89,34 @@ def fit_each(moments: Moments, structures: Sequence[LagStructure], parts: Iterab
     -------
     ndarray of shape (n_structures, n_features, n_targets)
     """
-    chosen = list(parts)
-    weights = np.full((len(structures), *moments.cross.shape[1:]), 0.0 if chosen else np.nan)
-    if not chosen:
+    return _fit_all(moments, structures, [list(parts)])[0]
+
+
+def _fit_all(moments: Moments, structures: Sequence[LagStructure], groups: Sequence[Sequence[int]]) -> FloatArray:
+    """Return the weights fitted to each group of parts, (n_groups, n_structures, n_features, n_targets)."""
+    weights = np.full((len(groups), len(structures), *moments.cross.shape[1:]), np.nan)
+    filled = [k for k, group in enumerate(groups) if group]
+    if not filled:
         return weights
-    n = moments.rows[chosen].sum()
-    gram, cross = moments.gram[chosen].sum(axis=0) / n, moments.cross[chosen].sum(axis=0) / n
-    noisy, own = gram + moments.noise, gram.diagonal()
+    weights[filled] = 0.0
+    n = [moments.rows[groups[k]].sum() for k in filled]
+    gram = np.array([moments.gram[groups[k]].sum(axis=0) / m for k, m in zip(filled, n, strict=True)])
+    cross = np.array([moments.cross[groups[k]].sum(axis=0) / m for k, m in zip(filled, n, strict=True)])
+    noisy, own = (gram + moments.noise).reshape(len(filled), -1), gram.diagonal(axis1=1, axis2=2)
     of_size: dict[int, list[int]] = {}
     for k, structure in enumerate(structures):
         of_size.setdefault(len(structure.columns), []).append(k)
-    for size, places in of_size.items():  # all small systems of the same size at once
+    for size, places in of_size.items():  # as many small systems at once as there are of a size
         columns, every = np.array([structures[k].columns for k in places]), np.arange(size)
-        systems = noisy.take(columns[:, :, None] * len(gram) + columns[:, None, :])
-        squares = own[columns]
-        # a feature that is zero in all rows keeps weight zero
+        systems = noisy.take(columns[:, :, None] * gram.shape[1] + columns[:, None, :], axis=1)
+        squares = own[:, columns]
+        # a feature that is zero in all rows keeps the weight zero
         strengths = np.array([structures[k].strengths for k in places])
-        systems[:, every, every] += np.where(squares > 0, strengths * squares, 1.0)
-        scale = 1.0 / np.sqrt(systems[:, every, every])  # powers of a speed may differ by orders of magnitude
-        systems *= scale[:, :, None] * scale[:, None, :]
-        solved = np.linalg.solve(systems, scale[:, :, None] * cross[columns])
-        weights[np.array(places)[:, None], columns] = scale[:, :, None] * solved
+        systems[..., every, every] += np.where(squares > 0, strengths * squares, 1.0)
+        scale = 1.0 / np.sqrt(systems[..., every, every])  # powers of a speed may be of another size altogether
+        systems *= scale[..., :, None] * scale[..., None, :]
+        solved = np.linalg.solve(systems, scale[..., None] * cross[:, columns])
+        weights[np.array(filled)[:, None, None], np.array(places)[:, None], columns] = scale[..., None] * solved
     return weights
 
 
@@ -122,7 +129,7 @@ def share_out(moments: Moments, structures: Sequence[LagStructure]) -> tuple[Flo
     shares = np.full((len(structures), n_targets), 1 / len(structures))
     if n_parts == 1:
         return shares, np.full((1, n_targets), np.nan)
-    fitted = np.array([fit_each(moments, structures, set(range(n_parts)) - {k}) for k in range(n_parts)])
+    fitted = _fit_all(moments, structures, [[p for p in range(n_parts) if p != k] for k in range(n_parts)])
     own = np.array([moments.error(k, weights) for k, weights in enumerate(fitted)])
     own = np.log(np.maximum(own, np.finfo(np.float64).tiny)).mean(axis=0)
     shares = np.exp(TRUST / 2 * (own.min(axis=0) - own))
