@@ -60,6 +60,8 @@ def weigh_swaps(
     memory: FloatArray,
     able: BoolArray,
     dt: FloatArray,
+    *,
+    find: bool = True,
 ) -> tuple[FloatArray, Blamed]:
     """Assess whether two sensors have been swapped since the start.
 
@@ -79,6 +81,8 @@ def weigh_swaps(
         Sensors whose readings and predictions are reliable.
     dt : ndarray of shape (..., 1)
         Time since `evidence` was computed; 0 where predictions are not reliable [s].
+    find : bool
+        Whether to find the most likely pair; without, `both` holds none.
 
     Returns
     -------
@@ -88,8 +92,8 @@ def weigh_swaps(
     """
     n, (direct, states) = len(watch.sensors), watch.read_out
     first, second = watch.pairs
-    mine = np.isfinite(evidence) & able[..., first] & able[..., second]
-    if not mine.any():
+    mine = np.isfinite(evidence)
+    if not (mine.any() and (mine := mine & able[..., first] & able[..., second]).any()):
         return evidence, _nobody(able)
     # most pairs are soon excluded: compute only the remaining ones, with one row for each pair of each run
     *run, pair = np.nonzero(mine)
@@ -108,6 +112,8 @@ def weigh_swaps(
     after = lagbank.follow(evidence[mine], better, step)
     evidence = evidence.copy()
     evidence[mine] = np.where(after > -AGAINST * n, after, -np.inf)
+    if not find:
+        return evidence, _nobody(able)
     rests, worst = np.full(mine.shape, np.inf), np.full(mine.shape, np.inf)
     rests[mine], worst[mine] = rest, np.abs(left / watch.limits("off")).max(axis=-1)
     each = np.eye(n, dtype=np.bool_)

@@ -219,17 +219,20 @@ def _step(watch: Watch, state: WatchState, time: float, x: FloatArray, values: F
     s = state._replace(time=time)
     s, stepped = _jumps(watch, s, x, dt, seen & (s.fault == GOOD))
     s = _missing(s, seen)
-    bridged = s.usual + s.predicted
-    waiting = np.isfinite(s.jumped) & (s.fault == GOOD) & seen
-    used = np.where(s.fault != GOOD, _stand_in(s, time), np.where(waiting | ~seen, bridged, x))
+    failed = s.fault != GOOD
+    some_failed, waiting = failed.any(), np.isfinite(s.jumped) & ~failed & seen
+    used = np.where(waiting, s.usual + s.predicted, x)
+    if some_failed:  # every missing sensor among them
+        used = np.where(failed, _stand_in(s, time), used)
     change = _calmed(watch, values - s.reference)
     change[..., watch.bank.temperatures] = used
     memory = watch.bank.advance(s.memory, change, dt)
     direct, weights = watch.read_out
     predicted = used @ direct + memory @ weights
-    used = np.where(s.fault != GOOD, _stand_in(s._replace(predicted=predicted), time), used)
-    difference = np.where(seen, x - predicted, np.nan)
-    calm = (s.fault == GOOD) & seen & ~waiting
+    if some_failed:
+        used = np.where(failed, _stand_in(s._replace(predicted=predicted), time), used)
+    difference = x - predicted
+    calm = ~failed & seen & ~waiting
     inner = np.where(calm, difference, 0.0)
     usual = np.where(calm, lagbank.follow(s.usual, inner, np.full(inner.shape, dt / USUAL)), s.usual)
     taus = np.repeat(watch.time_constants, len(watch.sensors))
@@ -256,6 +259,8 @@ def _jumps(watch: Watch, s: WatchState, x: FloatArray, dt: float, able: BoolArra
     with np.errstate(invalid="ignore"):
         before = np.where(waiting, s.predicted + s.usual, s.used)
         far = able & (np.abs(x - before) > limit)
+    if not (far.any() or waiting.any()):
+        return s, far
     fresh = far & ~waiting
     lasts = far & waiting & (s.time - s.jumped >= LASTING)
     jumped = np.where(far, np.where(fresh, s.time, s.jumped), np.where(able, np.nan, s.jumped))
@@ -264,6 +269,8 @@ def _jumps(watch: Watch, s: WatchState, x: FloatArray, dt: float, able: BoolArra
 
 def _missing(s: WatchState, seen: BoolArray) -> WatchState:
     lost = ~seen & (s.fault == GOOD)
+    if not lost.any():
+        return s
     return s._replace(
         fault=np.where(lost, MISSING, s.fault).astype(np.int8),
         since=np.where(lost, s.time, s.since),
@@ -276,6 +283,9 @@ def _missing(s: WatchState, seen: BoolArray) -> WatchState:
 def _stuck(watch: Watch, s: WatchState, x: FloatArray, calm: BoolArray) -> tuple[WatchState, BoolArray]:
     """Find sensors that are constant although their prediction moves, or for too long while others change."""
     same = x == s.same
+    if not same.any():
+        nan = np.full(x.shape, np.nan)
+        return s._replace(same=x, still=np.full(x.shape, s.time), then=s.predicted, moving=nan), same
     with np.errstate(invalid="ignore"):
         apart = np.abs(s.predicted - s.then)
     fresh = ~same
@@ -295,6 +305,8 @@ def _stuck(watch: Watch, s: WatchState, x: FloatArray, calm: BoolArray) -> tuple
 def _beyond(watch: Watch, s: WatchState, difference: FloatArray, calm: BoolArray) -> tuple[WatchState, BoolArray]:
     """Find the runs, (...,), in which a difference has been too large for too long."""
     z = np.where(calm, difference, 0.0) / watch.limits("off")
+    if not (np.abs(z) > 1.0).any():
+        return s._replace(off=np.full(z.shape, np.nan)), np.zeros(z.shape[:-1], dtype=np.bool_)
     recent = np.nanmax(np.where(s.fault > MISSING, s.since, -np.inf), axis=-1, initial=-np.inf, keepdims=True)
     beyond = (np.abs(z) > 1.0) & (s.time - recent > REST) & (s.time - s.fast[..., None] > REST)
     off = np.where(beyond, np.where(np.isfinite(s.off), s.off, s.time), np.nan)
@@ -313,8 +325,9 @@ def _blame(
     """Exclude failed sensors: a swapped pair if it explains all residuals better than one failure; else single ones."""
     stepped, stuck, lasting = found
     counts = np.where(s.time - s.fast[..., None] > REST, dt, 0.0)
-    evidence, both = weigh_swaps(watch, s.evidence, x, s.memory, able, counts)
-    s, wrong = s._replace(evidence=evidence), lasting | (stepped | stuck).any(axis=-1)
+    wrong = lasting | (stepped | stuck).any(axis=-1)
+    evidence, both = weigh_swaps(watch, s.evidence, x, s.memory, able, counts, find=bool(wrong.any()))
+    s = s._replace(evidence=evidence)
     if not wrong.any():
         return s
     direct, states = watch.read_out
@@ -340,6 +353,8 @@ def _returns(watch: Watch, s: WatchState, difference: FloatArray) -> WatchState:
     """Trust a missing sensor again once it agrees with its prediction."""
     with np.errstate(invalid="ignore"):
         fits = (s.fault == MISSING) & (np.abs(difference) <= watch.limits("off"))
+        if not fits.any():
+            return s._replace(back=np.full(fits.shape, np.nan))
         back = np.where(fits, np.where(np.isfinite(s.back), s.back, s.time), np.nan)
         again = fits & (s.time - back >= RETURN)
     return s._replace(

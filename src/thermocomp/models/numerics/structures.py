@@ -89,7 +89,8 @@ def fit_each(moments: Moments, structures: Sequence[LagStructure], parts: Iterab
     -------
     ndarray of shape (n_structures, n_features, n_targets)
     """
-    return _fit_all(moments, structures, [list(parts)])[0]
+    weights: FloatArray = _fit_all(moments, structures, [list(parts)])[0]
+    return weights
 
 
 def _fit_all(moments: Moments, structures: Sequence[LagStructure], groups: Sequence[Sequence[int]]) -> FloatArray:
