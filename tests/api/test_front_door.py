@@ -78,7 +78,7 @@ def test_three_kinds_of_models_in_one_comparison(recording: Recording) -> None:
 @pytest.fixture(scope="module")
 def results() -> dict[str, Result]:
     """Each kind of result, of the same small machine."""
-    test = small_machine()
+    test = small_machine(dt=200.0)
     fitted = tc.fit(test, ["z_um", "x_um"], "ols")
     return {
         "compare": tc.compare(test, models=FAST),
@@ -192,7 +192,7 @@ def test_report_of_a_handed_in_estimator(recording: Recording, tmp_path: Path) -
 
 
 def test_fitted_models(results: dict[str, Result], tmp_path: Path) -> None:
-    found, test = results["fit"], small_machine()
+    found, test = results["fit"], small_machine(dt=200.0)
     assert isinstance(found, FittedModels)
     with pytest.raises(InputError, match=r"models of z_um, x_um: use one of \.models"):
         found.model  # noqa: B018

@@ -45,7 +45,7 @@ RESULT_KEYS = {
 def drift(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A CSV file with four thermal cycles."""
     path = tmp_path_factory.mktemp("cli") / "drift.csv"
-    recordings.write(small_machine(), path)
+    recordings.write(small_machine(dt=200.0), path)
     return path
 
 
@@ -85,7 +85,7 @@ def test_compare_as_json(drift: Path, capsys: pytest.CaptureFixture[str]) -> Non
     ]
     for r in results:
         assert set(r) >= RESULT_KEYS
-        assert r["block"] == "rows 600-799"
+        assert r["block"] == "rows 180-239"
         assert r["verdict"] == "unproven"
         assert r["reason"].startswith("judged on one stretch that continues from what was learned; ")
         assert r["n_sensors"] == len(r["sensors"])
@@ -121,7 +121,7 @@ def test_fit_assess_and_their_exit_codes(drift: Path, tmp_path: Path, capsys: py
     assert "exists already" in capsys.readouterr().err
 
     other = tmp_path / "other.csv"
-    recordings.write(small_machine((2200.0, 1200.0), seed=3), other)
+    recordings.write(small_machine((2200.0, 1200.0), seed=3, dt=200.0), other)
     assert run(["assess", str(model), str(other), "--json"]) == 0
     results = printed(capsys)["results"]
     assert run(["assess", str(model), str(other)]) == 0
@@ -150,30 +150,30 @@ def test_assess_leaves_out_what_was_learned_from(
     assert run(["fit", str(drift), "--target", "z_um", "--jobs", "1", "-o", str(model), "--json"]) == 0
     capsys.readouterr()
     lines = drift.read_text(encoding="utf-8").splitlines(keepends=True)
-    copy.write_text("".join(lines[:400] + lines[401:]), encoding="utf-8")
+    copy.write_text("".join(lines[:120] + lines[121:]), encoding="utf-8")
     assert run(["assess", str(model), str(copy), "--json"]) == 1
     found = printed(capsys)
     assert found["seen_in_training"] == []
     assert found["results"][-1]["verdict"] == "refused"
-    reason = "no honest test: 799 of 799 rows were learned from; judge it on another recording"
+    reason = "no honest test: 239 of 239 rows were learned from; judge it on another recording"
     assert found["results"][-1]["reason"] == reason
-    first, day = small_machine(), small_machine((2200.0, 1200.0), seed=3)
-    table = pd.concat([first.table.drop(index=399), day.table], ignore_index=True)
-    time = 60.0 * np.arange(len(table), dtype=np.float64)
+    first, day = small_machine(dt=200.0), small_machine((2200.0, 1200.0), seed=3, dt=200.0)
+    table = pd.concat([first.table.drop(index=119), day.table], ignore_index=True)
+    time = 200.0 * np.arange(len(table), dtype=np.float64)
     cycles = find_cycles(time, table["spindle_rpm"].to_numpy())
     recordings.write(replace(first, time=time, table=table, cycles=cycles), copy, overwrite=True)
     assert run(["assess", str(model), str(copy), "--json"]) == 0
     found = printed(capsys)["results"][-1]
-    assert (found["n_rows"], found["n_rows_learned_from"]) == (400, 799)
+    assert (found["n_rows"], found["n_rows_learned_from"]) == (120, 239)
     run(["assess", str(model), str(copy)])
-    assert "799 of 1,199 rows were learned from: left out" in " ".join(capsys.readouterr().out.split())
+    assert "239 of 359 rows were learned from: left out" in " ".join(capsys.readouterr().out.split())
 
 
 def test_what_fit_has_refused_assess_does_not_pass(
     drift: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     model, other = tmp_path / "model.json", tmp_path / "other.csv"
-    recordings.write(small_machine((2200.0, 1200.0), seed=3), other)
+    recordings.write(small_machine((2200.0, 1200.0), seed=3, dt=200.0), other)
     run(["fit", str(drift), "--target", "z_um", "--jobs", "1", "-o", str(model), "--json"])
     (fitted,) = modelfile.read(model)
     assert fitted.honest_error is not None
@@ -189,7 +189,7 @@ def test_what_fit_has_refused_assess_does_not_pass(
 
 
 def test_a_refused_model_gives_exit_code_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    recording = small_machine()
+    recording = small_machine(dt=200.0)
     table = recording.table.copy()
     table["z_um"] = 5.0 * (-1.0) ** (recording.table.index // 200)  # nothing the temperatures could explain
     path = tmp_path / "noise.csv"
@@ -206,9 +206,9 @@ def test_a_refused_model_gives_exit_code_one(tmp_path: Path, capsys: pytest.Capt
 def test_check(drift: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["check", str(drift), "--json"]) == 0
     (found,) = printed(capsys)["recordings"]
-    assert found["rows"] == 800
-    assert [c["start"] for c in found["cycles"]] == [0, 200, 400, 600]
-    recording = small_machine()
+    assert found["rows"] == 240
+    assert [c["start"] for c in found["cycles"]] == [0, 60, 120, 180]
+    recording = small_machine(dt=200.0)
     table = recording.table.copy()
     table["t2_C"] = -180.0
     path = tmp_path / "absent.csv"
@@ -221,7 +221,7 @@ def test_check(drift: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
 
 def altered(path: Path, **columns: Any) -> Path:
     """Write the small machine's recording with other columns."""
-    recording = small_machine()
+    recording = small_machine(dt=200.0)
     table = recording.table.assign(**columns)
     channels = tuple(
         Channel(str(c), *("displacement", "um"))
@@ -269,7 +269,7 @@ def test_a_constant_target_is_refused_not_a_crash(tmp_path: Path, capsys: pytest
 
 @pytest.mark.parametrize("name", ["[/]_um", "z'[red]_um", "<b>z</b>_um", "z µ°_um"])
 def test_odd_names_are_printed_as_they_are(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = altered(tmp_path / "odd.csv", **{name: small_machine().table["z_um"]})
+    path = altered(tmp_path / "odd.csv", **{name: small_machine(dt=200.0).table["z_um"]})
     arguments = ["compare", str(path), "--target", name, "--models", "ols", "--jobs", "1"]
     assert run([*arguments, "-o", str(tmp_path / "r.html")]) == 0
     assert f"{name}: ols" in capsys.readouterr().out

@@ -116,7 +116,7 @@ def test_a_model_fitted_before_assesses_after(tmp_path: Path, way: str, fitted: 
 
 @pytest.fixture(scope="module")
 def renamed() -> Recording:
-    plain = small_machine()
+    plain = small_machine(dt=200.0)
     names = {"t1_C": "spindle front", "z_um": "Z", "t2_C": "t2_degC"}
     channels = tuple(replace(c, name=names.get(c.name, c.name)) for c in plain.channels)
     return replace(plain, channels=channels, table=plain.table.rename(columns=names))

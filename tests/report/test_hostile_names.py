@@ -71,7 +71,7 @@ def mixed(recording: Recording, first: int) -> Recording:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_what_was_measured(name: str) -> None:
-    recording = renamed(small_machine(), name)
+    recording = renamed(small_machine(dt=200.0), name)
     said = [t.strip() for t in texts(figures.measured(recording))]
     assert all(shorten(c.name, 48).strip() in said for c in recording.channels if c.quantity != "spindle_speed")
     finding = Finding("warning", "kind", recording.channels[0].name, name, rows=np.arange(3))
@@ -87,7 +87,7 @@ def test_what_failed() -> None:
     names = [n for n in NAMES if n.strip() and n.isprintable() and len(n) <= 200]
     assert len(names) > 10
     for k in range(0, len(names), 4):
-        plain = small_machine()
+        plain = small_machine(dt=200.0)
         renames = dict(zip(("t1_C", "t2_C", "t3_C", "z_um"), (names + names)[k : k + 4], strict=True))
         channels = tuple(replace(c, name=renames.get(c.name, c.name)) for c in plain.channels)
         recording = replace(plain, table=plain.table.rename(columns=renames), channels=channels, name=names[k])
@@ -105,8 +105,8 @@ def test_what_failed() -> None:
 
 @pytest.mark.parametrize("first", range(0, len(NAMES), 12))
 def test_a_whole_report(first: int) -> None:
-    recording = mixed(small_machine(), first)
-    speed = small_machine().speed
+    recording = mixed(small_machine(dt=200.0), first)
+    speed = small_machine(dt=200.0).speed
     assert recording.speed is not None
     assert speed is not None
     # a model takes no name with unprintable characters; that of the speed stands in every model
@@ -136,7 +136,7 @@ def test_a_whole_report(first: int) -> None:
 
 @pytest.mark.parametrize("first", range(0, len(NAMES), 12))
 def test_iso230_and_papers(first: int) -> None:
-    recording = mixed(small_machine(), first)
+    recording = mixed(small_machine(dt=200.0), first)
     name, other = NAMES[first], NAMES[(first + 1) % len(NAMES)]
     settlings = time_constants(recording)
     texts(iso230figures.time_constants(settlings))
@@ -159,7 +159,7 @@ def test_iso230_and_papers(first: int) -> None:
 def test_a_user_s_own_settings_change_nothing() -> None:
     """With TeX in a matplotlibrc, names would be programs."""
     with mpl.rc_context({"text.usetex": True, "text.parse_math": True}):
-        recording = renamed(small_machine(), "\\input{x} $a$ ")
+        recording = renamed(small_machine(dt=200.0), "\\input{x} $a$ ")
         assert any("\\input{x} $a$" in t for t in texts(figures.measured(recording)))
 
 
