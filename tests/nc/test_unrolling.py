@@ -12,6 +12,7 @@ from oracle_run import Oracle
 from test_interpret import needs_linuxcnc
 
 from thermocomp.core.exceptions import ProgramError
+from thermocomp.nc.expansion import unroll as unroll_module
 from thermocomp.nc.expansion.unroll import unroll
 from thermocomp.nc.interpreter.block import Setup
 from thermocomp.nc.interpreter.interpret import follow_program
@@ -295,20 +296,30 @@ def test_it_ends_where_too_much_comes_out(monkeypatch: pytest.MonkeyPatch) -> No
         ("M98 P2\nM30\nO2\nN5 X1.\nIF[1EQ1]GOTO5\nM99", 4, "no variable changes"),
         ("N1 M98 P2\nN3 M30\nO2\nM99 P1", 1, "no variable changes"),
         # a counter runs away
-        ("#1=0\nN10 #1=#1+1\nGOTO10", 2, "200,000 lines and moved no axis"),
-        ("#1=9\nWHILE[#1GT0]DO1\n#2=0\nWHILE[#2LT3]DO2\n#2=#2+1\nEND2\n#1=#1+1\nEND1", 2, "200,000 lines and"),
-        *((f"#1=9\nN1 #1=#1+1\n{text}\nGOTO1", 2, "200,000 lines and moved no axis") for text in STILL),
-        ("#1=9\nN1 #1=#1+1\nM98 P2\nGOTO1\nM30\nO2\n#3=1\n#3=2\nM5\nM99", 2, "200,000 lines and moved no axis"),
-        ("#1=9\nWHILE[#1GT0]DO1\n#1=#1+1\nX#1\nEND1", 2, "more than 220,000 lines that would be"),
-        ("#1=9\nN1 #1=#1+1\nM98 P2\nGOTO1\nM30\nO2\n#3=1\n#3=2\n#3=3\nX#1\nM99", 2, "more than 1,000,000 lines"),
+        ("#1=0\nN10 #1=#1+1\nGOTO10", 2, "2,000 lines and moved no axis"),
+        ("#1=9\nWHILE[#1GT0]DO1\n#2=0\nWHILE[#2LT3]DO2\n#2=#2+1\nEND2\n#1=#1+1\nEND1", 2, "2,000 lines and"),
+        *((f"#1=9\nN1 #1=#1+1\n{text}\nGOTO1", 2, "2,000 lines and moved no axis") for text in STILL),
+        ("#1=9\nN1 #1=#1+1\nM98 P2\nGOTO1\nM30\nO2\n#3=1\n#3=2\nM5\nM99", 2, "2,000 lines and moved no axis"),
+        ("#1=9\nWHILE[#1GT0]DO1\n#1=#1+1\nX#1\nEND1", 2, "more than 2,200 lines that would be"),
+        ("#1=9\nN1 #1=#1+1\nM98 P2\nGOTO1\nM30\nO2\n#3=1\n#3=2\n#3=3\nX#1\nM99", 2, "more than 10,000 lines"),
     ],
 )
-def test_a_loop_without_end_is_refused_where_it_begins(text: str, line: int, reason: str) -> None:
+def test_a_loop_without_end_is_refused_where_it_begins(
+    text: str, line: int, reason: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("MOST", "MOST_STEPS", "MOST_IDLE"):
+        monkeypatch.setattr(unroll_module, name, getattr(unroll_module, name) // 100)
     with pytest.raises(ProgramError) as caught:
         for _ in unroll(split_lines(f"{text}\nM30\n"), FANUC):
             pass
     assert (caught.value.line, reason in caught.value.reason) == (line, True)
     assert "no end" in caught.value.reason
+
+
+def test_so_many_lines_are_run() -> None:
+    with pytest.raises(ProgramError, match="has run more than 220,000 lines that would be written"):
+        for _ in unroll(split_lines("#1=9\nWHILE[#1GT0]DO1\n#1=#1+1\nX#1\nEND1\nM30\n"), FANUC):
+            pass
 
 
 def test_a_subprogram_that_calls_itself_is_refused() -> None:
