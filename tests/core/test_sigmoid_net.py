@@ -145,8 +145,8 @@ def test_a_net_refuses_numbers_that_do_not_fit(change: dict[str, Any], message: 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"net": net(8, 20, 1)}, "9 inputs, scaling of 9 and a net that takes 8"),
-        ({"input_scaling": Affine((1.0,), (0.0,))}, "9 inputs, scaling of 1 and a net that takes 9"),
+        ({"net": net(8, 20, 1)}, "9 inputs, scaling for 9 and a net for 8"),
+        ({"input_scaling": Affine((1.0,), (0.0,))}, "9 inputs, scaling for 1 and a net for 9"),
         ({"net": net(9, 20, 3)}, "a net of 3 outputs with scaling of 1: expected 1"),
         ({"intercept": float("nan")}, "intercept must be finite"),
     ],

@@ -12,7 +12,9 @@ from thermocomp.recordings.cycles import find_cycles
 from thermocomp.recordings.recording import Recording
 
 
-def small_machine(speeds: Sequence[float] = (1000.0, 2500.0, 1800.0, 3000.0), *, seed: int = 0, dt: float = 60.0) -> Recording:
+def small_machine(
+    speeds: Sequence[float] = (1000.0, 2500.0, 1800.0, 3000.0), *, seed: int = 0, dt: float = 60.0
+) -> Recording:
     """Return a drift test: lags of 20 and 90 minutes in the drift, of 20 and 45 minutes in the sensors.
 
     A larger `dt` [s] is enough where the size of the recording is not what is tested.

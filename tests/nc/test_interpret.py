@@ -241,7 +241,9 @@ def test_the_motion_code_of_an_optional_line(text: str, line: int) -> None:
     if not line:
         assert run(text)
         return
-    with pytest.raises(ProgramError, match=f"line {line}: .*(is run by G1 of an optional line|optional line)"):
+    with pytest.raises(
+        ProgramError, match=f"line {line}: .*(takes its motion code G1 from an optional line|optional line)"
+    ):
         run(text)
 
 

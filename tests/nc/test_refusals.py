@@ -92,7 +92,7 @@ NOT_FOLLOWED = [
     ("M99", "subprogram"),
     (
         "M101",
-        "a code of the user): its effect is unknown; if it does not affect axes and spindle: --harmless M101",
+        "user-defined), so its effect is unknown; if it does not affect axes and spindle: --harmless M101",
     ),
     ("M70", "M70"),
     ("G28.1", "G28"),
@@ -189,7 +189,7 @@ def test_a_speed_that_was_never_told() -> None:
         ("G10 L50", "is not supported"),
         ("G52 X1\nG92 X2", "G52 and G92"),
         ("M10", "if it does not affect axes and spindle: --harmless M10"),
-        ("G999", "unknown (fanuc): its effect is unknown; replace it by supported codes"),
+        ("G999", "not a known code (fanuc), so its effect is unknown; replace it with supported codes"),
         ("T0101", "a lathe program: X is a diameter"),
         ("T1212\nG0 X1.\nG1 X2. F100", "T1212 before, and no M6: a lathe program"),
         ("G50 S2500", "a lathe program"),

@@ -74,7 +74,7 @@ class LinearDynamic(ErrorModel):
         if not len(self.lag_signals) == len(self.time_constants) == len(self.lagged):
             raise SettingError(
                 f"{owner}: {len(self.lag_signals)} lag signals, {len(self.time_constants)} time constants and "
-                f"{len(self.lagged)} lag coefficients: must be equally many"
+                f"{len(self.lagged)} lag coefficients; their numbers must be equal"
             )
         if any(not 0 <= i < len(self.signals) for i in self.lag_signals):
             raise SettingError(f"{owner}: a lag follows a signal beyond the {len(self.signals)} given")

@@ -238,8 +238,8 @@ class Network(ErrorModel):
         n_inputs, _, n_outputs = self.net.shape
         if n_inputs != len(self.inputs) or n_inputs != len(self.input_scaling.gain):
             raise SettingError(
-                f"{owner}: {len(self.inputs)} inputs, scaling of {len(self.input_scaling.gain)} and a net that takes "
-                f"{n_inputs}: must be equally many"
+                f"{owner}: {len(self.inputs)} inputs, scaling for {len(self.input_scaling.gain)} and a net for "
+                f"{n_inputs}; their numbers must be equal"
             )
         if n_outputs != 1 or len(self.output_scaling.gain) != 1:
             raise SettingError(

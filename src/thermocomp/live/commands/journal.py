@@ -40,7 +40,7 @@ def journal(
     every : float
         Minimum interval between exported readings [s]; 0: all readings.
     last : int
-        Number of the last events to show.
+        Number of most recent events to show.
     overwrite : bool
         Overwrite an existing recording.
     json : bool

@@ -32,7 +32,7 @@ class Code(NamedTuple):
 
 
 _EXPAND = "--expand lets the interpreter unroll it"
-_LATHE = "a turning cycle; replace it by its moves"
+_LATHE = "a turning cycle; replace it with its moves"
 
 _COMMON_G: Final = (
     Code("G0", "motion", "rapid move"),

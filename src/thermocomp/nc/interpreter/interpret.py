@@ -157,8 +157,8 @@ class Follower:
         told, force = words.groups.get("motion"), self.state.modal.motion
         if told is None and force != otherwise and self._motion(words):
             raise words.error(
-                f"is run by {force} of an optional line (/), or by {otherwise or 'none'} if the operator skips that; "
-                "write its motion code, or decide with --block-delete"
+                f"takes its motion code {force} from an optional line (/), or {otherwise or 'none'} if "
+                "that is skipped; write the motion code in this line, or set --block-delete"
             )
         if told is not None or force == otherwise:
             self._if_skipped = None

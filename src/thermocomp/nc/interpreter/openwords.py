@@ -35,7 +35,7 @@ _SHIFT = (
     "shares one store with G92 and G52 in LinuxCNC, which keeps it after the end of the program; a Fanuc stores it "
     "separately and clears it: shift by G54 to G59"
 )
-_OTHER = "is a different cycle in LinuxCNC and in a Fanuc: replace it by its moves"
+_OTHER = "is a different cycle in LinuxCNC and in a Fanuc: replace it with its moves"
 _TILTED = "sets the tool length offset to its words in LinuxCNC, and applies the length along a tilted tool in a Fanuc"
 _NORMAL = "takes the cutter diameter from D in LinuxCNC, and turns an axis along the path in a Fanuc (normal direction)"
 _STORES = "stores the tool position in LinuxCNC, and moves in a Fanuc (to a floating reference point)"

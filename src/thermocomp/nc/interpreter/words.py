@@ -160,8 +160,8 @@ class Reader:
             remedy = f"if it does not affect axes and spindle: --harmless {name}; otherwise " if letter == "M" else ""
             raise ProgramError(
                 line.number,
-                f"{name} is unknown ({'a code of the user' if user else self._controller}): its effect is unknown; "
-                f"{remedy}replace it by supported codes (docs/precompensation.rst)",
+                f"{name} is not a known code ({'user-defined' if user else self._controller}), so its effect is "
+                f"unknown; {remedy}replace it with supported codes (docs/precompensation.rst)",
             )
         if code.refused:
             raise ProgramError(line.number, f"{code.name} ({code.does}): {code.refused}")

@@ -219,8 +219,8 @@ class Way:
         Work coordinate Z at and above which the tool is up and there is no cut. Default: the tool counts as up after a
         rapid that lifts it (coordinates), or after tool changes and moves of Z in machine coordinates (offset).
     no_split : bool
-        Do not split long cuts. Default: a cut is split where a linear change of the correction would leave an error of
-        more than a step in its middle (method coordinates, linuxcnc).
+        Do not split long cuts. Default: a cut is split where a linear change of the correction over it would be wrong
+        by more than one correction step at mid-cut (method coordinates, linuxcnc).
     expand : bool
         Expand loops, variables and subprograms into plain lines first: with the interpreter of LinuxCNC, or, for fanuc,
         with a built-in unroller for those in the same file.

@@ -75,7 +75,7 @@ def papers(
     seed : int
         Random seed of the weather, the sensor noise and random draws.
     repeats : int
-        Number of runs of each paper's study, with seeds 100 apart: claims that hold in some runs only are reported.
+        Number of runs of each paper's study, with seeds 100 apart: claims that hold in only some runs are marked.
         Numbers and figures are those of the first run.
     jobs : int
         Number of parallel processes for the runs or the methods of cross; -1: one per core.
