@@ -74,7 +74,7 @@ def check(trace: Trace) -> None:
 @pytest.mark.parametrize(
     ("pattern", "seconds"),
     [
-        ("offset", 30.0),
+        ("offset", 8.0),
         ("drive", 5.0),
         pytest.param("offset", 600.0, marks=pytest.mark.long),
         pytest.param("drive", 600.0, marks=pytest.mark.long),
