@@ -155,7 +155,7 @@ def test_measured_machines(shared_data: Path, tmp_path: Path, capsys: pytest.Cap
     assert run([*line, "--to", "heidenhain"]) == 0
     assert "1.83 times" in (tmp_path / "fl" / "tc_thermal.txt").read_text()
 
-    mapping = ["--mapping", str(Path(__file__).parents[1] / "files" / "voron.toml")]
+    mapping = ["--mapping", str(Path(__file__).parents[1] / "recordings" / "voron.toml")]
     night = str(shared_data / "voron_frame" / "frame_exp_quant_v3_2021-06-13_05-41-53.csv")
     model = str(tmp_path / "voron.json")
     assert run(["fit", night, "--target", "z", "--model", "ols", "--split", "0.6/0.4", "-o", model, *mapping]) in (0, 1)
