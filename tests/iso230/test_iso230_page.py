@@ -64,7 +64,7 @@ def test_the_page_is_offline_and_complete(spindle: ThermalTest, tmp_path: Path) 
         "z_um, with model",
         "Axis Y: change of the length over 550 mm [um]",
         "Time constants: cool-down [min]",
-        "The text of ISO 230-3:2020 was not at hand",
+        "The text of ISO 230-3:2020 was not available",
         "computed by its formulas as textbooks quote them",
     ):
         assert said in text, said

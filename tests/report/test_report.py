@@ -177,7 +177,7 @@ def test_a_real_browser_shows_it(page: str, tmp_path: Path) -> None:
         timeout=120,
         check=True,
     )
-    assert "Thermal compensation: may it be used?" in shown.stdout
+    assert "Thermal compensation: can it be used?" in shown.stdout
     # matplotlib comes with the extra, so its reader will do: a page that was drawn is neither white nor of one colour
     from matplotlib.image import imread
 

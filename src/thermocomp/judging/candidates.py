@@ -69,9 +69,9 @@ class Candidates:
         caption = (
             f"X'X of their changes: smallest eigenvalue {raw.smallest:.3g}, sum of inverse eigenvalues "
             f"{raw.sum_inverse:.3g}, condition number {raw.condition_number:.3g}. A variance inflation factor (VIF) "
-            "above 10 means that the others say almost the same."
+            "above 10 means that the others carry almost the same information."
         )
-        title = "How far the chosen sensors repeat each other"
+        title = "Collinearity of the chosen sensors"
         return Table(
             title=title,
             columns=("sensor", "correlation with the error", "VIF"),

@@ -31,7 +31,7 @@ def draw(choice: Choice) -> tuple[Drawn, str] | None:
     if isinstance(found, Budget):
         return budget(found), (
             "How many sensors are needed? Lines: mean over the unseen blocks; dots: each block. Ring: enough, for what "
-            "more sensors bring is within the margin of the rule. Condition: how far the sensors repeat each other."
+            "more sensors bring is within the margin of the rule. Condition: collinearity of the sensors."
         )
     if choice.method == "grouping" and found is not None:
         return grouping(found, choice.target), (
