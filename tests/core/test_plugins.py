@@ -1,9 +1,11 @@
 """What another package brings is found by its entry points, used like our own, and skipped with a reason."""
 
 import json
+import os
 import subprocess
 import sys
 import zipfile
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -102,14 +104,30 @@ broken = tinyplug:NOTHING
 """
 CONFIG = 'models = ["model.json"]\nown_compensation = "off"\nshadow = true\n[[sources]]\nkind = "counting"\n{}\n'
 READ = """
-import asyncio, sys
-sys.path.insert(0, {path!r})
+import asyncio
 from thermocomp.live.build import build
 from thermocomp.live.config import read_config
 (source,) = build(read_config("live.toml")).sources
 async def read():
     return [r.values["t"] async for r in source.readings()]
 print(asyncio.run(read()))
+"""
+SERVE = """
+import fastapi, joblib, matplotlib.figure, os, pandas, rich.console, scipy.stats, sklearn.linear_model, sys, json
+for line in sys.stdin:
+    folder, *words = json.loads(line)
+    if not (pid := os.fork()):
+        os.chdir(folder)
+        for number, name in ((1, "stdout"), (2, "stderr")):
+            os.dup2(os.open(name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
+        sys.path.insert(0, sys.argv[1])
+        if words[0] == "-c":
+            exec(words[1])
+            sys.exit()
+        sys.argv = ["thermocomp", *words]
+        from thermocomp.cli.app import main
+        sys.exit(main())
+    print(os.waitpid(pid, 0)[1], flush=True)
 """
 
 
@@ -132,47 +150,64 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return site
 
 
-def thermocomp(installed: Path, *words: str, code: int = 0, cwd: Path | None = None) -> tuple[str, str]:
-    """Run a command with the package on the path; return what it prints."""
-    start = f"import sys; sys.path.insert(0, {str(installed)!r}); from thermocomp.cli.app import main; main()"
-    done = subprocess.run([sys.executable, "-c", start, *words], capture_output=True, text=True, cwd=cwd, check=False)
-    assert done.returncode == code, done.stderr
-    return done.stdout, " ".join(done.stderr.split())
+@pytest.fixture(scope="module")
+def orders(installed: Path) -> Iterator[subprocess.Popen[str]]:
+    """Start a process that runs each command in a copy of itself: what others wrote is loaded once, ours each time."""
+    words = [sys.executable, "-c", SERVE, str(installed)]
+    with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        yield process
 
 
-def test_a_command(installed: Path) -> None:
-    out, err = thermocomp(installed, "greet", "shop")
+Thermocomp = Callable[..., tuple[str, str]]
+
+
+@pytest.fixture
+def thermocomp(orders: subprocess.Popen[str], tmp_path: Path) -> Thermocomp:
+    """Run a command, or -c and code, with the package on the path; return what it prints."""
+
+    def ran(*words: str, code: int = 0) -> tuple[str, str]:
+        assert orders.stdin
+        assert orders.stdout
+        print(json.dumps([str(tmp_path), *words]), file=orders.stdin, flush=True)
+        ended = os.waitstatus_to_exitcode(int(orders.stdout.readline()))
+        out, err = ((tmp_path / name).read_text(encoding="utf-8") for name in ("stdout", "stderr"))
+        assert ended == code, err
+        return out, " ".join(err.split())
+
+    return ran
+
+
+def test_a_command(thermocomp: Thermocomp) -> None:
+    out, err = thermocomp("greet", "shop")
     assert out == "hello shop\n"
     assert "plug-in absent (thermocomp.commands) of the package tinyplug is skipped: there is no nowhere.at_all" in err
     assert "plug-in fit (thermocomp.commands) of the package tinyplug is skipped: fit is there already" in err
-    out, _ = thermocomp(installed, "--help")
+    out, _ = thermocomp("--help")
     assert "Greet somebody." in out
     assert "Fit a model" in out
 
 
-def test_a_method_and_an_export(installed: Path, tmp_path: Path) -> None:
+def test_a_method_and_an_export(thermocomp: Thermocomp, tmp_path: Path) -> None:
     recordings.write(small_machine(), tmp_path / "drift.csv")
     words = ["compare", "drift.csv", "--target", "z_um", "--models", "ols", "halved", "--json", "--jobs", "1"]
-    out, err = thermocomp(installed, *words, cwd=tmp_path)
+    out, err = thermocomp(*words)
     judged = {a["model"]: a["rms_um"] for a in json.loads(out)["results"] if a["block"] == "all unseen cycles"}
     assert judged["halved"] > 1.5 * judged["ols"]
     assert "plug-in broken (thermocomp.methods) of the package tinyplug cannot be loaded" in err
-    thermocomp(installed, "fit", "drift.csv", "--target", "z_um", "--model", "ols", "-o", "model.json", cwd=tmp_path)
-    thermocomp(installed, "export", "model.json", "--to", "list", "-o", "out", cwd=tmp_path)
+    thermocomp("fit", "drift.csv", "--target", "z_um", "--model", "ols", "-o", "model.json", "--jobs", "1")
+    thermocomp("export", "model.json", "--to", "list", "-o", "out")
     assert (tmp_path / "out" / "thermal.txt").read_text() == "z_um"
-    _, err = thermocomp(installed, "export", "model.json", "--to", "broken", "-o", "out2", cwd=tmp_path, code=2)
+    _, err = thermocomp("export", "model.json", "--to", "broken", "-o", "out2", code=2)
     assert "plug-in broken (thermocomp.exporters) of the package tinyplug cannot be loaded: AttributeError" in err
 
 
-def test_a_source(installed: Path, tmp_path: Path) -> None:
+def test_a_source(thermocomp: Thermocomp, tmp_path: Path) -> None:
     write_models([judged(lags("z_um", 1.0))], str(tmp_path / "model.json"))
     (tmp_path / "live.toml").write_text(CONFIG.format("by = 2.0"), encoding="utf-8")
-    words = [sys.executable, "-c", READ.format(path=str(installed))]
-    done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path, check=False)
-    assert done.stdout == "[20.0, 21.0, 22.0]\n", done.stderr
-    thermocomp(installed, "serve", "live.toml", "--check", cwd=tmp_path)
+    assert thermocomp("-c", READ)[0] == "[20.0, 21.0, 22.0]\n"
+    thermocomp("serve", "live.toml", "--check")
     (tmp_path / "live.toml").write_text(CONFIG.format("to = 2.0"), encoding="utf-8")
-    _, err = thermocomp(installed, "serve", "live.toml", "--check", cwd=tmp_path, code=2)
+    _, err = thermocomp("serve", "live.toml", "--check", code=2)
     assert "sources.1.to is no key that is known" in err
     for kind, why in (
         ("broken", "of the package tinyplug cannot be loaded"),
@@ -180,6 +215,6 @@ def test_a_source(installed: Path, tmp_path: Path) -> None:
         ("other", "tinyplug:CountingIn needs a field kind: Literal['other']"),
     ):
         (tmp_path / "live.toml").write_text(CONFIG.format("").replace("counting", kind), encoding="utf-8")
-        _, err = thermocomp(installed, "serve", "live.toml", "--check", cwd=tmp_path, code=2)
+        _, err = thermocomp("serve", "live.toml", "--check", code=2)
         assert f"plug-in {kind} (thermocomp.sources)" in err
         assert why in err

@@ -5,7 +5,7 @@ from typing import Any, Literal
 
 import numpy as np
 import pytest
-from compiledblock import COMPILERS, OPTIMISED, SANITIZED, CompiledBlock, check_block, check_same
+from compiledblock import COMPILERS, OPTIMISED, QUICK, SANITIZED, CompiledBlock, check_block, check_same
 from driftmodels import ACCEPTED
 from families import CURVES, FAMILIES, HEAD, INPUTS, READINGS, SINGLES
 from hypothesis import HealthCheck, given, settings
@@ -38,8 +38,16 @@ def accepted(model: ErrorModel, **changes: Any) -> ErrorModel:
     return replace(model, honest_error=ACCEPTED, **changes)
 
 
-@pytest.mark.parametrize("compiler", COMPILERS)
-@pytest.mark.parametrize("family", FAMILIES)
+#: gcc sees every family in `test_every_method`, too
+BOTH = ("polynomial", "autoregressive-network")
+PAIRS = [
+    pytest.param(f, c, id=f"{f}-{c}", marks=pytest.mark.long if f not in BOTH and c != QUICK else ())
+    for c in COMPILERS
+    for f in FAMILIES
+]
+
+
+@pytest.mark.parametrize(("family", "compiler"), PAIRS)
 @settings(**SLOW)
 @given(
     data=st.data(),
@@ -101,8 +109,20 @@ def test_in_single_precision_it_says_nearly_the_same(
 JOINT = JointSupport((0, 1), (4.0, 3.0), ((0.0, 0.0), (1.0, -1.0), (2.5, 1.0)), 1.5, (2,), ((0.0, 2500.0),), (250.0,))
 
 
-@pytest.mark.parametrize("joint", [None, JOINT, replace(JOINT, columns=(), scale=(), points=())])
-@pytest.mark.parametrize("policy", ["hold", "fade"])
+SPEED_ALONE = replace(JOINT, columns=(), scale=(), points=())
+
+
+@pytest.mark.parametrize(
+    ("policy", "joint"),
+    [
+        pytest.param("hold", None, id="hold-None", marks=pytest.mark.long),
+        pytest.param("hold", JOINT, id="hold-joint"),
+        pytest.param("hold", SPEED_ALONE, id="hold-speed"),
+        pytest.param("fade", None, id="fade-None"),
+        pytest.param("fade", JOINT, id="fade-joint"),
+        pytest.param("fade", SPEED_ALONE, id="fade-speed", marks=pytest.mark.long),
+    ],
+)
 @settings(**SLOW)
 @given(model=st.one_of(*FAMILIES.values()), over=st.sampled_from([0.1, 0.5, 2.0]), rows=READINGS)
 def test_beyond_the_trained_range(
@@ -163,6 +183,15 @@ def test_the_readings_of_the_test_vectors_show_all_that_it_does(flags: tuple[str
     assert fading.min() < 0.2 * fading.max()
 
 
+@pytest.fixture(scope="module")
+def two_targets(tmp_path_factory: pytest.TempPathFactory) -> tuple[Compensator, CompiledBlock, CompiledBlock]:
+    """Return a compensator, and its code in double and in single precision."""
+    compensator = Compensator.of([watched_model("z_um"), watched_model("x_um")], Limits(dead_band=0.2))
+    precisions = (SANITIZED, ("-DTC_FLOAT", *SANITIZED))
+    double, single = (CompiledBlock(compensator, tmp_path_factory.mktemp("two"), flags=f) for f in precisions)
+    return compensator, double, single
+
+
 NOTHING: dict[str, tuple[float, float | None]] = {}
 
 
@@ -177,18 +206,15 @@ NOTHING: dict[str, tuple[float, float | None]] = {}
         ({"t1_C": (1.0, None), "t3_C": (2.0, None)}, [1, 0, 1]),
     ],
 )
-@pytest.mark.parametrize("flags", [SANITIZED, ("-DTC_FLOAT", *SANITIZED)])
-def test_sensors_that_fail(cuts: dict[str, Any], found: list[int], flags: tuple[str, ...]) -> None:
-    compensator = Compensator.of([watched_model("z_um"), watched_model("x_um")], Limits(dead_band=0.2))
-    day, within = failing(**cuts), 1e-12 if flags == SANITIZED else 1e-5
-    rows = day.table[[c.name for c in gather(compensator).channels]].to_numpy(dtype=np.float64)
-    said = check_block(
-        compensator,
-        rows,
-        np.diff(day.time, prepend=day.time[0]),
-        flags=flags,
-        within=within * 20 if within > 1e-9 else within,
-    )
+def test_sensors_that_fail(
+    cuts: dict[str, Any], found: list[int], two_targets: tuple[Compensator, CompiledBlock, CompiledBlock]
+) -> None:
+    (compensator, double, single), day = two_targets, failing(**cuts)
+    rows = day.table[[c.name for c in double.tables.channels]].to_numpy(dtype=np.float64)
+    readings = Readings(rows, np.zeros(len(rows)), np.diff(day.time, prepend=day.time[0]))
+    said = replay(compensator, double.tables, readings)
+    check_same(said, double.run(readings))
+    check_same(said, single.run(readings), 2e-4)
     assert said.fault.max(axis=0).tolist() == found
     assert (said.status[-1] > 1).all() == (found[2] > 0)  # without t3_C it does harm: held, then faded
 

@@ -13,7 +13,8 @@ from families import FAMILIES, READINGS
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from spoiling import FAILURES, models_of, spoiled
-from stmachine import Machine, check_block, check_same, parsed, run
+from stmachine import Machine, check_block, check_same, run
+from stparsing import parsed
 from watchedmachine import failing, watched_model
 
 from thermocomp.core.correction import Limits
@@ -52,6 +53,11 @@ def watched() -> Compensator:
 @pytest.fixture(scope="module")
 def units(watched: Compensator) -> list[SourceUnit]:
     return translate(gather(watched), "tc_x", "codesys")
+
+
+@pytest.fixture(scope="module")
+def machine(units: list[SourceUnit]) -> Machine:
+    return Machine(units)
 
 
 def test_it_says_what_the_compensator_says(watched: Compensator) -> None:
@@ -179,13 +185,14 @@ ODD = st.one_of(st.floats(), st.sampled_from([np.nan, np.inf, -np.inf, 1e308, -0
     quiet=st.booleans(),
 )
 def test_nothing_that_comes_in_moves_it_beyond_its_limits(
-    watched: Compensator, units: list[SourceUnit], rows: list[tuple[float, ...]], quiet: bool
+    watched: Compensator, machine: Machine, rows: list[tuple[float, ...]], quiet: bool
 ) -> None:
     table = np.array(rows, dtype=np.float64)
     age = np.abs(np.nan_to_num(table[:, 4], posinf=0, neginf=0)) % 5 if quiet else table[:, 4]
     dt = np.abs(np.nan_to_num(table[:, 5], posinf=0, neginf=0)) % 90 if quiet else table[:, 5]
     readings, tables = Readings(table[:, :4], age, dt), gather(watched)
-    said = run(Machine(units), readings, 1, len(tables.sensors))
+    machine.start()
+    said = run(machine, readings, 1, len(tables.sensors))
     check_same(replay(watched, tables, readings), said)
     moved = np.abs(np.diff(said.correction[:, 0], prepend=0.0))
     assert (np.abs(said.correction) <= 20.0).all()

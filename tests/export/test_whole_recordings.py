@@ -59,12 +59,20 @@ def check_recording(recording: Recording, targets: list[str], method: str, folde
         assert apart < (3e-5 if method == "averaged" else 5e-4)  # a temperature in single precision is off by 1e-6 degC
 
 
-@pytest.mark.parametrize("flags", [[], ["-DTC_FLOAT"]])
-def test_the_vectors_of_a_model_whose_terms_cancel(shared_data: Path, tmp_path: Path, flags: list[str]) -> None:
+@pytest.fixture(scope="module")
+def cancelling(shared_data: Path) -> dict[str, bytes]:
+    """Return what is written for a model whose terms cancel."""
     recording = read(shared_data / "fl_thermal" / "recording.csv")
     targets = [c.name for c in recording.channels if c.quantity == "displacement"][:1]
     compensator = Compensator.of(models_of(recording, targets, "mra"))
-    for name, text in write_package(compensator, "mra", Facts("model.json", "", "0", "2026-01-31")).items():
+    return write_package(compensator, "mra", Facts("model.json", "", "0", "2026-01-31"))
+
+
+@pytest.mark.parametrize("flags", [[], ["-DTC_FLOAT"]])
+def test_the_vectors_of_a_model_whose_terms_cancel(
+    cancelling: dict[str, bytes], tmp_path: Path, flags: list[str]
+) -> None:
+    for name, text in cancelling.items():
         (tmp_path / name).write_bytes(text)
     code = ["tc_mra.c", "tc_mra_test.c", "-lm", "-o", "mra"]
     subprocess.run([COMPILERS[0], "-std=c99", "-O2", *flags, *code], cwd=tmp_path, check=True)
@@ -72,11 +80,12 @@ def test_the_vectors_of_a_model_whose_terms_cancel(shared_data: Path, tmp_path: 
     assert done.returncode == 0, done.stdout
 
 
+@pytest.mark.parametrize("every", [4, pytest.param(1, marks=pytest.mark.long)])
 @pytest.mark.parametrize("method", ["averaged", "mra"])
-def test_fl_thermal_with_faults(shared_data: Path, tmp_path: Path, method: str) -> None:
+def test_fl_thermal_with_faults(shared_data: Path, tmp_path: Path, method: str, every: int) -> None:
     recording = read(shared_data / "fl_thermal" / "recording.csv")
     targets = [c.name for c in recording.channels if c.quantity == "displacement"][:2]
-    check_recording(recording, targets, method, tmp_path)
+    check_recording(recording, targets, method, tmp_path, every)
 
 
 def test_the_virtual_machine_with_faults(tmp_path: Path) -> None:

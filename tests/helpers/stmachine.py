@@ -6,76 +6,21 @@ number of 32 bits that overflows and a variable that is read before it is set ar
 
 import math
 import re
-from collections.abc import Callable, Sequence
-from functools import cache
+from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 from blark import transform as b
-from blark.parse import parse_source_code
+from stparsing import PYTHON, Array, Block, Type, block_of, declared
 
 from thermocomp.export.block.tables import gather
 from thermocomp.export.st.structuredtext import NOTHING, SourceUnit, translate
 from thermocomp.export.vectors import Answers, Readings, replay
 from thermocomp.runtime.compensator import Compensator
 
-_PYTHON = {"LREAL": float, "DINT": int, "BOOL": bool}
 _COMPARE = {"=": "==", "<>": "!=", "<": "<", "<=": "<=", ">": ">", ">=": ">="}
 _NUMBERS = {"EXP": math.exp, "LN": math.log, "SQRT": math.sqrt}
-#: numbers of a list that blark is given: it takes half a minute for a hundred and sixty
-_PIECE = 12
-
-Type = Any  #: 'LREAL', 'DINT', 'BOOL', the name of a structure, or ('ARRAY', Type, size)
-
-
-class Array(list[Any]):
-    """An array that knows its ends."""
-
-    def __getitem__(self, at: Any) -> Any:
-        assert 0 <= at < len(self), f"index {at} of {len(self)}"
-        return super().__getitem__(at)
-
-    def __setitem__(self, at: Any, value: Any) -> None:
-        assert 0 <= at < len(self), f"index {at} of {len(self)}"
-        super().__setitem__(at, value)
-
-
-@cache
-def parsed(text: str) -> Any:
-    """Parse one block or type."""
-    found = parse_source_code(text)
-    assert found.exception is None, found.exception
-    return found.transform().items[0]
-
-
-def declared(text: str) -> dict[str, tuple[Type, Any]]:
-    """Return types and initial values of a structure; a long list is parsed in pieces."""
-    text = re.sub(r"\(\*.*?\*\)", "", text, flags=re.DOTALL)
-    members: dict[str, tuple[Type, Any]] = {}
-    body = re.search(r"STRUCT\n(.*)END_STRUCT", text, re.DOTALL)
-    assert body
-    for name, what, start in re.findall(r"(\w+) : (.*?)(?: := (.*?))?;", " ".join(body.group(1).split())):
-        sized = re.fullmatch(r"ARRAY\[0\.\.(\d+)\] OF (\w+)", what)
-        kind: Type = ("ARRAY", sized.group(2), int(sized.group(1)) + 1) if sized else what
-        texts = start.strip("[]").split(", ") if start else []
-        for k in dict.fromkeys((0, max(len(texts) - _PIECE, 0))):  # the first and the last of a long list
-            piece = texts[k : k + _PIECE]
-            shown = f"[{', '.join(piece)}]" if sized else "".join(piece)
-            parsed(f"TYPE x :\nSTRUCT\n    {name} : {what}{f' := {shown}' if piece else ''};\nEND_STRUCT\nEND_TYPE\n")
-        scalar = _PYTHON[sized.group(2) if sized else what]
-        numbers = [t == "TRUE" if scalar is bool else _number(t, scalar) for t in texts]
-        if sized:
-            assert len(texts) in (0, kind[2]), name
-            members[name] = (kind, Array(numbers or [scalar()] * kind[2]))
-        else:
-            members[name] = (kind, numbers[0] if numbers else scalar())
-    return members
-
-
-def _number(text: str, scalar: Callable[[str], Any]) -> Any:
-    assert re.fullmatch(r"-?\d+" if scalar is int else r"-?\d+\.\d+(E[-+]?\d+)?", text), text
-    return scalar(text)
 
 
 class Machine:
@@ -89,8 +34,8 @@ class Machine:
 
     def __init__(self, units: Sequence[SourceUnit]) -> None:
         self._structs = {u.name: declared(u.declaration) for u in units if not u.end}
-        blocks = [parsed(u.text("codesys")) for u in units if u.end]
-        self._heads = {str(block.name): _head(block) for block in blocks}
+        blocks = [block_of(u) for u in units if u.end]
+        self._heads = {str(block.head.name): _head(block) for block in blocks}
         self._space: dict[str, Any] = {
             "Array": Array,
             "SEL": lambda g, one, other: other if g else one,
@@ -99,7 +44,11 @@ class Machine:
         }
         for block in blocks:
             exec(_Function(self, block).source(), self._space)
-        self._name = str(blocks[-1].name)
+        self._name = str(blocks[-1].head.name)
+        self.start()
+
+    def start(self) -> None:
+        """Begin with a new memory."""
         self.memory = self._memory(self._name)
 
     def _memory(self, block: str) -> SimpleNamespace:
@@ -109,14 +58,14 @@ class Machine:
 
     def _new(self, kind: Type) -> Any:
         if isinstance(kind, tuple):
-            return Array([_PYTHON[kind[1]]()] * kind[2])
+            return Array([PYTHON[kind[1]]()] * kind[2])
         if kind in self._heads:
             return self._memory(kind)
         if kind in self._structs:
             return SimpleNamespace(
                 **{n: v if not isinstance(v, Array) else Array(v) for n, (_, v) in self._structs[kind].items()}
             )
-        return _PYTHON[kind]()
+        return PYTHON[kind]()
 
     def call(self, **inputs: Any) -> SimpleNamespace:
         """Call the function block; returns all that is in it."""
@@ -141,7 +90,7 @@ def _trunc(value: float) -> int:
     return int(value)
 
 
-def _head(block: Any) -> dict[str, Any]:
+def _head(block: Block) -> dict[str, Any]:
     """Return names and types of a block's variables, by section."""
     found: dict[str, Any] = {"in": {}, "inout": {}, "out": {}, "own": {}}
     words = {
@@ -151,14 +100,17 @@ def _head(block: Any) -> dict[str, Any]:
         b.VariableDeclarations: "own",
         b.FunctionVariableDeclarations: "own",
     }
-    for section in block.declarations:
+    for section in block.head.declarations:
         for item in section.items:
             kind = _type(str(item.init).split(":=")[0])
             for variable in item.variables:
                 found[words[type(section)]][str(variable.variable if hasattr(variable, "variable") else variable)] = (
                     kind
                 )
-    returned = getattr(block, "return_type", None)
+    if block.numbered:
+        del found["own"]["v1"]
+        found["own"] |= dict.fromkeys(block.numbered, "LREAL")
+    returned = getattr(block.head, "return_type", None)
     found["gives"] = str(returned) if returned is not None else None
     return found
 
@@ -171,10 +123,11 @@ def _type(text: str) -> Type:
 class _Function:
     """Writes a block as Python."""
 
-    def __init__(self, machine: Machine, block: Any) -> None:
-        self._machine, self._block, self._name = machine, block, str(block.name)
+    def __init__(self, machine: Machine, block: Block) -> None:
+        self._machine, self._body, self._name = machine, block.body, str(block.head.name)
+        self._written: dict[str, str] = {}
         head = machine.head(self._name)
-        self._is_block = isinstance(block, b.FunctionBlock)
+        self._is_block = isinstance(block.head, b.FunctionBlock)
         self._types: dict[str, Type] = {**head["in"], **head["inout"], **head["out"], **head["own"]}
         self._given = [*head["inout"], *head["in"]]
         if not self._is_block:
@@ -182,7 +135,10 @@ class _Function:
 
     def source(self) -> str:
         given = "self" if self._is_block else ", ".join(self._given)
-        lines = [f"def {self._name}({given}):", *self._block_of(self._block.body, 1)]
+        lines = [f"def {self._name}({given}):"]
+        for piece in self._body:
+            self._written = piece.written
+            lines += self._block_of(piece.tree, 1)
         if not self._is_block:
             lines += [f"    return {self._name}_"] if self._types[self._name] == "LREAL" else ["    return False"]
         return "\n".join(lines)
@@ -230,6 +186,10 @@ class _Function:
                 return [f"{pad}{self._value(s)[0]}"]
         raise TypeError(f"{type(s)}: {s}")
 
+    def _number(self, value: Any) -> str:
+        """Return the number that stands where another was parsed."""
+        return self._written[str(value)]
+
     def _as(self, node: Any, kind: Type) -> str:
         text, given = self._value(node)
         assert given == kind, f"{node}: {given}, want {kind}"
@@ -242,11 +202,11 @@ class _Function:
             case b.Boolean():
                 return str(str(node.value).upper() == "TRUE"), "BOOL"
             case b.Integer():
-                return str(int(node.value)), "DINT"
+                return str(int(self._number(node.value))), "DINT"
             case b.Real():
-                return repr(float(node.value)), "LREAL"
+                return repr(float(self._number(node.value))), "LREAL"
             case b.SimpleVariable():
-                name = str(node.name)
+                name = self._written.get(str(node.name), str(node.name))
                 if name == self._name:
                     return f"{name}_", self._types[name]
                 return (f"self.{name}" if self._is_block else name), self._types[name]

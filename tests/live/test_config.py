@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from pydantic import TypeAdapter
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.live.adapters.network import MqttIn
@@ -157,6 +158,16 @@ def spots(content: Any, path: tuple[str | int, ...] = ()) -> Iterator[tuple[str 
 def test_whatever_is_written_there_is_told_not_a_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
     rng = random.Random(1)
     values = [0, -1, 1.5, "x", "", True, [], [1], ["a", {"b": 1}], {}, {"kind": "mqtt"}, {"file": {"b": []}}, [[1]]]
+    known = dict[str, TypeAdapter[Any]]()
+
+    def adapter(made: type) -> TypeAdapter[Any]:
+        """Make one validator of the same sections: it takes most of the time."""
+        sections = str(made.__annotations__)
+        if sections not in known:
+            known[sections] = TypeAdapter(made)
+        return known[sections]
+
+    monkeypatch.setattr("thermocomp.live.config.TypeAdapter", adapter)
     refused = 0
     for _ in range(2000):
         content = tomllib.loads(GOOD)

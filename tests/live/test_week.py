@@ -24,7 +24,8 @@ from thermocomp.virtual.datasets import record
 @pytest.mark.parametrize("days", [2, pytest.param(7, marks=pytest.mark.long)])
 def test_memory_is_flat(days: int, tmp_path: Path) -> None:
     (day,) = record("demo", seed=3)
-    rows = [{str(n): float(v) for n, v in row.items()} for row in day.table.iloc[:2880].to_dict("records")]
+    # one a minute: tracing costs three times what the service does
+    rows = [{str(n): float(v) for n, v in row.items()} for row in day.table.iloc[:2880:2].to_dict("records")]
     clock, compensator = Told(), Compensator.of([model()], Limits())
     service = Service(compensator, [], [FileSink(path=tmp_path / "out.json")], clock, tmp_path / "state.json")
     service.recorder = Recorder(
@@ -36,7 +37,7 @@ def test_memory_is_flat(days: int, tmp_path: Path) -> None:
         async with asking(make_app(service)) as client:
             for k in range(days):
                 for j, row in enumerate(rows):
-                    clock.at = 86400.0 * k + 30.0 * j
+                    clock.at = 86400.0 * k + 60.0 * j
                     if j % 240 == 120:
                         service.measure(Measurement(clock.now(), "z_um", float(np.sin(j)), left=False))
                     service.take(Reading(clock.now(), row))
@@ -55,6 +56,6 @@ def test_memory_is_flat(days: int, tmp_path: Path) -> None:
         tracemalloc.stop()
         service.recorder.journal.close()
     print(f"held after each day [kB]: {[n // 1000 for n in held]}")
-    assert held[-1] - held[0] < 200_000
+    assert held[-1] - held[0] < 100_000
     on_disk = sum(p.stat().st_size for p in tmp_path.glob("live.*"))
     assert on_disk < 3 * 8 * 2**20

@@ -3,7 +3,7 @@
 import ast
 import inspect
 from collections.abc import Iterator, Mapping
-from functools import cache
+from functools import cache, lru_cache
 from types import MappingProxyType, ModuleType
 from typing import NamedTuple
 
@@ -70,7 +70,7 @@ def functions(tables: Tables, own: Mapping[str, str] = MappingProxyType({})) -> 
 
     def add(name: str) -> None:
         function = known[name]
-        tree = _Decided(tables.sizes).visit(ast.parse(ast.unparse(function.tree)).body[0])
+        tree = _Decided(tables.sizes).visit(ast.parse(_text_of(function.tree)).body[0])
         for node in ast.walk(tree):
             if isinstance(node, ast.Call) and called(node) in known and called(node) not in found:
                 add(called(node))
@@ -78,6 +78,11 @@ def functions(tables: Tables, own: Mapping[str, str] = MappingProxyType({})) -> 
 
     add("step")
     return list(found.values())
+
+
+@lru_cache(maxsize=256)
+def _text_of(tree: ast.FunctionDef) -> str:
+    return ast.unparse(tree)
 
 
 def _made(name: str, text: str) -> Function:
@@ -93,6 +98,10 @@ class _Decided(ast.NodeTransformer):
 
     def __init__(self, sizes: Mapping[str, int]) -> None:
         self._sizes = sizes
+
+    def generic_visit(self, node: ast.AST) -> ast.AST:
+        """Leave an expression: no statement is in one."""
+        return node if isinstance(node, ast.expr) else super().generic_visit(node)
 
     def visit_If(self, node: ast.If) -> ast.AST | list[ast.stmt]:
         """Replace an ``if`` with a known condition by the branch it selects."""
@@ -153,10 +162,11 @@ def locals_of(tree: ast.FunctionDef, parameters: Mapping[str, Kind]) -> dict[str
     return {name: kind for name, kind in found.items() if name not in parameters}
 
 
-def _in_order(node: ast.AST) -> Iterator[ast.AST]:
+def _in_order(node: ast.AST) -> Iterator[ast.stmt]:
     for child in ast.iter_child_nodes(node):
-        yield child
-        yield from _in_order(child)
+        if isinstance(child, ast.stmt):
+            yield child
+            yield from _in_order(child)
 
 
 #: types of function parameters, by annotation

@@ -1,0 +1,130 @@
+"""Structured text, read by blark: types with their values, blocks with their statements.
+
+blark takes a millisecond for a character. So a block is parsed in pieces, which are its head and its statements, and
+pieces that differ in numbers and in the numbers of names alone are parsed once.
+"""
+
+import re
+from collections.abc import Callable
+from functools import cache
+from itertools import count
+from typing import Any, NamedTuple
+
+from blark.parse import parse_source_code
+
+from thermocomp.export.st.structuredtext import SourceUnit
+
+#: by the name of a type
+PYTHON = {"LREAL": float, "DINT": int, "BOOL": bool}
+#: what may differ in statements that are parsed once: a name with a number of its own, and numbers
+_DIFFERS = re.compile(r"\b(v|gain)\d+\b|(?<![\w.])\d+(\.\d+(E[-+]?\d+)?)?")
+_NUMBERED = re.compile(r"^    ((?:v|gain)\d+) : LREAL;\n", re.MULTILINE)
+
+
+Type = Any  #: 'LREAL', 'DINT', 'BOOL', the name of a structure, or ('ARRAY', Type, size)
+
+
+class Array(list[Any]):
+    """An array that knows its ends."""
+
+    def __getitem__(self, at: Any) -> Any:
+        assert 0 <= at < len(self), f"index {at} of {len(self)}"
+        return super().__getitem__(at)
+
+    def __setitem__(self, at: Any, value: Any) -> None:
+        assert 0 <= at < len(self), f"index {at} of {len(self)}"
+        super().__setitem__(at, value)
+
+
+@cache
+def parsed(text: str) -> Any:
+    """Parse one block or type."""
+    return _parse(text, "iec_source")
+
+
+@cache
+def _parse(text: str, what: str) -> Any:
+    found = parse_source_code(text, starting_rule=what)
+    assert found.exception is None, found.exception
+    return found.transform().items[0]
+
+
+class Piece(NamedTuple):
+    """Statements."""
+
+    tree: Any
+    #: what stands there, by what was parsed instead
+    written: dict[str, str]
+
+
+def pieces(statements: str) -> list[Piece]:
+    """Parse the statements of a block one by one."""
+    found = []
+    for text in re.split(r"(?<=;)\n(?=\S)(?!ELSE|ELSIF|END_)", statements.rstrip("\n")):
+        shape, written = _shape(text)
+        found.append(Piece(_parse(shape, "statement_list"), written))
+    return found
+
+
+def _shape(text: str) -> tuple[str, dict[str, str]]:
+    """Return statements with names and numbers that are counted, and what they stand for."""
+    numbers, known = count(1), dict[str, str]()
+
+    def stand_in(m: re.Match[str]) -> str:
+        if m[0] not in known:
+            k = next(numbers)
+            exponent = re.sub(r"\d+", "1", m[3] or "")
+            known[m[0]] = f"{m[1] or ''}{k}{'.5' if m[2] else ''}{exponent}"
+        return known[m[0]]
+
+    shape = _DIFFERS.sub(stand_in, text)
+    return shape, {stands: was for was, stands in known.items()}
+
+
+class Block(NamedTuple):
+    """A function or a function block."""
+
+    head: Any
+    #: variables of a function that are numbered
+    numbered: list[str]
+    body: list[Piece]
+
+
+def block_of(unit: SourceUnit) -> Block:
+    """Parse a block."""
+    numbered = _NUMBERED.findall(unit.declaration + "\n")
+    assert len(set(numbered)) == len(numbered), unit.name
+    kept = iter(("    v1 : LREAL;\n",))  # one is parsed
+    head = _NUMBERED.sub(lambda _: next(kept, ""), unit.declaration + "\n") + unit.end + "\n"
+    return Block(_parse(head, "iec_source"), numbered, pieces(unit.statements))
+
+
+@cache
+def declared(text: str) -> dict[str, tuple[Type, Any]]:
+    """Return types and initial values of a structure; of a long list every kind of number is parsed."""
+    text = re.sub(r"\(\*.*?\*\)", "", text, flags=re.DOTALL)
+    members: dict[str, tuple[Type, Any]] = {}
+    body = re.search(r"STRUCT\n(.*)END_STRUCT", text, re.DOTALL)
+    assert body
+    for name, what, start in re.findall(r"(\w+) : (.*?)(?: := (.*?))?;", " ".join(body.group(1).split())):
+        sized = re.fullmatch(r"ARRAY\[0\.\.(\d+)\] OF (\w+)", what)
+        kind: Type = ("ARRAY", sized.group(2), int(sized.group(1)) + 1) if sized else what
+        texts = start.strip("[]").split(", ") if start else []
+        kinds = list(dict.fromkeys(re.sub(r"\d+", "1", t) for t in texts))
+        shown = f"[{', '.join([*kinds, *kinds[-1:]])}]" if sized else "".join(kinds)
+        member = f"x : {f'ARRAY[0..1] OF {sized.group(2)}' if sized else what}{f' := {shown}' if texts else ''}"
+        parsed(f"TYPE x :\nSTRUCT\n    {member};\nEND_STRUCT\nEND_TYPE\n")
+        scalar = PYTHON[sized.group(2) if sized else what]
+        numbers = [t == "TRUE" if scalar is bool else _number(t, scalar) for t in texts]
+        if sized:
+            assert len(texts) in (0, kind[2]), name
+            members[name] = (kind, Array(numbers or [scalar()] * kind[2]))
+        else:
+            members[name] = (kind, numbers[0] if numbers else scalar())
+    parsed(f"FUNCTION x : BOOL\nVAR\n    {', '.join(members)} : BOOL;\nEND_VAR\nEND_FUNCTION\n")
+    return members
+
+
+def _number(text: str, scalar: Callable[[str], Any]) -> Any:
+    assert re.fullmatch(r"-?\d+" if scalar is int else r"-?\d+\.\d+(E[-+]?\d+)?", text), text
+    return scalar(text)
