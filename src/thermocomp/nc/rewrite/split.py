@@ -8,7 +8,8 @@ from typing import Final, NamedTuple
 from thermocomp.nc.interpreter.arcs import CENTRE
 from thermocomp.nc.interpreter.block import PLANES, Block, Known, Move, Point
 from thermocomp.nc.interpreter.codes import ROTARY
-from thermocomp.nc.parser.tokens import Controller, read_line
+from thermocomp.nc.parser.line import Controller
+from thermocomp.nc.parser.tokens import read_line
 from thermocomp.nc.rewrite.frame import Vector
 from thermocomp.nc.rewrite.method import AXES
 from thermocomp.nc.rewrite.offset import ending
