@@ -118,6 +118,21 @@ def shares(samples: Sequence[Sample], carried: Vector, axes: Sequence[int], step
     return [samples[k].share for k in ends[1:]]
 
 
+def beside(samples: Sequence[Sample], knots: Sequence[tuple[float, Vector]]) -> Iterator[tuple[Vector, Vector]]:
+    """Yield deviation and correction of each sample: the correction is linear between knots."""
+    k = 1
+    for sample in samples:
+        while sample.share > knots[k][0]:
+            k += 1
+        (first, before), (last, after) = knots[k - 1 : k + 1]
+        if before == after:
+            yield sample.deviation, after
+            continue
+        part = (sample.share - first) / (last - first)
+        x, y, z = (b + part * (a - b) for b, a in zip(before, after, strict=True))
+        yield sample.deviation, (x, y, z)
+
+
 def axes_to_split(block: Block, before: Known) -> list[int]:
     """Return the axes whose correction can change within a block: all for a line, the third one for an arc."""
     arc = block.moves[0].arc
