@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core.correction import Limits
-from thermocomp.core.model import ErrorModel, State
+from thermocomp.core.model import ErrorModel
+from thermocomp.core.state import State
 from thermocomp.core.zero import Zeroing, first_rows, robust_mean
 from thermocomp.judging.probing import Probed, Probings
 from thermocomp.judging.watched import believe
