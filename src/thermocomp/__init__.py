@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from thermocomp.api.explain import explain
     from thermocomp.api.inputs import read, training_table
     from thermocomp.api.plan import may_stop, plan
-    from thermocomp.api.verbs import assess, compare, fit, select
+    from thermocomp.api.select import select
+    from thermocomp.api.verbs import assess, compare, fit
     from thermocomp.core.correction import Correction, Deviation, Limits
     from thermocomp.core.exceptions import ThermocompError
     from thermocomp.core.lineardynamic import LinearDynamic
@@ -59,7 +60,7 @@ _PUBLIC = {
     "read": "thermocomp.api.inputs",
     "simulate": "thermocomp.virtual.verbs",
     "check": "thermocomp.api.check",
-    "select": "thermocomp.api.verbs",
+    "select": "thermocomp.api.select",
     "compare": "thermocomp.api.verbs",
     "fit": "thermocomp.api.verbs",
     "assess": "thermocomp.api.verbs",

@@ -17,9 +17,9 @@ from sklearn.pipeline import make_pipeline
 from smallmachine import small_machine
 
 import thermocomp as tc
-from thermocomp.api.results import Assessed, Compared, FittedModels, Result
-from thermocomp.api.selected import Selected
-from thermocomp.api.verbs import SelectionMethod
+from thermocomp.api.base import Result
+from thermocomp.api.results import Assessed, Compared, FittedModels
+from thermocomp.api.select import Selected, SelectionMethod
 from thermocomp.core.exceptions import InputError
 from thermocomp.judging import splits
 from thermocomp.judging.compare import compare as own_compare

@@ -20,7 +20,7 @@ from smallmachine import small_machine
 from thermocomp.api import testprogram
 from thermocomp.api.check import CheckedRecordings
 from thermocomp.api.results import Assessed, Compared
-from thermocomp.api.selected import Selected
+from thermocomp.api.select import Selected
 from thermocomp.cli.app import run
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel

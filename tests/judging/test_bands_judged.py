@@ -11,7 +11,7 @@ from thermocomp.cli.terminal import print_items
 from thermocomp.core.band import Band
 from thermocomp.core.inputs import Input
 from thermocomp.core.paceddynamic import LaggedInput, PacedDynamic, SpeedState
-from thermocomp.judging import splits, study
+from thermocomp.judging import assessing, splits, study
 from thermocomp.judging.compare import compare, split_by_cycle
 from thermocomp.judging.results import Assessment, Comparison
 from thermocomp.models.training import train
@@ -131,7 +131,7 @@ def test_where_all_counts_anew_nothing_is_said_of_the_band(comparison: Compariso
     assert frozen is not None
     warm = replace(small_machine((1500.0, 2000.0), seed=3), name="warm")
     earlier = small_machine((1200.0, 2200.0), seed=2)
-    judged = study.assess([frozen], [warm], starts=Start("rezeroed", earlier=(earlier,)))
+    judged = assessing.assess([frozen], [warm], starts=Start("rezeroed", earlier=(earlier,)))
     (whole,) = judged.overall()
     assert np.isfinite(whole.metric("rms"))
     assert whole.band == ""
@@ -164,7 +164,7 @@ def test_who_fits_and_assesses_is_told(samples: Samples, capsys: pytest.CaptureF
     assert f"held {100 * fitted.comparison.overall()[0].coverage:.0f} % of the judged rows" in shown
     assert "(90 % band by assumption, 3 cycles)" in shown
     tests = [small_machine((1500.0, 2000.0), seed=3)]
-    judged = study.assess([model], tests)
+    judged = assessing.assess([model], tests)
     print_items(printed.assess(judged, tests), console)
     shown = capsys.readouterr().out
     assert "90 % band by assumption, 4 cycles: half-width at least" in shown

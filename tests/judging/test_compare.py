@@ -16,7 +16,7 @@ from thermocomp.core.machine import Channel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.reading import Reading
 from thermocomp.files import modelfile
-from thermocomp.judging import splits, study
+from thermocomp.judging import assessing, splits, study
 from thermocomp.judging.compare import ALL, compare, n_pieces
 from thermocomp.judging.judge import judge
 from thermocomp.judging.replay import replay, replay_compensated
@@ -331,10 +331,10 @@ def test_fit_writes_its_honest_error_into_the_models(samples: Samples) -> None:
 
 def test_assess_says_when_the_test_is_not_honest(recording: Recording, samples: Samples) -> None:
     models = study.fit(samples, "dynamic", splits.leave_one_cycle_out(samples)).models
-    again = study.assess(models, [recording])
+    again = assessing.assess(models, [recording])
     assert again.seen == ("small",)
     assert not any(a.accepted for a in again.assessments)
-    fresh = study.assess(models, [small_machine((2200.0, 1200.0), seed=5)])
+    fresh = assessing.assess(models, [small_machine((2200.0, 1200.0), seed=5)])
     assert fresh.seen == ()
     assert [a.block for a in fresh.assessments if a.target == "z_um"] == [
         "cycle 1 (2200 1/min)",
@@ -342,7 +342,7 @@ def test_assess_says_when_the_test_is_not_honest(recording: Recording, samples: 
         "all cycles",
     ]
     assert {a.word for a in fresh.overall()} == {"unproven"}  # two cycles are too few
-    more = study.assess(models, [small_machine((2200.0, 1200.0, 1700.0, 2500.0), seed=5)])
+    more = assessing.assess(models, [small_machine((2200.0, 1200.0, 1700.0, 2500.0), seed=5)])
     assert {a.word for a in more.overall()} == {"accepted"}
 
 
@@ -351,7 +351,7 @@ def test_assess_names_the_missing_channel(recording: Recording, samples: Samples
     channels = tuple(c for c in recording.channels if c.name != "t2_C")
     poorer = replace(recording, table=pd.DataFrame(recording.table.drop(columns="t2_C")), channels=channels)
     with pytest.raises(InputError, match="no channel is named 't2_C'"):
-        study.assess(models, [poorer])
+        assessing.assess(models, [poorer])
 
 
 def test_the_same_test_twice_is_refused(recording: Recording) -> None:

@@ -11,7 +11,7 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
 from thermocomp.core.validity import Validity
 from thermocomp.files import modelfile
-from thermocomp.judging import coverage, splits, study
+from thermocomp.judging import assessing, coverage, splits, study
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.stacking import stack
@@ -131,7 +131,7 @@ def test_the_model_file_carries_it_and_assess_tells_both(samples: Samples, recor
     assert first.validity == coverage.find_validity(samples, judging, [recording])
     assert modelfile.loads(modelfile.dumps(fitted)) == fitted
     other = replace(small_machine([2000.0, 900.0], seed=9), name="other")
-    judged = study.assess(fitted, [other])
+    judged = assessing.assess(fitted, [other])
     assert judged.validity is not None
     assert judged.validity.speeds == (0.0, 900.0, 2000.0)
     shown = coverage.table({"when fitted": first.validity, "these recordings": judged.validity})

@@ -10,7 +10,7 @@ from watchedmachine import LOST, failing, watched_model
 
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.reading import Reading
-from thermocomp.judging import study
+from thermocomp.judging import assessing
 from thermocomp.judging.faultlog import find_costs, find_faults
 from thermocomp.judging.metrics import rms
 from thermocomp.models.training import train
@@ -46,7 +46,7 @@ def live(model: ErrorModel, recording: Recording) -> tuple[list[dict[str, str]],
 @pytest.mark.parametrize("cuts", [{"t1_C": (4.0, 4.0)}, {"t2_C": (5.0, None), "t1_C": (8.0, 5.0)}, {}])
 def test_it_is_what_the_compensator_says_live(model: ErrorModel, cuts: dict[str, tuple[float, float | None]]) -> None:
     recording = failing(**cuts)
-    judged = study.assess([model], [recording], starts=Start())
+    judged = assessing.assess([model], [recording], starts=Start())
     (log,) = find_faults(judged, [recording])
     failed, said, _ = live(model, recording)
     assert set(log.failed) == set(cuts)
@@ -69,7 +69,7 @@ def test_it_is_what_the_compensator_says_live(model: ErrorModel, cuts: dict[str,
 
 def test_what_stands_in_is_given_where_the_sensor_is_not_believed(model: ErrorModel) -> None:
     recording = failing(t1_C=(4.0, 4.0))
-    (log,) = find_faults(study.assess([model], [recording], starts=Start()), [recording])
+    (log,) = find_faults(assessing.assess([model], [recording], starts=Start()), [recording])
     place = log.watch.names.index("t1_C")
     bad = log.fault[:, place] != GOOD
     truth = failing().table["t1_C"].to_numpy()
@@ -82,7 +82,7 @@ def test_what_stands_in_is_given_where_the_sensor_is_not_believed(model: ErrorMo
 
 def test_a_correction_that_does_harm_is_held_then_fades(model: ErrorModel) -> None:
     recording = failing(t3_C=(4.0, None))
-    judged = study.assess([model], [recording], starts=Start())
+    judged = assessing.assess([model], [recording], starts=Start())
     before, after = find_costs(model, judged.overall()[0], find_faults(judged, [recording]))
     _, said, held = live(model, recording)
     later = np.array([bool(why) for why in held])
@@ -99,7 +99,7 @@ def test_a_correction_that_does_harm_is_held_then_fades(model: ErrorModel) -> No
 
 def test_several_lost_are_told_apart(model: ErrorModel) -> None:
     recording = failing(t2_C=(3.0, None), t1_C=(6.0, None))
-    judged = study.assess([model], [recording], starts=Start())
+    judged = assessing.assess([model], [recording], starts=Start())
     found = find_costs(model, judged.overall()[0], find_faults(judged, [recording]))
     assert [(c.failed, c.honest) for c in found] == [
         ((), 1.25), (("t2_C",), 2.5), (("t1_C", "t2_C"), LOST["t1_C, t2_C"])
@@ -112,7 +112,7 @@ def test_one_that_comes_back_is_believed_again(model: ErrorModel) -> None:
     gone = (recording.time >= 4 * 3600) & (recording.time < 5 * 3600)
     table = recording.table.assign(t1_C=recording.table["t1_C"].where(~gone))
     recording = replace(recording, table=table)
-    (log,) = find_faults(study.assess([model], [recording], starts=Start()), [recording])
+    (log,) = find_faults(assessing.assess([model], [recording], starts=Start()), [recording])
     (fault,) = log.faults
     assert (fault.word, fault.begin, fault.returned) == ("missing", 4 * 3600, True)
     assert 5 * 3600 + 540 <= fault.end <= 5 * 3600 + 720
@@ -124,7 +124,7 @@ def test_a_sensor_that_the_recording_lacks_is_missing_from_the_start(model: Erro
         day, table=day.table.drop(columns="t2_C"), channels=tuple(c for c in day.channels if c.name != "t2_C")
     )
     other = replace(model, watch=None)  # judged as if t2_C were not one of its own: assess needs those
-    judged = study.assess([other], [day], starts=Start())
+    judged = assessing.assess([other], [day], starts=Start())
     (log,) = find_faults(replace(judged, models=(model,)), [lacking])
     (fault,) = log.faults
     assert (fault.sensor, fault.word) == ("t2_C", "missing")
@@ -140,7 +140,7 @@ def test_a_sensor_that_the_recording_lacks_is_missing_from_the_start(model: Erro
 def test_without_a_watch_there_is_no_log(model: ErrorModel) -> None:
     recording = failing(t1_C=(4.0, 4.0))
     bare = replace(model, watch=None)
-    judged = study.assess([bare], [recording], starts=Start())
+    judged = assessing.assess([bare], [recording], starts=Start())
     assert find_faults(judged, [recording]) == ()
     assert find_costs(bare, judged.overall()[0], ()) == ()
 
@@ -150,7 +150,7 @@ def test_models_of_two_files_have_a_watch_each(model: ErrorModel) -> None:
     deaf = replace(model.watch, sensors=tuple(replace(s, off=80.0, jump=80.0) for s in model.watch.sensors))
     other = replace(model, watch=deaf)
     recording = failing(t1_C=(4.0, 4.0))
-    judged = study.assess([model, other], [recording], starts=Start())
+    judged = assessing.assess([model, other], [recording], starts=Start())
     logs = find_faults(judged, [recording])
     assert [log.failed for log in logs] == [("t1_C",), ()]
     first, second = judged.overall()
@@ -167,7 +167,7 @@ def test_rows_of_an_earlier_file_are_gone_through_and_not_counted(model: ErrorMo
         cycles = find_cycles(time, table["spindle_rpm"].to_numpy())
         parts.append(replace(whole, name=f"from {rows.start}", time=time, table=table, cycles=cycles))
     first, second = parts
-    judged = study.assess([model], [second], starts=Start("continued", earlier=(first,)))
+    judged = assessing.assess([model], [second], starts=Start("continued", earlier=(first,)))
     (log,) = find_faults(judged, [second])
     assert [(f.sensor, f.word, f.begin) for f in log.faults] == [
         ("t1_C", "stepped", 0.0),  # found before, in the first file
@@ -180,7 +180,7 @@ def test_rows_of_an_earlier_file_are_gone_through_and_not_counted(model: ErrorMo
 
 def test_a_sensor_that_is_missing_from_the_first_row_on_is_stood_in_for(model: ErrorModel) -> None:
     recording = failing(t1_C=(0.0, None))
-    judged = study.assess([model], [recording], starts=Start())
+    judged = assessing.assess([model], [recording], starts=Start())
     (log,) = find_faults(judged, [recording])
     (whole,) = judged.overall()
     _, said, _ = live(model, recording)
@@ -193,7 +193,7 @@ def test_a_sensor_that_is_missing_from_the_first_row_on_is_stood_in_for(model: E
 def test_the_band_is_that_without_the_sensors_that_failed(model: ErrorModel) -> None:
     assert model.band is not None
     good, lost, harm = (
-        study.assess([model], [failing(**cuts)], starts=Start()).overall()[0].half_widths
+        assessing.assess([model], [failing(**cuts)], starts=Start()).overall()[0].half_widths
         for cuts in ({}, {"t2_C": (4.0, None)}, {"t3_C": (4.0, None)})
     )
     assert good is not None
@@ -209,7 +209,7 @@ def test_the_band_is_that_without_the_sensors_that_failed(model: ErrorModel) -> 
 
 def test_the_failures_are_told(model: ErrorModel) -> None:
     recording = failing(t1_C=(4.0, 4.0), t2_C=(6.0, None))
-    logs = find_faults(study.assess([model], [recording], starts=Start()), [recording])
+    logs = find_faults(assessing.assess([model], [recording], starts=Start()), [recording])
     first, second = describe_faults(logs, [recording])
     assert first.startswith("failing: t1_C stepped from 4.")
     assert " to the end; it read +" in first
@@ -219,7 +219,7 @@ def test_the_failures_are_told(model: ErrorModel) -> None:
 def test_losses_are_tried_with_the_watch_there(model: ErrorModel) -> None:
     recording = failing()
     with_watch, without = (
-        study.assess([m], [recording], starts=Start()).overall()[0].robustness
+        assessing.assess([m], [recording], starts=Start()).overall()[0].robustness
         for m in (model, replace(model, watch=None))
     )
     assert with_watch is not None
@@ -230,7 +230,7 @@ def test_losses_are_tried_with_the_watch_there(model: ErrorModel) -> None:
 
 def test_what_is_held_is_told_and_has_no_band(model: ErrorModel) -> None:
     recording = failing(t3_C=(4.0, None))
-    judged = study.assess([model], [recording], starts=Start())
+    judged = assessing.assess([model], [recording], starts=Start())
     (line,) = describe_held(judged, find_faults(judged, [recording]))
     assert line.startswith("z_um: with t3_C failed its correction is held, then fades at the machine: ")
     (told,) = describe_bands(judged.models, judged.overall())
@@ -258,6 +258,6 @@ def test_trouble_of_a_temperature_caps_the_verdict_where_no_watch_could_look() -
         table=recording.table.drop(columns="spindle_rpm"),
         channels=tuple(c for c in recording.channels if c.quantity != "spindle_speed"),
     )
-    (seen,), (unseen,) = (study.assess([model], [r], starts=Start()).overall() for r in (recording, blind))
+    (seen,), (unseen,) = (assessing.assess([model], [r], starts=Start()).overall() for r in (recording, blind))
     assert not any("t1_C" in cap for cap in seen.verdict.caps)
     assert any("t1_C has trouble" in cap for cap in unseen.verdict.caps)

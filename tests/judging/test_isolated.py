@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from smallmachine import small_machine
 
 from thermocomp.core.exceptions import FitError, InputError
-from thermocomp.judging import refit, selecting, splits, study
+from thermocomp.judging import assessing, refit, selecting, splits, study
 from thermocomp.judging.choice import Settings
 from thermocomp.judging.compare import compare
 from thermocomp.judging.pieces import work_through
@@ -183,10 +183,10 @@ def test_a_model_that_cannot_be_assessed_leaves_the_others(recording: Recording,
     unseen = small_machine((2200.0, 1200.0, 1700.0, 2500.0), seed=5)
     channels = tuple(c for c in unseen.channels if c.name != "x_um")
     poorer = replace(unseen, table=pd.DataFrame(unseen.table.drop(columns="x_um")), channels=channels)
-    good, failed = study.assess(models, [poorer]).overall()
+    good, failed = assessing.assess(models, [poorer]).overall()
     assert (good.target, failed.target, failed.word) == ("z_um", "x_um", "refused")
     assert "could not be judged: " in failed.reason
     assert "no channel is named 'x_um'" in failed.reason
-    assert good.metric("rms") == study.assess(models[:1], [poorer]).overall()[0].metric("rms")
+    assert good.metric("rms") == assessing.assess(models[:1], [poorer]).overall()[0].metric("rms")
     with pytest.raises(InputError, match="no channel is named 'x_um'"):
-        study.assess(models[1:], [poorer])
+        assessing.assess(models[1:], [poorer])

@@ -9,7 +9,7 @@ from smallmachine import small_machine
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
-from thermocomp.judging import splits, study
+from thermocomp.judging import assessing, splits, study
 from thermocomp.judging.choice import Settings
 from thermocomp.judging.compare import compare
 from thermocomp.judging.leaks import find_learned_rows
@@ -51,7 +51,7 @@ def test_minus_a_row_minus_a_column_is_no_test(recording: Recording, models: tup
         of(recording.table.iloc[250:700], recording),
     ]
     for copy in copies:
-        judged = study.assess(models, [copy], starts=COLD)
+        judged = assessing.assess(models, [copy], starts=COLD)
         assert judged.seen == ()
         (overall,) = judged.overall()
         assert not overall.accepted
@@ -65,7 +65,7 @@ def test_minus_a_row_minus_a_column_is_no_test(recording: Recording, models: tup
 def test_plus_a_day_only_the_day_is_judged(recording: Recording, models: tuple[ErrorModel, ...]) -> None:
     day = small_machine(DAY, seed=5)
     long = after(recording, day)
-    (overall,) = study.assess(models, [long]).overall()
+    (overall,) = assessing.assess(models, [long]).overall()
     assert overall.learned == 800
     assert overall.row.tolist() == list(range(800, 1600))
     assert overall.word == "unproven"  # its level is that of the rows that were learned
@@ -73,7 +73,7 @@ def test_plus_a_day_only_the_day_is_judged(recording: Recording, models: tuple[E
     assert overall.reason.endswith("; 800 of 1,600 rows were learned from: left out")
     # a piece of it in the middle of two days, in a file of its own beside a whole one
     both = [after(day, of(recording.table.iloc[100:500], recording)), small_machine(DAY, seed=6)]
-    (overall,) = study.assess(models, [replace(r, name=f"{k}") for k, r in enumerate(both)]).overall()
+    (overall,) = assessing.assess(models, [replace(r, name=f"{k}") for k, r in enumerate(both)]).overall()
     assert 400 <= overall.learned <= 500
     assert set(range(700)) <= set(overall.row[overall.test == 0]) <= set(range(800))
     assert (overall.test == 1).sum() == 800
@@ -81,20 +81,20 @@ def test_plus_a_day_only_the_day_is_judged(recording: Recording, models: tuple[E
 
 def test_the_file_itself_is_left_out_beside_another(recording: Recording, models: tuple[ErrorModel, ...]) -> None:
     day = replace(small_machine(DAY, seed=5), name="day")
-    judged = study.assess(models, [recording, day])
+    judged = assessing.assess(models, [recording, day])
     assert judged.seen == ("small",)
     (overall,) = judged.overall()
     assert overall.learned == 800
     assert set(overall.test) == {1}
     assert overall.accepted
-    alone = study.assess(models, [recording]).overall()[0]
+    alone = assessing.assess(models, [recording]).overall()[0]
     assert alone.reason == "no honest test: fitted to small; judge it on another recording"
     # a model from before there were fingerprints knows the file, and no copy
     (model,) = models
     assert model.provenance is not None
     old = replace(model, provenance=replace(model.provenance, prints=None))
-    assert study.assess([old], [recording]).overall()[0].caveat
-    assert not study.assess([old], [of(recording.table.drop(index=333), recording)]).overall()[0].caveat
+    assert assessing.assess([old], [recording]).overall()[0].caveat
+    assert not assessing.assess([old], [of(recording.table.drop(index=333), recording)]).overall()[0].caveat
 
 
 def test_a_column_that_has_another_name_in_the_file_is_known(
@@ -108,7 +108,7 @@ def test_a_column_that_has_another_name_in_the_file_is_known(
         channels=tuple(replace(c, name=names.get(c.name, c.name)) for c in recording.channels if c.name != "x_um"),
         aliases=names,
     )
-    (overall,) = study.assess(models, [other]).overall()
+    (overall,) = assessing.assess(models, [other]).overall()
     assert overall.target == "z_um"
     assert overall.caveat.startswith("no honest test: 800 of 800 rows")
 
@@ -170,9 +170,11 @@ def test_two_files_that_share_rows_are_refused_with_both_names(recording: Record
 
 def test_what_goes_on_from_a_file_that_was_learned_is_a_stretch(models: tuple[ErrorModel, ...]) -> None:
     day = replace(small_machine(DAY, seed=5), name="day")
-    (alone,) = study.assess(models, [day]).overall()
+    (alone,) = assessing.assess(models, [day]).overall()
     assert alone.accepted
-    (goes_on,) = study.assess(models, [day], starts=Start("continued", "stated", (small_machine(),), 60.0)).overall()
+    (goes_on,) = assessing.assess(
+        models, [day], starts=Start("continued", "stated", (small_machine(),), 60.0)
+    ).overall()
     assert not goes_on.accepted
     assert "stretch" in " ".join(goes_on.verdict.caps)
 
@@ -180,7 +182,7 @@ def test_what_goes_on_from_a_file_that_was_learned_is_a_stretch(models: tuple[Er
 def test_copies_of_one_cycle_are_one_unit(models: tuple[ErrorModel, ...]) -> None:
     one = small_machine((2000.0,), seed=5)
     copies = [replace(one, name="a"), of(one.table.drop(index=50), one, "b"), of(one.table.drop(index=77), one, "c")]
-    (overall,) = study.assess(models, copies, starts=COLD).overall()
+    (overall,) = assessing.assess(models, copies, starts=COLD).overall()
     assert overall.word == "unproven"
     assert overall.reason == (
         "only 1 of 3 units are not alike, at least 3 are needed; record cycles at other speeds or on other days"

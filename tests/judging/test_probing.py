@@ -8,9 +8,9 @@ import pytest
 import thermocomp as tc
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.reading import Reading
+from thermocomp.judging.assessing import assess
 from thermocomp.judging.probing import Probed, Probings
 from thermocomp.judging.replay import replay_compensated
-from thermocomp.judging.study import assess
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.stacking import stack
 from thermocomp.report.probings import describe_probings

@@ -15,7 +15,7 @@ from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.zero import FIRST_READING, Zeroing
 from thermocomp.iso230 import part3
-from thermocomp.judging import study
+from thermocomp.judging import assessing
 from thermocomp.judging.judge import judge
 from thermocomp.judging.replay import replay, replay_compensated
 from thermocomp.judging.robustness import stress
@@ -148,7 +148,7 @@ def test_a_known_zero_is_counted_from() -> None:
 def test_assess_of_the_second_half_is_the_replay_of_the_whole() -> None:
     models = [fitted("dynamic")]
     first, second, gap = cut(resting(), 310)
-    judged = study.assess(models, [second], starts=Start("continued", "stated", (first,), gap))
+    judged = assessing.assess(models, [second], starts=Start("continued", "stated", (first,), gap))
     ((name, start),) = judged.starts
     assert name == "b"
     assert "b begins 60 s after the end of a (stated)" in start.why
@@ -159,8 +159,8 @@ def test_assess_of_the_second_half_is_the_replay_of_the_whole() -> None:
     )
     assert found.measured.tolist() == second.table[TARGET].tolist()
     with pytest.raises(InputError, match=r"b: z_um begins at \d+\.\d um, so it was not zeroed"):
-        study.assess(models, [second])
-    assert not study.assess(models, [second], starts=Start()).overall()[0].accepted
+        assessing.assess(models, [second])
+    assert not assessing.assess(models, [second], starts=Start()).overall()[0].accepted
 
 
 def test_a_thermal_test_that_goes_on() -> None:

@@ -22,7 +22,8 @@ MOVES = ("rapid", "feed", "arc", "probe", "tap")
 TELLS = f"""
 import json, os, struct, sys
 sys.path.append({str(rs274process.CHILD.parent)!r})
-from _rs274_child import CODES, KINDS, RAPID, RECORD
+from _rs274_kinds import CODES, KINDS, RECORD
+RAPID = CODES["rapid"]
 def tell(*rows):
     print(json.dumps(KINDS), flush=True)
     os.write(1, struct.pack("<II", len(rows), 2) + b"".join(rows) + b"[]")

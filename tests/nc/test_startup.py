@@ -7,7 +7,8 @@ from thermocomp.nc.interpreter.block import Modal, Setup
 from thermocomp.nc.interpreter.interpret import follow_program
 from thermocomp.nc.interpreter.startup import complete_codes, modal, tidy
 from thermocomp.nc.linuxcnc.verification.states import build_stored
-from thermocomp.nc.parser.tokens import Controller, read_lines
+from thermocomp.nc.parser.line import Controller
+from thermocomp.nc.parser.tokens import read_lines
 from thermocomp.nc.planner.timeline import MotionLimits, time_blocks
 
 

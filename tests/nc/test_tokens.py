@@ -9,10 +9,10 @@ from nc_interpreter import PROGRAMS, needs_programs
 from oracle_run import ends
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.nc.parser import tokens
 from thermocomp.nc.parser.expressions import Parameters, evaluate
-from thermocomp.nc.parser.line import Line
-from thermocomp.nc.parser.tokens import Controller, program_lines, read_line, read_lines, split_lines
+from thermocomp.nc.parser.line import Controller, Line
+from thermocomp.nc.parser.squeezed import read_slowly
+from thermocomp.nc.parser.tokens import program_lines, read_line, read_lines, split_lines
 
 CONTROLLERS: tuple[Controller, ...] = ("linuxcnc", "fanuc")
 
@@ -327,7 +327,7 @@ PIECES = st.sampled_from(
 @given(st.lists(PIECES, max_size=12).map("".join), st.sampled_from(CONTROLLERS))
 def test_both_ways_of_reading_agree(text: str, controller: Controller) -> None:
     line = read_line(text, 1, controller)
-    assert line == tokens._read_slowly(text, 1, controller)
+    assert line == read_slowly(text, 1, controller)
     check(line)
 
 
@@ -356,7 +356,7 @@ def test_programs_of_linuxcnc() -> None:
         assert "".join(line.text for line in lines).encode("latin-1") == path.read_bytes()
         for line in lines:
             check(line)
-            assert line == tokens._read_slowly(line.text, line.number, "linuxcnc")
+            assert line == read_slowly(line.text, line.number, "linuxcnc")
             # the one line of them that the interpreter does not understand either
             assert not line.error or line.text == "O<g20sub> callsub\n", (path, line)
         count += len(lines)

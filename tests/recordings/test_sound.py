@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from smallmachine import small_machine
 
-from thermocomp.judging import splits, study
+from thermocomp.judging import assessing, splits, study
 from thermocomp.judging.compare import compare
 from thermocomp.recordings.checks.sound import drop_unsound
 from thermocomp.recordings.cycles import Cycle
@@ -66,7 +66,7 @@ def test_assess_leaves_trouble_out_too() -> None:
         stack([small_machine()], ["z_um"]), "dynamic", splits.leave_one_cycle_out(stack([small_machine()], ["z_um"]))
     ).models
     day = small_machine((2200.0, 1200.0, 1700.0, 2600.0), seed=5)
-    (a,) = study.assess(models, [spoiled("z_um", slice(50, 800, 150), 4300.0, day)]).overall()
+    (a,) = assessing.assess(models, [spoiled("z_um", slice(50, 800, 150), 4300.0, day)]).overall()
     assert len(a.measured) == 800 - 5
     assert a.word == "accepted"
 

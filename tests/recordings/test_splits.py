@@ -8,7 +8,7 @@ import pytest
 from smallmachine import small_machine
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.judging import splits, study
+from thermocomp.judging import assessing, splits, study
 from thermocomp.recordings.cycles import Cycle
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
@@ -78,7 +78,7 @@ def test_short_cycles_are_left_out_together(recording: Recording) -> None:
     assert model.honest_error is not None
     assert set(model.honest_error.cycles) == {"0 to 2", "3", "4 to 5"}
     assert np.isfinite(list(model.honest_error.cycles.values())).all()
-    judged = study.assess([model], [cut])
+    judged = assessing.assess([model], [cut])
     assert [a.block for a in judged.assessments] == [
         "cycle 0 to 2",
         "cycle 3",

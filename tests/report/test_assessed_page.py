@@ -13,9 +13,9 @@ from watchedmachine import failing, watched_model
 import thermocomp as tc
 from thermocomp.cli.app import run
 from thermocomp.files import modelfile
-from thermocomp.judging import study
+from thermocomp.judging import assessing
+from thermocomp.judging.assessing import Judged
 from thermocomp.judging.faultlog import FaultLog, find_costs, find_faults
-from thermocomp.judging.study import Judged
 from thermocomp.recordings.readers import recordings
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.starts import Start
@@ -32,7 +32,7 @@ def recording() -> Recording:
 
 @pytest.fixture(scope="module")
 def judged(recording: Recording) -> Judged:
-    return study.assess([watched_model()], [recording], starts=Start())
+    return assessing.assess([watched_model()], [recording], starts=Start())
 
 
 @pytest.fixture(scope="module")
@@ -122,7 +122,7 @@ def test_codes_of_a_dead_sensor_do_not_flatten_the_curves(judged: Judged) -> Non
 
 def test_without_a_failure_there_is_a_sentence() -> None:
     day = failing()
-    judged = study.assess([watched_model()], [day], starts=Start())
+    judged = assessing.assess([watched_model()], [day], starts=Start())
     assert faults.section(judged, [day]) == Section("Sensors", ["None of the 3 temperatures failed: t1_C, t2_C, t3_C."])
     page = assessed.render(judged, [day])
     assert "None of the 3 temperatures failed" in page
@@ -137,7 +137,7 @@ def test_the_verdict_stands_out_by_what_it_is(judged: Judged, recording: Recordi
     refused = replace(judged, assessments=(replace(whole, caveat="no honest test"),))
     assert '<p class="verdict">z_um: refused' in assessed.render(refused, [recording])
     sound = failing()  # a correction that is held for want of sensors is not accepted
-    judged = study.assess([watched_model()], [sound], starts=Start())
+    judged = assessing.assess([watched_model()], [sound], starts=Start())
     (whole,) = judged.overall()
     fine = replace(whole, verdict=replace(whole.verdict, caps=()), robustness=None)
     assert fine.accepted
@@ -159,7 +159,7 @@ def test_two_recordings_are_told_apart(recording: Recording) -> None:
     # another noise: the same day twice is refused
     table = day.table.assign(z_um=day.table["z_um"] + 0.01)
     both = [recording, replace(day, table=table)]
-    judged = study.assess([watched_model()], both, starts=Start())
+    judged = assessing.assess([watched_model()], both, starts=Start())
     page = words(assessed.render(judged, both))
     assert "failing: 2 of 3 temperatures failed" in page
     assert "other: 1 of 3 temperatures failed" in page

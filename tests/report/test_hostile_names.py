@@ -18,7 +18,7 @@ from thermocomp.core.shown import shorten
 from thermocomp.iso230 import part2
 from thermocomp.iso230.report import iso230 as iso230pages
 from thermocomp.iso230.report import iso230figures
-from thermocomp.judging import selecting, splits, study
+from thermocomp.judging import assessing, selecting, splits
 from thermocomp.judging.choice import Settings
 from thermocomp.judging.compare import compare
 from thermocomp.judging.faultlog import find_faults
@@ -95,7 +95,7 @@ def test_what_failed() -> None:
         every = np.ones(len(samples), np.bool_)
         model = replace(train("ols", samples, 0, every).model, watch=find_watch(samples, every))
         lost = replace(recording, table=recording.table.assign(**{renames["t1_C"]: np.nan}))
-        judged = study.assess([model], [recording], starts=Start())
+        judged = assessing.assess([model], [recording], starts=Start())
         (log,) = find_faults(judged, [lost])
         assert renames["t1_C"] in log.failed
         said = [t.strip() for t in (*texts(faults.draw_timeline(log, lost)), *texts(faults.draw_stand_ins(log)))]

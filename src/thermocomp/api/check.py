@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from thermocomp.api.base import Paged, Result
 from thermocomp.api.inputs import Given, recordings_of
-from thermocomp.api.results import Paged, Result
 from thermocomp.core.exceptions import InputError
 from thermocomp.recordings.checks import quality
 from thermocomp.recordings.checks.findings import Finding

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from thermocomp.api import testprogram
+from thermocomp.api.base import Result
 from thermocomp.api.inputs import Given, LeaveOne, Prepared, Starts, judging_of, prepare, recordings_of, trouble_of
 from thermocomp.api.keywords import Listener, silent
-from thermocomp.api.results import Result
 from thermocomp.api.testprogram import Dialect
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel

@@ -1,6 +1,5 @@
 """Results for notebooks: tables, figures, and short text."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -10,14 +9,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from thermocomp.api.base import Paged, Result, told_trouble
 from thermocomp.core.columns import Columns
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.explained import Explanations, explain_all
 from thermocomp.core.model import ErrorModel
-from thermocomp.files.draft import write_text
+from thermocomp.judging.assessing import Judged
 from thermocomp.judging.faultlog import find_faults
 from thermocomp.judging.results import Assessment, Comparison
-from thermocomp.judging.study import Fitted, Judged
+from thermocomp.judging.study import Fitted
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.starts import Start
@@ -26,46 +26,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FloatArray = NDArray[np.float64]
-
-
-class Result(ABC):
-    """Base class of all results."""
-
-    @abstractmethod
-    def to_frame(self) -> pd.DataFrame:
-        """Return the values as a table, a row for each judged, fitted or selected item."""
-
-    @abstractmethod
-    def to_dict(self) -> dict[str, Any]:
-        """Return all results as a dict, as printed by ``--json``."""
-
-    @abstractmethod
-    def plot(self) -> "Figure":
-        """Return the most informative figure."""
-
-    @abstractmethod
-    def __str__(self) -> str:
-        """Return the result in a sentence or two."""
-
-    def __repr__(self) -> str:
-        return f"<{type(self).__name__}: {self}>"
-
-    def _repr_html_(self) -> str:
-        from html import escape
-
-        return f"<p>{escape(str(self))}</p>{self.to_frame().to_html(index=False, float_format='{:.2f}'.format)}"
-
-
-class Paged(ABC):
-    """A result with an HTML page."""
-
-    @abstractmethod
-    def page(self) -> str:
-        """Return the page as a self-contained HTML text."""
-
-    def report(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write the page; return its path."""
-        return write_text(self.page(), path, overwrite=overwrite)
 
 
 def starts_content(begins: Sequence[tuple[str, Start]]) -> list[dict[str, object]]:
@@ -379,11 +339,6 @@ def _judged(a: Assessment) -> str:
         f"{a.target}: {a.model} {a.word}, {a.metric('rms'):.2f} um RMS instead of {a.none_metric('rms'):.2f} um "
         f"({a.reason})."
     )
-
-
-def told_trouble(trouble: Sequence[str]) -> list[str]:
-    """Return the data-quality problems of recordings as a sentence; empty if there are none."""
-    return [f"Trouble: {'; '.join(trouble)}."] if trouble else []
 
 
 def _run(

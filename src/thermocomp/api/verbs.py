@@ -1,4 +1,4 @@
-"""The main workflow in Python: select, compare, fit, assess. The keywords are the options of the commands."""
+"""The main workflow in Python: compare, fit, assess. The keywords are the options of the commands."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
@@ -7,28 +7,22 @@ from typing import Any, Literal
 
 from thermocomp.api.explain import models_of
 from thermocomp.api.inputs import Given, LeaveOne, Starts, prepare, recordings_of, starts_of, trouble_of
-from thermocomp.api.keywords import Listener, settings_of, silent
+from thermocomp.api.keywords import Listener, silent
 from thermocomp.api.results import Assessed, Compared, FittedModels
-from thermocomp.api.selected import Selected
 from thermocomp.core.correction import Limits
-from thermocomp.core.exceptions import InputError
 from thermocomp.core.inputs import Support
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.zero import Zeroing
+from thermocomp.judging import assessing, do_no_harm
 from thermocomp.judging import compare as comparing
-from thermocomp.judging import do_no_harm, selecting
 from thermocomp.judging import study as studies
-from thermocomp.judging.choice import Settings
 from thermocomp.judging.probing import Probings
 from thermocomp.judging.results import Assessment, Rules
 from thermocomp.judging.sharing import shared_among
 from thermocomp.recordings.readers.mapping import Mapping
 
 DEFAULT_MODELS = ("ols", "partial-f", "mra", "dynamic", "averaged")
-SelectionMethod = Literal["pareto", "subsets", "grouping", "partial-f", "stepwise", "ace"]
 Policy = Literal["clip", "hold", "fade"]
-#: settings of `select`, in addition to the recordings
-SelectionSettings = Settings
 
 
 def compare(
@@ -327,7 +321,7 @@ def assess(
     begun, trouble = starts_of(starts, tests), trouble_of(tests)
     listener.warn(trouble)
     listener.begin(lambda: len(models))
-    judged = studies.assess(
+    judged = assessing.assess(
         models,
         tests,
         rules=Rules(harm_margin),
@@ -337,78 +331,3 @@ def assess(
         progress=progress,
     )
     return Assessed(judged, tuple(tests), tuple(trouble))
-
-
-def select(
-    recordings: Given,
-    targets: str | Sequence[str] | None = None,
-    method: SelectionMethod = "pareto",
-    *,
-    inputs: str | Sequence[str] | None = None,
-    split: str | None = None,
-    leave_one: LeaveOne | None = None,
-    absolute: bool = False,
-    starts: Starts = None,
-    zero_over: float = Zeroing.at_rest,
-    mapping: str | Path | Mapping | None = None,
-    jobs: int = -1,
-    scheduler: str | None = None,
-    progress: Callable[..., None] = silent,
-    **settings: Any,
-) -> Selected:
-    """Select the few temperature sensors that a model needs.
-
-    Parameters
-    ----------
-    recordings, targets
-        As for `compare`.
-    method : {'pareto', 'subsets', 'grouping', 'partial-f', 'stepwise', 'ace'}
-        Selection method (:doc:`/methods`). pareto: error on unseen cycles against the number of sensors; subsets: exact
-        best subset of every size; grouping: correlation grouping (Hwang); partial-f and stepwise: by partial F
-        (stepwise 2017, Chen); ace: by maximal correlation (Wessel).
-    inputs, split, leave_one, absolute, starts, zero_over, mapping, jobs, scheduler, progress
-        As for `compare`.
-    **settings
-        Settings of the method, see `thermocomp.judging.choice.Settings`: ``max_sensors=5``, ``threshold=0.95``.
-
-    Returns
-    -------
-    Selected
-
-    Raises
-    ------
-    InputError
-        A recording, channel, method or setting is invalid.
-
-    Examples
-    --------
-    >>> import thermocomp as tc
-    >>> chosen = tc.select(tc.simulate("hwang"), "z_um", "grouping")
-    >>> chosen.sensors
-    {'z_um': ('t_y_bearing_C', 't_rear_seat_C', 't_column_front_left_C')}
-    >>> chosen
-    <Selected: z_um: t_y_bearing_C, t_rear_seat_C, t_column_front_left_C (smallest residual mean square, 3.869 um^2,
-    among the members of 3 of 4 groups).>
-    """
-    if method not in ("pareto", "subsets", "grouping", "partial-f", "stepwise", "ace"):
-        raise InputError(f"method {method!r}: expected pareto, subsets, grouping, partial-f, stepwise or ace")
-    chosen = settings_of(Settings, settings, "select")
-    chosen.check(method)
-    listener = Listener(progress)
-    ready = prepare(
-        recordings_of(recordings, mapping),
-        targets,
-        inputs,
-        absolute=absolute,
-        starts=starts,
-        zero_over=zero_over,
-        split=split,
-        leave_one=leave_one,
-        jobs=jobs,
-        judged=method == "pareto",
-        listener=listener,
-    )
-    with shared_among(scheduler):
-        listener.begin(lambda: selecting.n_pieces(method, ready.samples, ready.judging, chosen))
-        found = selecting.select(method, ready.samples, ready.judging, chosen, jobs=jobs, progress=progress)
-    return Selected(found, tuple(ready.trouble), ready.tests)

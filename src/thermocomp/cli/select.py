@@ -4,8 +4,7 @@ from dataclasses import dataclass, field
 
 from cyclopts import Parameter
 
-from thermocomp.api.selected import Selected
-from thermocomp.api.verbs import SelectionSettings
+from thermocomp.api.select import Selected, SelectionSettings
 from thermocomp.cli.face import CommandFace, command
 from thermocomp.report import printed
 
@@ -20,7 +19,7 @@ class Selector(SelectionSettings):  # noqa: D101 - docstring of SelectionSetting
     holm: bool = False
 
 
-@command("thermocomp.api.verbs:select", writes=".html", forms={"settings": Selector})
+@command("thermocomp.api.select:select", writes=".html", forms={"settings": Selector})
 def select(found: Selected, face: CommandFace) -> int:
     """Write and show the results.
 

@@ -8,10 +8,11 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.bounds import NODES, check_count, check_finite
 from thermocomp.core.exceptions import SettingError
 from thermocomp.core.expression import Constant, Lookup, Node, Sum
-from thermocomp.core.model import ErrorModel, FloatArray
+from thermocomp.core.model import ErrorModel
 from thermocomp.core.terms import Variable
 
 

@@ -26,11 +26,13 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.bounds import GAP, ORDER, TICK, check_between, check_count, check_finite
 from thermocomp.core.exceptions import InputError, SettingError
 from thermocomp.core.expression import Constant, Mean, Named, Node, Past, Recurrence, Sum, sum_weighted
-from thermocomp.core.model import ErrorModel, FloatArray, State
+from thermocomp.core.model import ErrorModel
 from thermocomp.core.network import Affine, Perceptron
+from thermocomp.core.state import State
 
 #: fraction of the interval by which a reading may come early and still trigger the tick; covers rounding of clocks
 EARLY = 1e-6
@@ -113,8 +115,7 @@ class Ticking(ErrorModel):
             raise InputError(f"start of the model of {self.target}: expected {len(self.inputs)} inputs and references")
         if not (np.isfinite(zero).all() and np.isfinite(given).all() and np.isfinite(known).all()):
             raise InputError(f"start of the model of {self.target}: deviation, inputs or reference not finite")
-        low, high = self._bounds
-        change = np.clip(given - zero, low, high)
+        change, _ = self.clip(given - zero)
         k, m = self.orders
         shape = np.broadcast_shapes(known.shape, change.shape[:-1])
         own = np.broadcast_to(known[..., None], (*shape, max(k, 1)))

@@ -6,10 +6,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from thermocomp.core import lagbank
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.columns import Columns
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.model import ErrorModel, FloatArray
+from thermocomp.core.model import ErrorModel
 from thermocomp.core.paceddynamic import PacedDynamic
+from thermocomp.core.rows import walk
 
 
 class Gain(NamedTuple):
@@ -51,7 +53,7 @@ def contributions(
     of = np.zeros((len(weights), len(model.inputs)))
     of[np.arange(len(weights)), _owners(model)] = weights
     parts = []
-    for state, last in model.walk(table, time, reference=reference):
+    for state, last in walk(model, table, time, reference=reference):
         if state.memory is None:
             parts.append(np.zeros(len(model.inputs)))
         else:

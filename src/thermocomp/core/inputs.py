@@ -1,8 +1,12 @@
 """Inputs of a model, their training range, and the behaviour of the model outside it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
+import numpy as np
+
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.bounds import LEAST, MARGIN, RANGE, check_between, check_finite, check_name
 from thermocomp.core.exceptions import SettingError, explain_unknown
 from thermocomp.core.units import HOUSE_UNITS
@@ -81,3 +85,55 @@ class Support:
     def __post_init__(self) -> None:
         check_between("support", 0.0, MARGIN, margin=self.margin)
         check_between("support", LEAST, MARGIN, fade_over=self.fade_over)
+
+
+class TrainedRange(NamedTuple):
+    """Trained range of all inputs of a model, as values minus their reference."""
+
+    low: FloatArray  #: (n_inputs,), minimum with the margin
+    high: FloatArray  #: (n_inputs,), maximum with the margin
+    fade_span: FloatArray  #: (n_inputs,), distance beyond them over which ``fade`` reaches zero
+
+    @classmethod
+    def of(cls, inputs: Sequence[Input], support: Support) -> "TrainedRange":
+        """Return the range of the given inputs."""
+        low = np.array([i.low for i in inputs])
+        high = np.array([i.high for i in inputs])
+        margin = support.margin * (high - low)
+        span = (high - low) * support.fade_over
+        return cls(low - margin, high + margin, np.where(span > 0, span, np.finfo(np.float64).tiny))
+
+    def clip(self, change: FloatArray) -> tuple[FloatArray, BoolArray]:
+        """Return inputs minus their reference, clipped to the range, and which were outside."""
+        clipped = np.minimum(np.maximum(change, self.low), self.high)
+        return clipped, np.asarray(clipped != change)
+
+    def keep(
+        self,
+        support: Support,
+        before: FloatArray,
+        deviation: FloatArray,
+        change: FloatArray,
+        clipped: FloatArray,
+        far: FloatArray,
+    ) -> FloatArray:
+        """Return the deviation after ``hold`` or ``fade``.
+
+        Parameters
+        ----------
+        support : Support
+        before, deviation : ndarray of shape (...,)
+            Previous deviation; deviation at the clipped inputs.
+        change, clipped : ndarray of shape (..., n_inputs)
+            Inputs minus their reference, before and after clipping.
+        far : ndarray of shape (...,)
+            See `JointSupport.distance`.
+        """
+        outside = (clipped != change).any(axis=-1) | ~(far <= 1.0)
+        if not outside.any():
+            return deviation
+        if support.policy == "hold":
+            return np.where(outside, before, deviation)
+        excess = np.minimum(np.abs(change - clipped), self.fade_span) / self.fade_span
+        beyond = np.maximum(excess.max(axis=-1, initial=0.0), (far - 1.0) / support.fade_over)
+        return np.asarray(deviation * np.clip(1.0 - beyond, 0.0, 1.0))

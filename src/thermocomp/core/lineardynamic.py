@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core import lagbank
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.bounds import ENTRIES, GAP, LEAST, check_between, check_count, check_finite
 from thermocomp.core.exceptions import SettingError
 from thermocomp.core.expression import Lag, Node, sum_weighted
-from thermocomp.core.model import ErrorModel, FloatArray
+from thermocomp.core.model import ErrorModel
 from thermocomp.core.terms import Term, TermTable, Variable
 
 

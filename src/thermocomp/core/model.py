@@ -5,50 +5,37 @@ object is evaluated live, replayed in every assessment and written as JSON. It h
 and returns the next one.
 """
 
-import math
 import re
-from abc import ABC, abstractmethod
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import pairwise
-from typing import ClassVar, NamedTuple, Self
+from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.band import Band
 from thermocomp.core.bounds import GAP, INPUTS, READING, check_count, check_name
-from thermocomp.core.columns import Columns, count_rows, read_clock, read_numbers
+from thermocomp.core.columns import Columns
 from thermocomp.core.exceptions import InputError, ReadingError, SettingError
 from thermocomp.core.expression import Clip, Node, format_node
 from thermocomp.core.expression import Input as Leaf
-from thermocomp.core.inputs import Input, Support
+from thermocomp.core.family import ModelFamily
+from thermocomp.core.inputs import Input, Support, TrainedRange
 from thermocomp.core.joint import JointSupport
-from thermocomp.core.provenance import HonestError, Provenance
+from thermocomp.core.provenance import HonestError, Provenance, read_approval
+from thermocomp.core.rows import walk
+from thermocomp.core.state import State
 from thermocomp.core.validity import Validity
 from thermocomp.core.watch import Watch
-from thermocomp.core.zero import FIRST_READING, Zeroing, find_zero
+from thermocomp.core.zero import FIRST_READING, Zeroing
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 _UNIT = re.compile(r"(um|urad)(/m(\^[2-9])?)?")
 
 
-class State(NamedTuple):
-    """Model state between two steps.
-
-    Leading axes, if any, are a batch of independent runs.
-    """
-
-    reference: FloatArray  #: (..., n_inputs), values that count as zero
-    memory: FloatArray | None  #: (..., n_memory); None before the first reading
-    deviation: FloatArray  #: (...,), last deviation returned
-    outside: BoolArray  #: (..., n_inputs), inputs beyond the trained range
-
-
 @dataclass(frozen=True, kw_only=True)
-class ErrorModel(ABC):
+class ErrorModel(ModelFamily):
     """Frozen model of one error component.
 
     Parameters
@@ -89,8 +76,6 @@ class ErrorModel(ABC):
     [0.0, 8.0]
     """
 
-    remembers: ClassVar[bool]  #: False: the deviation depends only on the current reading
-
     family: str
     target: str
     unit: str
@@ -119,55 +104,17 @@ class ErrorModel(ABC):
             raise SettingError(f"{owner}: its band has more inputs than the model, which has {len(names)}")
         self._check()
 
-    # -- methods implemented by a family ------------------------------------------------------------------------------
-
-    @abstractmethod
-    def _check(self) -> None:
-        """Raise `InputError` if the numbers are inconsistent."""
-
-    @abstractmethod
-    def _begin(self, change: FloatArray) -> FloatArray:
-        """Return the memory of a machine at steady state for `change`."""
-
-    @abstractmethod
-    def _advance(self, memory: FloatArray, change: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
-        """Return (memory, deviation) `dt` seconds later, after the inputs changed to `change`."""
-
-    def _directions(self, memory: FloatArray, change: FloatArray) -> FloatArray:  # noqa: ARG002
-        """Return the principal directions in which the structures averaged by the model differ [unit].
-
-        Shape (..., n_directions); the root of the sum of their squares is the spread of the structures.
-        """
-        return np.zeros((*change.shape[:-1], 0))
-
-    @abstractmethod
-    def _expression(self, change: Sequence[Node]) -> Node:
-        """Return the result of `_advance` as an expression of the clipped changes of the inputs."""
-
-    @abstractmethod
-    def coefficients_by_name(self) -> dict[str, float]:
-        """Return the coefficient of each term of `formula`."""
-
-    @property
-    @abstractmethod
-    def sensors(self) -> tuple[str, ...]:
-        """Names of the inputs that have an influence on the deviation."""
-
-    def may_lose(self, names: Sequence[str]) -> bool:
-        """Return whether the model was judged without these inputs and then leaves less error than no compensation.
-
-        This must hold for each input alone as well: a second failure must not re-enable a correction stopped by the
-        first one.
-        """
-        found = self.honest_error
-        own = [i.name for i in self.inputs if i.name in names]
-        left = [found.lost.get(key, math.inf) for key in (*own, ", ".join(own))] if found is not None else [math.inf]
-        return found is not None and max(left) <= found.none_rms
+    def may_lose(self, names: Collection[str]) -> bool:
+        """Return whether the model is better than no compensation without these inputs: see `HonestError.may_lose`."""
+        return self.honest_error is not None and self.honest_error.may_lose(self._named(names))
 
     def widening(self, names: Collection[str]) -> float:
         """Return the factor by which the error on unseen cycles increases without some of the inputs; at least 1."""
-        found, key = self.honest_error, ", ".join(i.name for i in self.inputs if i.name in names)
-        return 1.0 if found is None or not found.rms else max(1.0, found.lost.get(key, 0.0) / found.rms)
+        return 1.0 if self.honest_error is None else self.honest_error.widening(self._named(names))
+
+    def _named(self, names: Collection[str]) -> list[str]:
+        """Return those names that are inputs, in their order."""
+        return [i.name for i in self.inputs if i.name in names]
 
     # -- evaluation ---------------------------------------------------------------------------------------------------
 
@@ -228,7 +175,8 @@ class ErrorModel(ABC):
             memory, dt = self._begin(clipped), 0.0
         memory, deviation = self._advance(memory, clipped, dt)
         if self.support.policy != "clip":
-            deviation = self._supported(state.deviation, deviation, change, clipped)
+            far = np.zeros(change.shape[:-1]) if self.joint is None else self.joint.distance(change)
+            deviation = self._range.keep(self.support, state.deviation, deviation, change, clipped, far)
         return State(reference, memory, deviation, outside), deviation
 
     def settle(self, reference: FloatArray, inputs: FloatArray) -> FloatArray:
@@ -237,9 +185,7 @@ class ErrorModel(ABC):
 
     def clip(self, change: FloatArray) -> tuple[FloatArray, BoolArray]:
         """Return the inputs minus their reference, clipped to the trained range and margin, and which were outside."""
-        low, high = self._bounds
-        clipped = np.minimum(np.maximum(change, low), high)
-        return clipped, np.asarray(clipped != change)
+        return self._range.clip(change)
 
     def distance(self, state: State, inputs: FloatArray) -> FloatArray:
         """Return the distance of a reading from the training data, in all inputs together.
@@ -309,20 +255,6 @@ class ErrorModel(ABC):
         """Return a reading relative to its reference, clipped to the training range."""
         return self.clip(_bounded(inputs) - state.reference)[0]
 
-    def _supported(
-        self, before: FloatArray, deviation: FloatArray, change: FloatArray, clipped: FloatArray
-    ) -> FloatArray:
-        """Return the deviation after ``hold`` or ``fade``."""
-        far = np.zeros(change.shape[:-1]) if self.joint is None else self.joint.distance(change)
-        outside = (clipped != change).any(axis=-1) | ~(far <= 1.0)
-        if not outside.any():
-            return deviation
-        if self.support.policy == "hold":
-            return np.where(outside, before, deviation)
-        excess = np.minimum(np.abs(change - clipped), self._fade_span) / self._fade_span
-        beyond = np.maximum(excess.max(axis=-1, initial=0.0), (far - 1.0) / self.support.fade_over)
-        return np.asarray(deviation * np.clip(1.0 - beyond, 0.0, 1.0))
-
     def predict(
         self, table: Columns, time: ArrayLike | str | None = None, *, reference: ArrayLike | None = None
     ) -> FloatArray:
@@ -351,7 +283,7 @@ class ErrorModel(ABC):
         InputError
             A column is missing or contains a non-numeric value; or a model with memory has no time.
         """
-        said = [state.deviation for state, _ in self.walk(table, time, reference=reference)]
+        said = [state.deviation for state, _ in walk(self, table, time, reference=reference)]
         return np.array(said, dtype=np.float64)
 
     def half_widths(
@@ -369,56 +301,8 @@ class ErrorModel(ABC):
         ndarray of shape (n_rows,)
             [unit]; NaN without a band, and before the first complete row of a test.
         """
-        found = [self.half_width(state, last) for state, last in self.walk(table, time, reference=reference)]
+        found = [self.half_width(state, last) for state, last in walk(self, table, time, reference=reference)]
         return np.array(found, dtype=np.float64)
-
-    def walk(
-        self, table: Columns, time: ArrayLike | str | None = None, *, reference: ArrayLike | None = None
-    ) -> Iterator[tuple[State, FloatArray]]:
-        """Replay the model through a table as `predict` does, and yield its state after each row.
-
-        Parameters
-        ----------
-        table, time, reference
-            As for `predict`.
-
-        Yields
-        ------
-        state : State
-        values : ndarray of shape (n_inputs,)
-            Last complete reading [units of the inputs]; NaN before the first.
-        """
-        columns = [read_numbers(table, i.name, f"model of {self.target}") for i in self.inputs]
-        clock = read_clock(table, time, f"model of {self.target}", needed=self.remembers)
-        n = len(columns[0]) if columns else len(clock) if clock is not None else count_rows(table)
-        for name, values in [*zip((i.name for i in self.inputs), columns, strict=True), ("the time", clock)]:
-            if values is not None and values.shape != (n,):
-                raise InputError(f"model of {self.target}: {name} has shape {values.shape}, and there are {n} rows")
-        values = np.column_stack(columns) if columns else np.empty((n, 0))
-        steps: FloatArray = np.full(n, 1.0) if clock is None else np.diff(clock, prepend=np.inf)
-        starts = (steps <= 0).tolist()
-        usable: BoolArray = np.all(np.isfinite(values), axis=1)
-        resting = np.zeros(n, dtype=np.bool_)
-        if self.zeroing.speed in table:
-            speed = read_numbers(table, self.zeroing.speed, f"model of {self.target}")
-            resting = np.array([self.zeroing.stands(v) for v in speed.tolist()], dtype=np.bool_)
-        zeros: dict[int, ArrayLike | None] = {0: reference}
-        for a, b in pairwise([0, *(k for k in range(1, n) if starts[k]), n]):
-            zeros[a] = reference
-            if clock is not None and usable[a:b].any():
-                zeros[a], values[a:b] = find_zero(
-                    self.zeroing, self.init(reference).reference, clock[a:b], values[a:b], resting[a:b], usable[a:b]
-                )
-        state, since, last = self.init(reference), 0.0, np.full(len(columns), np.nan)
-        for k in range(n):
-            if k in zeros:
-                state, since = self.init(zeros[k]), 0.0
-            else:
-                since += float(steps[k]) if np.isfinite(steps[k]) else 0.0
-            if usable[k]:
-                state, _ = self.step(state, values[k], since)
-                since, last = 0.0, values[k]
-            yield state, last
 
     # -- derived numbers ----------------------------------------------------------------------------------------------
 
@@ -428,22 +312,14 @@ class ErrorModel(ABC):
         return np.array([np.nan if i.rezero else i.reference for i in self.inputs])
 
     @cached_property
-    def _bounds(self) -> tuple[FloatArray, FloatArray]:
-        low = np.array([i.low for i in self.inputs])
-        high = np.array([i.high for i in self.inputs])
-        margin = self.support.margin * (high - low)
-        return low - margin, high + margin
-
-    @cached_property
-    def _fade_span(self) -> FloatArray:
-        span = np.array([i.high - i.low for i in self.inputs]) * self.support.fade_over
-        return np.where(span > 0, span, np.finfo(np.float64).tiny)
+    def _range(self) -> TrainedRange:
+        return TrainedRange.of(self.inputs, self.support)
 
     @property
     def bounds(self) -> tuple[list[float], list[float], list[float]]:
         """Minimum and maximum change of each input with its margin, and the fade distance beyond them."""
-        low, high = self._bounds
-        return low.tolist(), high.tolist(), self._fade_span.tolist()
+        low, high, span = self._range
+        return low.tolist(), high.tolist(), span.tolist()
 
     def expression(self, change: Sequence[Node] | None = None) -> Node:
         """Return the computation of the model as a tree, equal to `step` with the support policy ``clip``.
@@ -453,7 +329,7 @@ class ErrorModel(ABC):
         change : sequence of Node, optional
             Expressions of the inputs minus their reference, clipped to the trained range.
         """
-        bounds = zip(self.inputs, *(b.tolist() for b in self._bounds), strict=True)
+        bounds = zip(self.inputs, *self.bounds[:2], strict=True)
         return self._expression(change or [Clip(Leaf(k, i.name), low, high) for k, (i, low, high) in enumerate(bounds)])
 
     def formula(self) -> str:
@@ -480,15 +356,10 @@ class ErrorModel(ABC):
         """
         if by is None:
             return self
-        name, _, reason = by.partition(",")
-        if not (name.strip() and reason.strip()):
-            raise InputError(
-                f"{by!r} accepts an unproven model: expected a name and a reason, such as 'M. Weber, trial'"
-            )
-        found = self.honest_error
+        taken, found = read_approval(by), self.honest_error
         if found is None or found.word != "unproven":
             return self
-        return replace(self, honest_error=replace(found, taken=f"{name.strip()}, {reason.strip()}"))
+        return replace(self, honest_error=replace(found, taken=taken))
 
     def check_may_run(self) -> None:
         """Reject a model that the do-no-harm gate did not accept, unless a person approved it as unproven.
@@ -505,17 +376,7 @@ class ErrorModel(ABC):
                 f"model of {self.target} was never judged on cycles it has not seen and will not run: "
                 "'thermocomp fit' judges what it fits; what was fitted otherwise can be compared and assessed"
             )
-        if found.word == "accepted":
-            return
-        if found.word == "refused":
-            raise InputError(f"model of {self.target} was refused and will not run: {found.reason}")
-        if not found.current:
-            raise InputError(f"model of {self.target} is unproven and runs in shadow only: {found.why}; fit it again")
-        if not found.taken:
-            raise InputError(
-                f"model of {self.target} is unproven and runs in shadow only: {found.why}. To approve its use "
-                'nevertheless: --accept-unproven "NAME, REASON", or model.taken("NAME, REASON") in Python'
-            )
+        found.check_may_run(self.target)
 
 
 def _bounded(inputs: FloatArray) -> FloatArray:

@@ -7,10 +7,11 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.bounds import ENTRIES, NODES, check_count, check_finite
 from thermocomp.core.exceptions import SettingError
 from thermocomp.core.expression import Constant, Named, Node, Sigmoid, Sum, scale_node, sum_weighted
-from thermocomp.core.model import ErrorModel, FloatArray
+from thermocomp.core.model import ErrorModel
 
 Activation = Literal["sigmoid", "tanh", "identity"]
 

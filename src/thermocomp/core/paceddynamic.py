@@ -7,10 +7,11 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.bounds import DEGREE, ENTRIES, GAP, LEAST, RANGE, check_between, check_count, check_finite
 from thermocomp.core.exceptions import SettingError
 from thermocomp.core.expression import Lag, Magnitude, Node, PacedLag, Power, scale_node, sum_weighted
-from thermocomp.core.model import ErrorModel, FloatArray
+from thermocomp.core.model import ErrorModel
 from thermocomp.core.pacedbank import Bank
 
 

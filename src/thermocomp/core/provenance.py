@@ -1,10 +1,13 @@
 """Metadata of a model: its origin, and the results of judging."""
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from statistics import median
 from typing import Literal
 
 from thermocomp.core.bounds import COEFFICIENT, check_between
+from thermocomp.core.exceptions import InputError
 from thermocomp.core.fingerprints import Prints
 from thermocomp.core.learned import Learned
 
@@ -149,3 +152,42 @@ class HonestError:
         other = "" if self.current or self.word != "unproven" else "older" if self.rules < RULES else "newer"
         why = f"judged by {other} rules: {self.reason}" if other else self.reason
         return f"{why}. Taken by {self.taken}" if self.taken else why
+
+    def may_lose(self, names: Sequence[str]) -> bool:
+        """Return whether the model was judged without these inputs and then leaves less error than no compensation.
+
+        This must hold for each input alone as well: a second failure must not re-enable a correction stopped by the
+        first one.
+
+        Parameters
+        ----------
+        names : sequence of str
+            In the order of the inputs.
+        """
+        return max(self.lost.get(key, math.inf) for key in (*names, ", ".join(names))) <= self.none_rms
+
+    def widening(self, names: Sequence[str]) -> float:
+        """Return the factor by which the error increases without these inputs, named in their order; at least 1."""
+        return max(1.0, self.lost.get(", ".join(names), 0.0) / self.rms) if self.rms else 1.0
+
+    def check_may_run(self, target: str) -> None:
+        """Raise `InputError` if the model of a target must not run; see `ErrorModel.check_may_run`."""
+        if self.word == "accepted":
+            return
+        if self.word == "refused":
+            raise InputError(f"model of {target} was refused and will not run: {self.reason}")
+        if not self.current:
+            raise InputError(f"model of {target} is unproven and runs in shadow only: {self.why}; fit it again")
+        if not self.taken:
+            raise InputError(
+                f"model of {target} is unproven and runs in shadow only: {self.why}. To approve its use "
+                'nevertheless: --accept-unproven "NAME, REASON", or model.taken("NAME, REASON") in Python'
+            )
+
+
+def read_approval(by: str) -> str:
+    """Return name and reason of a person who approves an unproven model; raise `InputError` if one is missing."""
+    name, _, reason = by.partition(",")
+    if not (name.strip() and reason.strip()):
+        raise InputError(f"{by!r} accepts an unproven model: expected a name and a reason, such as 'M. Weber, trial'")
+    return f"{name.strip()}, {reason.strip()}"

@@ -7,12 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core import lagbank
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.exceptions import InputError, ReadingError
 from thermocomp.core.inputs import Input
 from thermocomp.core.lineardynamic import LinearDynamic
-from thermocomp.core.model import BoolArray, ErrorModel, FloatArray, State
+from thermocomp.core.model import ErrorModel
 from thermocomp.core.paceddynamic import PacedDynamic
 from thermocomp.core.polynomial import Polynomial
+from thermocomp.core.state import State
 from thermocomp.core.terms import Term, TermTable, Variable
 from thermocomp.core.together import Together, TogetherState
 
@@ -97,7 +99,7 @@ class Stack:
         used: dict[int, list[int]] = {}  # taps by model
         for k, m in linear:
             mine = used[k] = []
-            for i, *row in zip(m.inputs, m._reference, *m._bounds, m._fade_span, strict=True):
+            for i, *row in zip(m.inputs, m._reference, *m._range, strict=True):
                 mine.append(taps.setdefault((i, m.support.margin, m.support.fade_over), len(taps)))
                 bounds += [row] if len(bounds) < len(taps) else []
             mixed = []

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.core.model import FloatArray
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.paceddynamic import PacedDynamic
 
 

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from thermocomp.api.base import Paged
 from thermocomp.api.explain import models_of
 from thermocomp.api.inputs import Given, Starts, recordings_of, starts_of, trouble_of
 from thermocomp.api.keywords import Listener, silent
-from thermocomp.api.results import Paged
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError, UnitError
 from thermocomp.core.model import ErrorModel

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.watch import Watch
+from thermocomp.judging.assessing import Judged
 from thermocomp.judging.metrics import rms
-from thermocomp.judging.replay import can_look, look_through, stack_watched
 from thermocomp.judging.results import Assessment
-from thermocomp.judging.study import Judged
+from thermocomp.judging.watched import can_look, look_through, stack_watched
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
 from thermocomp.runtime.watch import GOOD, MISSING, WORDS

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core.watch import Watch
-from thermocomp.judging.replay import given_zero, rows_until
+from thermocomp.judging.replay import rows_until
 from thermocomp.models.watching import find_watch
 from thermocomp.recordings.samples import Samples
 from thermocomp.runtime.watch import begin, look
@@ -106,7 +106,7 @@ def _go_through(
 ) -> None:
     """Replay a test with the sensors of each row of `cut` reading their zero; write the readings passed to `found`."""
     zero = samples.reference()[samples.test[mine[0]]][columns] if mine.size else np.empty(0)
-    state = begin(watch, given_zero(samples, columns, samples.test[mine[0]]) if mine.size else None, (len(cut),))
+    state = begin(watch, samples.given_zero(samples.test[mine[0]], columns) if mine.size else None, (len(cut),))
     for row in mine.tolist():
         values = np.where(cut, zero, samples.values[row, columns])
         state, found[:, row] = look(watch, state, float(samples.time[row]), values, resting=bool(samples.stands[row]))

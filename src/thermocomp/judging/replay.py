@@ -7,16 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core.correction import Limits
-from thermocomp.core.model import ErrorModel, State
-from thermocomp.core.watch import Watch
+from thermocomp.core.model import ErrorModel
+from thermocomp.core.state import State
 from thermocomp.core.zero import Zeroing, first_rows, robust_mean
 from thermocomp.judging.probing import Probed, Probings
-from thermocomp.recordings.recording import Recording
+from thermocomp.judging.watched import believe
 from thermocomp.recordings.samples import Samples
-from thermocomp.recordings.stacking import stack
-from thermocomp.recordings.starts import Start
 from thermocomp.runtime import batch
-from thermocomp.runtime.watch import WatchState, begin, look
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -84,8 +81,8 @@ def replay_compensated(
     probings : Probings, optional
         Made in the judged rows, from the first of each test on: the only displacements used, each from the next row on.
     widening : ndarray of shape (n_rows,), optional
-        Band widening that belongs to samples already passed by a watch: see `believe`. Default: the samples are first
-        passed through the model's own watch.
+        Band widening that belongs to samples already passed by a watch: see `thermocomp.judging.watched.believe`.
+        Default: the samples are first passed through the model's own watch.
 
     Returns
     -------
@@ -113,7 +110,7 @@ def replay_compensated(
             within and replace(within, reading_age=max(within.reading_age, step)),
             time,
             samples.values[mine][:, columns],
-            reference=given_zero(samples, columns, test),
+            reference=samples.given_zero(test, columns),
             resting=samples.stands[mine],
             anew=None if anew is None else int(np.flatnonzero(mine == anew)[0]),
             undriven=np.isinf(widening[mine]),
@@ -143,107 +140,6 @@ def replay_compensated(
         half_width=half_width[rows],
         probed=seen,
     )
-
-
-def believe(
-    model: ErrorModel, samples: Samples, rows: BoolArray, watched: Samples | None = None
-) -> tuple[Samples, FloatArray]:
-    """Return samples as passed by a model's watch, and the widening of its band, in the tests of `rows`.
-
-    Both are unchanged without a watch, or without the speeds it needs. Rows without a speed are passed on unchanged.
-
-    Parameters
-    ----------
-    model : ErrorModel
-    samples : Samples
-    rows : ndarray of bool of shape (n_rows,)
-    watched : Samples, optional
-        The same rows with all inputs of the model's watch, as recorded: see `stack_watched`. Values of failed sensors
-        are replaced.
-
-    Returns
-    -------
-    samples : Samples
-    widening : ndarray of shape (n_rows,)
-        See `ErrorModel.widening`; infinite where the model must not run and its correction is held.
-    """
-    widening, watch, seen = np.ones(len(samples)), model.watch, watched or samples
-    if watch is None or not can_look(watch, seen):
-        return samples, widening
-    names, values = [c.name for c in samples.inputs], samples.values.copy()
-    known = [i.name in names for i in watch.inputs]
-    places = [names.index(i.name) for i in watch.inputs if i.name in names]
-    fault, wider = np.zeros(len(watch.names), dtype=np.int8), 1.0
-    for test in np.unique(samples.test[rows]).tolist():
-        for row, state, let in look_through(watch, seen, test):
-            values[row, places] = let[known]
-            if (state.fault != fault).any():
-                fault = state.fault
-                failed = [n for n, f in zip(watch.names, fault.tolist(), strict=True) if f and n in model.sensors]
-                wider = 1.0
-                if failed:
-                    wider = model.widening(failed) if model.may_lose(failed) else np.inf
-            widening[row] = wider
-        fault, wider = np.zeros_like(fault), 1.0
-    return replace(samples, values=values), widening
-
-
-def stack_watched(
-    watch: Watch, target: str, recordings: Sequence[Recording], starts: Sequence[Start] | Start | None
-) -> Samples | None:
-    """Return all rows of recordings with the inputs of a watch, as recorded; None if there are no such inputs.
-
-    Parameters
-    ----------
-    watch : Watch
-    target : str
-        Any displacement channel, since samples must have one.
-    recordings : sequence of Recording
-    starts : Start or sequence of Start or None
-        Initial state of each recording.
-    """
-    known = [i.name for i in watch.inputs if all(r.has(i.name) for r in recordings)]
-    if not known:
-        return None
-    rezero = any(i.rezero for i in watch.inputs)
-    samples = stack(recordings, [target], known, rezero=rezero, zeroing=watch.zeroing, starts=starts)
-    called = zip(samples.inputs, known, strict=True)
-    return replace(samples, inputs=tuple(replace(channel, name=own) for channel, own in called))
-
-
-def can_look(watch: Watch, samples: Samples) -> bool:
-    """Return whether samples have the spindle speeds that a watch needs."""
-    names = [c.name for c in samples.inputs]
-    return all(i.name in names for i in watch.inputs if i.quantity != "temperature")
-
-
-def look_through(watch: Watch, samples: Samples, test: int) -> Iterator[tuple[int, WatchState, FloatArray]]:
-    """Replay a watch over a test; inputs of the watch that the samples lack are treated as missing.
-
-    Parameters
-    ----------
-    watch : Watch
-    samples : Samples
-        Samples with the speeds of the watch.
-    test : int
-
-    Yields
-    ------
-    row : int
-    state : WatchState
-        State after the reading.
-    let : ndarray of shape (n_inputs,)
-        Readings passed, in the order of the watch's inputs.
-    """
-    names = [c.name for c in samples.inputs]
-    known = [i.name in names for i in watch.inputs]
-    places = [names.index(i.name) for i in watch.inputs if i.name in names]
-    state = begin(watch, given_zero(samples, places, test) if all(known) else None)
-    for row in np.flatnonzero(samples.test == test).tolist():
-        given = np.full(len(watch.inputs), np.nan)
-        given[known] = samples.values[row, places]
-        state, let = look(watch, state, float(samples.time[row]), given, resting=bool(samples.stands[row]))
-        yield row, state, let
 
 
 def replay(model: ErrorModel, samples: Samples, rows: BoolArray) -> tuple[FloatArray, BoolArray]:
@@ -301,7 +197,7 @@ def walk(model: ErrorModel, samples: Samples, rows: BoolArray, disturb: Disturb 
         def read(k: int, zero: FloatArray = reference[test]) -> FloatArray:
             return values[k] if disturb is None else disturb(k, values[k], zero)
 
-        state, head = _begun(model, samples, mine[usable[mine]], given_zero(samples, columns, test), read)
+        state, head = _begun(model, samples, mine[usable[mine]], samples.given_zero(test, columns), read)
         last, waiting, there = samples.time[mine[0]], list[State](), list[FloatArray]()
         shift: FloatArray | float | None = None if window.size else 0.0
         for k, needed in zip(
@@ -383,12 +279,6 @@ def rows_until(
         _, known = first_rows(zeroing, samples.time[mine[own]], samples.stands[mine[own]])
         stop = max(stop, int(own[min(known, len(own) - 1)]) + 1) if len(own) else stop
     return mine[:stop]
-
-
-def given_zero(samples: Samples, columns: Sequence[int], test: int) -> FloatArray | None:
-    """Return the given zero of a test; None if the first readings determine it."""
-    given = samples.zero is not None and not np.isnan(samples.zero[test]).any()
-    return samples.reference()[test, columns] if given else None
 
 
 def _needed(model: ErrorModel, usable: BoolArray, wanted: BoolArray) -> BoolArray:

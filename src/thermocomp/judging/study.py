@@ -1,47 +1,27 @@
-"""Complete workflows: fit one method with its honest error, judge model files on recordings."""
+"""Fitting of one method, with its error on unseen data."""
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.inputs import Support
-from thermocomp.core.machine import Channel
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.provenance import RULES, HonestError
-from thermocomp.core.validity import Validity
 from thermocomp.judging import coverage
-from thermocomp.judging.compare import compare, split_by_cycle
-from thermocomp.judging.do_no_harm import Verdict
-from thermocomp.judging.guards import Guard, find_guard, let_fail
-from thermocomp.judging.judge import cap_alike_units, judge
-from thermocomp.judging.leaks import find_learned_rows
-from thermocomp.judging.pieces import explain
-from thermocomp.judging.probing import Probings
+from thermocomp.judging.compare import compare
+from thermocomp.judging.guards import find_guard
 from thermocomp.judging.refit import stress_written
-from thermocomp.judging.replay import are_absolute, believe, can_look, stack_watched
 from thermocomp.judging.results import Assessment, Comparison, Rules
-from thermocomp.judging.splits import Judging, Split, join_short_cycles, name_cycles
+from thermocomp.judging.splits import Judging
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.methods import deployable, expand
 from thermocomp.models.training import train
-from thermocomp.recordings.checks.sound import drop_unsound
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
-from thermocomp.recordings.stacking import stack
-from thermocomp.recordings.starts import Start, find_starts
-
-BoolArray = NDArray[np.bool_]
-FloatArray = NDArray[np.float64]
-
-
-def _silent(_: str) -> None:
-    pass
 
 
 @dataclass(frozen=True)
@@ -76,7 +56,7 @@ def fit(
     recordings: Sequence[Recording] = (),
     limits: Limits = Limits(),
     jobs: int = 1,
-    progress: Callable[[str], None] = _silent,
+    progress: Callable[[str], None] = lambda _: None,
 ) -> Fitted:
     """Judge a method on unseen blocks, then fit it to all rows.
 
@@ -179,255 +159,3 @@ def honest_error(overall: Assessment, judging: Judging) -> HonestError:
         harm_margin=overall.verdict.stated,
         lost={**tried.lost_rms, **tried.together_rms} if (tried := overall.robustness) else {},
     )
-
-
-@dataclass(frozen=True)
-class Judged:
-    """Model files judged on recordings.
-
-    Parameters
-    ----------
-    models : tuple of ErrorModel
-    assessments : tuple of Assessment
-        Per model and cycle, and per model over all cycles.
-    seen : tuple of str
-        Names of recordings to which a model was fitted unchanged: not judged on if there are others.
-    validity : Validity or None
-        Conditions covered by the thermal cycles of these recordings.
-    starts : tuple of (str, Start)
-        Names of the recordings, and their initial states.
-    """
-
-    models: tuple[ErrorModel, ...]
-    assessments: tuple[Assessment, ...]
-    seen: tuple[str, ...]
-    validity: Validity | None = None
-    starts: tuple[tuple[str, Start], ...] = ()
-
-    def overall(self) -> tuple[Assessment, ...]:
-        """Return one assessment per model, over all cycles."""
-        return tuple(a for a in self.assessments if a.overall)
-
-
-def assess(
-    models: Sequence[ErrorModel],
-    recordings: Sequence[Recording],
-    *,
-    rules: Rules = Rules(),
-    limits: Limits = Limits(),
-    starts: Start | Sequence[Start] | None = None,
-    probings: Probings | None = None,
-    progress: Callable[[str], None] = _silent,
-) -> Judged:
-    """Judge frozen models on recordings: per cycle, with noise, with lost sensors, outside the trained range.
-
-    Rows on which a model was trained are left out and counted, whichever file contains them; if there are no other
-    rows, the model is refused: see `thermocomp.recordings.fingerprints`.
-
-    Parameters
-    ----------
-    models : sequence of ErrorModel
-    recordings : sequence of Recording
-        With the inputs and targets of the models.
-    rules : Rules
-        Rules stated before judging.
-    limits : Limits
-        Limits of the judged compensator.
-    starts : Start or sequence of Start, optional
-        Initial state of each recording, or of all of them. Default: determined from the recordings.
-    probings : Probings, optional
-        Made in the judged rows: see `thermocomp.runtime.adaptation`.
-    progress : callable
-        Called with a line of text per model.
-
-    Returns
-    -------
-    Judged
-
-    Raises
-    ------
-    InputError
-        There is no model, a model to be probed was never judged, a channel that all models need is missing from the
-        recordings, or the initial state of a recording is unknown. A model that fails alone is refused.
-    """
-    if not models:
-        raise InputError("no model given: name a model file, or give at least one model")
-    if probings and (unknown := [m.target for m in models if m.honest_error is None]):
-        raise InputError(
-            f"model of {', '.join(unknown)} was never judged on cycles it has not seen: how informative a probing is "
-            "next to it is not known; 'thermocomp fit' judges what it fits"
-        )
-    found: list[Assessment] = []
-    covered = None
-    hashes = {h for m in models for h in _hashes(m)}
-    seen = tuple(r.name for r in recordings if r.fingerprint in hashes)
-    if starts is None:
-        starts = find_starts(
-            recordings,
-            _known_targets(models, recordings),
-            zeroing=models[0].zeroing,
-            absolute=are_absolute(models),
-        )
-    told: tuple[tuple[str, Start], ...] = ()
-    guards: list[Guard] = []
-    errors: list[Exception] = []
-    for model in models:
-        progress(f"{model.target} {model.family}")
-        try:
-            samples = _stacked(model, recordings, starts)
-            watched = None if model.watch is None else stack_watched(model.watch, model.target, recordings, starts)
-            samples = _called_as_in(model, samples)
-            known, every = find_learned_rows(model, samples), np.ones(len(samples), np.bool_)
-            samples, widening = believe(model, samples, every, watched)
-            guard = _guard(model, samples, watched, guards)
-            looked = model.watch is not None and can_look(model.watch, watched or samples)
-            names = model.watch.names if model.watch is not None and looked else ()
-            overall, judged = _assess(model, samples, known, rules, limits, probings, widening, guard, names)
-            covered = covered or coverage.find_validity(samples, judged, recordings)
-            cut = [replace(a, learned=0) for a in split_by_cycle(overall)]
-        except Exception as e:  # noqa: BLE001 - whatever fails for one model, the other models keep their results
-            errors.append(e)
-            found.append(_refused(model, explain(e)))
-            continue
-        told = tuple(zip(samples.test_names, samples.starts, strict=True))
-        found += [*cut, overall] if len(cut) > 1 else [overall]
-    if len(errors) == len(models):
-        raise errors[0]
-    return Judged(models=tuple(models), assessments=tuple(found), seen=seen, validity=covered, starts=told)
-
-
-def _known_targets(models: Sequence[ErrorModel], recordings: Sequence[Recording]) -> list[Channel]:
-    """Return the targets available in the first recording; there must be at least one."""
-    found = []
-    for recording in recordings[:1]:
-        for model in models:
-            with suppress(InputError):
-                found.append(recording.channel(model.target))
-        if not found:
-            recording.channel(models[0].target)
-    return found
-
-
-def _stacked(model: ErrorModel, recordings: Sequence[Recording], starts: Start | Sequence[Start]) -> Samples:
-    """Return the data of recordings that a model needs, without faulty rows."""
-    samples = stack(
-        recordings,
-        [model.target],
-        [i.name for i in model.inputs],
-        rezero=any(i.rezero for i in model.inputs),
-        zeroing=model.zeroing,
-        starts=starts,
-    )
-    return drop_unsound(samples, recordings)
-
-
-def _refused(model: ErrorModel, why: str) -> Assessment:
-    """Return the assessment of a model without data for judging."""
-    nothing, nowhere = np.empty(0), np.empty(0, np.intp)
-    return Assessment(
-        model=_name(model),
-        target=model.target,
-        block="all cycles",
-        measured=nothing,
-        predicted=nothing,
-        row=nowhere,
-        test=nowhere,
-        cycle=nowhere,
-        verdict=Verdict((), refusal=why),
-        sensors=(),
-        fit_s=0.0,
-        n_effective=float("nan"),
-        failure=why,
-        overall=True,
-    )
-
-
-def _name(model: ErrorModel) -> str:
-    return model.provenance.method if model.provenance else model.family
-
-
-def _called_as_in(model: ErrorModel, samples: Samples) -> Samples:
-    """Return samples whose channels have the names used in the model: names in a file may differ."""
-    (target,) = samples.targets
-    inputs = zip(samples.inputs, model.inputs, strict=True)
-    return replace(
-        samples,
-        targets=(replace(target, name=model.target),),
-        inputs=tuple(replace(channel, name=own.name) for channel, own in inputs),
-    )
-
-
-def _hashes(model: ErrorModel) -> tuple[str, ...]:
-    return model.provenance.data_sha256 if model.provenance else ()
-
-
-def _assess(
-    model: ErrorModel,
-    samples: Samples,
-    known: BoolArray,
-    rules: Rules,
-    limits: Limits,
-    probings: Probings | None,
-    widening: FloatArray,
-    guard: Guard | None,
-    looked_after: Sequence[str],
-) -> tuple[Assessment, Judging]:
-    """Judge a model on unseen rows (not `known`); on all rows if there are no others, with a caveat.
-
-    Returns
-    -------
-    Assessment
-    Judging
-        Scheme with its units.
-    """
-    judged = np.isfinite(samples.deviations[:, 0])
-    n, of = int((known & judged).sum()), int(judged.sum())
-    caveat = ""
-    if 0 < n == of:
-        seen = [name for k, name in enumerate(samples.test_names) if samples.hashes[k] in _hashes(model)]
-        why = (
-            f"fitted to {', '.join(seen)}"
-            if len(seen) == len(samples.test_names)
-            else f"{n:,} of {of:,} rows were learned from"
-        )
-        caveat, known = f"no honest test: {why}; judge it on another recording", np.zeros_like(known)
-    split = Split("all cycles", np.zeros(len(samples), np.bool_), ~known, stretch=_goes_on(model, samples, known))
-    found = judge(
-        _name(model), model, samples, split,
-        rules=rules, limits=limits, guard=guard, probings=probings, widening=widening, watched=looked_after,
-    )  # fmt: skip
-    judging = units(samples, ~known)
-    caps = (*found.verdict.caps, *cap_alike_units(samples, judging))
-    return replace(found, verdict=replace(found.verdict, caps=caps), overall=True, caveat=caveat, learned=n), judging
-
-
-def _guard(model: ErrorModel, samples: Samples, watched: Samples | None, known: list[Guard]) -> Guard | None:
-    """Return the readings that a model's watch passes while sensors fail; shared by models of one file (`known`)."""
-    watch = model.watch
-    if watch is None or watched is None or not can_look(watch, watched):
-        return None
-    have = [c.name for c in watched.inputs]
-    if any(i.name not in have for i in watch.inputs):
-        return None
-    guard = next((g for g in known if g.watch is watch or g.watch == watch), None)
-    if guard is None:
-        every = np.ones(len(watched), np.bool_)
-        guard = let_fail(watch, believe(model, watched, every)[0], every)
-        known.append(guard)
-    own = [c.name for c in samples.inputs]
-    return guard.among([own.index(name) if name in own else -1 for name in have])
-
-
-def _goes_on(model: ErrorModel, samples: Samples, known: BoolArray) -> bool:
-    """Return whether the judged rows continue the training data, so that their level is that of the training part."""
-    judged = np.unique(samples.test[~known & np.isfinite(samples.deviations[:, 0])])
-    earlier = {r.fingerprint for k in judged for r in (samples.starts[k].earlier if samples.starts else ())}
-    return bool(np.isin(samples.test[known], judged).any() or not earlier.isdisjoint(_hashes(model)))
-
-
-def units(samples: Samples, rows: BoolArray | None = None) -> Judging:
-    """Return the thermal cycles of recordings, or of some of their rows, as units; see `join_short_cycles`."""
-    none = np.zeros(len(samples), dtype=np.bool_)
-    cycle = samples.cycle if rows is None else np.where(rows, samples.cycle, -1)
-    blocks = join_short_cycles(cycle, samples.test)
-    return Judging("all cycles", tuple(Split(name_cycles(samples, b), none, np.isin(cycle, b)) for b in blocks))

@@ -11,8 +11,9 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.nc.revision import outcome
 from thermocomp.nc.revision.job import Tell
 from thermocomp.nc.revision.job import revise as revise_program
-from thermocomp.nc.revision.options import Controller, Drifting, Starting, Timing, Way
+from thermocomp.nc.revision.options import Controller, Timing, Way
 from thermocomp.nc.revision.prepare import prepare_job
+from thermocomp.nc.revision.thermaloptions import Drifting, Starting
 
 #: groups of options of the command; their fields are the keywords of `revise`
 GROUPS = (Drifting, Starting, Way, Controller, Timing)

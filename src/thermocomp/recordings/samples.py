@@ -107,6 +107,11 @@ class Samples:
             zero[k] = np.where(self.rezeroed, robust_mean(self.values[rows[:count]]), 0.0)
         return zero
 
+    def given_zero(self, test: int, inputs: Sequence[int]) -> FloatArray | None:
+        """Return the given zero of some inputs in a test; None if the first readings determine it."""
+        given = self.zero is not None and not np.isnan(self.zero[test]).any()
+        return self.reference()[test, inputs] if given else None
+
     @property
     def stands(self) -> BoolArray:
         """Rows in which the spindle is known to be stopped."""

@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 from thermocomp.judging import coverage
+from thermocomp.judging.assessing import Judged
 from thermocomp.judging.diagnostics import Collinearity
 from thermocomp.judging.results import Assessment, Comparison
 from thermocomp.judging.splits import Judging
-from thermocomp.judging.study import Judged
 from thermocomp.recordings.recording import Recording
 from thermocomp.report import faults, figures, probings
 from thermocomp.report.html import draw_runs, page

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 
 from thermocomp.core.correction import Limits
 from thermocomp.core.shown import shorten
+from thermocomp.judging.assessing import Judged
 from thermocomp.judging.faultlog import Cost, Fault, FaultLog, find_costs, find_faults
-from thermocomp.judging.study import Judged
 from thermocomp.recordings.recording import Recording
 from thermocomp.report.drawing import Drawn, add_legend, drawing, name_ticks, svg
 from thermocomp.report.figures import LETTERS, LONGEST, MEASURED, POINTS, PREDICTED, SHADE, FloatArray

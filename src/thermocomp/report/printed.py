@@ -3,12 +3,13 @@
 from collections.abc import Iterator, Sequence
 
 from thermocomp.judging import coverage
+from thermocomp.judging.assessing import Judged
 from thermocomp.judging.choice import Choice, Table
 from thermocomp.judging.do_no_harm import JudgedUnit
 from thermocomp.judging.faultlog import find_faults
 from thermocomp.judging.results import Assessment, Comparison
 from thermocomp.judging.robustness import Robustness
-from thermocomp.judging.study import Fitted, Judged
+from thermocomp.judging.study import Fitted
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.starts import Start
 from thermocomp.report import records

@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from thermocomp.core.shown import shorten
+from thermocomp.judging.assessing import Judged
 from thermocomp.judging.results import Assessment
-from thermocomp.judging.study import Judged
 from thermocomp.recordings.recording import Recording
 from thermocomp.report.drawing import Drawn, add_legend, drawing, svg
 from thermocomp.report.figures import LONGEST, MEASURED, NONE, POINTS, PREDICTED, clock

@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from thermocomp.core.model import FloatArray, State
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.reading import Reading
+from thermocomp.core.state import State
 from thermocomp.core.zero import Gathered, robust_mean
 from thermocomp.runtime.group import Group
 

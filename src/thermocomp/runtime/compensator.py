@@ -11,9 +11,8 @@ reading onwards: it measures the error of the models (`thermocomp.runtime.adapta
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,29 +20,25 @@ from numpy.typing import ArrayLike
 from thermocomp.core.correction import Correction, Deviation, Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Machine
-from thermocomp.core.model import ErrorModel, State
+from thermocomp.core.model import ErrorModel
 from thermocomp.core.position import PositionModel
 from thermocomp.core.reading import Reading
+from thermocomp.core.state import State
 from thermocomp.core.watch import Watch
 from thermocomp.core.zero import Gathered
 from thermocomp.runtime.adaptation import Probing
 from thermocomp.runtime.advance import advance
 from thermocomp.runtime.clocking import place
-from thermocomp.runtime.gate import explain_implausible, is_number
+from thermocomp.runtime.driving import drive, rest, travel_time
+from thermocomp.runtime.gate import explain_implausible
 from thermocomp.runtime.geometry.straight import best_lines
 from thermocomp.runtime.geometry.volumetric import VolumetricModel
 from thermocomp.runtime.group import Group
 from thermocomp.runtime.identity import remember, sift
-from thermocomp.runtime.limits import fade, limit_line
 from thermocomp.runtime.lines import DeviationLine, constant, evaluate, straight
 from thermocomp.runtime.lookout import Lookout
 from thermocomp.runtime.state import Compensated, CompensatorState, Reference, Status
 from thermocomp.runtime.watch import WatchState, begin
-
-#: after a restart, a correction has caught up once it differs by no more than this from the output of its models [um]
-ARRIVED = 0.1
-
-ACTIVE = Status("active")
 
 
 @dataclass(frozen=True, eq=False)
@@ -280,7 +275,7 @@ class Compensator:
             state, said = self.wait(state, tick, why)
             return state, said._replace(refused=dict.fromkeys(probings or (), f"its reading is rejected: {why}"))
         dt = 0.0 if state.time is None else instant.time - state.time
-        travel = self._travel(state, tick)
+        travel = travel_time(state, tick, self.limits)
         stepped = advance(self.groups, state.models, state.gathered, reading, instant.time, dt)
         failed, corrections, learned = (
             Lookout.failed(self._lookouts, state.watches),
@@ -310,14 +305,14 @@ class Compensator:
                 learned[target] = answer.learned
             if probing is not None:
                 refused[target], moved[target] = answer.refused, answer.moved
-            corrections[target], states_of[target] = self._drive(state, target, answer.deviation, travel)
+            corrections[target], states_of[target] = drive(state, target, line, answer.deviation, travel, self.limits)
             arrived &= states_of[target].word != "restarting"
-        rest = self._idle(state, corrections, tick, held, driven=states_of)
+        left = rest(state, corrections, tick, self.lines, self.limits, held, driven=states_of)
         new = state._replace(
             models=stepped.states,
-            corrections=rest.corrections,
-            clock=rest.clock,
-            idle=rest.idle,
+            corrections=left.corrections,
+            clock=left.clock,
+            idle=left.idle,
             gathered=stepped.gathered,
             learned=learned,
             probed=remember(state, {t: fresh[t] for t in moved}, instant.time) if moved else state.probed,
@@ -326,12 +321,12 @@ class Compensator:
             away=None if arrived else state.away,
             time=instant.time,
             origin=instant.origin,
-            taken=rest.clock,
+            taken=left.clock,
         )
         refused = known_before | {t: why for t, why in refused.items() if why}
-        every = states_of | rest.states
+        every = states_of | left.states
         return new, Compensated(
-            corrections=rest.corrections,
+            corrections=left.corrections,
             rejected="",
             outside=stepped.outside,
             failed=failed,
@@ -358,34 +353,19 @@ class Compensator:
         state : CompensatorState
         said : Compensated
         """
-        rest = self._idle(state, state.corrections, tick, dict.fromkeys(self.lines, why))
-        new = state._replace(corrections=rest.corrections, clock=rest.clock, idle=rest.idle)
+        left = rest(state, state.corrections, tick, self.lines, self.limits, dict.fromkeys(self.lines, why))
+        new = state._replace(corrections=left.corrections, clock=left.clock, idle=left.idle)
         failed = Lookout.failed(self._lookouts, state.watches)
         return new, Compensated(
-            corrections=rest.corrections,
+            corrections=left.corrections,
             rejected=why,
             outside=(),
             failed=failed,
-            states=rest.states,
+            states=left.states,
             deviations={},
             half_widths={},
             refused={},
         )
-
-    def _drive(
-        self, state: CompensatorState, target: str, deviation: Deviation, travel: float
-    ) -> tuple[Correction, Status]:
-        """Return the correction for a deviation, within the limits, and the status of the target."""
-        before, line, order = state.corrections[target], self.lines[target], state.orders.get(target)
-        wanted = Correction.opposing(deviation)
-        if order is not None and order.word in ("holding", "suspended"):
-            return before, order
-        if order is not None:  # shadow
-            return limit_line(Correction(0.0), before, line.travel, travel, replace(self.limits, dead_band=0.0)), order
-        after = limit_line(wanted, before, line.travel, travel, self.limits)
-        if state.away is not None and _apart(wanted, after, line.travel) > max(ARRIVED, self.limits.dead_band):
-            return after, Status("restarting", f"nothing ran for {state.away:.0f} s; probe, or set the zero again")
-        return after, ACTIVE
 
     def _believe(self, state: CompensatorState, reading: Reading, time: float) -> tuple[CompensatorState, Reading]:
         """Return the reading with substitutes for temperatures that are not trusted."""
@@ -397,50 +377,6 @@ class Compensator:
             return state, reading
         return state._replace(watches=tuple(states)), Reading(reading.time, values, reading.positions)
 
-    def _travel(self, state: CompensatorState, tick: float) -> float:
-        """Return the time that counts in a step; outages and rejected readings do not accumulate travel."""
-        if state.clock is None or not is_number(tick):
-            return 0.0
-        return max(0.0, min(tick - state.clock, self.limits.reading_age))
-
-    def _idle(
-        self,
-        state: CompensatorState,
-        corrections: dict[str, Correction],
-        tick: float,
-        held: dict[str, str],
-        driven: Collection[str] = (),
-    ) -> "_Idle":
-        """Fade corrections that have not been driven for longer than the hold time; return their status."""
-        # each step counts for at most the maximum age of a reading: a clock jump does not cause fading
-        travel = self._travel(state, tick)
-        clock = state.clock if not is_number(tick) else tick if state.clock is None else max(state.clock, tick)
-        corrections, states = dict(corrections), dict[str, Status]()
-        idle = {t: s for t, s in state.idle.items() if t not in driven}
-        for target, why in held.items():
-            order = state.orders.get(target)
-            if order is not None and order.word in ("holding", "suspended"):
-                states[target] = order
-                continue
-            idle[target] = idle.get(target, 0.0) + travel
-            ends = self.lines[target].travel
-            corrections[target] = fade(corrections[target], ends, idle[target], travel, self.limits)
-            if order is not None:
-                states[target] = order
-                continue
-            word: Literal["fading", "holding"] = "fading" if idle[target] > self.limits.hold else "holding"
-            states[target] = Status(word, f"not driven for {idle[target]:.0f} s: {why}")
-        return _Idle(corrections, clock, idle, states)
-
-
-class _Idle(NamedTuple):
-    """Corrections after a step, and the status of those not driven; see `CompensatorState`."""
-
-    corrections: dict[str, Correction]  #: of all targets or axes
-    clock: float | None
-    idle: dict[str, float]
-    states: dict[str, Status]  #: of those that are not driven
-
 
 def _unjudged(models: Sequence[ErrorModel], failed: Collection[str]) -> str:
     """Return the reason why models must not drive a correction without the failed sensors; empty if they may do so."""
@@ -449,8 +385,3 @@ def _unjudged(models: Sequence[ErrorModel], failed: Collection[str]) -> str:
         if lost and not model.may_lose(lost):
             return f"{model.target} does harm without {' and '.join(lost)}, or was not judged without"
     return ""
-
-
-def _apart(one: Correction, other: Correction, travel: tuple[float, float]) -> float:
-    """Return the largest difference of two corrections along the travel [um]."""
-    return max(abs(one.at(p) - other.at(p)) for p in travel)

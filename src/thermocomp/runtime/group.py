@@ -5,9 +5,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.bounds import GAP
-from thermocomp.core.model import ErrorModel, FloatArray, State
+from thermocomp.core.model import ErrorModel
 from thermocomp.core.paceddynamic import PacedDynamic
+from thermocomp.core.state import State
 from thermocomp.core.together import Together, TogetherState
 from thermocomp.runtime.gate import Ranges
 

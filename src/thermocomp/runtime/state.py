@@ -6,7 +6,7 @@ from types import MappingProxyType
 from typing import Literal, NamedTuple
 
 from thermocomp.core.correction import Correction, Deviation
-from thermocomp.core.model import State
+from thermocomp.core.state import State
 from thermocomp.core.zero import Gathered
 from thermocomp.runtime.adaptation import Adaptation
 from thermocomp.runtime.watch import WatchState

@@ -8,9 +8,9 @@ from typing import Any
 
 import pandas as pd
 
+from thermocomp.api.base import Paged
 from thermocomp.api.inputs import judging_of, recordings_of, trouble_of
 from thermocomp.api.keywords import Listener, settings_of, silent
-from thermocomp.api.results import Paged
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Machine
 from thermocomp.core.position import PositionModel

@@ -16,8 +16,9 @@ from thermocomp.cli.terminal import console, print_table, words
 from thermocomp.nc.revision import outcome
 from thermocomp.nc.revision.job import Done, Job
 from thermocomp.nc.revision.job import revise as revise_program
-from thermocomp.nc.revision.options import Controller, Drifting, Starting, Timing, Way
+from thermocomp.nc.revision.options import Controller, Timing, Way
 from thermocomp.nc.revision.prepare import prepare_job
+from thermocomp.nc.revision.thermaloptions import Drifting, Starting
 from thermocomp.nc.rewrite.course import Bound
 from thermocomp.report.layout import Column, Layout
 

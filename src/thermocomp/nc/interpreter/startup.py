@@ -4,8 +4,8 @@ from typing import Final
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.nc.interpreter.block import Modal, Setup
-from thermocomp.nc.parser.line import Word
-from thermocomp.nc.parser.tokens import Controller, read_line
+from thermocomp.nc.parser.line import Controller, Word
+from thermocomp.nc.parser.tokens import read_line
 
 _PATHS: Final = {61.0: "G61", 61.1: "G61.1", 64.0: "G64"}
 _RETRACTS: Final = {98.0: "G98", 99.0: "G99"}

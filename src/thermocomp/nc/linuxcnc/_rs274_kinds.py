@@ -1,4 +1,4 @@
-"""Canonical calls reported by `_rs274_child.py`, and their layout in its blocks: standard library only."""
+"""Canonical calls reported by `_rs274_canon.py`, and their layout in its blocks: standard library only."""
 
 import ctypes
 import struct
@@ -52,6 +52,22 @@ TOLD: dict[str, tuple[str, tuple[Any, ...]]] = {
     "_Z20CLEAR_AUX_OUTPUT_BITi": ("m65", (INT,)),
     "_Z23SET_MOTION_OUTPUT_VALUEid": ("m67", (INT, D)),
     "_Z20SET_AUX_OUTPUT_VALUEid": ("m68", (INT, D)),
+}
+#: other functions that are redirected: mangled name -> method of the receiver, types of the result and the arguments
+REDIRECTED: dict[str, tuple[str, tuple[Any, ...]]] = {
+    "_Z22START_SPEED_FEED_SYNCHidb": ("synchronised", (None, INT, D, B)),
+    "_Z20SET_TOOL_TABLE_ENTRYii7EmcPosedddi": ("tool_stored", (None, INT, INT, Pose, D, D, D, INT)),
+    "fopen64": ("opened", (P, TEXT, TEXT)),
+    "fgets": ("line_read", (P, P, INT, P)),
+    "_Z7COMMENTPKc": ("commented", (None, TEXT)),  # the module only handles ASCII
+    "_Z7MESSAGEPc": ("messaged", (None, TEXT)),
+    "_Z18CHANGE_TOOL_NUMBERi": ("change_tool_number", (None, INT)),
+    "_Z9RIGID_TAPidddd": ("tapped", (None, INT, D, D, D, D)),
+    "_Z4WAITiiid": ("waited", (INT, INT, INT, INT, D)),
+    "_Z16USE_LENGTH_UNITS11CANON_UNITS": ("united", (None, INT)),
+    "_Z23SET_MOTION_CONTROL_MODE17CANON_MOTION_MODEd": ("pathed", (None, INT, D)),
+    "_Z22SET_NAIVECAM_TOLERANCEd": ("naive", (None, D)),
+    "_Z10NURBS_FEEDiSt6vectorI13CONTROL_POINTSaIS0_EEj": ("curved", (None, INT, P, ctypes.c_uint)),
 }
 
 

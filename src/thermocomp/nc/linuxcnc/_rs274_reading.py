@@ -21,6 +21,8 @@ LOOK = 1024
 MOST_OF_LINE = 100_000
 MOST_CALLS = 5_000_000
 CALLS = 20
+#: processor time after which a program without output is refused [s]
+MOST_SILENT = 20.0
 #: number of lines then recorded to find the loop; fewer if lines are slow
 WATCHED = 20_000
 WATCHED_SLOW = 4_000
@@ -61,6 +63,7 @@ class ProgramReading:
         self.acted = self.calls = self.before = 0  # lines and calls before the latest acting line; total calls
         self.most_calls = CALLS * lines + MOST_CALLS
         self.watched: list[tuple[int, bool]] = []
+        self.told, self.last = 0, 0.0  # number of records at the last check, and when it last changed [s]
 
     def check_file(self, name: bytes, *, write: bool) -> None:
         """Refuse a pipe, a device, or a file outside the folders, resolving links and ``..``."""
@@ -119,6 +122,15 @@ class ProgramReading:
             return f"this line makes more than {MOST_OF_LINE:,} moves: write fewer repeats (L) or larger pecks (Q)"
         if self.calls > self.most_calls:
             return f"more than {self.most_calls:,} moves have been made up to here: let one program do less"
+        return None
+
+    def check_output(self, told: int) -> str | None:
+        """Return the reason for refusal if the number of records has not changed for too long."""
+        now = time.process_time()
+        if told != self.told:
+            self.told, self.last = told, now
+        elif now - self.last > MOST_SILENT:
+            return f"it has run for {MOST_SILENT:.0f} s without output: check the program for an endless loop"
         return None
 
     def find_loop(self) -> int:

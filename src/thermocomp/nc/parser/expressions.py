@@ -2,21 +2,18 @@
 
 Only known values are used: parameters set by the program itself or known to the caller. All others, such as probe
 results, offsets and positions, are unknown, and an expression that needs one is refused.
-
-Operators of LinuxCNC, by increasing precedence, left-associative: AND OR XOR; EQ NE GT GE LT LE; ``+ -``;
-``* / MOD``; ``**``; a sign belongs to the following value, so ``-2 ** 2`` is 4. Fanuc: comparisons; ``+ - OR XOR``;
-``* / MOD AND``.
 """
 
 import math
 import operator
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from typing import Literal
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.nc.parser.line import Assignment
+from thermocomp.nc.parser.operators import FANUC_FUNCTIONS, FUNCTIONS, OPERATORS, REFUSED_BY_FANUC, Binary
 from thermocomp.nc.parser.systemparameters import explain_unset, machine_meaning
 
 #: maximum nesting depth of brackets; that of a control is about 5 (Fanuc)
@@ -28,134 +25,12 @@ _NAME = re.compile(r"<([^<>]*)>")
 _FUNCTION = re.compile(r"[a-z]+(?=\[)")
 _OPERATOR = re.compile(r"\*\*|[-+*/]|mod|and|xor|or|eq|ne|gt|ge|lt|le")
 
-#: relative difference below which a Fanuc may regard two numbers as equal
-_ROUNDED = 1e-8
-
 # most expressions in loops: one value, or two values and an operator
 _OPERAND = r"(?:#([1-9][0-9]*)|([0-9]+\.?[0-9]*|\.[0-9]+))"
 _SIMPLE = re.compile(rf"(\[?){_OPERAND}(?:({_OPERATOR.pattern}){_OPERAND})?(\]?)")
 _ALONE = re.compile(r"#([1-9][0-9]*)")
 
 Key = int | str  # number or name of a parameter
-Binary = Callable[[float, float], float]
-
-
-def _modulo(a: float, b: float) -> float:
-    rest = math.fmod(a, b)
-    return rest + abs(b) if rest < 0 else rest
-
-
-def _equal(a: float, b: float) -> float:
-    return float(abs(a - b) < 1e-4)
-
-
-def _round(a: float) -> float:
-    return math.copysign(math.floor(abs(a) + 0.5), a)
-
-
-def _angle(a: float) -> float:
-    if abs(a) > 1e9:  # fractional digits are lost
-        raise ValueError(f"an angle of {a:g} degrees is out of range")
-    return math.radians(a)
-
-
-def _tangent(a: float) -> float:
-    if abs(math.cos(_angle(a))) < 1e-9:
-        raise ValueError(f"TAN of {a:g} degrees is undefined")
-    return math.tan(_angle(a))
-
-
-def _sure(what: Binary) -> Binary:
-    """Wrap a comparison to refuse numbers that differ by rounding only: controls may disagree on the result."""
-
-    def compared(a: float, b: float) -> float:
-        if a != b and abs(a - b) <= _ROUNDED * max(abs(a), abs(b)):
-            raise ValueError(f"{a:.12g} and {b:.12g} differ by rounding only; compare with a value half a step away")
-        return float(what(a, b))
-
-    return compared
-
-
-def _sure_whole(what: Callable[[float], float]) -> Callable[[float], float]:
-    def cut(a: float) -> float:
-        if a != round(a) and abs(a - round(a)) <= _ROUNDED * max(abs(a), 1.0):
-            raise ValueError(f"FIX or FUP of {a:.12g}, which is within rounding of a whole number")
-        return what(a)
-
-    return cut
-
-
-def _sure_half(a: float) -> float:
-    rest = abs(a) % 1.0
-    if rest != 0.5 and abs(rest - 0.5) <= _ROUNDED * max(abs(a), 1.0):
-        raise ValueError(f"ROUND of {a:.12g}, which is within rounding of a half")
-    return math.copysign(math.floor(abs(a) + 0.5), a)
-
-
-def _bits(what: Callable[[int, int], int]) -> Binary:
-    def on_integers(a: float, b: float) -> float:
-        if a != int(a) or b != int(b) or min(a, b) < 0:
-            raise ValueError(f"AND, OR and XOR of {a:g} and {b:g}: they need whole numbers")
-        return float(what(int(a), int(b)))
-
-    return on_integers
-
-
-# by name: precedence and function
-_LINUXCNC: dict[str, tuple[int, Binary]] = {
-    "and": (1, lambda a, b: float(a != 0 and b != 0)),
-    "or": (1, lambda a, b: float(a != 0 or b != 0)),
-    "xor": (1, lambda a, b: float((a != 0) != (b != 0))),
-    "eq": (2, _equal),
-    "ne": (2, lambda a, b: 1.0 - _equal(a, b)),
-    "gt": (2, operator.gt),
-    "ge": (2, operator.ge),
-    "lt": (2, operator.lt),
-    "le": (2, operator.le),
-    "+": (3, operator.add),
-    "-": (3, operator.sub),
-    "*": (4, operator.mul),
-    "/": (4, operator.truediv),
-    "mod": (4, _modulo),
-    "**": (5, math.pow),
-}
-_FANUC: dict[str, tuple[int, Binary]] = {
-    **{name: (2, _sure(getattr(operator, name))) for name in ("gt", "ge", "lt", "le", "eq", "ne")},
-    "+": (3, operator.add),
-    "-": (3, operator.sub),
-    "or": (3, _bits(operator.or_)),
-    "xor": (3, _bits(operator.xor)),
-    "*": (4, operator.mul),
-    "/": (4, operator.truediv),
-    "mod": (4, math.fmod),
-    "and": (4, _bits(operator.and_)),
-}
-_OPERATORS = {"linuxcnc": _LINUXCNC, "fanuc": _FANUC}
-
-_FUNCTIONS: dict[str, Callable[[float], float]] = {
-    "abs": abs,
-    "acos": lambda a: math.degrees(math.acos(a)),
-    "asin": lambda a: math.degrees(math.asin(a)),
-    "cos": lambda a: math.cos(_angle(a)),
-    "exp": math.exp,
-    "fix": math.floor,
-    "fup": math.ceil,
-    "ln": math.log,
-    "round": _round,
-    "sin": lambda a: math.sin(_angle(a)),
-    "sqrt": math.sqrt,
-    "tan": _tangent,
-}
-# differences of Fanuc: FIX truncates, FUP rounds away from zero
-_FANUC_FUNCTIONS: dict[str, Callable[[float], float]] = {
-    "fix": _sure_whole(math.trunc),
-    "fup": _sure_whole(lambda a: math.copysign(math.ceil(abs(a)), a)),
-    "round": _sure_half,
-}
-_REFUSED_BY_FANUC = {
-    "round": "ROUND in a word rounds to the control's least increment, which the program does not define",
-    "exists": "only LinuxCNC has EXISTS",
-}
 
 
 class Parameters:
@@ -262,10 +137,10 @@ def _read_simple(
     found = _SIMPLE.fullmatch(_BLANKS.sub("", text).lower())
     if found is None or bool(found[1]) != bool(found[7]) or not (found[1] or controller == "fanuc" or not found[4]):
         return None
-    if found[4] and found[4] not in _OPERATORS[controller]:
+    if found[4] and found[4] not in OPERATORS[controller]:
         return None
     operands = [int(key) if key else float(number or 0.0) for key, number in (found.group(2, 3), found.group(5, 6))]
-    return operands[0], _OPERATORS[controller][found[4]][1] if found[4] else None, operands[1]
+    return operands[0], OPERATORS[controller][found[4]][1] if found[4] else None, operands[1]
 
 
 class _Reader:
@@ -278,7 +153,7 @@ class _Reader:
         self.place = 0
         self.depth = 0
         self.parameters = parameters
-        self.operators = _OPERATORS[parameters.controller]
+        self.operators = OPERATORS[parameters.controller]
 
     def takes(self, mark: str) -> bool:
         found = self.text.startswith(mark, self.place)
@@ -371,11 +246,11 @@ class _Reader:
 
     def function(self, name: str) -> float:
         fanuc = self.parameters.controller == "fanuc"
-        if fanuc and name in _REFUSED_BY_FANUC and (self.word or name != "round"):
-            raise InputError(f"in '{self.written}': {_REFUSED_BY_FANUC[name]}")
+        if fanuc and name in REFUSED_BY_FANUC and (self.word or name != "round"):
+            raise InputError(f"in '{self.written}': {REFUSED_BY_FANUC[name]}")
         if name == "exists":
             return self._exists()
-        if name != "atan" and name not in _FUNCTIONS:
+        if name != "atan" and name not in FUNCTIONS:
             raise InputError(f"in '{self.written}': the function {name.upper()} is not supported")
         value = self.bracket()
         if name == "atan":
@@ -383,8 +258,8 @@ class _Reader:
                 raise self.error("'/[' and the second value of ATAN")
             result = math.degrees(math.atan2(value, self.bracket()))
         else:
-            own = _FANUC_FUNCTIONS if fanuc else _FUNCTIONS
-            result = float(own.get(name, _FUNCTIONS[name])(value))
+            own = FANUC_FUNCTIONS if fanuc else FUNCTIONS
+            result = float(own.get(name, FUNCTIONS[name])(value))
         if fanuc and name in {"asin", "atan"} and result < 0:
             raise InputError(
                 f"in '{self.written}': {name.upper()} is {result:g} or {result + 360:g} degrees, as the control is set"

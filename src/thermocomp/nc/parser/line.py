@@ -1,7 +1,9 @@
 """Parsed line of an NC program that preserves every byte of the text (ISO 6983 words)."""
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Literal, NamedTuple
+
+Controller = Literal["linuxcnc", "fanuc"]
 
 
 class Word(NamedTuple):

@@ -1,10 +1,14 @@
 """Recognition of the control from the first lines of a file; formats other than ISO 6983 are refused by name."""
 
+import itertools
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from thermocomp.core.exceptions import InputError
+
+#: number of lines used to recognise the control of a program
+FIRST = 200
 
 _POST = "have the CAM system write the part for an ISO control (LinuxCNC or Fanuc)"
 _GIVE = "give the NC program itself"
@@ -117,6 +121,14 @@ def recognise(first_lines: Sequence[str]) -> str:
                     f"it is not supported: {kind.advice}"
                 )
     return "iso"
+
+
+def recognised(texts: Iterable[str]) -> Iterator[str]:
+    """Return the lines unchanged, if the control is a supported one."""
+    rest = iter(texts)
+    first = list(itertools.islice(rest, FIRST))
+    recognise(first)
+    return itertools.chain(first, rest)
 
 
 def _refuse_binary(lines: Sequence[str]) -> None:

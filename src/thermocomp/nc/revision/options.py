@@ -1,20 +1,18 @@
-"""Options of a revision, as given to ``thermocomp revise``, and the objects built from them."""
+"""Options of a revision, as given to ``thermocomp revise``, and the objects built from them.
 
-from collections.abc import Iterable, Mapping, Sequence
+Those of the drift are in `thermocomp.nc.revision.thermaloptions`.
+"""
+
+from collections.abc import Sequence
 from dataclasses import dataclass
-from hashlib import sha256
 from pathlib import Path
 from typing import Literal
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Machine
-from thermocomp.core.model import ErrorModel
-from thermocomp.files import modelfile
 from thermocomp.files.machines import read_machine
 from thermocomp.nc.interpreter.block import Setup
 from thermocomp.nc.planner.timeline import MotionLimits
-from thermocomp.nc.revision import forecast as forecasts
-from thermocomp.nc.revision import jobstate
 from thermocomp.nc.revision.values import (
     m_code_of,
     origin_of,
@@ -30,171 +28,6 @@ from thermocomp.nc.rewrite.demand import Demand
 from thermocomp.nc.rewrite.method import CorrectionMethod
 from thermocomp.nc.rewrite.offset import Offset
 from thermocomp.nc.rewrite.text import DIGITS
-from thermocomp.nc.thermal import start
-from thermocomp.nc.thermal.drift import Drift
-from thermocomp.nc.thermal.inputs import SPEED, InputSignal, constants
-from thermocomp.nc.thermal.start import ThermalStart
-from thermocomp.nc.thermal.stations import Station, stations
-
-Zero = Literal["start", "cold", "last"]
-
-#: largest range of a temperature that may be set constant, except the ambient temperature [degC]
-WARMED = 3.0
-
-_COUNTED: dict[Zero, str] = {
-    "start": "from the start of the program",
-    "cold": "from the cold machine",
-    "last": "from the zero of the last job",
-}
-
-
-@dataclass(frozen=True, kw_only=True)
-class Drifting:
-    """Inputs that make the tool drift.
-
-    Parameters
-    ----------
-    model : list of Path
-        Model files of thermocomp fit (.json).
-    axis : list of str
-        Axis corrected by a model, such as ch3=Z, or "zz=X at Z 200 mm" for one of several positions; models that are
-        not listed are ignored. Default: the axes given by names of the targets such as x_um, z or z_at_200.
-    constant : list of str
-        Constant values of model inputs that do not follow from the program, such as "ambient=22 degC".
-    forecast : Path
-        CSV file with the course of such inputs over the time since the start of the program (columns such as time_min,
-        ambient_C).
-    accept_unproven : str
-        Person who approves the use of unproven models, and the reason: "NAME, REASON".
-    """
-
-    model: list[Path]
-    axis: list[str] | None = None
-    constant: list[str] | None = None
-    forecast: Path | None = None
-    accept_unproven: str | None = None
-
-    def stations(self) -> list[Station]:
-        """Return the model of each axis."""
-        models = [m.taken(self.accept_unproven) for path in self.model for m in modelfile.read(path)]
-        return stations(models, self.axis or ())
-
-    def others(self, found: Sequence[Station]) -> tuple[dict[str, InputSignal], list[str]]:
-        """Return the inputs that do not follow from the program, and notes on them."""
-        models = [s.model for s in found]
-        if self.constant and all(i.quantity == SPEED for m in models for i in m.inputs):
-            raise InputError(f"--constant {self.constant[0]!r}: the models are driven by the spindle speed alone")
-        signals = constants(self.constant or (), models)
-        for m in models:
-            _refuse_heated(m, signals)
-        driven = any(i.quantity == SPEED and i.name in m.sensors for m in models for i in m.inputs)
-        if not driven and self.forecast is None and any(m.sensors for m in models):
-            raise InputError(
-                "no model is driven by the spindle speed, and no --forecast gives changing inputs: the effect of this "
-                "program on the machine is unknown; fit a model with --inputs spindle_rpm"
-            )
-        if self.forecast is None:
-            return signals, _taken(signals, "held at a constant")
-        read = forecasts.read(self.forecast)
-        twice = sorted(set(signals) & set(read.columns))
-        if twice:
-            raise InputError(f"{self.forecast}: {twice[0]} is also given by --constant; remove one")
-        wanted = {i.name for m in models for i in m.inputs}
-        notes = [f"{self.forecast}: {name} is no input of the models" for name in read.columns if name not in wanted]
-        notes += [f"{self.forecast}: {text}" for text in read.left_out]
-        notes += _taken(signals, "held at a constant") + _taken(wanted & set(read.columns), "forecast")
-        return signals | {n: InputSignal(*column) for n, column in read.columns.items() if n in wanted}, notes
-
-    def hashes(self) -> dict[str, str]:
-        """Return the file name and the beginning of its SHA-256 for each target."""
-        return {
-            m.target: f"{path.name} {sha256(path.read_bytes()).hexdigest()[:8]}"
-            for path in self.model
-            for m in modelfile.read(path)
-        }
-
-
-def _refuse_heated(model: ErrorModel, constant: Iterable[str]) -> None:
-    """Raise `InputError` if a temperature affected by the machine's heat is set constant while a program runs."""
-    surroundings = model.validity.ambient_channel if model.validity is not None else ""
-    for i in model.inputs:
-        if i.name in constant and i.quantity == "temperature" and i.name != surroundings and i.high - i.low > WARMED:
-            raise InputError(
-                f"--constant {i.name}: it varied by {i.high - i.low:.1f} degC in training and will not stay constant "
-                "while this program runs; give it by --forecast, or fit a model without it, such as "
-                "--inputs spindle_rpm"
-            )
-
-
-def _taken(names: Iterable[str], how: str) -> list[str]:
-    return [f"{name} is {how}: a deviation from that is not part of the bounds" for name in sorted(names)]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Starting:
-    """Initial thermal state of the machine when the program starts.
-
-    Parameters
-    ----------
-    cold : bool
-        The machine is cold: it has been at rest for a long time.
-    carried : Path
-        State at the end of the last job: the file OUT.job.json of its revision.
-    pause : str
-        Time since the last job with the spindle stopped, such as "30 min". Default: none.
-    measured : list of str
-        Measured drift of the tool point relative to the cold machine, such as z=12um.
-    zero : str
-        Zero of the drift, that is when the work offsets were set. start: at the start of the program; cold: on the cold
-        machine; last: when those of the last job were set. The default assumes that they have not been changed since
-        the machine was cold, or since the last job: start for --cold, cold for --measured, last for --carried.
-    """
-
-    cold: bool = False
-    carried: Path | None = None
-    pause: str | None = None
-    measured: list[str] | None = None
-    zero: Zero | None = None
-
-    def check(self) -> None:
-        """Raise `InputError` if the state is not given, or given more than once."""
-        given = self.cold + (self.carried is not None) + (self.measured is not None)
-        if given != 1:
-            found = "not stated" if not given else f"stated {given} times"
-            raise InputError(
-                f"the initial thermal state of the machine is {found}: give one of --cold, --carried JOB.json and "
-                "--measured z=12um"
-            )
-        if self.pause is not None and self.carried is None:
-            raise InputError("--pause is the time since the last job: it goes with --carried")
-
-    def start(self, found: Sequence[Station], others: Mapping[str, InputSignal]) -> ThermalStart:
-        """Return the state of the models at the start of the program."""
-        if self.carried is not None:
-            pause = 0.0 if self.pause is None else read_value(self.pause, "time", "--pause", "30 min")
-            return start.carry_over(found, jobstate.read(self.carried).state, pause)
-        if self.measured is not None:
-            return start.begin_measured(found, start.deviations(self.measured), others)
-        return start.begin_cold(found, others)
-
-    def drift(self, found: Sequence[Station], others: Mapping[str, InputSignal]) -> Drift:
-        """Return the drift at the start of the program."""
-        return Drift(found, self.start(found, others), others, zero=self._zero)
-
-    @property
-    def _zero(self) -> Zero:
-        return self.zero or ("start" if self.cold else "cold" if self.carried is None else "last")
-
-    def words(self) -> str:
-        """Return the start state as text."""
-        if self.carried is not None:
-            name = self.carried.name
-            return f"{self.pause} after {name}" if self.pause else f"as {name} left it"
-        return f"measured {', '.join(self.measured)}" if self.measured else "cold"
-
-    def counted(self) -> str:
-        """Return the zero of the drift as text."""
-        return _COUNTED[self._zero]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,12 +11,13 @@ from thermocomp.nc.interpreter.block import Setup
 from thermocomp.nc.interpreter.dialect import check_dialect
 from thermocomp.nc.linuxcnc import rs274
 from thermocomp.nc.linuxcnc.verification.verify import foresee_sentence
-from thermocomp.nc.parser.recognise import recognise
+from thermocomp.nc.parser.recognise import FIRST, recognise
 from thermocomp.nc.parser.tokens import program_lines, read_lines
 from thermocomp.nc.revision import headers, ncprogram
 from thermocomp.nc.revision.job import ALL_THE_SAME, Job, Paths
-from thermocomp.nc.revision.options import Controller, Drifting, Starting, Timing, Way
-from thermocomp.nc.rewrite.revise import FIRST, Revision
+from thermocomp.nc.revision.options import Controller, Timing, Way
+from thermocomp.nc.revision.thermaloptions import Drifting, Starting
+from thermocomp.nc.rewrite.revise import Revision
 from thermocomp.nc.rewrite.travel import Travel
 from thermocomp.nc.thermal.stations import Station
 

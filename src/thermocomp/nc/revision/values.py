@@ -8,7 +8,7 @@ from thermocomp.core.units import read_with_unit as with_unit
 from thermocomp.nc.interpreter import startup
 from thermocomp.nc.interpreter.block import Point
 from thermocomp.nc.interpreter.codes import find_code
-from thermocomp.nc.parser.tokens import Controller
+from thermocomp.nc.parser.line import Controller
 
 _ANGLE = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+))\s*(?:deg|°)")
 _SYSTEM = re.compile(r"G?5([4-9])(?:\.([1-3]))?(?:\s*P(\d+))?", re.IGNORECASE)

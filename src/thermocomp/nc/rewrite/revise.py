@@ -5,7 +5,6 @@ whole run (`Revision`) are updated with each line.
 """
 
 import copy
-import itertools
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
@@ -17,7 +16,7 @@ from thermocomp.nc.interpreter.block import Block, Point, Setup
 from thermocomp.nc.interpreter.codes import ROTARY
 from thermocomp.nc.interpreter.interpret import follow_program
 from thermocomp.nc.parser.line import Line
-from thermocomp.nc.parser.recognise import recognise
+from thermocomp.nc.parser.recognise import recognised
 from thermocomp.nc.parser.tokens import read_lines
 from thermocomp.nc.planner.timeline import MotionLimits, time_blocks
 from thermocomp.nc.rewrite import header, known
@@ -28,10 +27,8 @@ from thermocomp.nc.rewrite.frame import Vector
 from thermocomp.nc.rewrite.method import Change, CorrectionMethod
 from thermocomp.nc.rewrite.offset import ending
 from thermocomp.nc.rewrite.path import find_point, length
-from thermocomp.nc.rewrite.split import Sample, axes_to_split, may_split, pieces, shares
+from thermocomp.nc.rewrite.split import Sample, axes_to_split, beside, may_split, pieces, shares
 
-#: number of lines used to recognise the control of a program
-FIRST = 200
 #: sampling intervals in a cut: in time [s], and along the path if the drift depends on the position [mm]
 OFTEN = 20.0
 DENSE = 20.0
@@ -146,7 +143,7 @@ class Revision:
         method, steered = copy.deepcopy(self.method), known.SpindleState(self.setup)
         nothing: Vector = (0.0, 0.0, 0.0)
         modal, seen = None, set[tuple[str, ...]]()
-        for block in follow_program(self._guarded(read_lines(_recognised(texts), self.setup.controller)), self.setup):
+        for block in follow_program(self._guarded(read_lines(recognised(texts), self.setup.controller)), self.setup):
             steered.speed(block)
             known.refuse_unknown(block, self.setup, by_position=self.drift.by_position)
             # lines with the same words and modal state as an earlier one do not change a method without corrections
@@ -183,7 +180,7 @@ class Revision:
         InputError
             The program is not an ISO program.
         """
-        lines = self._guarded(read_lines(_recognised(texts), self.setup.controller))
+        lines = self._guarded(read_lines(recognised(texts), self.setup.controller))
         check = Check(self.setup)
         steered = known.SpindleState(self.setup)
         point: Point = (0.0, 0.0, 0.0)
@@ -244,7 +241,7 @@ class Revision:
 
     def _cut(self, block: Block, samples: list[Sample], knots: list[tuple[float, Vector]], demand: Vector) -> CutErrors:
         """Return the error of the tool in a cut, and record the reason that held the correction."""
-        cut = self.left.take(block.line.number, _beside(samples, knots))
+        cut = self.left.take(block.line.number, beside(samples, knots))
         self._note_held(block, demand, samples[0].deviation, (knots[0][1], knots[-1][1]), cut)
         return cut
 
@@ -313,7 +310,7 @@ class Revision:
             knots = [(0.0, method.carried)]
             for piece, share in zip(pieces(block, ends, method.before, self.setup.controller), ends, strict=True):
                 knots.append((share, method.revise(piece, demands[share]).after))
-            left = [max(map(abs, map(add, *pair))) for pair in _beside(samples, knots)]
+            left = [max(map(abs, map(add, *pair))) for pair in beside(samples, knots)]
             found.append((max(left), left[-1]))
         (whole, at_end), (split, at_its_end) = found
         return bool(split < whole and at_its_end <= at_end + self.method.step)
@@ -392,26 +389,3 @@ class Revision:
                 self.lines,
                 "the program has no end (M2, M30 or %) at which the offset could be cancelled; add M2 or M30",
             )
-
-
-def _recognised(texts: Iterable[str]) -> Iterator[str]:
-    """Return the lines unchanged, if the control is a supported one."""
-    rest = iter(texts)
-    first = list(itertools.islice(rest, FIRST))
-    recognise(first)
-    return itertools.chain(first, rest)
-
-
-def _beside(samples: list[Sample], knots: list[tuple[float, Vector]]) -> Iterator[tuple[Vector, Vector]]:
-    """Yield deviation and correction of each sample: the correction is linear between knots."""
-    k = 1
-    for sample in samples:
-        while sample.share > knots[k][0]:
-            k += 1
-        (first, before), (last, after) = knots[k - 1 : k + 1]
-        if before == after:
-            yield sample.deviation, after
-            continue
-        part = (sample.share - first) / (last - first)
-        x, y, z = (b + part * (a - b) for b, a in zip(before, after, strict=True))
-        yield sample.deviation, (x, y, z)

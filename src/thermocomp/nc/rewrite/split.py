@@ -8,7 +8,8 @@ from typing import Final, NamedTuple
 from thermocomp.nc.interpreter.arcs import CENTRE
 from thermocomp.nc.interpreter.block import PLANES, Block, Known, Move, Point
 from thermocomp.nc.interpreter.codes import ROTARY
-from thermocomp.nc.parser.tokens import Controller, read_line
+from thermocomp.nc.parser.line import Controller
+from thermocomp.nc.parser.tokens import read_line
 from thermocomp.nc.rewrite.frame import Vector
 from thermocomp.nc.rewrite.method import AXES
 from thermocomp.nc.rewrite.offset import ending
@@ -115,6 +116,21 @@ def shares(samples: Sequence[Sample], carried: Vector, axes: Sequence[int], step
             break
         ends = sorted([*ends, where])
     return [samples[k].share for k in ends[1:]]
+
+
+def beside(samples: Sequence[Sample], knots: Sequence[tuple[float, Vector]]) -> Iterator[tuple[Vector, Vector]]:
+    """Yield deviation and correction of each sample: the correction is linear between knots."""
+    k = 1
+    for sample in samples:
+        while sample.share > knots[k][0]:
+            k += 1
+        (first, before), (last, after) = knots[k - 1 : k + 1]
+        if before == after:
+            yield sample.deviation, after
+            continue
+        part = (sample.share - first) / (last - first)
+        x, y, z = (b + part * (a - b) for b, a in zip(before, after, strict=True))
+        yield sample.deviation, (x, y, z)
 
 
 def axes_to_split(block: Block, before: Known) -> list[int]:

@@ -11,7 +11,8 @@ import numpy as np
 
 from thermocomp.core.autoregressive import Ticking
 from thermocomp.core.exceptions import InputError, explain_unknown
-from thermocomp.core.model import ErrorModel, State
+from thermocomp.core.model import ErrorModel
+from thermocomp.core.state import State
 from thermocomp.core.units import read_with_unit as with_unit
 from thermocomp.nc.thermal.inputs import SPEED, Inputs, Wiring
 from thermocomp.nc.thermal.jobstate import JobState, StationState

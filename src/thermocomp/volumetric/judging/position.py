@@ -2,94 +2,26 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
-import numpy as np
 from joblib import Parallel, delayed
-from numpy.typing import NDArray
 
-from thermocomp.core.exceptions import FitError, InputError
-from thermocomp.core.learned import Learned
-from thermocomp.core.provenance import RULES, HonestError
-from thermocomp.core.size import Size
-from thermocomp.judging import do_no_harm, metrics
-from thermocomp.judging.replay import replay
+from thermocomp.core.exceptions import InputError
 from thermocomp.judging.splits import Judging, Split, leave_one_cycle_out
 from thermocomp.recordings.profiles import Profiles
 from thermocomp.recordings.samples import Samples
+from thermocomp.volumetric.judging.positionerrors import (
+    ComponentStates,
+    JudgedSplit,
+    PositionAssessment,
+    assess_together,
+    judge_split,
+)
 from thermocomp.volumetric.models.position import PositionFit, fit_position, slope_samples
-from thermocomp.volumetric.models.positionoptions import PositionOptions, Setting, fill_options, reference_position
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
+from thermocomp.volumetric.models.positionoptions import PositionOptions, Setting, fill_options
 
 #: minimum number of thermal states for training and judging
 FEWEST = 4
-#: minimum number of profiles to judge a cycle by; each has many points, and profiles are far apart in time
-MIN_STATES = 8
-#: baselines of a position model
-BESIDE = ("no compensation", "the cold profile alone")
-
-
-@dataclass(frozen=True)
-class CycleErrors:
-    """Errors of the profiles of one thermal cycle, or of a test left out as a whole.
-
-    Parameters
-    ----------
-    cycle : str
-    n_states : int
-        Number of judged profiles.
-    none, geometric, model : float
-        RMS over their points [unit]: without compensation, with the cold profile alone, with the complete model.
-    none_max, model_max : float
-        Largest error [unit].
-    """
-
-    cycle: str
-    n_states: int
-    none: float
-    geometric: float
-    model: float
-    none_max: float
-    model_max: float
-
-
-@dataclass(frozen=True, eq=False)
-class PositionAssessment:
-    """Result of a position model on unseen cycles.
-
-    Parameters
-    ----------
-    protocol : str
-        Method of choosing the unseen cycles.
-    cycles : tuple of CycleErrors
-    overall : CycleErrors
-        Errors over all cycles together.
-    verdict : Verdict
-        Verdict of the do-no-harm gate: compared with no compensation and, if there is a thermal part, with the cold
-        profile alone; by cycles or, if files were left out, by files.
-    factors : tuple of HonestError
-        Errors of the model of each factor on the same states [unit/m^i]; verdict and reason are those of the whole.
-    unit : {'um', 'urad'}
-    """
-
-    protocol: str
-    cycles: tuple[CycleErrors, ...]
-    overall: CycleErrors
-    verdict: do_no_harm.Verdict
-    factors: tuple[HonestError, ...]
-    unit: str
-
-    @property
-    def accepted(self) -> bool:
-        """Whether the model may run."""
-        return self.verdict.accepted
-
-    @property
-    def reason(self) -> str:
-        """Reason for the verdict, and the additional data needed for a decision."""
-        return self.verdict.told
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,7 +115,7 @@ def study_all(
     tuple of PositionStudy
         One per component.
     """
-    whole = [_All(tuple(tests), *_splits(tests, options, judging)) for tests in components]
+    whole = [ComponentStates(tuple(tests), *_splits(tests, options, judging)) for tests in components]
     found = _studies(whole, options, left_open, jobs, progress)
     if "slopes" not in left_open:
         return tuple(found)
@@ -197,7 +129,7 @@ def study_all(
 
 
 def _studies(
-    whole: Sequence["_All"],
+    whole: Sequence[ComponentStates],
     options: PositionOptions,
     left_open: Sequence[Setting],
     jobs: int,
@@ -227,14 +159,6 @@ def n_pieces(
     return sum(len(_splits(tests, options, judging)[1].splits) + 1 for tests in components)
 
 
-class _All(NamedTuple):
-    """A component: its tests, their states, and the splits."""
-
-    tests: tuple[Profiles, ...]
-    samples: Samples
-    judging: Judging
-
-
 def _splits(
     tests: Sequence[Profiles], options: PositionOptions, judging: Callable[[Samples], Judging]
 ) -> tuple[Samples, Judging]:
@@ -256,11 +180,13 @@ def _piece(
     fit = fit_position(tests, chosen, learn=learn)
     if split is None:
         return f"{tests[0].target} all states", (chosen, fit)
-    return f"{tests[0].target} {split.block}", _judged(tests, fit, chosen, split)
+    return f"{tests[0].target} {split.block}", judge_split(tests, fit, chosen, split)
 
 
-def _study(one: _All, parts: Sequence["_Part"], options: PositionOptions, fit: PositionFit) -> PositionStudy:
-    assessment = _together(one, parts, options)
+def _study(
+    one: ComponentStates, parts: Sequence[JudgedSplit], options: PositionOptions, fit: PositionFit
+) -> PositionStudy:
+    assessment = assess_together(one, parts, options)
     honest = assessment.factors
     trained = tuple(
         replace(t, model=replace(t.model, honest_error=h)) for t, h in zip(fit.trained, honest, strict=True)
@@ -270,139 +196,3 @@ def _study(one: _All, parts: Sequence["_Part"], options: PositionOptions, fit: P
         fit.model, offset=models[0] if options.offset else None, slopes=tuple(models[1:] if options.offset else models)
     )
     return PositionStudy(replace(fit, model=model, trained=trained), options, assessment)
-
-
-@dataclass(frozen=True, eq=False)
-class _Part:
-    """Judged data of one split: errors of all points per state, and predicted thermal parts."""
-
-    state: NDArray[np.intp]  # (n,) row of the samples
-    errors: tuple[tuple[FloatArray, FloatArray, FloatArray], ...]  # per state: no model, cold profile alone, model
-    thermal: tuple[FloatArray, ...]  # per state, at all points of its test
-
-
-def _judged(tests: Sequence[Profiles], fit: PositionFit, options: PositionOptions, split: Split) -> _Part:
-    samples, model = fit.samples, fit.model
-    rows = split.judge.copy()
-    for k, test in enumerate(tests):
-        mine = np.flatnonzero(samples.test == k)
-        rows[mine[test.reference_rows(options.reference)]] &= not split.learn[mine].any()
-    state = np.flatnonzero(rows)
-    factors = np.array([replay(m, samples, rows)[0] for m in model.models]).reshape(-1, len(state)).T
-    assert model.profile is not None
-    errors, thermal = [], []
-    for row, factor in zip(state, factors, strict=True):
-        test = tests[int(samples.test[row])]
-        measured, profile = test.values[int(samples.row[row])], model.profile.at(test.points)
-        told = model.at(test.points, factor)
-        there = np.isfinite(measured)
-        errors.append((measured[there], (measured - profile)[there], (measured - told)[there]))
-        thermal.append(told - profile)
-    return _Part(state, tuple(errors), tuple(thermal))
-
-
-def _factors(one: _All, parts: Sequence[_Part], options: PositionOptions) -> tuple[FloatArray, FloatArray]:
-    """Return factors, measured and predicted, (n, n_factors); predictions are projected from the model output.
-
-    A split may use other powers; its thermal part is expressed in the powers of the complete model.
-    """
-    samples, _ = slope_samples(one.tests, options)
-    turn = reference_position(one.tests, options)
-    predicted = []
-    for row, thermal in ((r, t) for p in parts for r, t in zip(p.state, p.thermal, strict=True)):
-        q = 1e-3 * (one.tests[int(samples.test[row])].position - turn)
-        reach = float(np.abs(q).max())
-        found = np.linalg.lstsq(np.stack([(q / reach) ** k for k in options.powers], axis=1), thermal)[0]
-        predicted.append(found / reach ** np.array(options.powers))
-    return samples.deviations[np.concatenate([p.state for p in parts])], np.array(predicted)
-
-
-def _together(one: _All, parts: Sequence[_Part], options: PositionOptions) -> PositionAssessment:
-    samples, tests, protocol = one.samples, one.tests, one.judging.name
-    unit = tests[0].unit
-    rows = np.concatenate([p.state for p in parts])
-    triples = [e for p in parts for e in p.errors]
-    filled = np.array([e[0].size > 0 for e in triples], dtype=np.bool_)
-    if not filled.any():
-        raise FitError(f"{tests[0].target}: no profile is left to judge on")
-    rms = np.array([[Size.of(e).rms for e in triple] for triple in triples])
-    segments: list[tuple[str, BoolArray]] = []
-    for split, part in zip(one.judging.splits, parts, strict=True):
-        mine = filled & np.isin(rows, part.state)
-        if split.whole:
-            segments.append((split.name, mine))
-        else:
-            cycle = samples.cycle[rows]
-            segments += [(samples.cycle_names[k], mine & (cycle == k)) for k in np.unique(cycle[mine])]
-    verdict = do_no_harm.Verdict(
-        units=tuple(
-            _unit(name, rms[mine], unit, thermal=bool(options.powers))
-            for name, mine in segments
-            if mine.sum() >= MIN_STATES
-        ),
-        unit=unit,
-        names=BESIDE,
-        caps=("judged on one stretch that continues from what was learned",) if one.judging.splits[0].stretch else (),
-    )
-    measured, predicted = _factors(one, parts, options) if options.powers else (np.empty((len(rows), 0)),) * 2
-    factors = []
-    for j in range(measured.shape[1]):
-        m, p = measured[:, j], predicted[:, j]
-        there = np.isfinite(m)
-        known = [(name, mine & there) for name, mine in segments if (mine & there).any()]
-        m_there, p_there = m[there], p[there]
-        factors.append(
-            HonestError(
-                protocol=protocol,
-                mae=metrics.mae(m_there, p_there),
-                rms=metrics.rms(m_there, p_there),
-                max_abs=metrics.max_abs(m_there, p_there),
-                none_mae=metrics.mae(m_there, 0 * m_there),
-                none_rms=metrics.rms(m_there, 0 * m_there),
-                cycles={name: metrics.rms(m[mine], p[mine]) for name, mine in known},
-                verdict=verdict.word,
-                reason=verdict.told,
-                units=len(verdict.units),
-                rules=RULES,
-            )
-        )
-    return PositionAssessment(
-        protocol=protocol,
-        cycles=tuple(_errors(name, triples, mine) for name, mine in segments if mine.any()),
-        overall=_errors("all", triples, filled),
-        verdict=verdict,
-        factors=tuple(factors),
-        unit=unit,
-    )
-
-
-def _unit(name: str, rms: FloatArray, unit: str, *, thermal: bool) -> do_no_harm.JudgedUnit:
-    """Return a cycle with the RMS of its profiles, (n, 3): without compensation, with the cold profile alone, model."""
-    none, geometric, left = np.sqrt(np.mean(rms**2, axis=0)).tolist()
-    largest = float(rms[:, 0].max())
-    return do_no_harm.JudgedUnit(
-        name=name,
-        rows=len(rms),
-        rms=left,
-        largest=float(rms[:, 2].max()),
-        baselines=(none, geometric) if thermal else (none,),
-        none_largest=largest,
-        noise=0.0,
-        margin=do_no_harm.margin_of(Learned(0.0, 0.0, 0.0, largest), unit),
-        moves=True,
-    )
-
-
-def _errors(name: str, triples: Sequence[tuple[FloatArray, FloatArray, FloatArray]], mine: BoolArray) -> CycleErrors:
-    none, geometric, left = (
-        Size.of(np.concatenate([t[j] for t, wanted in zip(triples, mine, strict=True) if wanted])) for j in range(3)
-    )
-    return CycleErrors(
-        cycle=name,
-        n_states=int(mine.sum()),
-        none=none.rms,
-        geometric=geometric.rms,
-        model=left.rms,
-        none_max=none.largest,
-        model_max=left.largest,
-    )

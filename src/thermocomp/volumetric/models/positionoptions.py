@@ -11,7 +11,8 @@ from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.inputs import Support
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.recordings.profiles import Profiles
-from thermocomp.volumetric.models.geometric import Kind, Order
+from thermocomp.volumetric.models.geometric import Kind
+from thermocomp.volumetric.models.shapes import Order
 
 BoolArray = NDArray[np.bool_]
 Setting = Literal["slopes", "offset", "reference_position"]

@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 from typing import Any
 
-from thermocomp.volumetric.judging.position import CycleErrors, PositionStudy
+from thermocomp.volumetric.judging.position import PositionStudy
+from thermocomp.volumetric.judging.positionerrors import CycleErrors
 from thermocomp.volumetric.models.positionoptions import Setting
 
 

@@ -1,0 +1,119 @@
+"""Samples as a model's watch passes them: values of failed sensors are replaced, and the band is wider."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.model import ErrorModel
+from thermocomp.core.watch import Watch
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
+from thermocomp.recordings.starts import Start
+from thermocomp.runtime.watch import WatchState, begin, look
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+
+def believe(
+    model: ErrorModel, samples: Samples, rows: BoolArray, watched: Samples | None = None
+) -> tuple[Samples, FloatArray]:
+    """Return samples as passed by a model's watch, and the widening of its band, in the tests of `rows`.
+
+    Both are unchanged without a watch, or without the speeds it needs. Rows without a speed are passed on unchanged.
+
+    Parameters
+    ----------
+    model : ErrorModel
+    samples : Samples
+    rows : ndarray of bool of shape (n_rows,)
+    watched : Samples, optional
+        The same rows with all inputs of the model's watch, as recorded: see `stack_watched`. Values of failed sensors
+        are replaced.
+
+    Returns
+    -------
+    samples : Samples
+    widening : ndarray of shape (n_rows,)
+        See `ErrorModel.widening`; infinite where the model must not run and its correction is held.
+    """
+    widening, watch, seen = np.ones(len(samples)), model.watch, watched or samples
+    if watch is None or not can_look(watch, seen):
+        return samples, widening
+    names, values = [c.name for c in samples.inputs], samples.values.copy()
+    known = [i.name in names for i in watch.inputs]
+    places = [names.index(i.name) for i in watch.inputs if i.name in names]
+    fault, wider = np.zeros(len(watch.names), dtype=np.int8), 1.0
+    for test in np.unique(samples.test[rows]).tolist():
+        for row, state, let in look_through(watch, seen, test):
+            values[row, places] = let[known]
+            if (state.fault != fault).any():
+                fault = state.fault
+                failed = [n for n, f in zip(watch.names, fault.tolist(), strict=True) if f and n in model.sensors]
+                wider = 1.0
+                if failed:
+                    wider = model.widening(failed) if model.may_lose(failed) else np.inf
+            widening[row] = wider
+        fault, wider = np.zeros_like(fault), 1.0
+    return replace(samples, values=values), widening
+
+
+def stack_watched(
+    watch: Watch, target: str, recordings: Sequence[Recording], starts: Sequence[Start] | Start | None
+) -> Samples | None:
+    """Return all rows of recordings with the inputs of a watch, as recorded; None if there are no such inputs.
+
+    Parameters
+    ----------
+    watch : Watch
+    target : str
+        Any displacement channel, since samples must have one.
+    recordings : sequence of Recording
+    starts : Start or sequence of Start or None
+        Initial state of each recording.
+    """
+    known = [i.name for i in watch.inputs if all(r.has(i.name) for r in recordings)]
+    if not known:
+        return None
+    rezero = any(i.rezero for i in watch.inputs)
+    samples = stack(recordings, [target], known, rezero=rezero, zeroing=watch.zeroing, starts=starts)
+    called = zip(samples.inputs, known, strict=True)
+    return replace(samples, inputs=tuple(replace(channel, name=own) for channel, own in called))
+
+
+def can_look(watch: Watch, samples: Samples) -> bool:
+    """Return whether samples have the spindle speeds that a watch needs."""
+    names = [c.name for c in samples.inputs]
+    return all(i.name in names for i in watch.inputs if i.quantity != "temperature")
+
+
+def look_through(watch: Watch, samples: Samples, test: int) -> Iterator[tuple[int, WatchState, FloatArray]]:
+    """Replay a watch over a test; inputs of the watch that the samples lack are treated as missing.
+
+    Parameters
+    ----------
+    watch : Watch
+    samples : Samples
+        Samples with the speeds of the watch.
+    test : int
+
+    Yields
+    ------
+    row : int
+    state : WatchState
+        State after the reading.
+    let : ndarray of shape (n_inputs,)
+        Readings passed, in the order of the watch's inputs.
+    """
+    names = [c.name for c in samples.inputs]
+    known = [i.name in names for i in watch.inputs]
+    places = [names.index(i.name) for i in watch.inputs if i.name in names]
+    state = begin(watch, samples.given_zero(test, places) if all(known) else None)
+    for row in np.flatnonzero(samples.test == test).tolist():
+        given = np.full(len(watch.inputs), np.nan)
+        given[known] = samples.values[row, places]
+        state, let = look(watch, state, float(samples.time[row]), given, resting=bool(samples.stands[row]))
+        yield row, state, let

@@ -1,0 +1,123 @@
+"""Movement of corrections in a step: a driven one follows its model within the limits; others are held, then fade."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+from typing import Literal, NamedTuple
+
+from thermocomp.core.correction import Correction, Deviation, Limits
+from thermocomp.runtime.gate import is_number
+from thermocomp.runtime.limits import fade, limit_line
+from thermocomp.runtime.lines import DeviationLine
+from thermocomp.runtime.state import CompensatorState, Status
+
+#: after a restart, a correction has caught up once it differs by no more than this from the output of its models [um]
+ARRIVED = 0.1
+
+ACTIVE = Status("active")
+
+
+class Rest(NamedTuple):
+    """Corrections after a step, and the status of those not driven; see `CompensatorState`."""
+
+    corrections: dict[str, Correction]  #: of all targets or axes
+    clock: float | None
+    idle: dict[str, float]
+    states: dict[str, Status]  #: of those that are not driven
+
+
+def travel_time(state: CompensatorState, tick: float, limits: Limits) -> float:
+    """Return the time that counts in a step [s]; outages and rejected readings do not accumulate travel."""
+    if state.clock is None or not is_number(tick):
+        return 0.0
+    return max(0.0, min(tick - state.clock, limits.reading_age))
+
+
+def drive(
+    state: CompensatorState, target: str, line: DeviationLine, deviation: Deviation, travel: float, limits: Limits
+) -> tuple[Correction, Status]:
+    """Return the correction for a deviation, within the limits, and the status of the target.
+
+    Parameters
+    ----------
+    state : CompensatorState
+        State before the reading.
+    target : str
+        Target or axis.
+    line : DeviationLine
+        Line of the target.
+    deviation : Deviation
+        Deviation that the correction is to oppose.
+    travel : float
+        See `travel_time`.
+    limits : Limits
+
+    Returns
+    -------
+    correction : Correction
+    status : Status
+    """
+    before, order = state.corrections[target], state.orders.get(target)
+    wanted = Correction.opposing(deviation)
+    if order is not None and order.word in ("holding", "suspended"):
+        return before, order
+    if order is not None:  # shadow
+        return limit_line(Correction(0.0), before, line.travel, travel, replace(limits, dead_band=0.0)), order
+    after = limit_line(wanted, before, line.travel, travel, limits)
+    if state.away is not None and _apart(wanted, after, line.travel) > max(ARRIVED, limits.dead_band):
+        return after, Status("restarting", f"nothing ran for {state.away:.0f} s; probe, or set the zero again")
+    return after, ACTIVE
+
+
+def rest(
+    state: CompensatorState,
+    corrections: Mapping[str, Correction],
+    tick: float,
+    lines: Mapping[str, DeviationLine],
+    limits: Limits,
+    held: Mapping[str, str],
+    driven: Collection[str] = (),
+) -> Rest:
+    """Fade corrections that have not been driven for longer than the hold time.
+
+    Parameters
+    ----------
+    state : CompensatorState
+        State before the step.
+    corrections : mapping of str to Correction
+        Corrections of all targets or axes, those of `driven` ones as of this step.
+    tick : float
+        Present time of the monotonic clock of the process [s].
+    lines : mapping of str to DeviationLine
+    limits : Limits
+    held : mapping of str to str
+        Targets or axes that are not driven, and the reasons.
+    driven : collection of str
+
+    Returns
+    -------
+    Rest
+    """
+    # each step counts for at most the maximum age of a reading: a clock jump does not cause fading
+    travel = travel_time(state, tick, limits)
+    clock = state.clock if not is_number(tick) else tick if state.clock is None else max(state.clock, tick)
+    moved, states = dict(corrections), dict[str, Status]()
+    idle = {t: s for t, s in state.idle.items() if t not in driven}
+    for target, why in held.items():
+        order = state.orders.get(target)
+        if order is not None and order.word in ("holding", "suspended"):
+            states[target] = order
+            continue
+        idle[target] = idle.get(target, 0.0) + travel
+        ends = lines[target].travel
+        moved[target] = fade(moved[target], ends, idle[target], travel, limits)
+        if order is not None:
+            states[target] = order
+            continue
+        word: Literal["fading", "holding"] = "fading" if idle[target] > limits.hold else "holding"
+        states[target] = Status(word, f"not driven for {idle[target]:.0f} s: {why}")
+    return Rest(moved, clock, idle, states)
+
+
+def _apart(one: Correction, other: Correction, travel: tuple[float, float]) -> float:
+    """Return the largest difference of two corrections along the travel [um]."""
+    return max(abs(one.at(p) - other.at(p)) for p in travel)
