@@ -39,7 +39,7 @@ def accepted(model: ErrorModel, **changes: Any) -> ErrorModel:
 
 
 #: gcc sees every family in `test_every_method`, too
-BOTH = ("polynomial", "autoregressive-network")
+BOTH = ("polynomial", "autoregressive", "autoregressive-network")
 PAIRS = [
     pytest.param(f, c, id=f"{f}-{c}", marks=pytest.mark.long if f not in BOTH and c != QUICK else ())
     for c in COMPILERS

@@ -48,9 +48,9 @@ def test_when_they_are_made() -> None:
     assert Probings(3.0).find_rows(time, np.zeros(10, dtype=np.bool_)).size == 0
 
 
-def thin(name: str, **changes: int) -> Recording:
+def thin(name: str, seed: int = 0) -> Recording:
     """Return every third row of a recording: an interval of 60 s."""
-    (full,) = tc.simulate(name, **changes)
+    (full,) = tc.simulate(name, seed=seed)
     return Recording.from_dataframe(full.table.assign(time_s=full.time).iloc[::3], name=full.name)
 
 
