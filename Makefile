@@ -66,5 +66,5 @@ $(BENCH)/.bench: pyproject.toml
 	@touch $@
 
 $(VENV)/.docs: pyproject.toml
-	scripts/make_venv.sh $(PYTHON) $(VENV) --editable '.[study]' --group docs
+	scripts/make_venv.sh $(PYTHON) $(VENV) --editable '.[study,live]' --group docs
 	@touch $@ $(VENV)/.study

@@ -5,5 +5,5 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
-#: positions and row numbers
+# positions and row numbers
 IntArray = NDArray[np.intp]

@@ -113,7 +113,7 @@ def export(
         CSV, XLSX or Parquet files on which the model is reduced, for klipper, heidenhain and fanuc; each one is a
         separate test.
     name : str
-        Name of the files and functions, after the prefix tc_.
+        Name of the files and functions, after the prefix ``tc_``.
     dialect : {'codesys', 'twincat', 'scl'}, optional
         Dialect of structured text. Default: codesys.
     limits : Limits

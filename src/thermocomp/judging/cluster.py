@@ -2,11 +2,11 @@
 
 import logging
 import socket
+import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from queue import Empty, SimpleQueue
-from threading import Lock
 from typing import Any
 from urllib.parse import urlsplit
 from uuid import uuid4
@@ -31,7 +31,7 @@ WORKERLESS = 30.0
 ALIKE = ("python", "thermocomp", "numpy", "scipy", "scikit-learn", "numba", "pandas")
 
 #: a worker does one task at a time, whatever its threads: this bounds its memory, and warnings are per process
-_turn = Lock()
+_turn = threading.Lock()
 
 
 class ClusterError(InputError):

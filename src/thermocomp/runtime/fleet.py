@@ -18,7 +18,7 @@ from thermocomp.core.lagbank import step_response
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.runtime.gate import find_plausible_range
 
-#: any real array, with the precision of the fleet
+# any real array, with the precision of the fleet
 Array = NDArray[Any]
 
 
