@@ -125,7 +125,7 @@ def test_a_refusal_in_a_long_program_comes_before_the_work(
     monkeypatch.setattr(Revision, "revise", None)  # whoever gets there fails
     before = set(job_folder.iterdir())
     assert revise() == 2
-    assert "part.ngc: line 21: G77 is unknown" in said(capsys)
+    assert "part.ngc: line 21: G77 is not a known code" in said(capsys)
     assert set(job_folder.iterdir()) == before
 
 

@@ -107,7 +107,16 @@ class JudgedSplit:
 
 
 def judge_split(tests: Sequence[Profiles], fit: PositionFit, options: PositionOptions, split: Split) -> JudgedSplit:
-    """Return the errors in the judged rows of a split, except those of cold profiles that are zeros."""
+    """Return the errors in the judged rows of a split, except those of cold profiles that are zeros.
+
+    Parameters
+    ----------
+    tests : sequence of Profiles
+    fit : PositionFit
+        Fit to the other rows.
+    options : PositionOptions
+    split : Split
+    """
     samples, model = fit.samples, fit.model
     rows = split.judge.copy()
     for k, test in enumerate(tests):
@@ -146,7 +155,15 @@ def _factors(
 
 
 def assess_together(one: ComponentStates, parts: Sequence[JudgedSplit], options: PositionOptions) -> PositionAssessment:
-    """Return the assessment of a component over all of its splits."""
+    """Return the assessment of a component over all of its splits.
+
+    Parameters
+    ----------
+    one : ComponentStates
+    parts : sequence of JudgedSplit
+        One per split, in their order.
+    options : PositionOptions
+    """
     samples, tests, protocol = one.samples, one.tests, one.judging.name
     unit = tests[0].unit
     rows = np.concatenate([p.state for p in parts])
