@@ -1,7 +1,6 @@
 """Models judged with probings: the only displacements used, each after it was made."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -49,11 +48,7 @@ def test_when_they_are_made() -> None:
     assert Probings(3.0).find_rows(time, np.zeros(10, dtype=np.bool_)).size == 0
 
 
-<<<<<<< HEAD
 def thin(name: str, seed: int = 0) -> Recording:
-=======
-def thin(name: str, **changes: Any) -> Recording:
->>>>>>> under400
     """Return every third row of a recording: an interval of 60 s."""
     (full,) = tc.simulate(name, seed=seed)
     return Recording.from_dataframe(full.table.assign(time_s=full.time).iloc[::3], name=full.name)
