@@ -1,5 +1,6 @@
 """Many connections at the page, idle or deaf: the operator is served at once, and what nobody needs is closed."""
 
+import asyncio
 import contextlib
 import gc
 import json
@@ -11,9 +12,10 @@ from collections.abc import Iterator
 import httpx
 import pytest
 from test_doors import HOLD, served, serving
-from test_page import RIGHT, fed
+from test_page import RIGHT, TOKEN, fed
 
-from thermocomp.live.page import connections, status
+from thermocomp.live.page import connections, status, web
+from thermocomp.live.page.page import make_app
 
 #: an answer takes no longer, whoever else is there [s]; on an idle computer it takes some hundredths of a second
 SOON = 5.0
@@ -120,14 +122,23 @@ def test_half_a_request_is_closed(said: bytes, monkeypatch: pytest.MonkeyPatch) 
             assert said_more < 150
 
 
-def test_who_comes_while_the_page_ends_is_closed() -> None:
-    for _ in range(6):
-        with contextlib.ExitStack() as crowd, served(serving(), "127.0.0.1") as port:
-            for _ in range(120):
-                one = crowd.enter_context(socket.socket())
-                one.setblocking(False)
-                with contextlib.suppress(BlockingIOError):
-                    one.connect(("127.0.0.1", port))
+@pytest.mark.parametrize("turns", range(1, 25))
+def test_who_comes_while_the_page_begins_or_ends_is_closed(turns: int) -> None:
+    async def begin_and_end(listening: socket.socket) -> None:
+        serve = asyncio.create_task(web.serve(make_app(serving(), TOKEN), listening))
+        for _ in range(turns):
+            await asyncio.sleep(0)
+        serve.cancel()
+        await asyncio.wait([serve])
+
+    with contextlib.ExitStack() as crowd:
+        listening = web.listen("127.0.0.1", 0)
+        for _ in range(40):
+            one = crowd.enter_context(socket.socket())
+            one.setblocking(False)
+            with contextlib.suppress(BlockingIOError):
+                one.connect(listening.getsockname())
+        asyncio.run(begin_and_end(listening))
     gc.collect()  # a connection that is left open warns now
 
 

@@ -41,15 +41,6 @@ class _Server(uvicorn.Server):
                     connection.look(time.monotonic())
         return await super().on_tick(counter)
 
-    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        # connections accepted by asyncio but not yet set up would stay open when its server closes
-        for one in sockets or ():
-            with contextlib.suppress(NotImplementedError):  # Windows accepts connections in another way
-                asyncio.get_running_loop().remove_reader(one)
-        await asyncio.sleep(0)
-        await asyncio.sleep(0)
-        await super().shutdown(sockets)
-
 
 def read_token(path: Path) -> str:
     """Return the token in a file.
@@ -128,9 +119,19 @@ async def serve(app: FastAPI, listening: socket.socket) -> None:
         try:
             await server.serve([listening])
         finally:
+            # connections accepted by asyncio but not yet set up would stay open when its server closes
+            with contextlib.suppress(NotImplementedError):  # Windows accepts connections in another way
+                asyncio.get_running_loop().remove_reader(listening)
+            await _turn()
             if server.started and not server.should_exit:
                 server.should_exit = True
                 await server.shutdown([listening])
             for connection in list(server.server_state.connections):  # connections accepted meanwhile
                 connection.transport.abort()
-            await asyncio.sleep(0)
+            await _turn()
+
+
+async def _turn() -> None:
+    """Let the loop finish the setup of accepted connections: it takes four turns."""
+    for _ in range(4):
+        await asyncio.sleep(0)
