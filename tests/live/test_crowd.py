@@ -142,6 +142,16 @@ def test_who_comes_while_the_page_begins_or_ends_is_closed(turns: int) -> None:
     gc.collect()  # a connection that is left open warns now
 
 
+def test_a_server_that_ends_by_itself_ends_well(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def ends(*_: object) -> bool:
+        return True
+
+    monkeypatch.setattr(web._Server, "on_tick", ends)
+    listening = web.listen("127.0.0.1", 0)
+    asyncio.run(web.serve(make_app(serving(), TOKEN), listening))
+    assert listening.fileno() == -1
+
+
 def test_who_does_not_read_is_dropped_and_blocks_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(connections, "STUCK", 1.0)
     monkeypatch.setattr(status, "OFTEN", 0.01)  # the buffers are full the sooner

@@ -120,7 +120,7 @@ async def serve(app: FastAPI, listening: socket.socket) -> None:
             await server.serve([listening])
         finally:
             # connections accepted by asyncio but not yet set up would stay open when its server closes
-            with contextlib.suppress(NotImplementedError):  # Windows accepts connections in another way
+            with contextlib.suppress(NotImplementedError, ValueError):  # Windows; the server has closed it itself
                 asyncio.get_running_loop().remove_reader(listening)
             await _turn()
             if server.started and not server.should_exit:
