@@ -18,6 +18,7 @@ import pytest
 from numpydoc.docscrape import NumpyDocString  # type: ignore[import-untyped]
 from numpydoc.validate import validate  # type: ignore[import-untyped]
 
+import thermocomp
 from thermocomp.cli.app import app
 from thermocomp.recordings.cleaning import Cut, Resample, Rezero, Shift, Swap
 from thermocomp.recordings.readers.limits import FileLimits
@@ -169,6 +170,36 @@ def test_every_example_asserts_a_number(example: Path) -> None:
 
 #: no docstring, an unknown section, sections in the wrong order, a parameter that is not there, in another order
 _WRONG = ("GL06", "GL07", "GL08", "PR02", "PR03")
+#: what other packages program against; elsewhere an entry stands only for what the annotation does not say
+INTERFACES = {
+    "thermocomp.api.base",
+    "thermocomp.api.check",
+    "thermocomp.api.explain",
+    "thermocomp.api.inputs",
+    "thermocomp.api.plan",
+    "thermocomp.api.results",
+    "thermocomp.api.select",
+    "thermocomp.cli.face",
+    "thermocomp.core.correction",
+    "thermocomp.core.exceptions",
+    "thermocomp.core.expression",
+    "thermocomp.core.family",
+    "thermocomp.core.plugins",
+    "thermocomp.core.ports",
+    "thermocomp.core.reading",
+    "thermocomp.core.units",
+    "thermocomp.export.target",
+    "thermocomp.files.machines",
+    "thermocomp.files.modelfile",
+    "thermocomp.judging.metrics",
+    "thermocomp.live.page.board",
+    "thermocomp.models.base",
+    "thermocomp.models.method",
+    "thermocomp.models.timed",
+    "thermocomp.nc.revise",
+    "thermocomp.recordings.recording",
+    "thermocomp.recordings.samples",
+}
 
 
 @pytest.mark.parametrize("module", MODULES)
@@ -177,7 +208,9 @@ def test_docstrings_are_there_and_right(module: str) -> None:
     wrong = []
     for name, thing in _public(module):
         wrong += [f"{name}: {text}" for code, text in validate(name)["errors"] if code in _WRONG]
-        wrong += [f"{name}: parameter {p} is not described" for p in _undescribed(thing)]
+        home = name.removeprefix(f"{module}.").split(".")[0]
+        if module in INTERFACES or module.endswith(".verbs") or thermocomp._PUBLIC.get(home) == module:
+            wrong += [f"{name}: parameter {p} is not described" for p in _undescribed(thing)]
     assert wrong == []
 
 

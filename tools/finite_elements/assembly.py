@@ -66,7 +66,6 @@ def lump(name: str, capacity: float, height: float = Air.REFERENCE_HEIGHT, side:
 
     Parameters
     ----------
-    name : str
     capacity : float
         [J/K]
     height, side : float
@@ -133,10 +132,6 @@ class FullModel:
 class Assembly:
     """Parts that stand side by side in one vector of temperatures, to be joined.
 
-    Parameters
-    ----------
-    parts : sequence of Part
-
     Raises
     ------
     InputError
@@ -153,13 +148,7 @@ class Assembly:
         self._where = {p.name: slice(int(e) - n, int(e)) for p, n, e in zip(parts, sizes, ends, strict=True)}
 
     def place(self, name: str) -> FloatArray:
-        """Return the weights of a place, ``part.patch`` or a lump's name, in the whole vector, of shape (n,).
-
-        Raises
-        ------
-        InputError
-            There is no such place.
-        """
+        """Return the weights of a place, ``part.patch`` or a lump's name, in the whole vector, of shape (n,)."""
         part, _, patch = name.partition(".")
         owner = self._part(part, name)
         if patch not in owner.patches:
@@ -167,13 +156,7 @@ class Assembly:
         return self.spread(part, owner.patches[patch])
 
     def observable(self, part: str, name: str) -> FloatArray:
-        """Return a part's observable as a row over the whole vector, of shape (n,).
-
-        Raises
-        ------
-        InputError
-            There is no such observable.
-        """
+        """Return a part's observable as a row over the whole vector, of shape (n,)."""
         owner = self._part(part, f"{part}.{name}")
         if name not in owner.observables:
             raise InputError(f"part {part} has no observable {name!r}; it has {', '.join(owner.observables)}")
@@ -202,19 +185,8 @@ class Assembly:
 
         Parameters
         ----------
-        films, links : sequence
-            What heat passes through.
-        inputs, places : mapping of str to str
-            Name of an input, of a place of temperature, to ``part.patch``.
         observables : mapping of str to ndarray of shape (n,)
             Rows over the whole vector [um/K, urad/K].
-        thetas : sequence of str
-            Names of the shares.
-
-        Raises
-        ------
-        InputError
-            A name leads nowhere, or a coefficient is negative.
         """
         conduction = {j: csr_matrix((self.size, self.size)) for j in (None, *thetas)}
         conduction[None] = sparse.block_diag([p.conduction for p in self.parts.values()], format="csr")

@@ -66,8 +66,6 @@ class Bed:
 
         Parameters
         ----------
-        name : str
-        material : Material
         feet : mapping of int to float
             z of the column's middle with the Z axis at each position [mm: m].
 

@@ -37,7 +37,6 @@ class Blocks:
 
     Attributes
     ----------
-    mesh : skfem.MeshQuad
     materials : list of Material
         One per element.
 
@@ -87,13 +86,7 @@ class Blocks:
         self._facet_body = self.body[self.mesh.f2t[0]]
 
     def elements(self, box: Box) -> IntArray:
-        """Return the elements of a body within a box.
-
-        Raises
-        ------
-        InputError
-            There is no such body, nothing of it in the box, or the box cuts through elements.
-        """
+        """Return the elements of a body within a box."""
         self._uncut(box)
         inside = self.body == self._body(box)
         for axis, x in zip("rz", self._middle, strict=True):

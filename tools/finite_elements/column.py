@@ -73,8 +73,6 @@ class Column:
 
         Parameters
         ----------
-        name : str
-        material : Material
         positions : tuple of int
             Positions of Y at which the guide's shape is wanted [mm].
 

@@ -21,7 +21,6 @@ def capacity(space: Space, heat_capacity: ArrayLike) -> csr_matrix:
 
     Parameters
     ----------
-    space : Space
     heat_capacity : float or array-like of shape (n_elements,)
         Density times specific heat [J/(m3 K)].
     """
@@ -33,7 +32,6 @@ def conduction(space: Space, conductivity: ArrayLike) -> csr_matrix:
 
     Parameters
     ----------
-    space : Space
     conductivity : float or array-like of shape (n_elements,)
         [W/(m K)]
     """
@@ -47,9 +45,6 @@ def contact(space: Space, a: Facets, b: Facets, conductance: float, offset: Arra
 
     Parameters
     ----------
-    space : Space
-    a, b : Facets
-        The two edges (see `Space.jump`).
     conductance : float
         [W/(m2 K)]
     offset : array-like of shape (dim,)
@@ -66,8 +61,6 @@ def edge(
 
     Parameters
     ----------
-    space : Space
-    where : Facets
     height, side : Weight
         Of the air there: above the floor, to the right of the machine's middle [m].
     width : float or array-like of shape (n_elements,), optional
@@ -87,8 +80,6 @@ def faces(space: Space, exposure: ArrayLike, *, height: Weight = MIDDLE, side: W
 
     Parameters
     ----------
-    space : Space
-        Not axisymmetric.
     exposure : float or array-like of shape (n_elements,)
         Of a sheet: how many of its two faces the air touches. Of a bar: its circumference [m].
     height, side : Weight

@@ -144,8 +144,6 @@ class Elastic:
 
         Parameters
         ----------
-        a, b : Facets
-            See `Space.jump`.
         stiffness : sequence of float
             Along each coordinate [N/m3].
         offset : array-like of shape (dim,)
@@ -166,19 +164,12 @@ class Elastic:
         ----------
         rows : mapping of str to ndarray of shape (n,)
             Combinations of displacements: of length [m], or divided by a length [rad].
-        ties : sequence of Tie
-            Supports and joints.
         contacts : sequence of csr_matrix of shape (n, n)
 
         Returns
         -------
         dict of str to ndarray of shape (heat.n,)
             [um/K] or [urad/K]
-
-        Raises
-        ------
-        InputError
-            The body is not held, or two rigid ties hold the same.
         """
         if not rows:
             return {}

@@ -37,13 +37,6 @@ EXPOSED_LUMPS = ("headstock_front", "headstock_rear", "table", "x_bearing", "y_b
 def centre(table: dict[str, Any] | None = None, *, joints: bool = False) -> FullModel:
     """Return the full model of the machining centre.
 
-    Parameters
-    ----------
-    table : dict, optional
-        As ``data/centre.toml``, which is used without it.
-    joints : bool
-        With further inputs and places of the same names: the sides of `JOINTS`, the `EXPOSED` surfaces and lumps.
-
     Returns
     -------
     FullModel
@@ -97,20 +90,7 @@ def centre(table: dict[str, Any] | None = None, *, joints: bool = False) -> Full
 
 
 def tool(table: dict[str, Any] | None = None, *, joints: bool = False) -> FullModel:
-    """Return the full model of the resting tool (see `finite_elements.toolholder`).
-
-    Parameters
-    ----------
-    table : dict, optional
-        As ``data/tool.toml``, which is used without it.
-    joints : bool
-        With further inputs and places of the same names: the sides of `JOINTS`, and ``on_`` each surface.
-
-    Returns
-    -------
-    FullModel
-        Without shares. Inputs and places are all patches, and ``surface``: all that stands in the room's air.
-    """
+    """Return the full model of the resting tool (see `finite_elements.toolholder`)."""
     table = data("tool.toml") if table is None else table
     part = _with_means(toolholder(with_joints(table))) if joints else toolholder(table)
     load = np.sum([part.surfaces[name].load for name in ("tool", "chuck", "shaft")], axis=0)

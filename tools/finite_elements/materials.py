@@ -54,13 +54,7 @@ def materials() -> dict[str, Material]:
 
 
 def material(name: str) -> Material:
-    """Return a material of ``data/materials.toml``.
-
-    Raises
-    ------
-    InputError
-        There is none of that name.
-    """
+    """Return a material of ``data/materials.toml``."""
     known = materials()
     if name not in known:
         raise InputError(f"unknown material {name!r}; data/materials.toml has {', '.join(known)}")

@@ -46,12 +46,10 @@ class Part:
 
     Parameters
     ----------
-    name : str
     capacity : csr_matrix of shape (n, n)
         Symmetric, positive definite [J/K].
     conduction : csr_matrix of shape (n, n)
         Symmetric, of an insulated part: its rows sum to zero [W/K].
-    surfaces : mapping of str to Surface
     patches : mapping of str to ndarray of shape (n,)
         Weights w that sum to 1. The temperature there is ``w @ T``, heat put in there is spread as w, and a link of
         conductance g to another part carries g times the difference of the two temperatures.

@@ -43,21 +43,11 @@ def reduce(
 
     Parameters
     ----------
-    full : FullModel
-    size : int
-        Number of states.
     mixes : sequence of mapping of str to float
         Heat that usually comes together, by input [W]. Each mix counts as an input, and each input counts alone, with
         its largest heat in any mix.
-    regimes : sequence of mapping of str to float
-        Shares in which the answers are taken.
     shifts : sequence of float
         [1/s]
-
-    Raises
-    ------
-    InputError
-        A mix has an input that is not there, or an input is in no mix.
     """
     return project(full, basis(full, size, mixes, regimes, shifts))
 
@@ -73,13 +63,6 @@ def basis(
 
     Parameters
     ----------
-    full : FullModel
-    size : int
-        Number of columns.
-    mixes : sequence of mapping of str to float
-        As of `reduce`.
-    regimes : sequence of mapping of str to float
-        Shares in which the answers are taken.
     shifts : sequence of float
         [1/s]
     """

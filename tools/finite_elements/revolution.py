@@ -38,7 +38,6 @@ class Revolution:
 
     Attributes
     ----------
-    blocks : Blocks
     space : Space
         Of the temperatures.
     """

@@ -50,8 +50,6 @@ class Screw:
 
         Parameters
         ----------
-        name : str
-        material : Material
         positions : tuple of int
             Positions of the axis at which the expansion is wanted [mm].
 
@@ -62,11 +60,6 @@ class Screw:
             over the travel) and ``hat_0`` ... ``hat_6`` (from the start of the travel to its end); observables
             ``at@P``: how far the point at which the nut is at P mm moves away from the fixed bearing. Nothing holds
             the far end: that is the integral of ``alpha (T - 20 degC)``.
-
-        Raises
-        ------
-        InputError
-            The nut leaves the screw.
         """
         first, last = sorted(self.nut)
         if not 0.0 <= first < last <= self.length:

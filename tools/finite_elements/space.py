@@ -123,13 +123,7 @@ class Space:
         return csr_matrix(BilinearForm(lambda u, v, _: scale * u * v).assemble(self.basis))
 
     def facets(self, where: Facets) -> NDArray[np.integer[Any]]:
-        """Return the numbers of facets.
-
-        Raises
-        ------
-        InputError
-            There is no such boundary, or it is empty.
-        """
+        """Return the numbers of facets."""
         if isinstance(where, str):
             found = (self.mesh.boundaries or {}).get(where)
             if found is None:
@@ -148,8 +142,6 @@ class Space:
 
         Parameters
         ----------
-        where : Facets
-        weight : Weight
         width : float or array-like of shape (n_elements,), optional
             Of the edge across the mesh [m] (of a line's end: area [m2]), if not the section or the circumference.
         """
@@ -162,13 +154,7 @@ class Space:
         return csr_matrix(BilinearForm(lambda u, v, _: scale * u * v).assemble(basis))
 
     def mean(self, weight: Weight = 1.0) -> FloatArray:
-        """Return the row that averages over the volume with a weight, of shape (n,); it sums to 1.
-
-        Raises
-        ------
-        InputError
-            The weight is nothing.
-        """
+        """Return the row that averages over the volume with a weight, of shape (n,); it sums to 1."""
         return _normalised(self.load(weight))
 
     def edge_mean(self, where: Facets, weight: Weight = 1.0) -> FloatArray:
@@ -184,8 +170,6 @@ class Space:
             [m]
         radius : float
             Not much less than an element, else nothing is seen of it [m].
-        of : Weight
-            What the bell is multiplied by, such as 1 on the elements of one body.
         """
         centre = np.asarray(point, dtype=np.float64).reshape(-1, 1, 1)
         share = self.at(of, self.basis, slice(None))
@@ -206,8 +190,6 @@ class Space:
 
         Parameters
         ----------
-        a, b : Facets
-            Two edges with the same division, not connected by vertices.
         offset : array-like of shape (dim,)
             From a point of `a` to its partner of `b` [m].
 
@@ -218,11 +200,6 @@ class Space:
         difference : csr_matrix of shape (m, n)
             Takes a field to its value on `a` minus that on `b`. ``h * difference.T @ area @ difference`` is the
             conduction of a contact.
-
-        Raises
-        ------
-        InputError
-            A point of `a` has no partner on `b`.
         """
         mass = self.edge_mass(a)
         mine = np.unique(self.basis.get_dofs(self.facets(a)).all())

@@ -6,11 +6,5 @@ from finite_elements.revolution import Revolution, Table
 
 
 def spindle(table: Table | None = None) -> Part:
-    """Return the spindle as a part, z = 0 at the flange, z towards the tool.
-
-    Parameters
-    ----------
-    table : mapping, optional
-        As ``data/spindle.toml``, which is used without it; see `finite_elements.revolution.Revolution`.
-    """
+    """Return the spindle as a part, z = 0 at the flange, z towards the tool."""
     return Revolution(data("spindle.toml") if table is None else table).part("spindle")

@@ -91,8 +91,6 @@ class Stepper:
             At the start [degC].
         heat : Heat
             Put in, with what the air brings [W].
-        steps : int
-            Number of steps.
         time : float
             At the start [s].
         """

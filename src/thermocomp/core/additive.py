@@ -30,7 +30,6 @@ class Curve:
         Strictly increasing.
     y : tuple of float
         Same length as `x`; one more value for ``step``.
-    kind : {'linear', 'step'}
 
     Raises
     ------

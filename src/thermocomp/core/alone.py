@@ -10,18 +10,7 @@ from thermocomp.core.exceptions import InputError
 
 @contextmanager
 def alone(path: Path) -> Iterator[None]:
-    """Hold a lock on an empty file next to `path`; the system releases it when the process ends, even after a crash.
-
-    Parameters
-    ----------
-    path : Path
-        Its folder must exist.
-
-    Raises
-    ------
-    InputError
-        Another process holds the lock, or the folder is not writable.
-    """
+    """Hold a lock on an empty file next to `path`; the system releases it when the process ends, even after a crash."""
     beside = path.with_name(f"{path.name}.lock")
     try:
         lock = os.open(beside, os.O_RDWR | os.O_CREAT, 0o666)

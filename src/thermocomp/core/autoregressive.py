@@ -97,16 +97,6 @@ class Ticking(ErrorModel):
             Input values over the same time. Default: their reference values.
         reference : array-like of shape (n_inputs,), optional
             Values that count as zero. Default: those stored in the model.
-
-        Returns
-        -------
-        State
-            The `dt` of the next `step` counts from this state.
-
-        Raises
-        ------
-        InputError
-            A value is not finite, or the number of values differs from the number of inputs.
         """
         zero = np.array([i.reference for i in self.inputs]) if reference is None else np.asarray(reference, np.float64)
         given = zero if inputs is None else np.asarray(inputs, dtype=np.float64)

@@ -61,19 +61,7 @@ _CEILINGS = np.array([1.0 - LEAST, READING, COEFFICIENT, MEMORY, _LARGEST])
 def round_within(
     values: ArrayLike, least: float | FloatArray = -_LARGEST, most: float | FloatArray = _LARGEST
 ) -> FloatArray:
-    """Return the nearest single-precision numbers within bounds.
-
-    Parameters
-    ----------
-    values : array-like of float
-    least, most : float or ndarray
-        Bounds, common or one per number; each interval contains a single-precision number.
-
-    Returns
-    -------
-    ndarray of float
-        NaN stays NaN.
-    """
+    """Return the nearest single-precision numbers within bounds."""
     with np.errstate(over="ignore", under="ignore"):
         near = np.clip(np.asarray(values, dtype=np.float64), least, most).astype(np.float32)
         above, below = (np.nextafter(near, np.float32(end)) for end in (np.inf, -np.inf))
@@ -86,11 +74,6 @@ def round_single(values: ArrayLike) -> FloatArray:
 
     Numbers are rounded only here: values that satisfy the bounds of this module still do so afterwards. Non-zero values
     do not become zero, and finite values stay finite.
-
-    Parameters
-    ----------
-    values : array-like of float
-        NaN and infinities stay unchanged.
 
     Returns
     -------
@@ -119,22 +102,7 @@ def _spread(rising: FloatArray, most: FloatArray) -> FloatArray:
 
 
 def check_finite(owner: str, most: float = COEFFICIENT, **numbers: Any) -> None:
-    """Reject numbers that are not finite or exceed a bound.
-
-    Parameters
-    ----------
-    owner : str
-        Owner of the values, for messages.
-    most : float
-        Largest magnitude.
-    **numbers : float or nested sequence of float
-        Values by name.
-
-    Raises
-    ------
-    SettingError
-        Lists every name with an invalid number, and its first invalid value.
-    """
+    """Reject numbers that are not finite or exceed a bound."""
     wrong = []
     for name, values in numbers.items():
         table = np.asarray(values, dtype=np.float64).ravel()
@@ -146,21 +114,7 @@ def check_finite(owner: str, most: float = COEFFICIENT, **numbers: Any) -> None:
 
 
 def check_between(owner: str, least: float, most: float, **numbers: Any) -> None:
-    """Reject numbers outside two bounds.
-
-    Parameters
-    ----------
-    owner : str
-        Owner of the values, for messages.
-    least, most : float
-    **numbers : float or nested sequence of float
-        Values by name.
-
-    Raises
-    ------
-    SettingError
-        Lists every name with an invalid number, and its first invalid value.
-    """
+    """Reject numbers outside two bounds."""
     wrong = []
     for name, values in numbers.items():
         table = np.asarray(values, dtype=np.float64).ravel()
@@ -172,42 +126,14 @@ def check_between(owner: str, least: float, most: float, **numbers: Any) -> None
 
 
 def check_count(owner: str, most: int, **entries: Sequence[object]) -> None:
-    """Reject sequences that are too long.
-
-    Parameters
-    ----------
-    owner : str
-        Owner of the values, for messages.
-    most : int
-    **entries : sequence
-        Sequences of limited length, by name.
-
-    Raises
-    ------
-    SettingError
-        Lists every sequence with more than `most` entries.
-    """
+    """Reject sequences that are too long."""
     wrong = [f"{len(found):,} {name}, at most {most:,}" for name, found in entries.items() if len(found) > most]
     if wrong:
         raise SettingError(f"{owner}: {'; '.join(wrong)}")
 
 
 def check_name(what: str, name: str, most: int = NAME) -> None:
-    """Reject an invalid name: empty, too long, or with characters that break a line or a terminal.
-
-    Parameters
-    ----------
-    what : str
-        Kind of the named object.
-    name : str
-    most : int
-        Maximum number of characters.
-
-    Raises
-    ------
-    SettingError
-        The value is invalid; the message contains the kind of name.
-    """
+    """Reject an invalid name: empty, too long, or with characters that break a line or a terminal."""
     if not name.strip() or len(name) > most:
         raise SettingError(f"{what}: a name has 1 to {most} characters, found {len(name.strip())}")
     for c in name:

@@ -54,18 +54,8 @@ def read_clock(table: Columns, time: ArrayLike | str | None, owner: str, *, need
 
     Parameters
     ----------
-    table : mapping of str to array-like
     time : str or array-like or None
         Times, or the name of their column; None: the column ``time_s``, if present.
-    owner : str
-        Caller, for messages.
-    needed : bool
-        The time is required.
-
-    Raises
-    ------
-    InputError
-        The time is missing, or the values are not times.
     """
     if time is None and "time_s" in table:
         time = "time_s"

@@ -31,22 +31,10 @@ def contributions(
 
     With the intercept they sum to the model prediction, except where it holds or fades outside its trained range.
 
-    Parameters
-    ----------
-    model : PacedDynamic
-        Model of the method `averaged`; other families are not supported.
-    table, time, reference
-        See `thermocomp.core.model.ErrorModel.predict`.
-
     Returns
     -------
     dict of str to ndarray of shape (n_rows,)
         By input name [unit of the model]; 0 before the first complete row of a test.
-
-    Raises
-    ------
-    InputError
-        The model belongs to another family; see also `thermocomp.core.model.ErrorModel.predict`.
     """
     model = _paced(model)
     direct, weights = model.read_out
@@ -67,19 +55,8 @@ def gains(model: ErrorModel, step: float) -> list[Gain]:
 
     Parameters
     ----------
-    model : PacedDynamic
-        Model of the method `averaged`; other families are not supported.
     step : float
         Time between two rows [s].
-
-    Returns
-    -------
-    list of Gain
-
-    Raises
-    ------
-    InputError
-        The model belongs to another family, or the step is not positive.
     """
     model = _paced(model)
     if not step > 0:

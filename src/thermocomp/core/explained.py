@@ -25,7 +25,6 @@ class SensorExplanation:
 
     Parameters
     ----------
-    name, quantity, unit : str
     low, high : float
         Training range, relative to the reference of the input if it has a separate one [unit].
     settled : float or None
@@ -81,7 +80,6 @@ class Explanation:
 
     Parameters
     ----------
-    target, unit, method, family : str
     remembers : bool
         The output depends on earlier readings.
     sensors : tuple of SensorExplanation
@@ -132,12 +130,7 @@ class Explanation:
 
 @dataclass(frozen=True)
 class Explanations:
-    """Explanations of the models of several targets; `print` shows them as text.
-
-    Parameters
-    ----------
-    models : tuple of Explanation
-    """
+    """Explanations of the models of several targets; `print` shows them as text."""
 
     models: tuple[Explanation, ...]
 
@@ -151,14 +144,6 @@ class Explanations:
 
 def explain(model: ErrorModel) -> Explanation:
     """Return the explanation of a model.
-
-    Parameters
-    ----------
-    model : ErrorModel
-
-    Returns
-    -------
-    Explanation
 
     Examples
     --------
@@ -209,16 +194,7 @@ def explain(model: ErrorModel) -> Explanation:
 
 
 def explain_all(models: Sequence[ErrorModel]) -> Explanations:
-    """Return the explanations of the models of several targets.
-
-    Parameters
-    ----------
-    models : sequence of ErrorModel
-
-    Returns
-    -------
-    Explanations
-    """
+    """Return the explanations of the models of several targets."""
     return Explanations(tuple(map(explain, models)))
 
 

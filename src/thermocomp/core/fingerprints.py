@@ -18,13 +18,7 @@ def pack_marks(marks: Marks) -> str:
 
 
 def unpack_marks(text: str) -> Marks:
-    """Return the numbers in a text written by `pack_marks`.
-
-    Raises
-    ------
-    InputError
-        The text is invalid.
-    """
+    """Return the numbers in a text written by `pack_marks`."""
     try:
         content = base64.b64decode(text.encode("ascii"), validate=True)
     except (binascii.Error, UnicodeEncodeError) as e:
@@ -42,7 +36,6 @@ class Runs:
 
     Parameters
     ----------
-    stride : int
     rows : str
         First row of each run, in ascending order, as text of `pack_marks`; counted through all tests.
     moving : str

@@ -71,7 +71,6 @@ class Support:
 
     Parameters
     ----------
-    policy : {'clip', 'hold', 'fade'}
     margin : float
         Fraction of each input's trained span that still counts as inside.
     fade_over : float
@@ -121,7 +120,6 @@ class TrainedRange(NamedTuple):
 
         Parameters
         ----------
-        support : Support
         before, deviation : ndarray of shape (...,)
             Previous deviation; deviation at the clipped inputs.
         change, clipped : ndarray of shape (..., n_inputs)

@@ -12,21 +12,11 @@ FloatArray = NDArray[np.float64]
 def seconds(times: NDArray[Any]) -> FloatArray:
     """Return times as seconds.
 
-    Parameters
-    ----------
-    times : ndarray
-        Numbers, datetimes or timedeltas, also as Python or pandas objects.
-
     Returns
     -------
     ndarray of the same shape
         Numbers unchanged; other times relative to the first one [s], those with a time zone as elapsed UTC time, so
         that daylight-saving changes have no effect. NaN where the time is missing.
-
-    Raises
-    ------
-    TypeError, ValueError
-        A value is neither a number nor a time, or only some have a time zone.
     """
     if times.dtype.kind in "mM":
         return np.asarray((times - times.ravel()[:1]) / np.timedelta64(1, "s"), dtype=np.float64)

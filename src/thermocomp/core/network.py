@@ -135,11 +135,6 @@ class Perceptron:
         hidden_thresholds : ndarray of shape (n_hidden,)
         output_weights : ndarray of shape (n_outputs, n_hidden)
         output_thresholds : ndarray of shape (n_outputs,)
-        hidden, output : {'sigmoid', 'tanh', 'identity'}
-
-        Returns
-        -------
-        Perceptron
         """
         return cls(
             tuple(tuple(w) for w in hidden_weights.tolist()),

@@ -13,24 +13,7 @@ _NOT_ALLOWED = {errno.EACCES, errno.EPERM, errno.EROFS}
 
 
 def refuse_existing(paths: Sequence[Path], overwrite: bool, inputs: Sequence[Path] = (), ending: str = "") -> None:
-    """Raise `InputError` if an output cannot be written, before any work is done.
-
-    Parameters
-    ----------
-    paths : sequence of Path
-        Output paths.
-    overwrite : bool
-        Existing files may be replaced.
-    inputs : sequence of Path
-        Input files, which are never overwritten.
-    ending : str
-        Required extension, such as ``.html``.
-
-    Raises
-    ------
-    InputError
-        A path exists already, is an input, cannot be written, or has another extension.
-    """
+    """Raise `InputError` if an output cannot be written, before any work is done."""
     for path in paths:
         place = find_place(path)
         if any(place.exists() and other.exists() and place.samefile(other) for other in inputs):
@@ -42,18 +25,7 @@ def refuse_existing(paths: Sequence[Path], overwrite: bool, inputs: Sequence[Pat
 
 
 def find_place(target: Path) -> Path:
-    """Return the real path of a file: links are followed, the last one even if its target does not exist.
-
-    Returns
-    -------
-    Path
-        Its folder exists, and the path is free or a writable file.
-
-    Raises
-    ------
-    InputError
-        There is no such path.
-    """
+    """Return the real path of a file: links are followed, the last one even if its target does not exist."""
     place = Path(os.path.realpath(target))
     try:
         target.stat()

@@ -71,10 +71,8 @@ class PacedDynamic(ErrorModel):
         Name of the family in a file.
     time_constants : tuple of float
         Time constants of the lags, the same for all temperatures [s].
-    temperatures : tuple of LaggedInput
     top_speed : float
         n_top [1/min].
-    states : tuple of SpeedState
     spread : tuple of tuple of float
         Readout coefficients of the same terms (temperatures, their lags, lag by lag, and the speed states); the root of
         the sum of the squared outputs is the spread of the structures averaged by the model [unit]; empty: unknown.

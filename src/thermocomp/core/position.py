@@ -28,7 +28,6 @@ class PositionModel:
     ----------
     target : str
         Component that is modelled, such as ``EYY``.
-    unit : {'um', 'urad'}
     axis : {'X', 'Y', 'Z'}
         Axis of the position p.
     travel : tuple of float
@@ -41,7 +40,6 @@ class PositionModel:
         k_0 [unit]; None: zero.
     slopes : tuple of ErrorModel
         k_1, k_2 ... [unit/m, unit/m^2 ...].
-    provenance : Provenance or None
     """
 
     target: str

@@ -135,7 +135,6 @@ class SplineProfile:
     ----------
     kind : str
         Name of the kind in a file.
-    axis : {'X', 'Y', 'Z'}
     knots : tuple of float
         Ends of the pieces, increasing [mm]; outside, the value at the nearer end applies.
     pieces : tuple of (float, float, float, float)

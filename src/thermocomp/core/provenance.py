@@ -158,11 +158,6 @@ class HonestError:
 
         This must hold for each input alone as well: a second failure must not re-enable a correction stopped by the
         first one.
-
-        Parameters
-        ----------
-        names : sequence of str
-            In the order of the inputs.
         """
         return max(self.lost.get(key, math.inf) for key in (*names, ", ".join(names))) <= self.none_rms
 

@@ -44,15 +44,8 @@ def walk(
 ) -> Iterator[tuple[State, FloatArray]]:
     """Replay a model through a table as `ErrorModel.predict` does, and yield its state after each row.
 
-    Parameters
-    ----------
-    model : ErrorModel
-    table, time, reference
-        As for `thermocomp.core.model.ErrorModel.predict`.
-
     Yields
     ------
-    state : State
     values : ndarray of shape (n_inputs,)
         Last complete reading [units of the inputs]; NaN before the first.
     """

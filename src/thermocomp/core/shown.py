@@ -9,54 +9,20 @@ def replace_unprintable(text: object) -> str:
 
 
 def shorten(text: object, longest: int) -> str:
-    """Return a text that prints on one line, shortened with dots.
-
-    Parameters
-    ----------
-    text : object
-    longest : int
-        Maximum number of characters.
-
-    Returns
-    -------
-    str
-    """
+    """Return a text that prints on one line, shortened with dots."""
     line = str(text)
     return replace_unprintable(line if len(line) <= longest else f"{line[: longest - 3]}...")
 
 
 def escape(text: object, longest: int) -> str:
-    r"""Return a text with unprintable characters escaped, such as ``\x07`` or ``\ud800``; line breaks stay.
-
-    Parameters
-    ----------
-    text : object
-    longest : int
-        Maximum number of characters of the text that are shown; dots replace the rest.
-
-    Returns
-    -------
-    str
-    """
+    r"""Return a text with unprintable characters escaped, such as ``\x07`` or ``\ud800``; line breaks stay."""
     line = str(text)
     line = line if len(line) <= longest else f"{line[: longest - 3]}..."
     return "".join(c if c.isprintable() or c == "\n" else ascii(c)[1:-1] for c in line)
 
 
 def explain_unfit(text: str, longest: int = 200) -> str:
-    """Return the reason why an external text cannot be a name; empty if it is valid.
-
-    Parameters
-    ----------
-    text : str
-    longest : int
-        Maximum number of characters.
-
-    Returns
-    -------
-    str
-        Reason, with the text escaped.
-    """
+    """Return the reason why an external text cannot be a name; empty if it is valid."""
     if len(text) > longest:
         return f"{text[:40]!a}... has {len(text):,} characters; at most {longest:,}"
     if not text.isprintable():

@@ -41,13 +41,8 @@ class Stack:
     lags and one readout, so that an input, variable or term used by several of them is evaluated once. `PacedDynamic`
     models with the same states are grouped. The models of the other families are stepped individually.
 
-    Parameters
-    ----------
-    models : sequence of ErrorModel
-
     Attributes
     ----------
-    models : tuple of ErrorModel
     inputs : tuple of str
         Names of the inputs of all models, in the order of their first use.
 
@@ -155,8 +150,6 @@ class Stack:
 
         Parameters
         ----------
-        state : StackState
-            From `init` or the previous `step`.
         values : ndarray of shape (..., n_inputs)
             Values in the order of `inputs` [their units]. Leading axes are a batch of independent runs.
         dt : float
@@ -164,14 +157,8 @@ class Stack:
 
         Returns
         -------
-        state : StackState
         deviations : ndarray of shape (..., n_models)
             One per model [its unit].
-
-        Raises
-        ------
-        ReadingError
-            An input is not finite, or `dt` is negative or not finite.
         """
         if not np.isfinite(values).all() or not 0.0 <= dt < np.inf:
             raise ReadingError(f"inputs {values} of {', '.join(self.inputs)} or time step {dt} s not finite")
@@ -230,8 +217,6 @@ class Stack:
 
         Parameters
         ----------
-        state : StackState
-            State after the step that processed the reading.
         values : ndarray of shape (..., n_inputs)
             The reading.
 

@@ -5,17 +5,7 @@ from typing import Any
 
 
 def parse_json(text: bytes | str) -> Any:
-    """Return the content of a JSON text.
-
-    Parameters
-    ----------
-    text : bytes or str
-
-    Raises
-    ------
-    ValueError
-        The text is not UTF-8, not JSON, nested too deeply, or an object has a duplicate key.
-    """
+    """Return the content of a JSON text."""
     try:
         # json would guess UTF-16 and UTF-32, and use the last of duplicate keys
         return json.loads(text.decode("utf-8") if isinstance(text, bytes) else text, object_pairs_hook=_once)

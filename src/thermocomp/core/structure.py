@@ -50,26 +50,7 @@ class Structure:
 
     @classmethod
     def parse(cls, code: str) -> "Structure":
-        """Return the structure given by a code.
-
-        Parameters
-        ----------
-        code : str
-            According to ISO 10791, ``w X' b Z Y (C1) t``: from the workpiece over the bed to the tool, axes that carry
-            the workpiece with a prime, including rotary ones (``w C' A' X' b Y Z (C1) t``); or the short form ``XFZY``:
-            the letters before F carry the workpiece, those after it the tool; without F all carry the tool. Blanks and
-            case are ignored. A C as the last axis of the tool is the spindle, with or without parentheses.
-
-        Returns
-        -------
-        Structure
-
-        Raises
-        ------
-        SettingError
-            The code has neither form, a duplicate axis, an axis other than X Y Z A B C, a misplaced prime, or a spindle
-            that turns the workpiece.
-        """
+        """Return the structure given by a code."""
         text = "".join(code.split()).replace("’", "'").replace("′", "'").upper()
         short = _SHORT.fullmatch(text)
         if short and text:
@@ -96,12 +77,7 @@ class Structure:
         return " ".join(["w", *table, *(f"{a}'" for a in self.workpiece), "b", *self.tool, *head, "(C1)", "t"])
 
     def beyond(self, axis: str) -> tuple[str, ...]:
-        """Return the axes between an axis and the tool, which move the tool relative to the slide of this axis.
-
-        Parameters
-        ----------
-        axis : {'X', 'Y', 'Z'}
-        """
+        """Return the axes between an axis and the tool, which move the tool relative to the slide of this axis."""
         return self.axes[self.axes.index(axis) + 1 :]
 
 

@@ -82,14 +82,7 @@ class Variable:
 
 @dataclass(frozen=True)
 class TermTable:
-    """Evaluator of terms for one or many readings.
-
-    Parameters
-    ----------
-    n_inputs : int
-    variables : tuple of Variable
-    terms : tuple of Term
-    """
+    """Evaluator of terms for one or many readings."""
 
     n_inputs: int
     variables: tuple[Variable, ...]

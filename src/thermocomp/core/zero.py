@@ -95,17 +95,10 @@ def first_rows(zeroing: Zeroing, time: FloatArray, resting: BoolArray) -> tuple[
 
     Parameters
     ----------
-    zeroing : Zeroing
     time : ndarray of shape (n_readings,)
         Times of the usable readings, increasing [s].
     resting : ndarray of bool of shape (n_readings,)
         True where the spindle is known to be stopped.
-
-    Returns
-    -------
-    count : int
-    known : int
-        Index of the reading at which the zero is known: the last averaged reading, or the next one.
     """
     gathered, nothing = Gathered(), np.empty(0)
     for k, (t, r) in enumerate(zip(time.tolist(), resting.tolist(), strict=True)):
@@ -144,7 +137,6 @@ def find_zero(
 
     Parameters
     ----------
-    zeroing : Zeroing
     zero : ndarray of shape (n_inputs,)
         Known part of the zero; NaN where the first readings decide.
     time : ndarray of shape (n_rows,)

@@ -20,20 +20,7 @@ class Drive(NamedTuple):
 
 
 def find_drives(tables: Tables, named: Mapping[str, str]) -> list[Drive]:
-    """Return the axes to which corrections are applied.
-
-    Parameters
-    ----------
-    tables : Tables
-        Tables of the compensator.
-    named : mapping of str to str
-        Axes by target; if empty, derived from the target names, such as z_um.
-
-    Raises
-    ------
-    InputError
-        No target has an axis, or two targets have the same axis, or a named target does not exist.
-    """
+    """Return the axes to which corrections are applied."""
     if unknown := [t for t in named if t not in tables.targets]:
         raise InputError(f"--axes {unknown[0]}: no such target; there are {', '.join(tables.targets)}")
     found: dict[str, Drive] = {}
@@ -71,24 +58,7 @@ class Value(NamedTuple):
 def write_values(
     name: str, dialect: Dialect, drives: list[Drive], taken: Mapping[str, Value], direction: float
 ) -> SourceUnit:
-    """Return a function block that converts the corrections to the inputs of a controller.
-
-    Parameters
-    ----------
-    name : str
-        Name of the block.
-    dialect : {'codesys', 'twincat', 'scl'}
-    drives : list of Drive
-    taken : mapping of str to Value
-        For ``offset``, ``slope`` and ``position``.
-    direction : float
-        1 if the controller adds its input to the command, -1 if it subtracts it; an adjustable input of the block.
-
-    Raises
-    ------
-    InputError
-        A reference position exceeds the range of the controller's integers.
-    """
+    """Return a function block that converts the corrections to the inputs of a controller."""
     scl, n = dialect == "scl", len(drives)
     _check_whole(drives, taken["position"])
     mark = "#" if scl else ""

@@ -96,13 +96,5 @@ _FILES = {KLIPPER: "cfg", HEIDENHAIN: "txt", FANUC: "nc"}
 
 
 def write_script(answers: str, name: str) -> str:
-    """Return the source of the script.
-
-    Parameters
-    ----------
-    answers : str
-        `KLIPPER`, `HEIDENHAIN` or `FANUC`: code that evaluates the exported file.
-    name : str
-        Name of the files.
-    """
+    """Return the source of the script."""
     return _SCRIPT.format(name=name, file=f"{name}.{_FILES[answers]}", answers=answers)

@@ -39,12 +39,7 @@ class Facts:
         ]
 
     def lines(self, compensator: Compensator) -> list[str]:
-        """Return the summary, with the verdict in the first line.
-
-        Parameters
-        ----------
-        compensator : Compensator
-        """
+        """Return the summary, with the verdict in the first line."""
         found, limits = [_verdict(compensator)], compensator.limits
         found += [f"{target}: {status.reason}" for target, status in compensator.shadow.items()]
         taken = {m.honest_error.taken for m in compensator.models if m.honest_error and m.honest_error.taken}

@@ -5,16 +5,7 @@ from thermocomp.runtime.compensator import Compensator
 
 
 def describe(compensator: Compensator, tables: Tables, of: str = "") -> dict[str, object]:
-    """Return the parts of the page by name.
-
-    Parameters
-    ----------
-    compensator : Compensator
-    tables : Tables
-        Tables of the compensator.
-    of : str
-        Prefix of the output names.
-    """
+    """Return the parts of the page by name."""
     slopes = any(tables.values["to_slope"])
     zeroing = compensator.models[0].zeroing
     sensors = (

@@ -17,7 +17,6 @@ class Printer(ABC):
 
     Parameters
     ----------
-    function : Function
     sizes : mapping of str to int
         Sizes of the block's tables.
     """

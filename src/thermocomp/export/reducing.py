@@ -30,12 +30,8 @@ class ExportOrder:
     ----------
     to : str
         Name of the target.
-    target : Target
-    limits : Limits
     name : str
         Name of the files.
-    facts : Facts
-    options : ReductionOptions
     """
 
     to: str
@@ -62,26 +58,7 @@ def export_reduced(
     accept_unproven: str | None,
     listener: "Listener",
 ) -> Outcome:
-    """Create the files of an export to a target with a shape.
-
-    Parameters
-    ----------
-    order : ExportOrder
-    models : sequence of ErrorModel
-    recordings : sequence of Recording
-        Recordings on which the models are reduced.
-    starts : Start or sequence of Start, optional
-        Initial state of the recordings.
-    accept_unproven : str or None
-        Person who approves use of an unproven model, and reason.
-    listener : Listener
-
-    Raises
-    ------
-    InputError
-        No model has an axis that the controller corrects, or two have the same; a model has to be reduced and there is
-        no recording; or the correction would reach its limit.
-    """
+    """Create the files of an export to a target with a shape."""
     to, shape, options = order.to, order.target.shape, order.options
     assert shape is not None
     wanted, axes, elsewhere = along_axes(models, options, to, shape.axes)
@@ -115,22 +92,7 @@ def export_reduced(
 def along_axes(
     models: Sequence[_Model], options: ReductionOptions, to: str, corrected: str
 ) -> tuple[list[_Model], dict[str, str], dict[str, str]]:
-    """Return the models supported by a controller, their axes by target, and the reason for each omitted model.
-
-    Parameters
-    ----------
-    models : sequence of ErrorModel or PositionModel
-    options : ReductionOptions
-    to : str
-        Name of the controller.
-    corrected : str
-        Letters of the axes that it corrects.
-
-    Raises
-    ------
-    InputError
-        No model has one of these axes, or two have the same.
-    """
+    """Return the models supported by a controller, their axes by target, and the reason for each omitted model."""
     axes = _find_axes(models, options)
     elsewhere = {m.target: why for m in models if (why := _why_elsewhere(m, axes[m.target], to, corrected))}
     wanted = [m for m in models if m.target not in elsewhere]

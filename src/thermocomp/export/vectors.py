@@ -59,14 +59,8 @@ def replay(
 
     Parameters
     ----------
-    compensator : Compensator
-    tables : Tables
-        Tables of the compensator.
-    readings : Readings
     start : CompensatorState, optional
         State to start from. Default: `Compensator.start`.
-    rounded : callable, optional
-        Rounding applied to all numbers kept between two calls.
     """
     names, targets = [c.name for c in tables.channels], tables.targets
     state, clock, begun, rows = start or compensator.start(), 0.0, False, []
@@ -126,11 +120,6 @@ def round_all(value: Any, rounded: Callable[[FloatArray], FloatArray]) -> Any:
 def find_tolerance(tables: Tables) -> float:
     """Return the tolerance for other code in double precision: feedback amplifies rounding errors.
 
-    Parameters
-    ----------
-    tables : Tables
-        Tables of the compensator.
-
     Returns
     -------
     float
@@ -148,10 +137,6 @@ def make_readings(tables: Tables) -> Readings:
     A start at rest and a warm-up at changing speeds; each value missing, erratic or impossible for a while; late, old
     or out-of-order readings; a source that stops until the corrections have faded to zero, and its return; sensors that
     stick, step and drift one after the other; values beyond the trained range.
-
-    Parameters
-    ----------
-    tables : Tables
     """
     machine = Warming(tables)
     age, hold, fade = (tables.values[n] for n in ("reading_age", "hold", "fade"))

@@ -39,8 +39,6 @@ class Warming:
 
         Parameters
         ----------
-        share : float
-            Fraction of the top speed.
         dt : float
             Duration [s].
         """

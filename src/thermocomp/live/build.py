@@ -19,17 +19,7 @@ from thermocomp.runtime.compensator import Compensator
 
 
 def build(settings: ServiceSettings) -> Service:
-    """Return the service of a configuration; nothing is connected yet.
-
-    Parameters
-    ----------
-    settings : ServiceSettings
-
-    Raises
-    ------
-    InputError
-        A file or directory is missing, a model file or an experiment is invalid, or none of the models may run.
-    """
+    """Return the service of a configuration; nothing is connected yet."""
     config, folder = settings
     if missing := list(find_faults(settings)):
         raise InputError("\n".join(["invalid configuration:", *(f"  {m}" for m in missing)]))

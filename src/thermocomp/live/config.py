@@ -74,7 +74,6 @@ class MachineOf:
 
     Parameters
     ----------
-    file : str
     at : tuple of 3 float
         Positions of the stationary axes while one axis moves [mm].
     tool : tuple of 3 float or None
@@ -130,18 +129,14 @@ class Config:
         Sources of readings, receivers of corrections.
     models : tuple of str
         Model files, one target each; or none if a machine is given.
-    machine : MachineOf or None
     probes : tuple
         Sources of measurements of the tool point.
     state : str
         File of the saved state; without one every start is a cold start.
-    limits : Limits
     shadow : bool
         Apply no corrections: the models are only observed.
     speed : float
         Machine time per unit of real time: for the virtual machine and recordings only.
-    page : Page or None
-    journal : JournalOut or None
     own_compensation : {'on', 'off', 'unknown'}
         Whether the controller compensates for temperature by itself.
     at_stop : {'hold', 'fade'}
@@ -236,17 +231,7 @@ _PLAIN = {
 
 
 def read_config(path: str | Path) -> ServiceSettings:
-    """Read a configuration.
-
-    Parameters
-    ----------
-    path : str or Path
-
-    Raises
-    ------
-    InputError
-        File missing, not TOML, or invalid: all errors are listed, each with its position.
-    """
+    """Read a configuration."""
     content = read_toml(path, "configuration of the service")
     if unfit := list(_unfit(content)):
         raise InputError("\n".join([f"{path}: {len(unfit)} to mend:", *(f"  {line}" for line in unfit)]))

@@ -11,12 +11,7 @@ POINTS, EVERY = 720, 30.0
 
 
 class Curves(deque[dict[str, float]]):
-    """Rows of values by name, ``time`` first; the oldest rows are dropped.
-
-    Parameters
-    ----------
-    compensator : Compensator
-    """
+    """Rows of values by name, ``time`` first; the oldest rows are dropped."""
 
     def __init__(self, compensator: Compensator) -> None:
         super().__init__(maxlen=POINTS)
@@ -29,8 +24,6 @@ class Curves(deque[dict[str, float]]):
         ----------
         now : float
             Machine time [s].
-        said : Compensated
-        latest : Latest
         """
         if not said.deviations or (self and now - self[-1]["time"] < EVERY):
             return

@@ -22,7 +22,6 @@ class Event:
         Machine time, seconds since 1970.
     kind : str
         ``reference``, ``state``, ``sensor``, ``probing``, ``link`` or ``service``.
-    text : str
     """
 
     time: float
@@ -45,8 +44,6 @@ class Events(deque[Event]):
         ----------
         time_of_it : float
             Machine time, seconds since 1970.
-        kind, text : str
-            As for `Event`; unprintable characters are shown escaped.
         """
         if (lately := self._lately.get(kind)) is not None:
             now = time.monotonic()

@@ -19,12 +19,7 @@ _LONG = 255
 
 
 def find_faults(settings: ServiceSettings) -> Iterator[str]:
-    """Yield faults of files: those that cannot be read, and those that cannot be written.
-
-    Parameters
-    ----------
-    settings : ServiceSettings
-    """
+    """Yield faults of files: those that cannot be read, and those that cannot be written."""
     config, folder = settings
     read = [*config.models, *([config.machine.file] if config.machine else [])]
     read += [s.experiment for s in config.sources if isinstance(s, SimulatedIn) and s.experiment.endswith(".toml")]
@@ -56,14 +51,7 @@ def find_faults(settings: ServiceSettings) -> Iterator[str]:
 
 
 def find_faults_now(settings: ServiceSettings, page: Page | None) -> Iterator[str]:
-    """Yield other present faults that would prevent the start of the service or the operation of a link.
-
-    Parameters
-    ----------
-    settings : ServiceSettings
-    page : Page or None
-        Page as it will be served.
-    """
+    """Yield other present faults that would prevent the start of the service or the operation of a link."""
     config, folder = settings
     for source in config.sources:
         if isinstance(source, ReplayIn) and not _unreadable(folder / source.file, recording=True):
@@ -87,12 +75,7 @@ def find_faults_now(settings: ServiceSettings, page: Page | None) -> Iterator[st
 
 
 def runs_now(settings: ServiceSettings) -> bool:
-    """Return whether the service of this configuration is running: its port is then in use.
-
-    Parameters
-    ----------
-    settings : ServiceSettings
-    """
+    """Return whether the service of this configuration is running: its port is then in use."""
     config, folder = settings
     for name in (config.state, config.journal.file if config.journal else ""):
         if name and (folder / f"{name}.lock").exists():  # without a lock file no service is running

@@ -11,13 +11,7 @@ from thermocomp.runtime.state import CompensatorState, Status
 
 
 class ConfirmedCorrections:
-    """Corrections that controllers have confirmed, and their alarms.
-
-    Parameters
-    ----------
-    sinks : sequence of Sink
-    clock : ServiceClock
-    """
+    """Corrections that controllers have confirmed, and their alarms."""
 
     def __init__(self, sinks: Sequence[Sink], clock: ServiceClock) -> None:
         # the report of a controller takes precedence over that of a file
@@ -54,14 +48,7 @@ class ConfirmedCorrections:
 def suspensions(
     sink: Suspending, in_force: Mapping[str, Correction], state: CompensatorState
 ) -> Iterator[tuple[str, Status | None]]:
-    """Yield targets suspended or resumed by a controller, with the resulting order; None: resumed.
-
-    Parameters
-    ----------
-    sink : Suspending
-    in_force : mapping of str to Correction
-    state : CompensatorState
-    """
+    """Yield targets suspended or resumed by a controller, with the resulting order; None: resumed."""
     away = sink.suspended()
     for target in state.corrections.keys() & (in_force.keys() | away.keys()):
         order = state.orders.get(target)

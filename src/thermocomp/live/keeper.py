@@ -22,8 +22,6 @@ class StateKeeper:
     ----------
     path : Path or None
         None: the state is not stored.
-    compensator : Compensator
-    clock : ServiceClock
     say : callable
         Called with a line of text for the event list.
     """
@@ -37,13 +35,7 @@ class StateKeeper:
         self.not_saved = ""
 
     def begin(self) -> CompensatorState:
-        """Return the initial state: from the file, or a cold one.
-
-        Raises
-        ------
-        InputError
-            The file is of another kind and would be overwritten.
-        """
+        """Return the initial state: from the file, or a cold one."""
         cold = self._compensator.start()
         if self._path is None:
             return cold

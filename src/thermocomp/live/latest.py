@@ -30,7 +30,6 @@ class Latest(dict[str, tuple[float, float]]):
 
         Parameters
         ----------
-        values : mapping of str to float
         tick : float
             Present time [s].
         longest : float

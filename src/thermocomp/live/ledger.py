@@ -19,8 +19,6 @@ class ProbingLedger:
 
     Parameters
     ----------
-    compensator : Compensator
-    clock : ServiceClock
     say : callable
         Called with a line of text for the event list.
     """
@@ -43,8 +41,6 @@ class ProbingLedger:
 
         Parameters
         ----------
-        found : Measurement
-        state : CompensatorState
         in_force : Correction or None
             Correction at the time of the measurement; None: unknown.
         """
@@ -91,21 +87,7 @@ class ProbingLedger:
         state: CompensatorState,
         recorder: Recorder | None,
     ) -> None:
-        """Store the results of probings.
-
-        Parameters
-        ----------
-        probings : mapping of str to Probing
-            Probings used with a reading.
-        said : Compensated
-            Result of the compensator after the reading.
-        learned : mapping of str to Adaptation
-            Adaptations before the reading.
-        state : CompensatorState
-            State after the reading.
-        recorder : Recorder or None
-            Recorder of the journal.
-        """
+        """Store the results of probings."""
         for target, probing in probings.items():
             if target in said.deviations:
                 refused, after = said.refused.get(target, ""), state.learned.get(target)

@@ -29,12 +29,7 @@ SELDOM = 60.0
 
 
 class Link:
-    """Connection of one source, probe or sink.
-
-    Parameters
-    ----------
-    end : Source, Probe or Sink
-    """
+    """Connection of one source, probe or sink."""
 
     def __init__(self, end: Source | Probe | Sink) -> None:
         self.end = end
@@ -102,7 +97,6 @@ class Inlet(Link):
 
     Parameters
     ----------
-    source : Source or Probe
     said : callable
         Returns its readings or measurements.
     take : callable
@@ -130,7 +124,6 @@ class Outlet(Link):
 
     Parameters
     ----------
-    sink : Sink
     heard : callable, optional
         Called with the corrections in force, if the sink confirms them.
     """
@@ -171,12 +164,7 @@ class Outlet(Link):
 
 
 def explain(error: Exception) -> str:
-    """Return the reason why a link does not work, as text.
-
-    Parameters
-    ----------
-    error : Exception
-    """
+    """Return the reason why a link does not work, as text."""
     if isinstance(error, TimeoutError) and not str(error):
         return "no answer in time"
     known = isinstance(error, ThermocompError | OSError) and str(error)
@@ -184,13 +172,7 @@ def explain(error: Exception) -> str:
 
 
 async def within(seconds: float, work: Coroutine[Any, Any, None]) -> None:
-    """Await a coroutine with a time limit; exceptions and cancellation are ignored.
-
-    Parameters
-    ----------
-    seconds : float
-    work : coroutine
-    """
+    """Await a coroutine with a time limit; exceptions and cancellation are ignored."""
     task = asyncio.create_task(work)
     task.add_done_callback(lambda done: done.cancelled() or done.exception())
     try:

@@ -31,13 +31,8 @@ class Service:
 
     Parameters
     ----------
-    compensator : Compensator
-    sources : sequence of Source
-    sinks : sequence of Sink
-    clock : ServiceClock
     state_path : Path or None
         Path of the saved state.
-    probes : sequence of Probe
     recorder : Recorder or None
         Recorder of the journal.
     """

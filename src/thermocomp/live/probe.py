@@ -37,13 +37,6 @@ def check(
     ----------
     time : float
         Machine time [s].
-    target : str
-    probing : Probing
-    predicted : Deviation
-        Prediction for the time of the probing, before the probing is used.
-    learned : Adaptation or None
-        Adaptation after the probing; contains the expected size of the error.
-    refused : str
     """
     size = math.nan if learned is None else learned.size
     limit = ACTION * math.hypot(size, probing.repeatability)

@@ -37,12 +37,8 @@ class Recorder:
 
     Parameters
     ----------
-    path : Path
-    compensator : Compensator
     own : {'on', 'off', 'unknown'}
         Whether the controller has its own compensation.
-    clock : ServiceClock
-    limits : JournalLimits
     more : mapping of str to str, optional
         Quantity of channels that are recorded in addition to the inputs of the models.
     """

@@ -25,11 +25,6 @@ def minutes_until(times: Sequence[float], deviations: Sequence[float], below: fl
     -------
     float
         0 if already below; nan if unknown because the curve is too short; infinite if the change does not decrease.
-
-    Raises
-    ------
-    ValueError
-        `below` is not positive.
     """
     if not below > 0:
         raise ValueError(f"below = {below}: expected more than 0 um")

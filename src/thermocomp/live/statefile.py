@@ -44,7 +44,6 @@ class Saved:
     ----------
     written : datetime
         In UTC.
-    state : CompensatorState
     """
 
     written: datetime
@@ -60,21 +59,7 @@ def fingerprint(compensator: Compensator) -> str:
 
 
 def dumps(state: CompensatorState, compensator: Compensator, written: datetime) -> str:
-    """Return the text of a state file.
-
-    Parameters
-    ----------
-    state : CompensatorState
-    compensator : Compensator
-        Compensator of the state.
-    written : datetime
-        Now, with its time zone.
-
-    Raises
-    ------
-    InputError
-        `written` has no time zone.
-    """
+    """Return the text of a state file."""
     if written.tzinfo is None:
         raise InputError(f"state of a compensator: {written} has no time zone")
     entry = {
@@ -86,22 +71,7 @@ def dumps(state: CompensatorState, compensator: Compensator, written: datetime) 
 
 
 def loads(text: str, compensator: Compensator, source: str = "state") -> Saved:
-    """Read the text of a state file.
-
-    Parameters
-    ----------
-    text : str
-    compensator : Compensator
-        Compensator expected in the file.
-    source : str
-        Name of the source in an error.
-
-    Raises
-    ------
-    ModelFileError
-        Not JSON, not a state file, of a newer version, altered, incomplete, of other models, or not a possible state of
-        these models.
-    """
+    """Read the text of a state file."""
     (stored,) = jsonfile.unpack(KIND, _Stored, text, source).models[:1]
     if stored.models != fingerprint(compensator):
         raise ModelFileError(f"{source}: the state of other models; start without it, or with the models it belongs to")
@@ -114,49 +84,18 @@ def loads(text: str, compensator: Compensator, source: str = "state") -> Saved:
 
 
 def write(state: CompensatorState, compensator: Compensator, path: str | Path, written: datetime) -> None:
-    """Replace the state file; after a kill either the old or the new state is complete.
-
-    Parameters
-    ----------
-    state, compensator
-        See `dumps`.
-    path : str or Path
-    written : datetime
-        Now, with its time zone.
-
-    Raises
-    ------
-    InputError
-        The file cannot be written.
-    """
+    """Replace the state file; after a kill either the old or the new state is complete."""
     jsonfile.write(dumps(state, compensator, written), path, overwrite=True)
 
 
 def read(path: str | Path, compensator: Compensator) -> Saved:
-    """Read a state file.
-
-    Parameters
-    ----------
-    path : str or Path
-    compensator : Compensator
-        Compensator expected in the file.
-
-    Raises
-    ------
-    ModelFileError
-        The file is missing or invalid; see `loads`.
-    """
+    """Read a state file."""
     text, source = jsonfile.read(KIND, path)
     return loads(text, compensator, source)
 
 
 def is_ours(path: Path) -> bool:
-    """Return whether an unreadable file was once a state file and may be set aside.
-
-    Parameters
-    ----------
-    path : Path
-    """
+    """Return whether an unreadable file was once a state file and may be set aside."""
     try:
         begin = path.read_bytes()[:4096]
     except OSError:

@@ -128,10 +128,6 @@ def find_most(size: float, drift: float, magnitude: float) -> float:
         The same without compensation: the error of a thermal model cannot exceed the thermal drift of the machine [um].
     magnitude : float
         Largest permitted correction [um].
-
-    Returns
-    -------
-    float
     """
     return min(MOST * max(size, LEAST), MOST_OF_DRIFT * max(drift, LEAST), magnitude)
 
@@ -143,16 +139,10 @@ def begin(size: float, n_directions: int, typical: float = np.inf, most: float =
     ----------
     size : float
         Root mean square error on unseen cycles [um].
-    n_directions : int
-        Number of directions; 0 to estimate only an offset.
     typical : float
         Root mean square error on most of these cycles, limited to the size [um].
     most : float
         See `find_most` [um].
-
-    Returns
-    -------
-    Adaptation
     """
     size = max(size, LEAST)
     prior = np.diag([*[1.0] * n_directions, size**2])
@@ -169,7 +159,6 @@ def take(
 
     Parameters
     ----------
-    before : Adaptation
     directions : ndarray of shape (n_directions,)
         Directions of the model at the time of the probing [um].
     time : float
@@ -178,12 +167,6 @@ def take(
         Measured error minus the output of the model without probings [um].
     repeatability : float
         Repeatability of the probe, standard deviation [um].
-
-    Returns
-    -------
-    Adaptation
-    str
-        Reason why the probing is refused and not used; empty if it is used.
     """
     if not (np.isfinite(error) and 0.0 <= repeatability < np.inf):
         return before, f"{error} um with a repeatability of {repeatability} um: want finite numbers"

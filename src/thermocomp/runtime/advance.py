@@ -36,18 +36,10 @@ def advance(
 
     Parameters
     ----------
-    groups : sequence of Group
-    states, gathered : sequence of State, Gathered
-        States of the models.
-    reading : Reading
     time : float
         Time of the reading [s].
     dt : float
         Time since the previous reading [s].
-
-    Returns
-    -------
-    Advanced
     """
     after, begins, n = list(states), list(gathered), len(states)
     said, widths, given, outside = [math.nan] * n, [math.nan] * n, [np.empty(0)] * n, list[str]()

@@ -53,8 +53,6 @@ def run(
 
     Parameters
     ----------
-    model : ErrorModel
-        Model of any unit, even if refused, since this run judges it.
     limits : Limits or None
         None: the correction follows the model immediately, as for a model whose unit differs from that of the limits.
     time : ndarray of shape (n_rows,)
@@ -65,19 +63,12 @@ def run(
         Zero of the inputs; see `ErrorModel.init`.
     resting : ndarray of bool of shape (n_rows,), optional
         Whether the spindle is known to be stopped; default: never.
-    anew : int, optional
-        Row of a re-zero: from there, the deviation is the model output minus its mean over the rows of the new zero,
-        and the correction restarts at zero.
     undriven : ndarray of bool of shape (n_rows,), optional
         Rows in which the correction is not driven because essential sensors failed: it is held, then fades.
     probed : ndarray of shape (n_rows,), optional
         Deviation measured by a probing, nan elsewhere; it takes effect from the next row onwards [um].
     repeatability : float
         Repeatability of the probe, standard deviation [um].
-
-    Returns
-    -------
-    ModelRun
     """
     stands = np.zeros(len(time), dtype=np.bool_) if resting is None else resting
     complete = np.asarray(np.isfinite(values).all(axis=1))
@@ -130,7 +121,6 @@ def find_test_zero(
 
     Parameters
     ----------
-    model : ErrorModel
     time : ndarray of shape (n_rows,)
         [s]
     values : ndarray of shape (n_rows, n_inputs)

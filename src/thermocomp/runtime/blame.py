@@ -30,7 +30,6 @@ def one_fails(watch: Watch, difference: FloatArray, able: BoolArray) -> Blamed:
 
     Parameters
     ----------
-    watch : Watch
     difference : ndarray of shape (..., n_sensors)
         Difference of reading and prediction; 0 if there is none [degC].
     able : ndarray of bool of shape (..., n_sensors)
@@ -70,7 +69,6 @@ def weigh_swaps(
 
     Parameters
     ----------
-    watch : Watch
     evidence : ndarray of shape (..., n_pairs)
         Low-passed evidence for each pair; -inf once excluded.
     x : ndarray of shape (..., n_sensors)
@@ -81,14 +79,10 @@ def weigh_swaps(
         Sensors whose readings and predictions are reliable.
     dt : ndarray of shape (..., 1)
         Time since `evidence` was computed; 0 where predictions are not reliable [s].
-    find : bool
-        Whether to find the most likely pair; without, `both` holds none.
 
     Returns
     -------
     evidence : ndarray of shape (..., n_pairs)
-    both : Blamed
-        The pair that leaves the smallest residuals.
     """
     n, (direct, states) = len(watch.sensors), watch.read_out
     first, second = watch.pairs

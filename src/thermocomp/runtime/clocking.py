@@ -26,18 +26,10 @@ def place(state: CompensatorState, reading: Reading, now: float, tick: float, li
 
     Parameters
     ----------
-    state : CompensatorState
-    reading : Reading
     now : float
         Present time of the clock of the reading's source [s].
     tick : float
         Present time of the monotonic clock of the process [s].
-    limits : Limits
-
-    Returns
-    -------
-    Instant
-    str
     """
     if why := explain_untimely(reading, now, limits):
         return Instant(math.nan, state.origin), why

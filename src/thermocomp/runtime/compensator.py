@@ -53,7 +53,6 @@ class Compensator:
         Models of time, stepped individually, each with a separate zero.
     lines : dict of str to DeviationLine
         Lines by target or axis.
-    limits : Limits
     watching : bool
         True: permit creation even if none of its targets may run, to observe their predictions.
 
@@ -118,14 +117,6 @@ class Compensator:
         sources : sequence of ErrorModel or PositionModel
             One per target [um]. Of a `PositionModel`, only the thermal part is used, since its profile is a table in
             the controller; if the thermal part is not a straight line, it is replaced by the best line over the travel.
-        limits : Limits
-        watching : bool
-            True: permit creation even if none of the targets may run.
-
-        Raises
-        ------
-        InputError
-            Two models have the same target, one does not predict micrometres, or none may run.
         """
         targets = [m.target for m in sources]
         if len(set(targets)) != len(targets):
@@ -152,18 +143,10 @@ class Compensator:
 
         Parameters
         ----------
-        machine : Machine
-            Machine with its components.
         at : array-like of shape (3,)
             Positions of the other axes while one moves [mm].
         tool : array-like of shape (3,), optional
             Vector from the gauge point to the tip [mm]; default: that of the machine.
-        limits : Limits
-
-        Raises
-        ------
-        InputError
-            A position is not finite, or a model may not run.
         """
         model = VolumetricModel(machine)
         best_lines(model.field(np.zeros(len(model.stack.models))), at, tool)  # raises an error now if they are invalid
@@ -217,17 +200,6 @@ class Compensator:
         its trained span or `MIN_SPAN`, whichever is greater. Quantities without physical bounds (a displacement, a
         dimensionless number) may take values in their trained range widened by `WIDE` times its width. The constants
         are defined in `thermocomp.runtime.gate`.
-
-        Parameters
-        ----------
-        state : CompensatorState
-            State before the reading.
-        reading : Reading
-            Must contain the inputs of all models.
-
-        Returns
-        -------
-        str
         """
         for group in self.groups:
             values = group.ranges.pick(reading.values)
@@ -250,22 +222,11 @@ class Compensator:
 
         Parameters
         ----------
-        state : CompensatorState
-            State from `start`, `resume` or the previous `step`.
-        reading : Reading
         now : float
             Present time of the clock of the reading's source [s].
-        probings : mapping of str to Probing, optional
-            Probings by target or axis, made at the time of the reading. Each takes effect once, from the next reading
-            onwards: see `thermocomp.runtime.identity`.
         tick : float, optional
             Present time of the monotonic clock of the process [s], by which corrections move. Default: `now`; if that
             clock is set back, corrections wait until it has reached its previous time.
-
-        Returns
-        -------
-        state : CompensatorState
-        said : Compensated
         """
         (fresh, known_before), tick = sift(state, probings), now if tick is None else tick
         instant, untimely = place(state, reading, now, tick, self.limits)
@@ -342,16 +303,8 @@ class Compensator:
 
         Parameters
         ----------
-        state : CompensatorState
         tick : float
             Present time of the monotonic clock of the process [s].
-        why : str
-            Reason why there is no usable reading.
-
-        Returns
-        -------
-        state : CompensatorState
-        said : Compensated
         """
         left = rest(state, state.corrections, tick, self.lines, self.limits, dict.fromkeys(self.lines, why))
         new = state._replace(corrections=left.corrections, clock=left.clock, idle=left.idle)

@@ -35,27 +35,7 @@ def travel_time(state: CompensatorState, tick: float, limits: Limits) -> float:
 def drive(
     state: CompensatorState, target: str, line: DeviationLine, deviation: Deviation, travel: float, limits: Limits
 ) -> tuple[Correction, Status]:
-    """Return the correction for a deviation, within the limits, and the status of the target.
-
-    Parameters
-    ----------
-    state : CompensatorState
-        State before the reading.
-    target : str
-        Target or axis.
-    line : DeviationLine
-        Line of the target.
-    deviation : Deviation
-        Deviation that the correction is to oppose.
-    travel : float
-        See `travel_time`.
-    limits : Limits
-
-    Returns
-    -------
-    correction : Correction
-    status : Status
-    """
+    """Return the correction for a deviation, within the limits, and the status of the target."""
     before, order = state.corrections[target], state.orders.get(target)
     wanted = Correction.opposing(deviation)
     if order is not None and order.word in ("holding", "suspended"):
@@ -81,21 +61,8 @@ def rest(
 
     Parameters
     ----------
-    state : CompensatorState
-        State before the step.
-    corrections : mapping of str to Correction
-        Corrections of all targets or axes, those of `driven` ones as of this step.
     tick : float
         Present time of the monotonic clock of the process [s].
-    lines : mapping of str to DeviationLine
-    limits : Limits
-    held : mapping of str to str
-        Targets or axes that are not driven, and the reasons.
-    driven : collection of str
-
-    Returns
-    -------
-    Rest
     """
     # each step counts for at most the maximum age of a reading: a clock jump does not cause fading
     travel = travel_time(state, tick, limits)

@@ -103,11 +103,6 @@ class Fleet:
         -------
         ndarray of bool of shape (n_machines,)
             Machines whose reading was used. Corrections of the others are held for `Limits.hold`, then fade.
-
-        Raises
-        ------
-        InputError
-            `readings` have a wrong shape, or `dt` is negative or not finite.
         """
         if np.shape(readings) != self._values.shape or not 0.0 <= dt < np.inf:
             raise InputError(f"readings of shape {np.shape(readings)} after {dt} s: expected {self._values.shape}")

@@ -43,15 +43,10 @@ def explain_implausible(model: ErrorModel, values: Sequence[object], reference: 
 
     Parameters
     ----------
-    model : ErrorModel
     values : sequence of shape (n_inputs,)
         As delivered by the source; None if a value is missing.
     reference : sequence of float of shape (n_inputs,)
         Zero of the inputs; nan while unknown.
-
-    Returns
-    -------
-    str
     """
     undecided = []
     for channel, value, zero in zip(model.inputs, values, reference, strict=True):
@@ -83,14 +78,8 @@ def explain_untimely(reading: Reading, now: float, limits: Limits) -> str:
 
     Parameters
     ----------
-    reading : Reading
     now : float
         Present time of the clock of the reading's source [s].
-    limits : Limits
-
-    Returns
-    -------
-    str
     """
     values: object = reading.values
     if not isinstance(values, Mapping):
@@ -121,12 +110,7 @@ def find_plausible_range(channel: Input, zero: float) -> tuple[float, float]:
 
 
 class Ranges:
-    """Plausible ranges of several inputs, computed once per zero: fast path of `explain_implausible`.
-
-    Parameters
-    ----------
-    inputs : sequence of Input
-    """
+    """Plausible ranges of several inputs, computed once per zero: fast path of `explain_implausible`."""
 
     def __init__(self, inputs: Sequence[Input]) -> None:
         self._inputs = tuple(inputs)

@@ -61,7 +61,6 @@ class Group:
 
         Returns
         -------
-        states : list of State
         deviations : list of float
             One deviation per model [its unit].
         half_widths : list of float

@@ -15,14 +15,7 @@ KNOWN = "it was delivered before; give each probing its own id or time"
 
 
 def is_known(state: CompensatorState, target: str, probing: Probing) -> bool:
-    """Return whether a probing of a target or axis was delivered before.
-
-    Parameters
-    ----------
-    state : CompensatorState
-    target : str
-    probing : Probing
-    """
+    """Return whether a probing of a target or axis was delivered before."""
     return not state.probed.get(target, {}).keys().isdisjoint(probing.identity)
 
 
@@ -38,8 +31,6 @@ def remember(state: CompensatorState, probings: Mapping[str, Probing], time: flo
 
     Parameters
     ----------
-    state : CompensatorState
-    probings : mapping of str to Probing
     time : float
         Present time of the state [s].
     """

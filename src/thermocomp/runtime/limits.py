@@ -16,7 +16,6 @@ def limit_offset(target: float, current: float, dt: float, limits: Limits) -> fl
         Correction in force [um].
     dt : float
         Time available for the movement [s].
-    limits : Limits
 
     Returns
     -------
@@ -40,19 +39,12 @@ def fade(current: Correction, travel: tuple[float, float], idle: float, dt: floa
 
     Parameters
     ----------
-    current : Correction
     travel : tuple of float
         Ends of the travel [mm].
     idle : float
         Time without a demand [s].
     dt : float
         Duration of this step [s].
-    limits : Limits
-
-    Returns
-    -------
-    Correction
-        Unchanged during the hold time.
     """
     if not (idle > limits.hold and dt > 0):
         return current
@@ -71,20 +63,10 @@ def limit_line(
 
     Parameters
     ----------
-    target : Correction
-        Correction demanded by the models.
-    current : Correction
-        Correction in force.
     travel : tuple of float
         Ends of the travel [mm].
     dt : float
         Time available for the movement [s].
-    limits : Limits
-
-    Returns
-    -------
-    Correction
-        New correction, with the reference position of `target`.
     """
     low, high = travel
     if low == high or target.slope == current.slope == 0.0:

@@ -68,27 +68,10 @@ def evaluate(
 
     Parameters
     ----------
-    line : DeviationLine
-    models : sequence of ErrorModel
-        Models of the compensator.
-    spoken : Advanced
-        Outputs of the models.
     time : float
         Time of the reading [s].
-    learned : Adaptation or None
-        Adaptation by earlier probings.
-    probing : Probing or None
-        Probing made at the time of the reading; it takes effect from the next reading onwards.
-    failed : collection of str
-        Sensors that are not trusted.
-    zero : Deviation
-        Zero of the target: deviation subtracted from the outputs of the models.
     magnitude : float
         Largest permitted correction [um]; no probing changes the deviation by more.
-
-    Returns
-    -------
-    Said
     """
     first, end = line.models.start, line.models.stop
     raw, refused, moved, single = line.deviation(spoken.said[first:end]), "", 0.0, end == first + 1

@@ -11,12 +11,7 @@ from thermocomp.runtime.watch import WORDS, WatchState, is_quiet, look
 
 
 class Lookout:
-    """A watch, with the positions of its inputs in a reading.
-
-    Parameters
-    ----------
-    watch : Watch
-    """
+    """A watch, with the positions of its inputs in a reading."""
 
     def __init__(self, watch: Watch) -> None:
         self.watch = watch
@@ -29,12 +24,8 @@ class Lookout:
 
         Parameters
         ----------
-        state : WatchState
-            State before the reading.
         time : float
             Time of the reading [s].
-        values : mapping of str to float
-            Values by channel, as delivered by the source.
         """
         given = self._ranges.pick(values)
         if is_quiet(state, time) and self._ranges.hold(given, state.reference):

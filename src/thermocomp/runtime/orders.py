@@ -14,8 +14,6 @@ def withdraw(compensator: Compensator, state: CompensatorState, passed: float) -
 
     Parameters
     ----------
-    compensator : Compensator
-    state : CompensatorState
     passed : float
         Time since the previous step [s]; outages do not accumulate travel.
     """
@@ -32,22 +30,10 @@ def order(compensator: Compensator, state: CompensatorState, target: str, status
 
     Parameters
     ----------
-    compensator : Compensator
-    state : CompensatorState
-    target : str
     status : Status or None
         ``holding``: the correction is held until a further command; ``shadow``: the target is predicted, and its
         correction moves to zero within the limits; ``suspended``: the controller has no correction in force, and it
         starts at zero again. None: run.
-
-    Returns
-    -------
-    CompensatorState
-
-    Raises
-    ------
-    InputError
-        The target does not exist, the status word is not one of these, or the models may not run.
     """
     if target not in compensator.lines:
         raise InputError(f"{target}: expected one of {', '.join(compensator.lines)}")
@@ -76,25 +62,10 @@ def rezero(
 
     Parameters
     ----------
-    compensator : Compensator
-    state : CompensatorState
-    target : str
     time : float
         Time on the scale of the readings' stamps [s].
-    why : str
-        Reason for the ledger, such as ``homing`` or ``work offset, by M. Weber``.
     in_force : Correction, optional
         Present correction as reported by the controller. Default: the last one.
-
-    Returns
-    -------
-    CompensatorState
-        State without the results of earlier probings, which were relative to the previous zero.
-
-    Raises
-    ------
-    InputError
-        The target does not exist, or its zero is still being averaged.
     """
     if target not in compensator.lines:
         raise InputError(f"{target}: expected one of {', '.join(compensator.lines)}")

@@ -81,7 +81,6 @@ def silence(state: CompensatorState, tick: float) -> float:
 
     Parameters
     ----------
-    state : CompensatorState
     tick : float
         Present time of the monotonic clock of the process [s].
     """
@@ -104,20 +103,12 @@ def resume(
 
     Parameters
     ----------
-    state : CompensatorState
-        State as saved.
-    cold : CompensatorState
-        State of a newly started compensator.
     age : float
         Time since the last reading of the state [s].
     in_force : mapping of str to Correction, optional
         Present correction as reported by the controller. Default: the saved one.
     tick : float, optional
         Present time of the monotonic clock of the process; time until the first reading is also part of the outage [s].
-
-    Returns
-    -------
-    CompensatorState
     """
     corrections = {t: (in_force or state.corrections).get(t, c) for t, c in cold.corrections.items()}
     if not 0.0 <= age <= FORGOTTEN:

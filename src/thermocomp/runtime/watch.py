@@ -70,11 +70,8 @@ def begin(watch: Watch, reference: FloatArray | None = None, runs: tuple[int, ..
 
     Parameters
     ----------
-    watch : Watch
     reference : ndarray of shape (n_inputs,), optional
         Zero of the inputs; default: determined by the first readings for inputs with ``rezero``.
-    runs : tuple of int
-        Shape of a batch of runs.
     """
     zero = np.array([np.nan if i.rezero else i.reference for i in watch.inputs])
     zero = np.broadcast_to(zero if reference is None else reference, (*runs, len(watch.inputs))).copy()
@@ -119,20 +116,14 @@ def look(
 
     Parameters
     ----------
-    watch : Watch
-    state : WatchState
-        State from `begin` or the previous `look`.
     time : float
         Time of the reading, later than the previous one [s].
     values : ndarray of shape (..., n_inputs)
         Values in the order of the watch's inputs; nan where a value is missing. If a speed is missing, nothing is
         predicted and the values are returned unchanged.
-    resting : bool
-        Whether the spindle is known to be stopped.
 
     Returns
     -------
-    state : WatchState
     values : ndarray of shape (..., n_inputs)
         Values with substitutes for temperatures that are not trusted.
     """

@@ -24,7 +24,6 @@ def weigh_stations(axis: str, positions: ArrayLike) -> FloatArray:
 
     Parameters
     ----------
-    axis : {'x', 'y', 'z'}
     positions : array-like of shape (n,)
         [mm]; beyond the travel the value at its end is used.
 

@@ -56,8 +56,6 @@ class MachiningCentre:
     ----------
     model : ReducedModel
         Model of spindle, column, bed and screws by finite elements, and of the other parts as lumps.
-    heat : HeatSources
-    joints : Joints
     longest_step : float
         Longest interval between updates of friction and thermostat [s].
     """
@@ -91,24 +89,10 @@ class MachiningCentre:
 
         Parameters
         ----------
-        state : CentreState
-        drives : sequence of FeedDrive
-            Each applies during the whole of its step.
         air : ndarray of shape (n_steps, 3)
             `Air.values` of each step.
         dt : float
             [s]
-
-        Returns
-        -------
-        state : CentreState
-        truth : Truth
-
-        Raises
-        ------
-        InputError
-            `dt` is not positive, there is no drive, the air has another length or is not finite, a speed exceeds the
-            top speed, or a load is applied at a place that does not exist.
         """
         check(drives, air, dt)
         parts = math.ceil(dt / self.longest_step)

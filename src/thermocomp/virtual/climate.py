@@ -79,9 +79,6 @@ class Climate:
             Start of the first step, since the start of the test [s].
         step : float
             [s]
-        n_steps : int
-        rng : Generator
-            Generator of the weather.
 
         Returns
         -------

@@ -33,7 +33,6 @@ class Face:
         Height of the surface, or diameter of a horizontal cylinder [m].
     films : float
         Heat transfer coefficient of the linear model [W/(m2 K)].
-    emissivity : float
     curvature : float
         Length over diameter of a vertical cylinder; 0: flat.
     lying : bool
@@ -55,12 +54,7 @@ class Face:
 
 
 class Faces:
-    """Several surfaces, evaluated together.
-
-    Parameters
-    ----------
-    faces : sequence of Face
-    """
+    """Several surfaces, evaluated together."""
 
     def __init__(self, faces: Sequence[Face]) -> None:
         columns = np.array([astuple(face) for face in faces], dtype=np.float64).reshape(-1, len(fields(Face))).T
@@ -68,13 +62,7 @@ class Faces:
         self._lying, self._wind, self._films_turning = columns[5:]
 
     def linear(self, rotation: float) -> FloatArray:
-        """Return the conductances of the linear model [W/K].
-
-        Parameters
-        ----------
-        rotation : float
-            Share of `Face.films_turning` in effect.
-        """
+        """Return the conductances of the linear model [W/K]."""
         result: FloatArray = self._area * (self._films + self._films_turning * rotation)
         return result
 
@@ -87,8 +75,6 @@ class Faces:
             Temperatures [degC].
         speed : float
             Speed of the horizontal rotating part [1/min].
-        wind : float
-            Share of `Face.wind` in effect.
         """
         hot, cold = (np.asarray(t, dtype=np.float64) + KELVIN for t in (surface, air))
         film = (hot + cold) / 2.0
@@ -118,28 +104,13 @@ def air_at(temperature: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]
 
 
 def free_convection(rayleigh: FloatArray, prandtl: FloatArray, lying: FloatArray) -> FloatArray:
-    """Return the Nusselt numbers of vertical plates and horizontal cylinders (Churchill and Chu 1975).
-
-    Parameters
-    ----------
-    rayleigh, prandtl : ndarray
-        For the height of a plate or the diameter of a cylinder.
-    lying : ndarray
-        1 for cylinders, 0 for plates.
-    """
+    """Return the Nusselt numbers of vertical plates and horizontal cylinders (Churchill and Chu 1975)."""
     base, inner = np.where(lying > 0, 0.60, 0.825), np.where(lying > 0, 0.559, 0.492)
     result: FloatArray = (base + 0.387 * rayleigh ** (1 / 6) / (1.0 + (inner / prandtl) ** (9 / 16)) ** (8 / 27)) ** 2
     return result
 
 
 def rotating_convection(reynolds: FloatArray, prandtl: FloatArray) -> FloatArray:
-    """Return the Nusselt numbers of rotating cylinders (Becker 1963).
-
-    Parameters
-    ----------
-    reynolds : ndarray
-        u D / nu.
-    prandtl : ndarray
-    """
+    """Return the Nusselt numbers of rotating cylinders (Becker 1963)."""
     result: FloatArray = 0.133 * reynolds ** (2 / 3) * np.cbrt(prandtl)
     return result

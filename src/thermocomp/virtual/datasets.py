@@ -38,18 +38,7 @@ EXPERIMENTS: Mapping[str, Experiment] = _BuiltIn()
 
 
 def find_experiment(experiment: str | Path) -> Experiment:
-    """Return an experiment by its name, or from a custom file.
-
-    Parameters
-    ----------
-    experiment : str or Path
-        A key of `EXPERIMENTS`, or the path of a protocol that ends in ``.toml``; see :doc:`/protocols`.
-
-    Raises
-    ------
-    InputError
-        Experiment missing, or file invalid.
-    """
+    """Return an experiment by its name, or from a custom file."""
     if Path(experiment).suffix == ".toml":
         return read_protocol(experiment)
     if str(experiment) not in EXPERIMENTS:
@@ -71,28 +60,10 @@ def record(
 
     Parameters
     ----------
-    experiment : str, Path or Experiment
-        See `find_experiment`.
     physics : {'linear', 'nonlinear'}, optional
         Physics of the machine. Default: as defined by the experiment. See :doc:`/virtual_machine`.
-    seed : int
-        Random seed of weather, noise and random draws; the machine and its sensors do not depend on it.
     sensor_noise : float, optional
         Standard deviation of the temperature noise [degC]. Default: as defined for each sensor.
-    faults : sequence of SensorFault
-        Faults in every test, in addition to those of the protocol.
-    progress : callable
-        Called with the name of each completed test.
-
-    Returns
-    -------
-    list of Recording
-        One per test.
-
-    Raises
-    ------
-    InputError
-        Experiment or physics unknown, or file invalid.
     """
     found = experiment if isinstance(experiment, Experiment) else find_experiment(experiment)
     if physics is not None:

@@ -45,11 +45,6 @@ class Exchange:
 
         Parameters
         ----------
-        model : ReducedModel
-        operators : Operators
-            Operators of the time step.
-        watched : sequence of str
-            Places whose temperatures after the step are included in `operators`.
         paths : sequence of (str, str or None)
             From a watched place, which is also the name of a heat input, to another such place, or to the room air
             (None).

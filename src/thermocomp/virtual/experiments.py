@@ -43,7 +43,6 @@ class SimulatedTest:
 
     Parameters
     ----------
-    name : str
     time : ndarray of shape (n_rows,)
         [s], from 0
     channels : tuple of Channel
@@ -82,26 +81,9 @@ def simulate(
 
     Parameters
     ----------
-    experiment : Experiment
-    seed : int
-        Random seed of weather, noise and random draws; the machine and its sensors do not depend on it.
     sensor_noise : float, optional
         Standard deviation of the temperature noise [degC] (C-33: 0.4). Default: as defined for each sensor. The truth
         does not depend on it.
-    faults : sequence of SensorFault
-        Faults in every test, in addition to those of the protocol.
-    whole : bool
-        Whether to keep all observables of the machine.
-
-    Returns
-    -------
-    iterator of SimulatedTest
-        Each test is run when it is iterated; no test depends on another.
-
-    Raises
-    ------
-    InputError
-        A fault's channel is unknown, or seed or noise are negative.
     """
     if seed < 0:
         raise InputError(f"seed {seed}: must not be negative")
@@ -132,28 +114,8 @@ def run(
 
     Parameters
     ----------
-    machine : VirtualMachine
-    kit : Kit
-        Equipment mounted on the machine.
-    programme : Programme
-        Programme of the test, with the recorded channels.
-    weather, noise : numpy.random.Generator
-        Generators of the ambient air, and of sensors and probes.
     sensor_noise : float, optional
         Standard deviation of the temperature noise [degC]. Default: as defined for each sensor.
-    faults : sequence of SensorFault
-        Faults in addition to those of the programme.
-    whole : bool
-        Whether to keep all observables of the machine.
-
-    Returns
-    -------
-    SimulatedTest
-
-    Raises
-    ------
-    InputError
-        A place, a probe or the channel of a fault is missing, or a command exceeds the capabilities of the machine.
     """
     instruments = programme.instruments(kit, sensor_noise)
     sensors = [i.sensor for i in instruments]

@@ -86,8 +86,6 @@ def find_cold_component(code: str, points: FloatArray) -> FloatArray:
 
     Parameters
     ----------
-    code : str
-        Code of ISO 230-1, such as ``EXX``.
     points : ndarray of shape (..., 3)
         Positions of X, Y and Z [mm]. Each component depends only on its own axis, except EYX, which also depends on Z.
 

@@ -46,7 +46,6 @@ class HeatSources:
     ----------
     top_speed : float
         Maximum spindle speed [1/min].
-    front, rear : BearingFriction
     motor_on, motor_top : float
         Loss of the running spindle motor: magnetising; iron and windage at top speed, with speed squared [W].
     drive_nut, drive_bearing : float
@@ -126,8 +125,6 @@ class HeatSources:
 
         Parameters
         ----------
-        chilling : bool
-            Whether the chiller runs at the start of the step.
         before, after : float
             Coolant minus bed at the start of the step, and at its end without switching [K].
         """
@@ -148,11 +145,6 @@ def swept(stroke: tuple[float, float], travel: float) -> list[float]:
         Start and end of the stroke [mm]; equal for a movement on the spot.
     travel : float
         [mm], from 0
-
-    Returns
-    -------
-    list of float
-        One share per hat function; the shares sum to 1.
     """
     knots = np.linspace(0.0, travel, N_HATS)
     low, high = (min(max(p, 0.0), travel) for p in sorted(stroke))

@@ -57,7 +57,6 @@ class Instrument:
 
     Parameters
     ----------
-    sensor : Sensor
     reads : mapping of str to float
         Weights by the names of places and observables of the machine.
     air : tuple of float
@@ -83,13 +82,6 @@ def thermometer(kit: Kit, label: str, place: str, *, perfect: bool, noise: float
 
     Parameters
     ----------
-    kit : Kit
-        Equipment of the machine.
-    label : str
-        Its channel is ``t_LABEL_C``.
-    place : str
-    perfect : bool
-        Without lag, bias, drift and quantisation, and not affected by the air.
     noise : float or None
         Standard deviation [degC]; None: as defined for the sensor.
     """
@@ -109,15 +101,7 @@ def thermometer(kit: Kit, label: str, place: str, *, perfect: bool, noise: float
 
 
 def displacement(label: str, probe: VirtualProbe, *, perfect: bool) -> Instrument:
-    """Return a displacement probe or a laser line; its channel is ``LABEL_um``, for an angle ``LABEL_urad``.
-
-    Parameters
-    ----------
-    label : str
-    probe : VirtualProbe
-    perfect : bool
-        Without noise, drift and quantisation.
-    """
+    """Return a displacement probe or a laser line; its channel is ``LABEL_um``, for an angle ``LABEL_urad``."""
     quantity = "angle" if probe.unit == "urad" else "displacement"
     channel = Channel(f"{label}_{probe.unit}", quantity, probe.unit, probe.place)
     drift = float(np.random.default_rng([*label.encode()]).uniform(-0.15, 0.15))

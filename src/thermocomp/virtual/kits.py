@@ -85,7 +85,6 @@ class Kit:
         Description of the location, by place of a temperature sensor.
     air : mapping of str to float
         Height above the floor of the `places` in the air [m].
-    probes : mapping of str to VirtualProbe
     observables : tuple of str
         Quantities from which probes can be made.
     outfits, nests : mapping of str to tuple of str
@@ -109,20 +108,7 @@ class Kit:
     top_speed: float = 0.0
 
     def place(self, name: str, *, perfect: bool) -> str:
-        """Return the description of a temperature place.
-
-        Parameters
-        ----------
-        name : str
-            Name of the place.
-        perfect : bool
-            Whether the temperature is calculated, not measured.
-
-        Raises
-        ------
-        SettingError
-            Place missing, or not measurable.
-        """
+        """Return the description of a temperature place."""
         if name in self.inner and not perfect:
             raise SettingError(f"{name!r} is a rotation: it can only be calculated, with perfect = true")
         known = {**self.places, **self.inner} if perfect else self.places
@@ -131,13 +117,7 @@ class Kit:
         return known[name]
 
     def probe(self, name: str | Mapping[str, float]) -> VirtualProbe:
-        """Return a probe by its name, such as ``z``, ``y_laser_250``, ``z_at_400`` or ``EXX_0``, or by its weights.
-
-        Raises
-        ------
-        SettingError
-            Probe or observable missing, or its position is beyond the travel.
-        """
+        """Return a probe by its name, such as ``z``, ``y_laser_250``, ``z_at_400`` or ``EXX_0``, or by its weights."""
         if not isinstance(name, str):
             for observable in name:
                 if observable not in self.observables:
@@ -159,15 +139,7 @@ class Kit:
 
 
 def labelled(names: Sequence[str] | Mapping[str, T], sets: Mapping[str, tuple[str, ...]]) -> dict[str, str | T]:
-    """Return the names of mounted instruments by the label used in their channel names.
-
-    Parameters
-    ----------
-    names : sequence of str, or mapping of str to str
-        Names by label; in a sequence each name is its own label.
-    sets : mapping of str to tuple of str
-        Names that denote several instruments.
-    """
+    """Return the names of mounted instruments by the label used in their channel names."""
     if not isinstance(names, Mapping):
         return {n: n for given in names for n in sets.get(given, (given,))}
     check_labels(names)

@@ -129,9 +129,6 @@ class VirtualMachine(Protocol[S]):
 
         Parameters
         ----------
-        state : S
-        drives : sequence of FeedDrive
-            One per step.
         air : ndarray of shape (n_steps, 3)
             `Air.values` of each step.
         dt : float
@@ -145,15 +142,9 @@ def check(drives: Sequence[FeedDrive], air: FloatArray, dt: float) -> None:
 
     Parameters
     ----------
-    drives : sequence of FeedDrive
     air : ndarray of shape (n_steps, 3)
     dt : float
         [s]
-
-    Raises
-    ------
-    InputError
-        `dt` is not positive, there is no drive, or the air has another length or is not finite.
     """
     if not (dt > 0 and math.isfinite(dt)):
         raise InputError(f"step of {dt} s: must be positive")

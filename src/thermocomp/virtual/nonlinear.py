@@ -86,7 +86,6 @@ class NonlinearTool(RestingTool):
     ----------
     model : ReducedModel
         Model with joints.
-    faces : mapping of str to Face
     taper, grip : Fit or None
         Joint of the shank in the shaft, and of the tool in the chuck, where it slips; None: as in the reduced model.
     expansion_grows : float
@@ -155,7 +154,6 @@ class NonlinearCentre(MachiningCentre):
     ----------
     model : ReducedModel
         Model with joints.
-    faces : mapping of str to Face
     taper, seat : Fit or None
         Joint of the test bar in the shaft, and of the outer rings in the housing; None: as in the reduced model.
     front, rear : AngularContact or None

@@ -63,7 +63,6 @@ class AngularContact:
         Length of rings between the two sides; a longer inner ring reduces the preload of a back-to-back set [mm].
     sprung : bool
         Whether springs keep the preload constant at any temperature.
-    grease : Grease
     drag : float
         Palmgren's factor f0 for grease.
     """

@@ -28,7 +28,6 @@ class VirtualProbe:
         Weights of the machine's observables: um per um, or um per (urad m).
     cold : float
         Value in the initial state of the test, in its unit.
-    unit : {'um', 'urad'}
     noise : float
         Standard deviation, in its unit.
     zeroed : bool
@@ -48,14 +47,8 @@ def positioning(axis: str, position: float) -> dict[str, float]:
 
     Parameters
     ----------
-    axis : {'x', 'y', 'z'}
     position : float
         [mm]
-
-    Raises
-    ------
-    SettingError
-        The position is beyond the travel.
     """
     return _between(axis, axis, position)
 
@@ -161,18 +154,11 @@ def component(code: str, position: float, z: float = TEST_POSITION["z"]) -> Virt
 
     Parameters
     ----------
-    code : str
-        Code of ISO 230-1, such as ``EYX``.
     position : float
         Position of its axis [mm].
     z : float
         Position of Z, if different [mm]; the bed yields under the column. Possible for X only; the effect of its
         rotations by the lever is then included in the reading.
-
-    Raises
-    ------
-    SettingError
-        A position is beyond the travel, or Z is elsewhere while an axis other than X is measured.
     """
     axis, unit = code[2].lower(), "um" if code[1] in "XYZ" else "urad"
     for a, p in ((axis, position), ("z", z)):
@@ -215,7 +201,6 @@ def swing(along: str, way: FloatArray) -> list[tuple[str, float]]:
 
     Parameters
     ----------
-    along : {'X', 'Y', 'Z'}
     way : ndarray of shape (3,)
         Lever [mm].
 

@@ -40,7 +40,6 @@ class RecordingSetup:
     ----------
     sampling : float
         Time between two rows [s].
-    climate : Climate
     places : tuple of str, or mapping of str to str
         Places of temperature sensors, see `thermocomp.virtual.kits`; a mapping assigns other channel names.
     probes : tuple of str, or mapping of str to str or mapping of str to float
@@ -49,7 +48,6 @@ class RecordingSetup:
         Sensors without lag, bias, drift, noise and quantisation: a calculation, not a measurement.
     touch : Touch, optional
         A probing cycle.
-    faults : tuple of SensorFault
     """
 
     sampling: float
@@ -71,15 +69,8 @@ class RecordingSetup:
 
         Parameters
         ----------
-        kit : Kit
-            Equipment of the machine.
         noise : float, optional
             Standard deviation of the temperature noise [degC]. Default: as defined for each sensor.
-
-        Raises
-        ------
-        SettingError
-            Place or probe missing, or two channels have the same name.
         """
         perfect = self.perfect
         with add_path("places"):
@@ -105,7 +96,6 @@ class Programme(RecordingSetup):
 
     Parameters
     ----------
-    name : str
     segments : tuple of SteadySegment
         Each lasts an integer number of sampling intervals.
     soak : tuple of SteadySegment
@@ -197,8 +187,6 @@ class Experiment:
 
     Parameters
     ----------
-    name : str
-    tests : tuple of PlannedTest
     description : str
         One line.
     machine : str

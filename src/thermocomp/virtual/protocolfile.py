@@ -58,20 +58,6 @@ _PLAIN = {
 def read_protocol(path: str | Path) -> Experiment:
     """Read a protocol TOML.
 
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    Experiment
-        Named after the file.
-
-    Raises
-    ------
-    InputError
-        File missing, not TOML, or with an invalid key or value; the message names file, table and key.
-
     Examples
     --------
     Four jobs of random speed, each followed by a stop::

@@ -28,7 +28,6 @@ class SteadySegment:
     ----------
     duration : float
         [s]
-    drive : FeedDrive
     """
 
     duration: float
@@ -43,8 +42,6 @@ class Lot:
     ----------
     between : tuple of float, optional
         Lowest and highest value.
-    step : float, optional
-    one_of : tuple of float
     """
 
     between: tuple[float, float] | None = None
@@ -85,12 +82,7 @@ def values(number: Number | None) -> tuple[float, ...]:
 
 @dataclass(frozen=True)
 class Feed:
-    """Mean feed rates of the axes [mm/min].
-
-    Parameters
-    ----------
-    x, y, z : float or Lot
-    """
+    """Mean feed rates of the axes [mm/min]."""
 
     x: Number = 0.0
     y: Number = 0.0
@@ -99,12 +91,7 @@ class Feed:
 
 @dataclass(frozen=True)
 class Stroke:
-    """Start and end of the axis movements [mm]; None: over the whole travel.
-
-    Parameters
-    ----------
-    x, y, z : tuple of float, optional
-    """
+    """Start and end of the axis movements [mm]; None: over the whole travel."""
 
     x: tuple[float, float] | None = None
     y: tuple[float, float] | None = None
@@ -131,7 +118,6 @@ class Stretch:
         Spindle speed [1/min]. Default: inherited, else 0.
     feed : Feed, optional
         Feed rates. Default: inherited, else the axes are stopped.
-    stroke : Stroke, optional
     loads : mapping of str to float or Lot, optional
         Additional heat by place [W].
     cooled : bool, optional

@@ -23,7 +23,6 @@ class Sensor:
 
     Parameters
     ----------
-    channel : Channel
     noise : float
         Standard deviation, in the channel's unit.
     lag : float
@@ -79,13 +78,10 @@ def read(sensors: Sequence[Sensor], felt: FloatArray, time: FloatArray, rng: np.
 
     Parameters
     ----------
-    sensors : sequence of Sensor
     felt : ndarray of shape (n_rows, n_sensors)
         Output of `apply_lags`, in house units.
     time : ndarray of shape (n_rows,)
         [s]
-    rng : Generator
-        Generator of the noise.
 
     Returns
     -------
@@ -143,20 +139,12 @@ def with_faults(
     ----------
     time : ndarray of shape (n_rows,)
         [s]
-    channels : sequence of Channel
     values : ndarray of shape (n_rows, n_channels)
         Not modified.
-    faults : sequence of SensorFault
-        Applied in sequence; a fault that starts after the last row has no effect.
 
     Returns
     -------
     ndarray of shape (n_rows, n_channels)
-
-    Raises
-    ------
-    InputError
-        Channel missing.
     """
     values = values.copy()
     names = [c.name for c in channels]

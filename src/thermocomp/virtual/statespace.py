@@ -105,13 +105,7 @@ class ReducedModel:
         return cls(**values)
 
     def rows(self, places: Sequence[str]) -> FloatArray:
-        """Return the rows of `temperature` for some places.
-
-        Raises
-        ------
-        InputError
-            Place missing.
-        """
+        """Return the rows of `temperature` for some places."""
         for place in places:
             if place not in self.places:
                 raise InputError(f"virtual machine: there is no place {place!r} among {', '.join(self.places)}")
@@ -139,12 +133,8 @@ class ReducedModel:
 
         Parameters
         ----------
-        theta : tuple of float
-            One value per name in `theta`.
         dt : float
             [s]
-        watched : tuple of str
-            Places whose temperatures after the step are appended to the states.
         """
         key = (theta, dt, watched)
         found = self._kept.get(key)

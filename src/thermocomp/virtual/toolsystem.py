@@ -42,7 +42,6 @@ class RestingTool:
 
     Parameters
     ----------
-    model : ReducedModel
     stiction : float
         Free displacement of the shank in the chuck at which slip starts [um]; an engineering value.
     convection : float
@@ -80,24 +79,10 @@ class RestingTool:
 
         Parameters
         ----------
-        state : ToolState
-        drives : sequence of FeedDrive
-            Only their loads are used.
         air : ndarray of shape (n_steps, 3)
             `Air.values` of each step.
         dt : float
             [s]
-
-        Returns
-        -------
-        state : ToolState
-        truth : Truth
-
-        Raises
-        ------
-        InputError
-            `dt` is not positive, there is no drive, the air has another length or is not finite, rotation is commanded,
-            or a load is applied at a place that does not exist.
         """
         check(drives, air, dt)
         parts = math.ceil(dt / self.longest_step)

@@ -49,22 +49,7 @@ The CNC spreads a change over a number of cycles of its own; here a correction c
 def write_package(
     compensator: Compensator, name: str, facts: Facts, axes: Mapping[str, str] | None = None
 ) -> dict[str, bytes]:
-    """Return all files by name.
-
-    Parameters
-    ----------
-    compensator : Compensator
-        Created by `Compensator.of`.
-    name : str
-    facts : Facts
-    axes : mapping of str to str, optional
-        Axes by target.
-
-    Raises
-    ------
-    InputError
-        A model has no formula, the models cannot be combined, or no axis is known.
-    """
+    """Return all files by name."""
     tables, own = gather(compensator), identifier(name)
     drives = find_drives(tables, axes or {})
     more = write_values(f"{own}_axis", "twincat", drives, TAKEN, 1.0)

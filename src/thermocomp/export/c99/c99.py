@@ -135,7 +135,6 @@ class Sources:
     ----------
     name : str
         Name of the files and prefix of all names in them.
-    header, source : str
     """
 
     name: str
@@ -147,22 +146,6 @@ def translate(tables: Tables, name: str, facts: Sequence[str] = (), *, double_on
     """Return a compensator in C99.
 
     The code processes values as `Compensator.step` processes a reading.
-
-    Parameters
-    ----------
-    tables : Tables
-        Tables of the compensator.
-    name : str
-        Name of the files and prefix of all names in them.
-    facts : sequence of str
-        Lines at the top of the files.
-    double_only : bool
-        The code does not compile in single precision.
-
-    Raises
-    ------
-    InputError
-        A model belongs to a family without a formula.
     """
     name, n, sizes = identifier(name), len(tables.channels), tables.sizes
     functions = write_functions(tables, name)

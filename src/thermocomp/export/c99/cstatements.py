@@ -18,15 +18,7 @@ TYPES: dict[Kind, str] = {"real": "tc_real", "time": "double", "int": "int", "bo
 
 
 def write_functions(tables: Tables, state: str) -> str:
-    """Return the functions that a block needs, `step` last.
-
-    Parameters
-    ----------
-    tables : Tables
-        Tables of the compensator.
-    state : str
-        Name of the type of the state.
-    """
+    """Return the functions that a block needs, `step` last."""
     return "\n".join(_Writer(f, tables.sizes, state).text() for f in functions(tables))
 
 

@@ -87,12 +87,6 @@ def write_test(name: str, tables: Tables, readings: Readings, answers: Answers, 
 
     Parameters
     ----------
-    name : str
-        Name of the code.
-    tables : Tables
-    readings : Readings
-    answers : Answers
-        Outputs of the compensator.
     double, single : float
         Tolerance in double and in single precision, as a fraction of the correction, or in um for corrections below
         1 um; `single` is 0 if single precision is not supported.

@@ -81,20 +81,7 @@ _COARSE = 1.0
 
 
 def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str, bytes]:
-    """Return all files by name.
-
-    Parameters
-    ----------
-    compensator : Compensator
-        Created by `Compensator.of`.
-    name : str
-    facts : Facts
-
-    Raises
-    ------
-    InputError
-        A model has no formula, or the models cannot be combined.
-    """
+    """Return all files by name."""
     tables, said = gather(compensator), facts.lines(compensator)
     readings = make_readings(tables)
     answers = replay(compensator, tables, readings)

@@ -75,24 +75,7 @@ are 0 it has gone, and the calls may go, too. Never clear the external offset by
 def write_fanuc(
     reductions: Sequence[Reduced], limits: Limits, name: str, facts: Facts, *, figure: str = ""
 ) -> dict[str, bytes]:
-    """Return all files by name, the page of instructions last.
-
-    Parameters
-    ----------
-    reductions : sequence of Reduced
-        One per axis.
-    limits : Limits
-    name : str
-        Name of the files.
-    facts : Facts
-    figure : str
-        File of the figure; empty if there is none.
-
-    Raises
-    ------
-    InputError
-        There are more sensors than variables, or a limit is rounded to 0 in the digits of a control.
-    """
+    """Return all files by name, the page of instructions last."""
     marks = find_marks(reductions)
     if len(marks) > _ROOM:
         raise InputError(f"{len(marks)} temperatures, and the macro has room for {_ROOM}")

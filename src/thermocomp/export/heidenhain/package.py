@@ -63,19 +63,7 @@ axis follows at 1 um/s), and set the datums again: a dimension that changes move
 def write_heidenhain(
     reductions: Sequence[Reduced], limits: Limits, name: str, facts: Facts, *, figure: str = ""
 ) -> dict[str, bytes]:
-    """Return all files by name, the page of instructions last.
-
-    Parameters
-    ----------
-    reductions : sequence of Reduced
-        One per axis.
-    limits : Limits
-    name : str
-        Name of the files.
-    facts : Facts
-    figure : str
-        File of the figure; empty if there is none.
-    """
+    """Return all files by name, the page of instructions last."""
     first = [*head(reductions, facts, SIGN, UNITS), *UNCONFIRMED]
     marks = find_marks(reductions)
     most = min(math.floor(limits.magnitude), _WORD)  # in whole um
@@ -141,9 +129,6 @@ def write_vectors(reductions: Sequence[Reduced], marks: dict[str, str], toleranc
 
     Parameters
     ----------
-    reductions : sequence of Reduced
-    marks : dict of str to str
-        From `find_marks`.
     tolerance : float
         [um]
     """

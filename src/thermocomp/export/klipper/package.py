@@ -77,24 +77,7 @@ For good: take the section out of `printer.cfg`, `RESTART`, `G28`."""
 def write_klipper(
     reductions: Sequence[Reduced], limits: Limits, name: str, facts: Facts, *, figure: str = ""
 ) -> dict[str, bytes]:
-    """Return all files by name, the page of instructions last.
-
-    Parameters
-    ----------
-    reductions : sequence of Reduced
-        A single reduction, of Z.
-    limits : Limits
-    name : str
-        Name of the files.
-    facts : Facts
-    figure : str
-        File of the figure; empty if there is none.
-
-    Raises
-    ------
-    InputError
-        There are several reductions, or the coefficient exceeds Klipper's limit.
-    """
+    """Return all files by name, the page of instructions last."""
     if len(reductions) > 1:
         raise InputError(
             f"Klipper has one [z_thermal_adjust], but there are {', '.join(r.model.target for r in reductions)}: name "

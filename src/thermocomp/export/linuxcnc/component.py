@@ -167,18 +167,7 @@ net {hal}-teleop motion.teleop-mode => {hal}.teleop-mode
 
 
 def name_component(name: str) -> str:
-    """Return the name of a compensator's component, different from the name of its source.
-
-    Parameters
-    ----------
-    name : str
-        Name of the compensator's files.
-
-    Raises
-    ------
-    InputError
-        The name is too long for HAL.
-    """
+    """Return the name of a compensator's component, different from the name of its source."""
     component = f"{name}_hal"
     if (over := len(component) + 1 + _BEHIND - _LONGEST) > 0:
         raise InputError(f"--name: {over} characters too long: a name in HAL has {_LONGEST} at most")
@@ -186,19 +175,7 @@ def name_component(name: str) -> str:
 
 
 def write_component(tables: Tables, name: str, facts: Sequence[str], letters: Mapping[str, str]) -> str:
-    """Return the text of a component, for ``halcompile``.
-
-    Parameters
-    ----------
-    tables : Tables
-        Tables of the compensator.
-    name : str
-        Name of the C99 code.
-    facts : sequence of str
-        Lines at the top of the file.
-    letters : mapping of str to str
-        Axes by target.
-    """
+    """Return the text of a component, for ``halcompile``."""
     pins, moves = list[str](), list[str]()
     for k, target in enumerate(tables.targets):
         a, at = letters[target].lower(), "0.0"
@@ -229,19 +206,7 @@ def write_component(tables: Tables, name: str, facts: Sequence[str], letters: Ma
 
 
 def write_hal(tables: Tables, name: str, facts: Sequence[str], letters: Mapping[str, str]) -> str:
-    """Return the HAL file that loads a component and moves axes with it.
-
-    Parameters
-    ----------
-    tables : Tables
-        Tables of the compensator.
-    name : str
-        Name of the C99 code.
-    facts : sequence of str
-        Lines at the top of the file.
-    letters : mapping of str to str
-        Axes by target.
-    """
+    """Return the HAL file that loads a component and moves axes with it."""
     hal = name_component(name).replace("_", "-")
     sources = [
         f"#net {hal}-value-{k} SOURCE => {hal}.value-{k}\n#net {hal}-good-{k} SOURCE => {hal}.good-{k}"

@@ -87,18 +87,8 @@ def write_package(
 
     Parameters
     ----------
-    compensator : Compensator
-        Created by `Compensator.of`.
-    name : str
-    facts : Facts
     axes : mapping of str to str, optional
         Letters by target. Default: derived from the target names.
-
-    Raises
-    ------
-    InputError
-        A model has no formula, the models cannot be combined, a target has no axis, two targets have the same axis, or
-        the name is too long.
     """
     tables, said, code = gather(compensator), facts.lines(compensator), cpackage.write_package(compensator, name, facts)
     name = identifier(name)

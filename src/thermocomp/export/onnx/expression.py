@@ -19,7 +19,6 @@ class Memory:
 
     Parameters
     ----------
-    graph : Graph
     state : str
         Incoming state.
     begin : int
@@ -41,14 +40,12 @@ class Walk:
 
     Parameters
     ----------
-    graph : Graph
     change : sequence of str
         Inputs minus their zero.
     begun : str
         Whether there was an earlier reading.
     dt : str
         Time since the previous reading [s]; 0 without one.
-    memory : Memory
     """
 
     def __init__(self, graph: Graph, change: Sequence[str], begun: str, dt: str, memory: Memory) -> None:
@@ -141,19 +138,7 @@ _INT64 = 7
 
 
 def _tick(g: Graph, clock: Clock, past: str, kept: str, mean: str) -> str:
-    """Return the next value of a recurrence.
-
-    Parameters
-    ----------
-    g : Graph
-    clock : Clock
-    past : str
-        Past values, newest first.
-    kept : str
-        Means over the past intervals.
-    mean : str
-        Mean over the current interval.
-    """
+    """Return the next value of a recurrence."""
     places, known = {leaf: k for k, leaf in enumerate(clock.leaves)}, dict[e.Node, str]()
 
     def value(node: e.Node) -> str:
@@ -216,16 +201,7 @@ def _sum(g: Graph, terms: Sequence[e.Node], value: Callable[[e.Node], str]) -> s
 
 
 def _look_up(g: Graph, at: str, x: np.ndarray, y: np.ndarray, *, steps: bool) -> str:
-    """Return the value of a tabulated function of one variable.
-
-    Parameters
-    ----------
-    g : Graph
-    at : str
-    x, y : ndarray
-    steps : bool
-        Piecewise constant instead of linear.
-    """
+    """Return the value of a tabulated function of one variable."""
     reached = g.put("Cast", g.put("LessOrEqual", x, at), to=_INT64)
     place = g.put("ReduceSum", reached, keepdims=1)
     if steps:

@@ -27,7 +27,6 @@ class GraphBlock:
 
     Parameters
     ----------
-    graph : Graph
     size : int
         Number of elements of its state.
     deviation : int
@@ -61,18 +60,7 @@ class _Moment:
 
 
 def translate(tables: Tables) -> GraphBlock:
-    """Return a compensator as a graph of one step.
-
-    Parameters
-    ----------
-    tables : Tables
-        Tables of the compensator without its watch.
-
-    Raises
-    ------
-    InputError
-        A model belongs to a family without a formula.
-    """
+    """Return a compensator as a graph of one step."""
     g, n, targets = Graph(), len(tables.channels), len(tables.targets)
     places = [CLOCKS + k * targets for k in range(4)]
     value, zero, dt = g.enter("value", (n,)), g.enter("zero", (n,)), g.enter("dt")
@@ -126,16 +114,7 @@ def _changes(g: Graph, tables: Tables, value: str, zero: str) -> tuple[str, str]
 
 
 def _moment(g: Graph, tables: Tables, state: str, dt: str, plausible: str) -> _Moment:
-    """Return the time of a call; an invalid time changes nothing.
-
-    Parameters
-    ----------
-    g : Graph
-    tables : Tables
-    state, dt : str
-    plausible : str
-        Whether all values are plausible.
-    """
+    """Return the time of a call; an invalid time changes nothing."""
     begun, clock, seen, last = (g.pick(state, k) for k in range(CLOCKS))
     begun, seen = g.put("Greater", begun, 0.5), g.put("Greater", seen, 0.5)
     good = g.put("And", g.put("GreaterOrEqual", dt, 0.0), g.put("LessOrEqual", dt, GAP))
@@ -151,17 +130,7 @@ def _moment(g: Graph, tables: Tables, state: str, dt: str, plausible: str) -> _M
 
 
 def _models(g: Graph, tables: Tables, memory: Memory, moment: _Moment, change: str) -> str:
-    """Return the outputs of the models, and their next state.
-
-    Parameters
-    ----------
-    g : Graph
-    tables : Tables
-    memory : Memory
-    moment : _Moment
-    change : str
-        Changes of all inputs.
-    """
+    """Return the outputs of the models, and their next state."""
     last = memory.before(len(tables.models))
     inputs = [g.pick(change, k) for k in range(len(tables.ranges))]
     walk, said = Walk(g, inputs, moment.seen, moment.step, memory), list[str]()

@@ -8,13 +8,7 @@ from thermocomp.export.onnx.nodes import Graph
 
 
 class Drive:
-    """Movement of corrections, equivalent to ``drive`` and ``idle`` of `thermocomp.export.block.steps`.
-
-    Parameters
-    ----------
-    graph : Graph
-    tables : Tables
-    """
+    """Movement of corrections, equivalent to ``drive`` and ``idle`` of `thermocomp.export.block.steps`."""
 
     def __init__(self, graph: Graph, tables: Tables) -> None:
         t, self._graph = tables.values, graph
@@ -38,14 +32,7 @@ class Drive:
         return g.every(g.put("And", within, flat))
 
     def move(self, deviation: str, correction: str, slope: str, travel: str) -> tuple[str, str]:
-        """Return corrections and slopes moved towards the values required by the models.
-
-        Parameters
-        ----------
-        deviation : str
-            Deviations of all models.
-        correction, slope, travel : str
-        """
+        """Return corrections and slopes moved towards the values required by the models."""
         g = self._graph
         offset = g.put("Sub", 0.0, g.put("MatMul", self._to_offset, deviation))
         flat = self._limit(offset, correction, travel)
@@ -66,10 +53,8 @@ class Drive:
 
         Parameters
         ----------
-        correction, slope : str
         idle : str
             Time without an update from the models [s].
-        travel : str
         """
         g, largest = self._graph, self._largest(correction, slope)
         share = g.put("Exp", g.put("Div", g.put("Neg", travel), self._fade))

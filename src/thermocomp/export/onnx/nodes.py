@@ -23,7 +23,6 @@ class Port:
 
     Parameters
     ----------
-    name : str
     shape : tuple of int
     kind : type
         Type of the elements.
@@ -40,8 +39,6 @@ class Node:
 
     Parameters
     ----------
-    op : str
-    inputs, outputs : tuple of str
     attributes : dict of str to Any
         A `Graph` among them becomes a subgraph.
     """
@@ -84,9 +81,7 @@ class Graph:
 
         Parameters
         ----------
-        name, value : str
         shape : tuple of int
-        kind : type
         """
         self.nodes.append(Node("Identity", (value,), (name,), {}))
         self.outputs.append(Port(name, shape, kind))
@@ -142,17 +137,7 @@ class Graph:
         return self.put("Slice", of, np.array([begin]), np.array([end]))
 
     def loop(self, trips: str, carried: Sequence[str], body: "Graph") -> list[str]:
-        """Return the final values of variables that a loop body updates.
-
-        Parameters
-        ----------
-        trips : str
-            Number of iterations, unless the body ends the loop.
-        carried : sequence of str
-            Initial values.
-        body : Graph
-            Inputs: iteration number, whether to continue, and the values. Outputs: whether to continue, and the values.
-        """
+        """Return the final values of variables that a loop body updates."""
         left = tuple(self.name() for _ in carried)
         self.nodes.append(Node("Loop", (trips, "", *carried), left, {"body": body}))
         return list(left)
@@ -167,19 +152,7 @@ class Graph:
 
 
 def serialize(graph: Graph, name: str, facts: Sequence[str], properties: dict[str, str], version: str) -> bytes:
-    """Return the contents of the file of a graph.
-
-    Parameters
-    ----------
-    graph : Graph
-    name : str
-    facts : sequence of str
-        Description of the model.
-    properties : dict of str to str
-        Description as machine-readable metadata.
-    version : str
-        Version of thermocomp.
-    """
+    """Return the contents of the file of a graph."""
     from onnx import checker, helper, numpy_helper
 
     proto = graph.proto(name)

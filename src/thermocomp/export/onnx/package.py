@@ -87,20 +87,7 @@ controller must not compensate for temperature itself at the same time.
 
 
 def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str, bytes]:
-    """Return all files by name.
-
-    Parameters
-    ----------
-    compensator : Compensator
-        Created by `Compensator.of`.
-    name : str
-    facts : Facts
-
-    Raises
-    ------
-    InputError
-        A model has no formula, or the models cannot be combined.
-    """
+    """Return all files by name."""
     if len({m.zeroing for m in compensator.models}) > 1:
         raise InputError("models that average their zero in different ways: export each file alone")
     inside, name = without_watch(compensator), identifier(name)
@@ -133,20 +120,7 @@ def _properties(tables: Tables, said: list[str], facts: Facts) -> dict[str, str]
 
 
 def _readme(compensator: Compensator, tables: Tables, name: str, said: list[str], block: GraphBlock, calls: int) -> str:
-    """Return the page of instructions.
-
-    Parameters
-    ----------
-    compensator : Compensator
-        Including its watch.
-    tables : Tables
-    name : str
-    said : list of str
-        Facts.
-    block : GraphBlock
-    calls : int
-        Number of calls in the test vectors.
-    """
+    """Return the page of instructions."""
     slopes, zeroing = any(tables.values["to_slope"]), compensator.models[0].zeroing
     counted = sorted({r.name for r in tables.ranges if r.rezero})
     zero = (

@@ -10,19 +10,7 @@ from thermocomp.export.onnx.nodes import Graph
 
 
 def support(g: Graph, model: ErrorModel, change: str, said: str, before: str) -> str:
-    """Return the deviation after the support policy of a model.
-
-    Parameters
-    ----------
-    g : Graph
-    model : ErrorModel
-    change : str
-        Inputs of the model minus their zero.
-    said : str
-        Output of the model within its range.
-    before : str
-        Last deviation within the range.
-    """
+    """Return the deviation after the support policy of a model."""
     policy = model.support.policy
     if policy == "clip":
         return said

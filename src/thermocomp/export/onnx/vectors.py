@@ -93,10 +93,6 @@ def answer(compensator: Compensator, tables: Tables, readings: Readings, zero: F
 
     Parameters
     ----------
-    compensator : Compensator
-        Without a watch.
-    tables : Tables
-    readings : Readings
     zero : ndarray of shape (n_channels,)
     """
     place = {c.name: k for k, c in enumerate(tables.channels)}
@@ -111,16 +107,7 @@ def write_vectors(
 
     Parameters
     ----------
-    tables : Tables
-    readings : Readings
-    answers : Answers
-        Outputs of the compensator.
     zero : ndarray of shape (n_channels,)
-    facts : sequence of str
-    sha256 : str
-        SHA-256 of the model file.
-    size : int
-        Number of elements of the state.
     """
     head = {
         "facts": list(facts),

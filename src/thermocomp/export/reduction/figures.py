@@ -12,13 +12,7 @@ from thermocomp.report.figures import LONGEST, MEASURED, PREDICTED, RESIDUAL, SH
 
 
 def residuals(reductions: Sequence[Reduction]) -> Drawn:
-    """Plot the loss of a reduction: the deviation, and the residual of either model on each unseen cycle in turn.
-
-    Parameters
-    ----------
-    reductions : sequence of Reduction
-        One panel each.
-    """
+    """Plot the loss of a reduction: the deviation, and the residual of either model on each unseen cycle in turn."""
     with drawing("reduction"):
         figure = Figure(figsize=(9.6, 0.4 + 2.9 * len(reductions)), layout="constrained")
         panels = np.atleast_1d(figure.subplots(len(reductions), 1, squeeze=False)[:, 0])

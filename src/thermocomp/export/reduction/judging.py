@@ -41,7 +41,6 @@ class Reduction:
 
     Parameters
     ----------
-    reduced : Reduced
     blocks : tuple of Assessment
         Results on each unseen block.
     full : tuple of Assessment
@@ -76,31 +75,11 @@ def reduce_model(
 
     Parameters
     ----------
-    model : ErrorModel
-        The full model.
-    axis : str
-        Axis of its target.
-    recordings : sequence of Recording
     shape : Shape
     sensors : sequence of str, optional
         Candidate temperatures. Default: all.
     starts : Start or sequence of Start, optional
         Initial state of the recordings. Default: determined from the recordings.
-    rules : Rules
-        Rules stated before judging.
-    jobs : int
-        Number of parallel processes; -1: one per core.
-    progress : callable
-        Called with a line of text after each task.
-
-    Returns
-    -------
-    Reduction
-
-    Raises
-    ------
-    InputError
-        The recordings lack the target or a temperature, or nothing can be fitted to them.
     """
     samples = _samples(model, recordings, shape, starts)
     heat = [c.name for c in samples.inputs if c.quantity == "temperature"]

@@ -33,7 +33,6 @@ class LinearReduction(TermRegressor):
 
     Parameters
     ----------
-    max_sensors : int
     fit_intercept : bool
         False: the output is zero in the reference state.
     digits : int
@@ -79,17 +78,6 @@ class LinearReduction(TermRegressor):
         cycle : array-like of int of shape (n_rows,), optional
             Thermal cycle of each row; rows with -1 are not used for training. Default: five blocks of equal length as
             cycles.
-
-        Returns
-        -------
-        LinearReduction
-
-        Raises
-        ------
-        FitError
-            There are fewer than two training rows.
-        InputError
-            A setting is out of range.
         """
         if self.max_sensors < 1 or not 1 <= self.digits <= 17:
             raise InputError(f"max_sensors {self.max_sensors}, digits {self.digits}: expected at least 1, and 1 to 17")
@@ -147,8 +135,6 @@ def _unseen(parts: FloatArray, sets: Sets, *, intercept: bool) -> tuple[FloatArr
     parts : ndarray of shape (n_parts, n_columns + 1, n_columns + 1)
         Products of the columns with each other and with the target, per part.
     sets : ndarray of int of shape (n_sets, size)
-    intercept : bool
-        The last but one column is constant and belongs to every set.
 
     Returns
     -------

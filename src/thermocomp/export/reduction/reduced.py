@@ -229,15 +229,7 @@ def in_um(um: float) -> str:
 
 
 def shorten(text: str, *, cap: bool = False) -> str:
-    """Return a number of eight digits, at most seven of them after the point: the limit of Fanuc controls.
-
-    Parameters
-    ----------
-    text : str
-        Number without an exponent, as returned by `in_mm` and `in_um`.
-    cap : bool
-        The number is an upper bound: round it towards zero.
-    """
+    """Return a number of eight digits, at most seven of them after the point: the limit of Fanuc controls."""
     value = Decimal(text)
     if abs(value) >= _LARGEST:
         return _plain(_LARGEST.copy_sign(value))
@@ -259,15 +251,7 @@ def mark(name: str, taken: Sequence[str] = ()) -> str:
 
 
 def head(reductions: Sequence[Reduced], facts: Facts, sign: str, units: str) -> list[str]:
-    """Return the header of an export, with the verdict in the first line.
-
-    Parameters
-    ----------
-    reductions : sequence of Reduced
-    facts : Facts
-    sign, units : str
-        Sign convention and units of the controller.
-    """
+    """Return the header of an export, with the verdict in the first line."""
     words, more = [], []
     for r in reductions:
         found = r.model.honest_error

@@ -58,24 +58,7 @@ def write_page(
     off: str,
     figure: str,
 ) -> str:
-    """Return the page of instructions.
-
-    Parameters
-    ----------
-    name : str
-        Name of the files.
-    head : sequence of str
-        The verdict, and other facts for the top of the page.
-    reductions : sequence of Reduced
-    what, about : str
-        Target of the export, and its computation.
-    limits, failed : str
-        Handling of limits and of failed sensors.
-    install, check, off : str
-        Instructions.
-    figure : str
-        File of the figure; empty if there is none.
-    """
+    """Return the page of instructions."""
     ranges = "; ".join(
         ", ".join(f"{i.name} {i.low:+.1f} to {i.high:+.1f} degC from its zero" for i, _ in r.terms) for r in reductions
     )

@@ -85,21 +85,7 @@ _OBJECT = """<?xml version="1.0" encoding="utf-8"?>
 
 
 def write_package(compensator: Compensator, name: str, facts: Facts, dialect: Dialect = "codesys") -> dict[str, bytes]:
-    """Return all files by name.
-
-    Parameters
-    ----------
-    compensator : Compensator
-        Created by `Compensator.of`.
-    name : str
-    facts : Facts
-    dialect : {'codesys', 'twincat', 'scl'}
-
-    Raises
-    ------
-    InputError
-        A model has no formula, or the models cannot be combined.
-    """
+    """Return all files by name."""
     return write_blocks(compensator, name, facts, dialect)
 
 
@@ -111,25 +97,7 @@ def write_blocks(
     more: Sequence[SourceUnit] = (),
     about: str = "",
 ) -> dict[str, bytes]:
-    """Return all files of a compensator, and of further blocks for a controller.
-
-    Parameters
-    ----------
-    compensator : Compensator
-        Created by `Compensator.of`.
-    name : str
-    facts : Facts
-    dialect : {'codesys', 'twincat', 'scl'}
-    more : sequence of SourceUnit
-        Further blocks.
-    about : str
-        Description on the page.
-
-    Raises
-    ------
-    InputError
-        A model has no formula, or the models cannot be combined.
-    """
+    """Return all files of a compensator, and of further blocks for a controller."""
     tables, said, name = gather(compensator), facts.lines(compensator), identifier(name)
     readings = make_readings(tables)
     answers = replay(compensator, tables, readings)

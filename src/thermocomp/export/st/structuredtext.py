@@ -57,7 +57,6 @@ class SourceUnit:
 
     Parameters
     ----------
-    name : str
     declaration, statements : str
         Declarations and code; a type has no statements.
     end : str
@@ -81,19 +80,6 @@ def translate(tables: Tables, name: str, dialect: Dialect) -> list[SourceUnit]:
     """Return a compensator in structured text, with every unit after those that it uses.
 
     The code processes values as `Compensator.step` processes a reading.
-
-    Parameters
-    ----------
-    tables : Tables
-        Tables of the compensator.
-    name : str
-        Name of the function block, and prefix of all other names.
-    dialect : {'codesys', 'twincat', 'scl'}
-
-    Raises
-    ------
-    InputError
-        A model belongs to a family without a formula.
     """
     scl = dialect == "scl"
     functions = write_functions(tables, name, dialect)

@@ -51,16 +51,7 @@ def number(value: float, kind: Kind = "real") -> str:
 
 
 def write_functions(tables: Tables, name: str, dialect: Dialect) -> dict[str, tuple[str, str]]:
-    """Return declaration and statements of the functions that a block needs, by name.
-
-    Parameters
-    ----------
-    tables : Tables
-        Tables of the compensator.
-    name : str
-        Prefix of all names.
-    dialect : {'codesys', 'twincat', 'scl'}
-    """
+    """Return declaration and statements of the functions that a block needs, by name."""
     found = functions(tables, {"expm1": "exp_less_one", "pow": "power"})
     parameters = {f.name: parameters_of(f) for f in found}
     return {f"{name}_{f.name}": _Writer(f, tables, name, dialect, parameters).text() for f in found}
@@ -218,19 +209,7 @@ def wrapped(line: str) -> str:
 
 
 def write_type(tables: Tables, name: str, bag: str, used: str, dialect: Dialect) -> str:
-    """Return the type of a structure: the variables used in a text, with the values of constants.
-
-    Parameters
-    ----------
-    tables : Tables
-        Tables of the compensator.
-    name : str
-        Prefix of all names.
-    bag : {'s', 'w', 't'}
-    used : str
-        Text in which the variables are used.
-    dialect : {'codesys', 'twincat', 'scl'}
-    """
+    """Return the type of a structure: the variables used in a text, with the values of constants."""
     scl = dialect == "scl"
     lines = [f"TYPE {quoted(f'{name}_{BAGS[bag]}', scl)}{'' if scl else ' :'}"]
     lines += SCL[1:] if scl else []

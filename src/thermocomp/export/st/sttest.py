@@ -53,18 +53,7 @@ _FAULTS = """    FOR {_}j := 0 TO {last_sensor} DO
 
 
 def write_test(tables: Tables, name: str, dialect: Dialect, readings: Readings, answers: Answers) -> list[SourceUnit]:
-    """Return the type with the test vectors, and the block that runs them.
-
-    Parameters
-    ----------
-    tables : Tables
-    name : str
-        Name of the tested function block.
-    dialect : {'codesys', 'twincat', 'scl'}
-    readings : Readings
-    answers : Answers
-        Outputs of the compensator.
-    """
+    """Return the type with the test vectors, and the block that runs them."""
     scl, inputs, calls = dialect == "scl", len(tables.channels), len(readings.age)
     targets, sensors = len(tables.targets), len(tables.sensors)
     mark = "#" if scl else ""

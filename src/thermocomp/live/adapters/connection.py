@@ -9,12 +9,7 @@ from thermocomp.core.ports import LinkStatus
 
 @dataclass
 class Connection:
-    """Status of a connection.
-
-    Parameters
-    ----------
-    now : LinkStatus
-    """
+    """Status of a connection."""
 
     now: LinkStatus = field(default=LinkStatus("closed"))
 

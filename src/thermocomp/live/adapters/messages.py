@@ -28,19 +28,8 @@ def read_message(payload: bytes | str, arrived: float, names: Mapping[str, str])
 
     Parameters
     ----------
-    payload : bytes or str
-        JSON: values by channel, such as ``{"t1_C": 21.3, "spindle_rpm": 4000}``, optionally with ``time`` (s since
-        1970), the time of sampling. A value that is not a number counts as missing.
     arrived : float
         Present time of the clock [s], used if the message has no time.
-    names : mapping of str to str
-        Channel by the name in the message, for names that differ.
-
-    Raises
-    ------
-    ReadingError
-        Message too large, not JSON or not a table, or invalid text: not UTF-8, an unpaired surrogate, control
-        characters, or a name that is too long.
     """
     content = _table(payload, '{"t1_C": 21.3}')
     if len(content) > MOST_VALUES:
@@ -57,17 +46,8 @@ def read_measurement(payload: bytes | str, arrived: float) -> Measurement:
 
     Parameters
     ----------
-    payload : bytes or str
-        JSON: ``{"target": "z_um", "measured_um": 3.2, "under_correction": true}``; optionally with
-        ``repeatability_um``, ``position_mm``, ``time`` (s since 1970) and ``id`` (text or a whole number). A
-        measurement is identified by its id or time, or by its content if it has neither.
     arrived : float
         Present time of the clock [s], used if the message has no time.
-
-    Raises
-    ------
-    ReadingError
-        Message too large, not JSON, or not such a table; ``under_correction`` is mandatory.
     """
     example = '{"id": "17", "target": "z_um", "measured_um": 3.2, "under_correction": true}'
     content = _table(payload, example)

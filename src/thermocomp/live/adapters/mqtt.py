@@ -19,14 +19,7 @@ from thermocomp.live.adapters.messages import read_message, write_message
 
 @dataclass(kw_only=True)
 class Broker:
-    """Address of a broker, and a topic on it.
-
-    Parameters
-    ----------
-    topic : str
-    host : str
-    port : int
-    """
+    """Address of a broker, and a topic on it."""
 
     topic: str
     host: str = "127.0.0.1"

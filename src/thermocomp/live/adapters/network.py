@@ -21,7 +21,6 @@ class OnBroker:
 
     Parameters
     ----------
-    topic : str
     host, port : str, int
         Host and port of the broker.
     """
@@ -56,7 +55,6 @@ class MqttIn(OnBroker):
     ----------
     topic, host, port
         As for `OnBroker`.
-    kind : {'mqtt'}
     names : dict of str to str
         Channel by the name in the message, for names that differ.
     virtual : bool
@@ -87,7 +85,6 @@ class MqttProbing(OnBroker):
     ----------
     topic, host, port
         As for `OnBroker`.
-    kind : {'mqtt'}
     """
 
     kind: Literal["mqtt"]
@@ -101,7 +98,6 @@ class MqttOut(OnBroker):
     ----------
     topic, host, port
         As for `OnBroker`.
-    kind : {'mqtt'}
     """
 
     published: ClassVar[bool] = True
@@ -115,24 +111,12 @@ class MqttOut(OnBroker):
 
 
 def explain_topic(topic: str, *, published: bool) -> str:
-    """Return the reason why a topic is invalid; empty if it is valid.
-
-    Parameters
-    ----------
-    topic : str
-    published : bool
-        Topic for publishing, where wildcards are not allowed.
-    """
+    """Return the reason why a topic is invalid; empty if it is valid."""
     return next(_faults_of_topic(topic, published=published), "")
 
 
 def explain_host_name(host: str) -> str:
-    """Return the reason why a host is invalid; empty if it is valid: an address or a name.
-
-    Parameters
-    ----------
-    host : str
-    """
+    """Return the reason why a host is invalid; empty if it is valid: an address or a name."""
     try:
         ip_address(host)
     except ValueError:

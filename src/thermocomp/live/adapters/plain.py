@@ -91,12 +91,7 @@ class Played:
 
 @dataclass(kw_only=True)
 class ReplaySource(Played):
-    """A recording in thermocomp's own CSV, played back.
-
-    Parameters
-    ----------
-    path : Path
-    """
+    """A recording in thermocomp's own CSV, played back."""
 
     path: Path
 
@@ -112,7 +107,6 @@ class SimulatedSource(Played):
     ----------
     experiment : Experiment
         Experiment to run; all its tests in sequence.
-    seed : int
     """
 
     experiment: Experiment
@@ -139,12 +133,7 @@ class SimulatedSource(Played):
 
 @dataclass(kw_only=True)
 class FileSink:
-    """The corrections in force as a file that is replaced atomically each time.
-
-    Parameters
-    ----------
-    path : Path
-    """
+    """The corrections in force as a file that is replaced atomically each time."""
 
     path: Path
     _connection: Connection = field(default_factory=Connection, init=False, repr=False)
@@ -187,17 +176,7 @@ class FileSink:
 
 
 def read_rows(path: Path) -> Generator[tuple[float, dict[str, float]], None, None]:
-    """Return time [s] and values by channel of a recording in thermocomp's own CSV, read row by row.
-
-    Parameters
-    ----------
-    path : Path
-
-    Raises
-    ------
-    InputError
-        File unreadable, without times, or with invalid column names; while rows are read: a line is not UTF-8 text.
-    """
+    """Return time [s] and values by channel of a recording in thermocomp's own CSV, read row by row."""
     try:
         file = path.open("rb")
     except OSError as e:
@@ -243,13 +222,7 @@ def _parsed(row: Sequence[str], place: int) -> float | None:
 
 
 def find_experiment(name: str, folder: Path) -> Experiment:
-    """Return an experiment of the virtual machine: one included in the package, or a custom protocol.
-
-    Raises
-    ------
-    InputError
-        Experiment missing or invalid.
-    """
+    """Return an experiment of the virtual machine: one included in the package, or a custom protocol."""
     if name.endswith(".toml"):
         return read_protocol(folder / name)
     home = files("thermocomp.virtual") / "protocols"

@@ -47,8 +47,6 @@ class SimulatedProbe:
 
     Parameters
     ----------
-    machine : SimulatedSource
-    targets : tuple of str
     every : float
         Machine time between two probings [s].
     repeatability : float

@@ -22,15 +22,7 @@ class SourceSection(Protocol):
         """Name of the entry point."""
 
     def open(self, folder: Path, speed: float) -> Source:
-        """Create the source; it connects later.
-
-        Parameters
-        ----------
-        folder : Path
-            Folder of the configuration: relative paths are resolved against it.
-        speed : float
-            Machine time per unit of real time, for playback.
-        """
+        """Create the source; it connects later."""
 
 
 class SinkSection(Protocol):
@@ -50,7 +42,6 @@ class SimulatedIn:
 
     Parameters
     ----------
-    kind : {'simulated'}
     experiment : str
         Experiment to run: one included in the package, or a protocol (.toml).
     seed : int
@@ -78,7 +69,6 @@ class ReplayIn:
 
     Parameters
     ----------
-    kind : {'replay'}
     file : str
         File in thermocomp's own CSV.
     """
@@ -99,7 +89,6 @@ class SimulatedProbing:
 
     Parameters
     ----------
-    kind : {'simulated'}
     every : float
         Machine time between two probings [s].
     repeatability : float
@@ -124,7 +113,6 @@ class LinuxCncOut:
 
     Parameters
     ----------
-    kind : {'linuxcnc'}
     socket : str
         Socket of the HAL component that ``thermocomp linuxcnc setup`` installs.
     axes : dict of str to str
@@ -153,7 +141,6 @@ class FileOut:
 
     Parameters
     ----------
-    kind : {'file'}
     file : str
         File to be replaced atomically each time.
     """

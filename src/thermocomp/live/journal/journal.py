@@ -63,14 +63,7 @@ class JournalStatus(NamedTuple):
 
 
 class Journal:
-    """A journal opened for writing: see `open`.
-
-    Parameters
-    ----------
-    path : Path
-    limits : JournalLimits
-    start : StartRow
-    """
+    """A journal opened for writing: see `open`."""
 
     def __init__(self, path: Path, limits: JournalLimits, start: StartRow) -> None:
         self.path, self.limits = path, limits
@@ -94,19 +87,6 @@ class Journal:
 
         A damaged file, or one that is not a journal, is renamed to ``.refused``; one of a newer version is left
         unchanged.
-
-        Parameters
-        ----------
-        path : str or Path
-            Path of the journal; its files are numbered: ``live.db`` becomes ``live.000001.db`` and so on.
-        limits : JournalLimits
-        start : StartRow
-            Channels of the readings, and compensated targets.
-
-        Raises
-        ------
-        InputError
-            `start` is invalid.
         """
         journal = cls(Path(path), limits, start)
         journal.flush()
@@ -127,13 +107,7 @@ class Journal:
             self._shed()
 
     def flush(self) -> bool:
-        """Write all waiting rows to the disk in one transaction; call it from a single thread.
-
-        Returns
-        -------
-        bool
-            True: written; the rows survive a kill and a power failure. False: still waiting, see `status`.
-        """
+        """Write all waiting rows to the disk in one transaction; call it from a single thread."""
         with self._writing:
             with self._adding:
                 batch, self._waiting, self._bytes = self._waiting, deque(), 0

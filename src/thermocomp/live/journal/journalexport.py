@@ -90,14 +90,8 @@ def export(reader: JournalReader, every: float = 0.0) -> Exported:
 
     Parameters
     ----------
-    reader : JournalReader
     every : float
         Minimum interval of the exported readings [s].
-
-    Raises
-    ------
-    InputError
-        There is no reading, a row is damaged, or a channel or target is defined differently in two runs.
     """
     channels = _same([c for s in reader.starts.values() for c in s.channels])
     targets = _same([t for s in reader.starts.values() for t in s.targets])

@@ -81,17 +81,7 @@ class JournalReader:
             self.starts[stored[0]] = start
 
     def rows(self, kinds: Collection[str] = tuple(KINDS)) -> Iterator[StoredRun]:
-        """Return the rows of the given kinds in order of time; the start row of each run once.
-
-        Parameters
-        ----------
-        kinds : collection of str
-
-        Raises
-        ------
-        InputError
-            A row is damaged.
-        """
+        """Return the rows of the given kinds in order of time; the start row of each run once."""
         marks = ",".join("?" * len(kinds))
         query = f"{_ROWS} WHERE kind IN ({marks}) ORDER BY time, id"
         begun = set()
@@ -127,13 +117,7 @@ class JournalReader:
         return told
 
     def latest(self, n: int, kinds: Collection[str] = EVENTS) -> list[StoredRun]:
-        """Return the most recently written rows of the given kinds, oldest first.
-
-        Parameters
-        ----------
-        n : int
-        kinds : collection of str
-        """
+        """Return the most recently written rows of the given kinds, oldest first."""
         marks = ",".join("?" * len(kinds))
         query = f"{_ROWS} WHERE kind IN ({marks}) ORDER BY id DESC LIMIT ?"
         found: list[StoredRun] = []
@@ -206,13 +190,7 @@ def size(path: Path) -> int:
 
 
 def checksum(run: int, seq: int, time: float, kind: str, text: str) -> int:
-    """Return the CRC-32 of a row.
-
-    Parameters
-    ----------
-    run, seq, time, kind, text
-        See the columns of `SCHEMA`.
-    """
+    """Return the CRC-32 of a row."""
     # SQLite does not store -0.0
     return zlib.crc32(f"{run} {seq} {time + 0.0!r} {kind} {text}".encode())
 
@@ -244,17 +222,7 @@ def telling(path: Path) -> Iterator[None]:
 
 @contextmanager
 def reading(path: Path) -> Iterator[sqlite3.Connection | None]:
-    """Open a journal file for reading; None: removed meanwhile, or still empty.
-
-    Yields
-    ------
-    Connection or None
-
-    Raises
-    ------
-    InputError
-        Not a journal, or of a newer version.
-    """
+    """Open a journal file for reading; None: removed meanwhile, or still empty."""
     # without permission to create files next to it, SQLite reads a file without a writer only as immutable
     how = "mode=ro" if path.with_name(f"{path.name}-wal").exists() else "mode=ro&immutable=1"
     if not path.exists():

@@ -157,14 +157,6 @@ def measured_by(row: MeasurementRow, start: StartRow, in_force: Correction | Non
     deviation. A reported position that includes the correction therefore gives the full deviation; one without it gives
     the residual under the correction. So the correction is subtracted once in the second case, and never in the first.
 
-    Parameters
-    ----------
-    row : MeasurementRow
-    start : StartRow
-        Start row of its run.
-    in_force : Correction, optional
-        Correction in force, if not contained in the row.
-
     Returns
     -------
     float or None
@@ -182,13 +174,7 @@ def measured_by(row: MeasurementRow, start: StartRow, in_force: Correction | Non
 
 
 def kind_of(row: Row) -> str:
-    """Return the name of the kind of a row.
-
-    Raises
-    ------
-    ValueError
-        `row` is not a row.
-    """
+    """Return the name of the kind of a row."""
     found = _NAMES.get(type(row))
     if found is None:
         raise ValueError(f"{type(row).__name__} is no row of a journal")
@@ -196,19 +182,7 @@ def kind_of(row: Row) -> str:
 
 
 def dumps(row: Row, start: StartRow) -> str:
-    """Return a row without its time as ASCII text.
-
-    Parameters
-    ----------
-    row : Row
-    start : StartRow
-        Start row of its run, which defines the order of the channels in readings.
-
-    Raises
-    ------
-    ValueError
-        A field has a wrong type, is not finite, or exceeds the limits.
-    """
+    """Return a row without its time as ASCII text."""
     name = kind_of(row)
     to_number(row.time)
     if isinstance(row, StartRow):
@@ -221,21 +195,7 @@ def dumps(row: Row, start: StartRow) -> str:
 
 
 def loads(kind: str, time: float, text: str, start: StartRow | None) -> Row:
-    """Return the row encoded by `dumps`.
-
-    Parameters
-    ----------
-    kind : str
-    time : float
-    text : str
-    start : StartRow or None
-        Start row of its run.
-
-    Raises
-    ------
-    ValueError
-        `text` is not a valid row.
-    """
+    """Return the row encoded by `dumps`."""
     value = json.loads(text)
     want(kind in KINDS, kind, "kind", f"one of {', '.join(KINDS)}")
     if kind == "start":

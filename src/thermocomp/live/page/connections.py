@@ -27,12 +27,7 @@ class Guarded(H11Protocol):
     """
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Accept the connection; at the limit another one is closed, preferably an idle one.
-
-        Parameters
-        ----------
-        transport : asyncio.BaseTransport
-        """
+        """Accept the connection; at the limit another one is closed, preferably an idle one."""
         super().connection_made(transport)  # type: ignore[arg-type]
         self._since, self._stuck, self._served = time.monotonic(), 0.0, False
         self.app_state: dict[str, Any] = {**self.app_state, "connection": self}

@@ -77,11 +77,6 @@ class Doorkeeper:
 
         Every token is compared: if wrong tokens could lock the page, anyone who can reach it could prevent the operator
         from holding the machine's correction. A token of 16 characters or more cannot be guessed.
-
-        Raises
-        ------
-        HTTPException
-            403: no token is configured; 401: the token is wrong; 429: wrong, and too many recent ones were, too.
         """
         if not self._token:
             raise HTTPException(403, "no token is configured: this page only shows ([page] token_file)")
@@ -100,7 +95,6 @@ class Door:
 
     Parameters
     ----------
-    app : ASGI application
     names : collection of str
         Host names of the page, in addition to ``localhost`` and the addresses of this computer.
     """
@@ -144,15 +138,6 @@ def explain_host(header: str, names: Collection[str], server: str) -> str:
 
     A page of another site whose name resolves to this computer (DNS rebinding) sends that name. An address cannot be
     redirected in this way.
-
-    Parameters
-    ----------
-    header : str
-        Host header of the request: a name or an address, with or without a port.
-    names : collection of str
-        Permitted names, in lower case.
-    server : str
-        Local address of the connection.
     """
     found = _HOST.fullmatch(header)
     name = found[1].lower().removesuffix(".") if found else ""
@@ -168,10 +153,6 @@ def explain_foreign(request: Request) -> str:
     """Return the reason why a request comes from a page of another origin; empty if it does not.
 
     Browsers state the origin of the page in requests that may change something; other programs state none.
-
-    Parameters
-    ----------
-    request : Request
     """
     own = f"{request.url.scheme}://{request.headers.get('host', '')}".lower()
     site = request.headers.get("sec-fetch-site", "none").lower()

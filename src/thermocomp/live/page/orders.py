@@ -44,13 +44,7 @@ def make_router(board: Board) -> APIRouter:
 
 
 def read_order(body: bytes) -> PageOrder:
-    """Return the order in the body of a request.
-
-    Raises
-    ------
-    HTTPException
-        Not JSON in UTF-8 (400), or not such an order (422).
-    """
+    """Return the order in the body of a request."""
     try:
         content = parse_json(body)
     except ValueError as e:
@@ -63,13 +57,7 @@ def read_order(body: bytes) -> PageOrder:
 
 
 def give(service: Service, wanted: PageOrder) -> str:
-    """Carry out an order; return the reason if impossible, else an empty string.
-
-    Parameters
-    ----------
-    service : Service
-    wanted : PageOrder
-    """
+    """Carry out an order; return the reason if impossible, else an empty string."""
     target = wanted.target
     if wanted.do == "rezero":
         service.rezero(target, "by hand, at the page")

@@ -23,15 +23,8 @@ def make_app(
 
     Parameters
     ----------
-    service : Service
-    token : str
-        Token required for orders; empty: no orders are accepted.
     settled : float
         A drift below this in ten minutes counts as settled [um].
-    hosts : tuple of str
-        Host names of the page, in addition to ``localhost`` and the addresses of this computer.
-    pages : collection of str
-        Pages of other packages, by their entry points of ``thermocomp.pages``; one that fails is reported and omitted.
     """
     app = FastAPI(title="thermocomp", docs_url=None, redoc_url=None, default_response_class=Json)
     app.add_middleware(Door, names=hosts)

@@ -21,7 +21,6 @@ class Board:
 
     Parameters
     ----------
-    service : Service
     token : str
         Token required for orders; empty: no orders are accepted.
     settled : float

@@ -15,7 +15,6 @@ def snapshot(service: Service, settled: float) -> dict[str, Any]:
 
     Parameters
     ----------
-    service : Service
     settled : float
         A drift below this in ten minutes counts as settled [um].
 

@@ -24,7 +24,6 @@ class Streams:
 
     Parameters
     ----------
-    service : Service
     settled : float
         A drift below this in ten minutes counts as settled [um].
     """

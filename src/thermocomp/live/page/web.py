@@ -43,17 +43,7 @@ class _Server(uvicorn.Server):
 
 
 def read_token(path: Path) -> str:
-    """Return the token in a file.
-
-    Parameters
-    ----------
-    path : Path
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, or the token is too short.
-    """
+    """Return the token in a file."""
     try:
         token = path.read_text(encoding="ascii").strip()
     except (OSError, UnicodeDecodeError) as e:
@@ -67,20 +57,7 @@ def read_token(path: Path) -> str:
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """Return a listening socket.
-
-    Parameters
-    ----------
-    host : str
-        Name or address; ``0.0.0.0``: all IPv4 addresses of this computer, ``::``: all of IPv6 and IPv4.
-    port : int
-        Port number; 0: any free port.
-
-    Raises
-    ------
-    InputError
-        The port is in use, or the host does not exist.
-    """
+    """Return a listening socket."""
     bare = host.removeprefix("[").removesuffix("]")
     try:
         found = socket.getaddrinfo(bare, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
@@ -97,13 +74,7 @@ def listen(host: str, port: int) -> socket.socket:
 
 
 async def serve(app: FastAPI, listening: socket.socket) -> None:
-    """Serve an application until it is cancelled.
-
-    Parameters
-    ----------
-    app : FastAPI
-    listening : socket
-    """
+    """Serve an application until it is cancelled."""
     config = uvicorn.Config(
         app,
         http=Guarded,

@@ -16,7 +16,6 @@ def error(machine: Machine, values: FloatArray, points: FloatArray, tool: ArrayL
 
     Parameters
     ----------
-    machine : Machine
     values : ndarray of shape (..., 32)
         Components in the order of `thermocomp.core.components.COMPONENTS` [um, urad].
     points : ndarray of shape (..., 3)

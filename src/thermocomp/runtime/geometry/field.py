@@ -49,11 +49,6 @@ class ErrorField:
         -------
         ndarray of shape (..., 32)
             In the order of `thermocomp.core.components.COMPONENTS` [um, urad].
-
-        Raises
-        ------
-        InputError
-            A position is not finite.
         """
         places = check_finite("positions", points)
         xyz = coordinates(places)
@@ -73,18 +68,11 @@ class ErrorField:
             Positions of the axes [mm].
         tool : array-like of shape (3,), optional
             Vector from the gauge point to the tip [mm]; default: that of the machine.
-        exact : bool
-            True: homogeneous transforms; False: first order in the angles.
 
         Returns
         -------
         ndarray of shape (..., 3)
             Actual minus commanded, along X, Y, Z [um].
-
-        Raises
-        ------
-        InputError
-            A position or the tool is not finite.
         """
         places = np.asarray(points, dtype=np.float64)
         values = self.components(places)
@@ -106,11 +94,6 @@ class ErrorField:
         -------
         ndarray of shape (..., 3)
             About X, Y, Z [urad].
-
-        Raises
-        ------
-        InputError
-            A position is not finite.
         """
         places = np.asarray(points, dtype=np.float64)
         return self.kinematics.synthesize(self.components(places), places)[1]
@@ -133,12 +116,6 @@ class ErrorField:
         -------
         ndarray of shape (..., 3)
             Along X, Y, Z; zero along a non-existent axis [um].
-
-        Raises
-        ------
-        InputError
-            The iteration does not converge within ten steps (errors too large), or a position or the tool is not
-            finite.
 
         Notes
         -----
@@ -174,11 +151,6 @@ class ErrorField:
         -------
         ndarray of shape (32, 3)
             [um per um, um per urad]
-
-        Raises
-        ------
-        InputError
-            A position or the tool is not finite.
         """
         return self.kinematics.sensitivity(
             check_finite("position", point), None if tool is None else check_finite("tool", tool)

@@ -61,7 +61,6 @@ class Kinematics:
 
         Parameters
         ----------
-        axis : {'X', 'Y', 'Z'}
         points : ndarray of shape (..., 3)
             Positions of the axes [mm].
         tool : array-like of shape (3,), optional

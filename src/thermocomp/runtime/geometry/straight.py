@@ -20,7 +20,6 @@ class StraightLine:
 
     Parameters
     ----------
-    axis : {'X', 'Y', 'Z'}
     deviation : Deviation
         Fitted line; its reference position is that of the axis.
     along : Size
@@ -73,27 +72,10 @@ def straight_lines(
 
     Parameters
     ----------
-    field : ErrorField
-        Error field of the machine in one thermal state.
     at : array-like of shape (3,)
         Positions of the other axes while one moves [mm].
     tool : array-like of shape (3,), optional
         Vector from the gauge point to the tip [mm]; default: that of the machine.
-    stations : int
-        Positions per axis, equally spaced over its travel including both ends; at least 2.
-    grid : int
-        Grid points per axis over the work volume including its borders; at least 2.
-    exact : bool
-        True: homogeneous transforms; False: first order in the angles.
-
-    Returns
-    -------
-    StraightLines
-
-    Raises
-    ------
-    InputError
-        A position or the tool is not finite.
 
     Notes
     -----
@@ -142,17 +124,10 @@ def best_lines(
 
     Parameters
     ----------
-    field : ErrorField
     at : array-like of shape (3,)
         Positions of the other axes while one moves [mm].
     tool : array-like of shape (3,), optional
         Vector from the gauge point to the tip [mm]; default: that of the machine.
-    axes : str
-        Axes to correct; non-existent axes are ignored.
-    stations : int
-        Positions per axis, equally spaced over its travel including both ends; at least 2.
-    exact : bool
-        True: homogeneous transforms; False: first order in the angles.
 
     Returns
     -------
@@ -181,10 +156,6 @@ def best_line(positions: FloatArray, errors: FloatArray, reference: float) -> De
         [um]
     reference : float
         Position at which the offset of the line is valid [mm].
-
-    Returns
-    -------
-    Deviation
     """
     middle, mean = positions.mean(), errors.mean()
     way = 1e-3 * (positions - middle)
@@ -204,15 +175,10 @@ def find_remaining_error(
 
     Parameters
     ----------
-    field : ErrorField
     points : ndarray of shape (..., 3)
         Commanded positions of the axes [mm].
-    corrections : mapping of str to Correction
-        Corrections by axis.
     tool : array-like of shape (3,), optional
         Vector from the gauge point to the tip [mm]; default: that of the machine.
-    exact : bool
-        True: homogeneous transforms; False: first order in the angles.
 
     Returns
     -------

@@ -31,7 +31,6 @@ class VolumetricModel:
 
     Attributes
     ----------
-    machine : Machine
     stack : Stack
         All its models of time.
 
@@ -79,22 +78,8 @@ class VolumetricModel:
 
         Parameters
         ----------
-        state : VolumetricState
-            State from `init` or the previous `step`.
-        values : mapping of str to float
-            Values by channel; must contain those of `inputs`.
         dt : float
             Time since the previous reading [s]; ignored in the first step.
-
-        Returns
-        -------
-        state : VolumetricState
-        field : ErrorField
-
-        Raises
-        ------
-        ReadingError
-            A channel is missing or not finite, or `dt` is negative or not finite.
         """
         try:
             reading = np.array([values[name] for name in self.inputs], dtype=np.float64)
@@ -126,17 +111,6 @@ class VolumetricModel:
             [s]
         table : mapping of str to ndarray of shape (n,)
             Readings by channel; must contain those of `inputs`.
-
-        Returns
-        -------
-        ThermalStates
-            One state per row. In a row with a missing number the last state is held, as in the live gate; before the
-            first usable row all models of time give 0.
-
-        Raises
-        ------
-        InputError
-            A channel is missing or has a wrong length, or the time does not increase.
         """
         times = np.asarray(time, dtype=np.float64)
         if not np.isfinite(times).all() or (np.diff(times) <= 0).any():
@@ -167,7 +141,6 @@ class ThermalStates:
 
     Parameters
     ----------
-    model : VolumetricModel
     time : ndarray of shape (n,)
         [s]
     deviations : ndarray of shape (n, n_models)

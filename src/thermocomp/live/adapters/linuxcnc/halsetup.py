@@ -79,21 +79,7 @@ class HalSetup(NamedTuple):
 
 
 def prepare(path: Path, folder: Path, settings: HalSettings) -> HalSetup:
-    """Return the files and settings for corrections of a machine; nothing is written.
-
-    Parameters
-    ----------
-    path : Path
-        INI file of the machine.
-    folder : Path
-        Folder of the HAL file, the component and the socket.
-    settings : HalSettings
-
-    Raises
-    ------
-    InputError
-        The machine cannot be corrected with these settings; the message gives the reason and the remedy.
-    """
+    """Return the files and settings for corrections of a machine; nothing is written."""
     ini = read_ini(path)
     files = read_hal(ini, HAL_NAME)
     axes = [_axis(ini, letter, settings.pattern) for letter in settings.axes.upper()]
@@ -141,25 +127,7 @@ def prepare(path: Path, folder: Path, settings: HalSettings) -> HalSetup:
 
 
 def set_up(path: Path, folder: Path, settings: HalSettings, *, overwrite: bool = False) -> HalSetup:
-    """Write the files that correct a machine: a HAL file and the component that it starts.
-
-    Parameters
-    ----------
-    path, folder, settings
-        See `prepare`.
-    overwrite : bool
-        Overwrite existing files.
-
-    Returns
-    -------
-    HalSetup
-        Required changes; the machine's own INI and HAL files are left unchanged.
-
-    Raises
-    ------
-    InputError
-        See `prepare`, or a file exists already.
-    """
+    """Write the files that correct a machine: a HAL file and the component that it starts."""
     prepared = prepare(path, folder, settings)
     with drafts(prepared.files, overwrite=overwrite) as started:
         for draft, text in zip(started.values(), (prepared.component, prepared.hal), strict=True):

@@ -23,19 +23,7 @@ class HalAxis(NamedTuple):
 
 
 def load_modules(axes: Sequence[HalAxis], joints: int, pattern: str, files: HalFiles, todo: list[str]) -> list[str]:
-    """Return the lines that load HAL modules; LinuxCNC loads each module only once.
-
-    Parameters
-    ----------
-    axes : sequence of HalAxis
-    joints : int
-        Number of joints of the machine.
-    pattern : {'offset', 'drive'}
-    files : HalFiles
-        HAL files of the machine.
-    todo : list of str
-        Extended by the changes to be made by hand where the machine already loads a module.
-    """
+    """Return the lines that load HAL modules; LinuxCNC loads each module only once."""
     letters = [a.letter for a in axes]
     homed = ["tc.homed" if k == 0 else f"tc.homed-{k}" for k in range(-(-joints // _INPUTS))]
     wanted = {
@@ -80,16 +68,7 @@ def _net(files: HalFiles, source: str, *sinks: str) -> str:
 
 
 def make_gate(joints: int, pattern: str, files: HalFiles) -> list[str]:
-    """Return the HAL lines that determine whether a correction can be in force.
-
-    Parameters
-    ----------
-    joints : int
-        Number of joints of the machine.
-    pattern : {'offset', 'drive'}
-    files : HalFiles
-        HAL files of the machine.
-    """
+    """Return the HAL lines that determine whether a correction can be in force."""
     lines, before = [], ""
     for k in range(-(-joints // _INPUTS)):
         name = "tc.homed" if k == 0 else f"tc.homed-{k}"
@@ -125,13 +104,8 @@ def make_line(axis: HalAxis, files: HalFiles, magnitude: float, micron: float) -
 
     Parameters
     ----------
-    axis : HalAxis
-    files : HalFiles
-        HAL files of the machine.
     magnitude : float
         Largest correction [um].
-    micron : float
-        One micrometre in machine units.
     """
     a, most = axis.letter, magnitude * micron
     lines = [
@@ -164,14 +138,6 @@ def make_offset(axis: HalAxis, files: HalFiles, micron: float) -> list[str]:
 
     Only changes of the counts accumulate, and some are lost: the difference from the controller's own request is
     therefore added. While no correction can be in force the line starts from that request, so the difference is zero.
-
-    Parameters
-    ----------
-    axis : HalAxis
-    files : HalFiles
-        HAL files of the machine.
-    micron : float
-        One micrometre in machine units.
     """
     a, scale = axis.letter, RESOLUTION * 1e3 * micron
     request = f"axis.{a}.eoffset-request"
@@ -193,14 +159,7 @@ def make_offset(axis: HalAxis, files: HalFiles, micron: float) -> list[str]:
 
 
 def make_drive(axis: HalAxis, files: HalFiles) -> list[str]:
-    """Return the HAL lines that add a correction to the drive command and subtract it from the feedback.
-
-    Parameters
-    ----------
-    axis : HalAxis
-    files : HalFiles
-        HAL files of the machine; the added functions are appended to it.
-    """
+    """Return the HAL lines that add a correction to the drive command and subtract it from the feedback."""
     a, command, feedback = axis.letter, f"joint.{axis.joint}.motor-pos-cmd", f"joint.{axis.joint}.motor-pos-fb"
     told, answered = files.signals[command], files.signals[feedback]
     drives = [p for p in files.pins[told] if not p.startswith("joint.")]
