@@ -27,9 +27,9 @@ from thermocomp.core.state import State
 from thermocomp.core.watch import Watch
 from thermocomp.core.zero import Gathered
 from thermocomp.runtime.adaptation import Probing
-from thermocomp.runtime.advance import advance
+from thermocomp.runtime.advance import Advanced, advance
 from thermocomp.runtime.clocking import place
-from thermocomp.runtime.driving import drive, rest, travel_time
+from thermocomp.runtime.driving import Driven, drive, rest, travel_time
 from thermocomp.runtime.gate import explain_implausible
 from thermocomp.runtime.geometry.straight import best_lines
 from thermocomp.runtime.geometry.volumetric import VolumetricModel
@@ -238,65 +238,79 @@ class Compensator:
         dt = 0.0 if state.time is None else instant.time - state.time
         travel = travel_time(state, tick, self.limits)
         stepped = advance(self.groups, state.models, state.gathered, reading, instant.time, dt)
-        failed, corrections, learned = (
-            Lookout.failed(self._lookouts, state.watches),
-            dict(state.corrections),
-            dict(state.learned),
-        )
-        references, raw, held = dict(state.references), dict(state.raw), dict[str, str]()
-        deviations, widths, states_of = dict[str, Deviation](), dict[str, float](), dict[str, Status]()
-        refused, moved = dict.fromkeys(fresh, "no model drives its correction"), dict[str, float]()
-        arrived = state.away is not None
-        for target, line in self.lines.items():
-            if not all(map(math.isfinite, stepped.said[line.models])):
-                states_of[target] = Status("restarting", "its zero is being averaged")
-                continue
-            if target not in references:
-                references[target] = Reference(reading.time, "start: mean over the first readings")
-            zero, probing = references[target].shift, fresh.get(target)
-            known, most = learned.get(target), self.limits.magnitude
-            answer = evaluate(line, self.models, stepped, instant.time, known, probing, failed, zero, most)
-            raw[target], deviations[target] = answer.raw, answer.deviation
-            if failed and (why := _unjudged(self.models[line.models], failed)):
-                held[target] = why  # no band either: the error without these sensors was never judged
-                continue
-            if not math.isnan(answer.half_width):
-                widths[target] = answer.half_width
-            if answer.learned is not None:
-                learned[target] = answer.learned
-            if probing is not None:
-                refused[target], moved[target] = answer.refused, answer.moved
-            corrections[target], states_of[target] = drive(state, target, line, answer.deviation, travel, self.limits)
-            arrived &= states_of[target].word != "restarting"
-        left = rest(state, corrections, tick, self.lines, self.limits, held, driven=states_of)
+        failed = Lookout.failed(self._lookouts, state.watches)
+        done = self._drive(state, stepped, (reading.time, instant.time), fresh, failed, travel)
+        left = rest(state, done.corrections, tick, self.lines, self.limits, done.held, driven=done.states)
+        probed = {t: fresh[t] for t in done.moved}
         new = state._replace(
             models=stepped.states,
             corrections=left.corrections,
             clock=left.clock,
             idle=left.idle,
             gathered=stepped.gathered,
-            learned=learned,
-            probed=remember(state, {t: fresh[t] for t in moved}, instant.time) if moved else state.probed,
-            references=references,
-            raw=raw,
-            away=None if arrived else state.away,
+            learned=done.learned,
+            probed=remember(state, probed, instant.time) if probed else state.probed,
+            references=done.references,
+            raw=done.raw,
+            away=None if done.arrived else state.away,
             time=instant.time,
             origin=instant.origin,
             taken=left.clock,
         )
-        refused = known_before | {t: why for t, why in refused.items() if why}
-        every = states_of | left.states
         return new, Compensated(
             corrections=left.corrections,
             rejected="",
             outside=stepped.outside,
             failed=failed,
-            states=every,
-            deviations=deviations,
-            half_widths=widths,
-            refused=refused,
-            moved=moved,
+            states=done.states | left.states,
+            deviations=done.deviations,
+            half_widths=done.half_widths,
+            refused=known_before | {t: why for t, why in done.refused.items() if why},
+            moved=done.moved,
         )
+
+    def _drive(
+        self,
+        state: CompensatorState,
+        stepped: Advanced,
+        times: tuple[float, float],
+        fresh: Mapping[str, Probing],
+        failed: Mapping[str, str],
+        travel: float,
+    ) -> Driven:
+        """Return what the stepped models change, target by target.
+
+        Parameters
+        ----------
+        times : tuple of float
+            Time of the reading, as given and on the continuous clock of the state [s].
+        travel : float
+            Time that counts for the movement of the corrections [s].
+        """
+        done = Driven.begin(state, fresh)
+        for target, line in self.lines.items():
+            if not all(map(math.isfinite, stepped.said[line.models])):
+                done.states[target] = Status("restarting", "its zero is being averaged")
+                continue
+            if target not in done.references:
+                done.references[target] = Reference(times[0], "start: mean over the first readings")
+            zero, probing = done.references[target].shift, fresh.get(target)
+            known, most = done.learned.get(target), self.limits.magnitude
+            answer = evaluate(line, self.models, stepped, times[1], known, probing, failed, zero, most)
+            done.raw[target], done.deviations[target] = answer.raw, answer.deviation
+            if failed and (why := _unjudged(self.models[line.models], failed)):
+                done.held[target] = why  # no band either: the error without these sensors was never judged
+                continue
+            if not math.isnan(answer.half_width):
+                done.half_widths[target] = answer.half_width
+            if answer.learned is not None:
+                done.learned[target] = answer.learned
+            if probing is not None:
+                done.refused[target], done.moved[target] = answer.refused, answer.moved
+            correction, status = drive(state, target, line, answer.deviation, travel, self.limits)
+            done.corrections[target], done.states[target] = correction, status
+            done.arrived &= status.word != "restarting"
+        return done
 
     def wait(self, state: CompensatorState, tick: float, why: str) -> tuple[CompensatorState, Compensated]:
         """Let time pass without a usable reading: corrections are held for `Limits.hold`, then fade.

@@ -1,19 +1,49 @@
 """Movement of corrections in a step: a driven one follows its model within the limits; others are held, then fade."""
 
-from collections.abc import Collection, Mapping
-from dataclasses import replace
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
 from thermocomp.core.correction import Correction, Deviation, Limits
+from thermocomp.runtime.adaptation import Adaptation
 from thermocomp.runtime.gate import is_number
 from thermocomp.runtime.limits import fade, limit_line
 from thermocomp.runtime.lines import DeviationLine
-from thermocomp.runtime.state import CompensatorState, Status
+from thermocomp.runtime.state import CompensatorState, Reference, Status
 
 #: after a restart, a correction has caught up once it differs by no more than this from the output of its models [um]
 ARRIVED = 0.1
 
 ACTIVE = Status("active")
+
+
+@dataclass(kw_only=True)
+class Driven:
+    """What one reading changes, by target; see `CompensatorState` and `Compensated`."""
+
+    corrections: dict[str, Correction]
+    learned: dict[str, Adaptation]
+    references: dict[str, Reference]
+    raw: dict[str, Deviation]
+    refused: dict[str, str]
+    arrived: bool  #: no correction is still catching up after a restart
+    held: dict[str, str] = field(default_factory=dict)  #: reasons why corrections are not driven
+    states: dict[str, Status] = field(default_factory=dict)
+    deviations: dict[str, Deviation] = field(default_factory=dict)
+    half_widths: dict[str, float] = field(default_factory=dict)
+    moved: dict[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def begin(cls, state: CompensatorState, probed: Iterable[str]) -> "Driven":
+        """Return what is known before the models are evaluated."""
+        return cls(
+            corrections=dict(state.corrections),
+            learned=dict(state.learned),
+            references=dict(state.references),
+            raw=dict(state.raw),
+            refused=dict.fromkeys(probed, "no model drives its correction"),
+            arrived=state.away is not None,
+        )
 
 
 class Rest(NamedTuple):
