@@ -45,3 +45,17 @@ def test_no_class_has_its_name_in_two_rooms() -> None:
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 rooms.setdefault(node.name, set()).add(path.relative_to(PACKAGE).parts[0])
     assert {name: where for name, where in rooms.items() if len(where) > 1} == {}
+
+
+def test_functions_are_short() -> None:
+    kernels = {"drop", "add", "train"}  # compiled: a call that passes their twenty arrays would be longer than the loop
+    long: set[str] = set()
+    for path in [*PACKAGE.rglob("*.py"), *(PACKAGE.parents[1] / "tools").rglob("*.py")]:
+        lines = path.read_text(encoding="utf-8").splitlines()
+        code = [bool(line.strip()) and not line.strip().startswith("#") for line in lines]
+        for node in ast.walk(ast.parse("\n".join(lines))):
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                first = (node.body[0].end_lineno or 0) if ast.get_docstring(node) else node.lineno - 1
+                n = sum(code[first : node.end_lineno]) + (first >= node.lineno)  # with the signature
+                long |= {node.name} if n >= 60 else set()
+    assert long == kernels

@@ -61,6 +61,26 @@ class Bed:
     shoe: float
     cells: tuple[int, int] = (28, 5)
 
+    def _surfaces(self, space: Space) -> dict[str, Surface]:
+        """Return the surfaces that exchange heat, by name; see `part`."""
+        front = self._front()
+
+        def up(x: FloatArray) -> FloatArray:
+            return np.asarray(self.base + x[1])
+
+        def surface(where: Callable[[FloatArray], NDArray[np.bool_]]) -> Surface:
+            return edge(space, where, height=up, width=self.width)
+
+        return {
+            "outside": together(
+                faces(space, 2.0, height=up),
+                surface(lambda x: np.abs(x[0]) > self.length / 2.0 - 1e-9),
+                surface(lambda x: (x[1] > self.height - 1e-9) & (x[0] > front)),
+            ),
+            "work": surface(lambda x: (x[1] > self.height - 1e-9) & (x[0] < front)),
+            "bottom": surface(lambda x: x[1] < 1e-9),
+        }
+
     def part(self, name: str, material: Material, feet: Mapping[int, float] = MappingProxyType({})) -> Part:
         """Cut the bed into finite elements.
 
@@ -81,13 +101,6 @@ class Bed:
             of the table's guides), ``yz@P az@P`` (lift and tilt of the column's carriages with Z at P mm).
         """
         space = self.space()
-        front = self._front()
-
-        def up(x: FloatArray) -> FloatArray:
-            return np.asarray(self.base + x[1])
-
-        def surface(where: Callable[[FloatArray], NDArray[np.bool_]]) -> Surface:
-            return edge(space, where, height=up, width=self.width)
 
         def top(at: float, radius: float = _SPOT, on: Space = space) -> FloatArray:
             return on.edge_mean(lambda x: x[1] > self.height - 1e-9, spot(0, at, radius))
@@ -109,15 +122,7 @@ class Bed:
             name,
             capacity(space, material.heat_capacity),
             conduction(space, material.conductivity),
-            {
-                "outside": together(
-                    faces(space, 2.0, height=up),
-                    surface(lambda x: np.abs(x[0]) > self.length / 2.0 - 1e-9),
-                    surface(lambda x: (x[1] > self.height - 1e-9) & (x[0] > front)),
-                ),
-                "work": surface(lambda x: (x[1] > self.height - 1e-9) & (x[0] < front)),
-                "bottom": surface(lambda x: x[1] < 1e-9),
-            },
+            self._surfaces(space),
             {
                 "front": top(self.table),
                 "rear": top(self.foot),
