@@ -83,7 +83,7 @@ def traced(wanted: Sequence[Call]) -> Iterator[list[Call]]:
 
 
 def compared(folder: Path) -> None:
-    recordings.write(small_machine(), folder / "drift.csv")
+    recordings.write(small_machine(dt=200.0), folder / "drift.csv")
     assert run(["compare", str(folder / "drift.csv"), "--target", "z_um", "--models", "ols", "--jobs", "1"]) in (0, 1)
 
 
