@@ -1,7 +1,9 @@
 """The top of the package: what is there, how little it loads, and the main job through it."""
 
+import ast
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -41,10 +43,18 @@ def test_importing_it_loads_next_to_nothing() -> None:
     assert done.stdout.strip() == "[]"
 
 
+def typed_names() -> Iterator[str]:
+    """Yield the names that type checkers see."""
+    for node in ast.walk(ast.parse(Path(tc.__file__).read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("thermocomp."):
+            yield from (name.name for name in node.names)
+
+
 def test_every_name_is_there_and_every_method() -> None:
     for name in tc.__all__:
         assert getattr(tc, name) is not None
     assert set(dir(tc)) == set(tc.__all__)
+    assert set(tc.__all__) == {*tc._PUBLIC, "__version__"} == {*typed_names(), "__version__"}
     assert {m.kind.__name__ for m in METHODS.values()} <= set(tc.__all__)
     with pytest.raises(AttributeError, match="no attribute 'compere'"):
         tc.compere  # noqa: B018

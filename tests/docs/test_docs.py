@@ -192,7 +192,7 @@ INTERFACES = {
     "thermocomp.files.machines",
     "thermocomp.files.modelfile",
     "thermocomp.judging.metrics",
-    "thermocomp.live.page.board",
+    "thermocomp.live.page.pages",
     "thermocomp.models.base",
     "thermocomp.models.method",
     "thermocomp.models.timed",

@@ -1,6 +1,7 @@
 """Past values used by a value with a separate clock: see `thermocomp.core.expression.Recurrence`."""
 
 from collections.abc import Iterator
+from typing import assert_never
 
 from thermocomp.core import expression as e
 
@@ -38,7 +39,9 @@ def _walk(node: e.Node) -> Iterator[e.Node]:
             inner = (of,)
         case e.Difference(of, minus):
             inner = (of, minus)
-        case _:
+        case e.Constant() | e.Input() | e.Lag() | e.PacedLag() | e.Past() | e.Mean() | e.Recurrence():
             inner = ()
+        case _:
+            assert_never(node)
     for part in inner:
         yield from _walk(part)

@@ -21,6 +21,8 @@ class Board:
 
     Parameters
     ----------
+    service : Service
+        The service, with the state and the events of its compensator.
     token : str
         Token required for orders; empty: no orders are accepted.
     settled : float
