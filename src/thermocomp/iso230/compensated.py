@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
@@ -13,8 +13,6 @@ from thermocomp.judging.replay import are_absolute, replay_compensated
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.stacking import stack
 from thermocomp.recordings.starts import Start, find_starts
-
-FloatArray = NDArray[np.float64]
 
 
 def replay_models(

@@ -19,11 +19,9 @@ results, cannot be determined from the deviations and is not reported here.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.volumetric.positioning import Positioning
-
-FloatArray = NDArray[np.float64]
 
 #: ISO 230-2 requirements for an axis up to 2 m: targets per axis, targets per metre, runs in each direction
 TARGETS, TARGETS_PER_METRE, RUNS = 5, 5.0, 5

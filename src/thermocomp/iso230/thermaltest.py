@@ -7,15 +7,13 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
 from thermocomp.judging.settling.averaging import AveragedCurve, K
 from thermocomp.judging.settling.settling import Settling
 from thermocomp.recordings.recording import Recording
-
-FloatArray = NDArray[np.float64]
 
 Kind = Literal["etve", "spindle", "axis"]
 #: titles of the tests

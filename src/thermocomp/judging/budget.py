@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.judging.choice import Progress
 from thermocomp.judging.diagnostics import collinearity
@@ -19,9 +19,6 @@ from thermocomp.models.methods import expand
 from thermocomp.models.selection.standins import SensorSets, StandInAnswer
 from thermocomp.models.training import train
 from thermocomp.recordings.samples import Samples
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 #: minimum gain of further sensors that justifies their cost [um, urad] ...
 WORTH = 0.5

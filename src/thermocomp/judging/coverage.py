@@ -11,16 +11,13 @@ similar day, adds no information. Alike units count once (single linkage).
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.validity import Validity
 from thermocomp.judging.choice import Cell, Table
 from thermocomp.judging.splits import Judging
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 #: distance below which two units are alike [standard deviations of the inputs]
 ALIKE = 0.1

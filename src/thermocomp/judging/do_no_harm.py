@@ -12,14 +12,12 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.learned import Learned
 from thermocomp.judging.splits import MIN_ROWS
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 Word = Literal["accepted", "unproven", "refused"]
 
 #: minimum number of units for a significance test

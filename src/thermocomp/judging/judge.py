@@ -4,8 +4,8 @@ from collections.abc import Collection, Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.correction import Limits
 from thermocomp.core.learned import Learned
 from thermocomp.core.model import ErrorModel
@@ -19,9 +19,6 @@ from thermocomp.judging.robustness import stress
 from thermocomp.judging.splits import MIN_ROWS, Judging, Split, join_short_cycles, name_cycles
 from thermocomp.models.numerics.leastsquares import effective_sample_size
 from thermocomp.recordings.samples import Samples
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 
 def drop_unreadable(samples: Samples, target: int, judging: Judging) -> Judging:

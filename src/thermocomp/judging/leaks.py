@@ -1,16 +1,13 @@
 """Rows used for both training and judging: detect them, and leave them out or reject the judging scheme."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, IntArray
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
 from thermocomp.judging.splits import Judging
 from thermocomp.recordings.overlaps import overlap, repeats
 from thermocomp.recordings.samples import Samples
-
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.intp]
 
 #: a test with a smaller fraction of new rows is not judged
 LEAST_NEW = 0.05

@@ -4,8 +4,8 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import FitError
 from thermocomp.judging.choice import Choice, Progress, Settings, Table
 from thermocomp.judging.pieces import elsewhere, work_through
@@ -17,8 +17,6 @@ from thermocomp.models.selection.maximal_correlation import (
     subsets_up_to,
 )
 from thermocomp.recordings.samples import Samples
-
-FloatArray = NDArray[np.float64]
 
 #: half-width N of the boxcar of maximal correlation (W-04)
 HALF_WINDOW = 10

@@ -9,15 +9,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermocomp.judging import do_no_harm
 from thermocomp.judging.splits import Judging, Split
 from thermocomp.models.training import fit_method
 from thermocomp.recordings.samples import Samples
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
 
 #: up to this number of units every pair is left out; above, the other units are left out in `GROUPS` groups per unit
 PAIRS = 8

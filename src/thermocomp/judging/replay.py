@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.correction import Limits
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.state import State
@@ -14,9 +15,6 @@ from thermocomp.judging.probing import Probed, Probings
 from thermocomp.judging.watched import believe
 from thermocomp.recordings.samples import Samples
 from thermocomp.runtime import batch
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 #: converts one reading (n_inputs,) to a batch of disturbed readings (n_variants, n_inputs); its other arguments are the
 #: row and the reference of the test

@@ -7,7 +7,6 @@ from itertools import groupby
 
 import numpy as np
 from joblib import effective_n_jobs
-from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.judging import budget, maximal, pareto
@@ -24,8 +23,6 @@ from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.models.selection import grouping
 from thermocomp.models.subsets import BestSubset
 from thermocomp.recordings.samples import Samples
-
-FloatArray = NDArray[np.float64]
 
 #: methods whose tasks can be shared among the workers of a cluster
 SHARED = ("pareto", "ace")

@@ -5,14 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.shown import shorten
 from thermocomp.judging.results import Assessment, Comparison
 from thermocomp.recordings.recording import Recording
 from thermocomp.report.drawing import Drawn, add_legend, drawing, log_ticks, name_ticks, svg
-
-FloatArray = NDArray[np.float64]
 
 #: colour-blind safe palette (Okabe, Ito 2008)
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")

@@ -7,15 +7,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
-from numpy.typing import NDArray
 
 from thermocomp.iso230.part2 import PositioningResult
 from thermocomp.iso230.thermaltest import HOUR, ThermalCurve, ThermalTest
 from thermocomp.judging.settling.settling import Settling
 from thermocomp.report.drawing import add_legend, drawing, name_ticks, svg
 from thermocomp.report.figures import COLOURS, MEASURED, NONE, PREDICTED, RESIDUAL, SHADE, thin_points
-
-FloatArray = NDArray[np.float64]
 
 _BESIDE = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5), "fontsize": 7, "handlelength": 1.6}
 #: maximum number of temperatures drawn with names

@@ -6,8 +6,8 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray
 from thermocomp.core.exceptions import FitError
 from thermocomp.judging.budget import SHARE, WORTH
 from thermocomp.judging.choice import Progress
@@ -17,9 +17,6 @@ from thermocomp.judging.replay import replay_compensated
 from thermocomp.judging.splits import Judging
 from thermocomp.models.training import train
 from thermocomp.recordings.samples import Samples
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 #: random draws of training cycles, for each number and each unseen cycle
 DRAWS = 2

@@ -10,11 +10,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 from scipy.stats import t as student
 
-FloatArray = NDArray[np.float64]
+from thermocomp.core.arrays import FloatArray
 
 #: averaging time [s]
 WINDOW = 600.0

@@ -2,15 +2,12 @@
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from thermocomp.core.components import BY_CODE, COMPONENTS
 from thermocomp.report.drawing import add_legend, drawing, svg
 from thermocomp.report.figures import COLOURS, MEASURED, thin_points
 from thermocomp.runtime.geometry.kinematics import INDEX
 from thermocomp.volumetric.judging.volumetric import Moment, Volumetric
-
-FloatArray = NDArray[np.float64]
 
 WIDTH = 9.6
 MAX_MOMENTS = 3
