@@ -75,6 +75,5 @@ class Candidates:
             title=title,
             columns=("sensor", "correlation with the error", "VIF"),
             rows=rows,
-            marked=None,
             caption=caption,
         )

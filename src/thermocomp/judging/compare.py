@@ -25,6 +25,8 @@ from thermocomp.models.numerics.leastsquares import effective_sample_size
 from thermocomp.models.training import train
 from thermocomp.recordings.samples import Samples
 
+#: fields of an assessment with a value for each judged row
+_PER_ROW = ("measured", "predicted", "row", "test", "cycle")
 #: name of the block of all unseen cycles together
 ALL = "all unseen cycles"
 
@@ -228,23 +230,19 @@ def split_by_cycle(whole: Assessment) -> list[Assessment]:
     blocks = [b for b in join_short_cycles(whole.cycle, whole.test) if np.isin(whole.cycle, b).sum() >= MIN_ROWS]
     for unit, block in zip(whole.verdict.units, blocks, strict=True):
         rows = np.isin(whole.cycle, block)
-        measured, predicted = whole.measured[rows], whole.predicted[rows]
+        cut = {name: getattr(whole, name)[rows] for name in _PER_ROW}
         half_widths = None if whole.half_widths is None else whole.half_widths[rows]
         found.append(
             replace(
                 whole,
+                **cut,
                 block=f"cycle {unit.name}",
-                measured=measured,
-                predicted=predicted,
                 alone=None if whole.alone is None else whole.alone[rows],
                 half_widths=half_widths,
                 band=whole.band if half_widths is not None and np.isfinite(half_widths).any() else "",
                 probed=whole.probed and whole.probed.take(rows),
-                row=whole.row[rows],
-                test=whole.test[rows],
-                cycle=whole.cycle[rows],
                 verdict=replace(whole.verdict, units=(unit,)),
-                n_effective=effective_sample_size(measured - predicted),
+                n_effective=effective_sample_size(cut["measured"] - cut["predicted"]),
                 robustness=None,
                 overall=False,
             )
@@ -301,12 +299,8 @@ def _together(parts: Sequence[Assessment]) -> Assessment:
     failures = [a.failure for a in parts if a.failure]
     return replace(
         first,
+        **{name: np.concatenate([getattr(a, name) for a in parts]) for name in _PER_ROW},
         block=ALL,
-        measured=np.concatenate([a.measured for a in parts]),
-        predicted=np.concatenate([a.predicted for a in parts]),
-        row=np.concatenate([a.row for a in parts]),
-        test=np.concatenate([a.test for a in parts]),
-        cycle=np.concatenate([a.cycle for a in parts]),
         verdict=do_no_harm.join_verdicts([a.verdict for a in parts]),
         sensors=tuple(dict.fromkeys(s for a in parts for s in a.sensors)),
         n_sensors=(min(a.n_sensors[0] for a in parts), max(a.n_sensors[1] for a in parts)),

@@ -236,9 +236,6 @@ def refuse_method(samples: Samples, name: str, target: int, split: Split, why: s
         test=samples.test[rows],
         cycle=samples.cycle[rows],
         verdict=do_no_harm.Verdict((), refusal=why),
-        sensors=(),
-        fit_s=0.0,
-        n_effective=float("nan"),
         failure=why,
     )
 

@@ -93,14 +93,10 @@ def choose(samples: Samples, settings: Settings, *, jobs: int, progress: Progres
 
 
 def _share(work: Callable[[Any], FloatArray], pieces: Sequence[Any]) -> Iterator[FloatArray]:
-    for found in work_through(work, pieces, _why, jobs=1):
+    for found in work_through(work, pieces, jobs=1):
         if isinstance(found, str):
             raise FitError(found)
         yield found
-
-
-def _why(_: Any, why: str) -> FloatArray | str:
-    return why
 
 
 def _best_sets(psi: MaximalCorrelations, same: Equivalents, names: Sequence[str], targets: Sequence[str]) -> Table:
@@ -117,7 +113,6 @@ def _best_sets(psi: MaximalCorrelations, same: Equivalents, names: Sequence[str]
             )
             for d, (t, k) in enumerate(zip(targets, same.best, strict=True))
         ),
-        marked=None,
         caption=f"{len(psi.subsets)} sets, {done} thermal cycles, {len(targets)} displacements: "
         f"{len(psi.subsets) * done * len(targets)} models.",
     )

@@ -240,7 +240,6 @@ def _frequency(found: Budget, place: int) -> Table:
             for j in order
             if found.frequency[place, j] > 0
         ),
-        marked=None,
         caption="Chosen again without each block: a sensor far below 100 % was a matter of luck.",
     )
 
@@ -278,7 +277,6 @@ def _stand_ins(found: Budget, place: int) -> Table:
             f"loses [{found.unit}]",
         ),
         rows=rows,
-        marked=None,
         caption="Each is made up from the one other that misses it least, and from the chosen sensors "
         "(a chosen one from the "
         f"others of them, as if it failed), with {found.answer.noise:g} degC of noise in use. Miss: RMS of what is "

@@ -105,9 +105,9 @@ class Assessment:
     test: IntArray
     cycle: IntArray
     verdict: do_no_harm.Verdict
-    sensors: tuple[str, ...]
-    fit_s: float
-    n_effective: float
+    sensors: tuple[str, ...] = ()
+    fit_s: float = 0.0
+    n_effective: float = float("nan")
     robustness: Robustness | None = None
     frozen: ErrorModel | None = None
     failure: str = ""

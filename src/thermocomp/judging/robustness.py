@@ -7,6 +7,7 @@ import numpy as np
 
 from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.model import ErrorModel
+from thermocomp.core.size import Size
 from thermocomp.judging.guards import Guard
 from thermocomp.judging.replay import walk
 from thermocomp.recordings.samples import Samples
@@ -238,10 +239,10 @@ def stress(
         lost_rms={names[0]: float(v) for names, v in zip(lost, rms[1 + 2 * draws :], strict=True) if len(names) == 1},
         together_rms={", ".join(n): float(v) for n, v in zip(lost, rms[1 + 2 * draws :], strict=True) if len(n) > 1},
         outside=float(beyond.mean()),
-        outside_rms=_rms((measured - predicted)[beyond]),
-        none_rms=_rms(measured),
+        outside_rms=Size.of((measured - predicted)[beyond]).rms,
+        none_rms=Size.of(measured).rms,
         unlike=float(unlike.mean()),
-        unlike_rms=_rms((measured - predicted)[unlike]),
+        unlike_rms=Size.of((measured - predicted)[unlike]).rms,
     )
     return Replayed(predicted, beyond, robustness)
 
@@ -263,7 +264,3 @@ def unlike_rows(model: ErrorModel, samples: Samples, rows: BoolArray) -> BoolArr
         return np.zeros(int(rows.sum()), dtype=np.bool_)
     columns = [[c.name for c in samples.inputs].index(i.name) for i in model.inputs]
     return np.asarray(model.joint.distance(samples.change()[rows][:, columns]) > 1.0)
-
-
-def _rms(residual: FloatArray) -> float:
-    return float(np.sqrt(np.mean(residual**2))) if residual.size else float("nan")

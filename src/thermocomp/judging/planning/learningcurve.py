@@ -9,13 +9,11 @@ import numpy as np
 
 from thermocomp.core.arrays import BoolArray
 from thermocomp.core.exceptions import FitError
-from thermocomp.judging.budget import SHARE, WORTH
+from thermocomp.judging.budget import SHARE, WORTH, unseen_rms
 from thermocomp.judging.choice import Progress
 from thermocomp.judging.metrics import rms
 from thermocomp.judging.pieces import work_through
-from thermocomp.judging.replay import replay_compensated
 from thermocomp.judging.splits import Judging
-from thermocomp.models.training import train
 from thermocomp.recordings.samples import Samples
 
 #: random draws of training cycles, for each number and each unseen cycle
@@ -157,7 +155,7 @@ def learning_curve(
     points = []
     work = partial(_judged, samples, blocks, model)
     errors: list[str] = []
-    for (unseen, own), found in zip(pieces, work_through(work, pieces, _why, jobs=jobs), strict=True):
+    for (unseen, own), found in zip(pieces, work_through(work, pieces, jobs=jobs), strict=True):
         progress(f"{model} from {len(own)} cycle(s)")
         errors += [found] if isinstance(found, str) else []
         speeds = _n_speeds(samples, np.any([blocks[k] for k in own], axis=0))
@@ -181,16 +179,7 @@ def _sizes(blocks: int) -> list[int]:
 def _judged(samples: Samples, blocks: Sequence[BoolArray], model: str, piece: tuple[int, list[int]]) -> float:
     unseen, own = piece
     learn = np.any([blocks[k] for k in own], axis=0)
-    left = []
-    for target in range(len(samples.targets)):
-        rows = blocks[unseen] & np.isfinite(samples.deviations[:, target])
-        frozen = train(model, samples, target, learn, joint=False).model
-        left.append(rms(samples.deviations[rows, target], replay_compensated(frozen, samples, rows).compensated))
-    return float(np.mean(left))
-
-
-def _why(_: tuple[int, list[int]], why: str) -> float | str:
-    return why
+    return float(np.mean(unseen_rms(samples, model, learn, blocks[unseen])))
 
 
 def _none(samples: Samples, rows: BoolArray) -> float:
