@@ -17,9 +17,8 @@ from thermocomp.core.paceddynamic import PacedDynamic
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.watch import Watch
 from thermocomp.files import jsonfile
+from thermocomp.files.draft import write_text
 
-#: name of the format in the file
-FORMAT = jsonfile.MODELS.name
 #: all families that a file can contain
 Family = Polynomial | LinearDynamic | PacedDynamic | Network | Additive | Autoregressive | AutoregressiveNet
 #: entry of a file, distinguished by its ``family``
@@ -76,7 +75,7 @@ def write(models: Sequence[ErrorModel], path: str | Path, *, overwrite: bool = F
     InputError
         The file exists and `overwrite` is False.
     """
-    jsonfile.write(dumps(models), path, overwrite=overwrite)
+    write_text(dumps(models), path, overwrite=overwrite)
 
 
 def read(path: str | Path) -> tuple[ErrorModel, ...]:

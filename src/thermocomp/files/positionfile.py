@@ -11,9 +11,7 @@ from thermocomp.core.position import PositionModel
 from thermocomp.core.profile import Profile
 from thermocomp.core.provenance import Provenance
 from thermocomp.files import jsonfile, modelfile
-
-#: name of the format in the file
-FORMAT = jsonfile.POSITION_MODELS.name
+from thermocomp.files.draft import write_text
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,7 +67,7 @@ def write(models: Sequence[PositionModel], path: str | Path, *, overwrite: bool 
     InputError
         The file exists and `overwrite` is False.
     """
-    jsonfile.write(dumps(models), path, overwrite=overwrite)
+    write_text(dumps(models), path, overwrite=overwrite)
 
 
 def read(path: str | Path) -> tuple[PositionModel, ...]:

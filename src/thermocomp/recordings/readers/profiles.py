@@ -128,10 +128,7 @@ def read(
         layout = "long" if has_position and not named else "wide"
     if layout == "wide":
         return from_recording(read_recording(path, mapping), wanted)
-    axis, unit = wanted.about
-    return read_long(
-        path, mapping, wanted.target, unit, axis, error=wanted.columns, position=wanted.position, state=wanted.state
-    )
+    return read_long(path, mapping, wanted)
 
 
 def read_components(
