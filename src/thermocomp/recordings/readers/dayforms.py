@@ -14,6 +14,7 @@ from thermocomp.recordings.readers.dateorder import IntArray
 from thermocomp.recordings.readers.numbers import is_filler
 from thermocomp.recordings.readers.stamps import parse, read_days
 from thermocomp.recordings.readers.tables import FileTable
+from thermocomp.recordings.words import read_word_groups
 
 #: maximum number of numeric columns examined
 _MOST = 100
@@ -44,23 +45,12 @@ _WITHIN = (
 )
 #: headings that name a day in one language and have another meaning in others
 _NO_DAY = ("tag", "data", "stamp", "stempel", "dag", "dat")
-_DAYS = (
-    *("monday tuesday wednesday thursday friday saturday sunday", "mon tue wed thu fri sat sun"),
-    *("montag dienstag mittwoch donnerstag freitag samstag sonntag", "mo di mi do fr sa so"),
-    *("lunedì martedì mercoledì giovedì venerdì sabato domenica", "lun mar mer gio ven sab dom"),
-    *("lunes martes miércoles jueves viernes sábado domingo", "lun mar mié jue vie sáb dom"),
-    *("maandag dinsdag woensdag donderdag vrijdag zaterdag zondag", "ma di wo do vr za zo"),
-    *("segunda terça quarta quinta sexta sábado domingo", "seg ter qua qui sex sáb dom"),
-    *("poniedziałek wtorek środa czwartek piątek sobota niedziela", "pon wt śr czw pt sob ndz"),
-    *("pondělí úterý středa čtvrtek pátek sobota neděle", "po út st čt pá so ne"),
-    *("måndag tisdag onsdag torsdag fredag lördag söndag", "mån tis ons tors fre lör sön"),
-    *("lundi mardi mercredi jeudi vendredi samedi dimanche", "lun mar mer jeu ven sam dim"),
-)
+_DAYS = read_word_groups("weekdays")
 
 
 #: a number that is not a date, unless the heading names one
 _SMALL = re.compile(r"[-+]?\d{1,7}(?:[.,]\d+)?")
-_WEEKDAYS = frozenset(day for names in _DAYS for day in names.split())
+_WEEKDAYS = frozenset(day for names in _DAYS for day in names)
 
 
 def find_day_columns(table: FileTable, columns: Sequence[int], *, beside_clock: bool = False) -> list[int]:
@@ -217,7 +207,7 @@ def _are_parts(texts: "pd.Series[str]") -> bool:
 
 def _read_weekdays(texts: "pd.Series[str]") -> list[IntArray]:
     words = texts.str.casefold().str.rstrip(".")
-    fitting = (names for names in map(str.split, _DAYS) if words.isin(names).all())
+    fitting = (names for names in _DAYS if words.isin(names).all())
     return [_unwrap(words.map(names.index).to_numpy(dtype=np.int64), 7) for names in fitting]
 
 
