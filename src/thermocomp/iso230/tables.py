@@ -155,8 +155,8 @@ def time_constant_tables(settlings: Sequence[Settling]) -> tuple[Table, ...]:
             "has not settled at the end; still: its averages do not move beyond their noise; faint: it moves, but too "
             "little above its noise for a time; returns: it comes back before the end; peaks: it overshoots its last "
             "value, then settles back. tau: of one exponential, fast and slow: of two, where they are called "
-            "for; each with its standard error, in brackets if it is longer than "
-            "the phase or less sure than half of itself."
+            "for; each with its standard error, in brackets if it is longer than the phase or less sure than half of "
+            "itself."
         )
         tables.append(Table(title=title, columns=columns, rows=rows, caption=caption))
     return tuple(tables)

@@ -84,8 +84,7 @@ def choose(samples: Samples, settings: Settings, *, jobs: int, progress: Progres
         target=", ".join(targets),
         sensors=tuple(names[j] for j in chosen),
         reason=f"greatest sum of Psi among the sets of up to {max(map(len, small))} sensors "
-        "that are as good as the best for "
-        f"all displacements ({len(same.common)} sets are)",
+        f"that are as good as the best for all displacements ({len(same.common)} sets are)",
         tables=(_best_sets(psi, same, names, targets), _listed_sets(psi, same, names, targets, chosen)),
         notes=tuple(notes),
         details=same,

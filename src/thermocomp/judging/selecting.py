@@ -163,8 +163,7 @@ def _by_grouping(candidates: Candidates, settings: Settings) -> Choice:
         target=candidates.target,
         sensors=needed,
         reason=f"smallest residual mean square, {found.mse_:.4g} um^2, "
-        f"among the members of {len(found.participating_)} of "
-        f"{len(found.groups_)} groups",
+        f"among the members of {len(found.participating_)} of {len(found.groups_)} groups",
         tables=(groups, curve, candidates.repeats(sensors), _other_thresholds(candidates, found, settings)),
         notes=_dependence(found.n_effective_, len(candidates.y)),
         details=found,
