@@ -137,8 +137,8 @@ def _errors(found: Budget, judging: Judging, model: str, place: int | None) -> T
         rows=rows,
         marked=place,
         caption=f"RMS on each unseen block, mean over the blocks{_mean(found)}; "
-        f"without compensation {found.none_mean():.2f} {found.unit}. Next gains: what {model} gains by the sensors of the "
-        "next row. Enough, each model by itself: "
+        f"without compensation {found.none_mean():.2f} {found.unit}. Next gains: what {model} gains by the sensors of "
+        "the next row. Enough, each model by itself: "
         + ", ".join(f"{found.enough(m) or 'none'} for {m}" for m in found.models)
         + ".",
     )
@@ -279,7 +279,8 @@ def _stand_ins(found: Budget, place: int) -> Table:
         caption="Each is made up from the one other that misses it least, and from the chosen sensors "
         f"(a chosen one from the others of them, as if it failed), with {found.answer.noise:g} degC of noise in use. "
         "Miss: RMS of what is left of it. Loses: what the answer of `averaged` with all temperatures changes by if "
-        f"this one alone is made up from the chosen{_mean(found)}. Those with less than {100 * PART:g} % part in it are not named.",
+        f"this one alone is made up from the chosen{_mean(found)}. Those with less than {100 * PART:g} % part in it "
+        "are not named.",
     )
 
 
