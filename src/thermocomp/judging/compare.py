@@ -95,7 +95,7 @@ def compare(
     scores: dict[int, dict[str, list[list[float]]]] = {}
     inners = [_inners(names, own, rules) for own in by_target]
     try:
-        for a in work_through(work, pieces, partial(_refused, samples), jobs=jobs):
+        for a in work_through(work, pieces, partial(refuse_method, samples), jobs=jobs):
             progress(f"{a.target} {a.model} {a.block}")
             done.append(a)
         scores = _scores(samples, names, by_target, inners, jobs, progress)
@@ -199,7 +199,7 @@ def _scores(
     found: dict[int, dict[str, list[list[float]]]] = {
         k: {name: [] for name in kept} for k, own in enumerate(inners) if own
     }
-    results = work_through(partial(_score, samples, by_target), pieces, _no_score, jobs=jobs)
+    results = work_through(partial(score, samples, by_target), pieces, _no_score, jobs=jobs)
     for (k, name, inner), values in zip(pieces, results, strict=True):
         progress(f"{samples.targets[k].name} {name} without {inner.split.block}")
         found[k][name].append(values)
@@ -275,17 +275,6 @@ def _assess_method(
         limits=limits,
         guard=guards.get(split.name),
     )
-
-
-def _refused(samples: Samples, piece: tuple[int, str, Split], why: str) -> Assessment:
-    """Return the assessment of a method that failed, in its fit or in the replay with noise."""
-    target, name, split = piece
-    return refuse_method(samples, name, target, split, why)
-
-
-def _score(samples: Samples, by_target: Sequence[Judging], piece: tuple[int, str, Inner]) -> list[float]:
-    target, name, inner = piece
-    return score(samples, name, target, by_target[target], inner)
 
 
 def _no_score(piece: tuple[int, str, Inner], _: str) -> list[float]:

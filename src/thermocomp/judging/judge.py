@@ -96,11 +96,9 @@ def judge(
 
     """
     target = [c.name for c in samples.targets].index(model.target)
-    rows = split.judge & np.isfinite(samples.deviations[:, target])
+    rows, piece = split.judge & np.isfinite(samples.deviations[:, target]), (target, name, split)
     if not rows.any():
-        return refuse_method(
-            samples, name, target, split, f"{model.target} has no number in {split.block} to judge against"
-        )
+        return refuse_method(samples, piece, f"{model.target} has no number in {split.block} to judge against")
     measured = samples.deviations[rows, target]
     if learned is None and model.provenance is not None:
         learned = model.provenance.learned
@@ -108,7 +106,7 @@ def judge(
     stressed = stress(model, samples, measured, rows, guard=guard) if robustness else None
     predicted = ran.deviation if limits is None else ran.compensated
     if not np.isfinite(metrics.rms(measured, ran.deviation)):
-        return refuse_method(samples, name, target, split, f"the residual of {model.target} is beyond all numbers")
+        return refuse_method(samples, piece, f"the residual of {model.target} is beyond all numbers")
     return Assessment(
         model=name,
         target=model.target,
@@ -206,24 +204,22 @@ def _caps(
     return tuple(found)
 
 
-def refuse_method(samples: Samples, name: str, target: int, split: Split, why: str) -> Assessment:
+def refuse_method(samples: Samples, piece: tuple[int, str, Split], why: str) -> Assessment:
     """Return the assessment of a method without a prediction: refused.
 
     Parameters
     ----------
     samples : Samples
-    name : str
-        Name of the method.
-    target : int
-        Index into ``samples.targets``.
-    split : Split
+    piece : tuple of (int, str, Split)
+        Index into ``samples.targets``, name of the method, and split.
     why : str
-        Reason for the missing prediction.
+        Reason for the missing prediction: in the fit, or in the replay with noise.
 
     Returns
     -------
     Assessment
     """
+    target, name, split = piece
     rows = split.judge & np.isfinite(samples.deviations[:, target])
     measured = samples.deviations[rows, target]
     return Assessment(
