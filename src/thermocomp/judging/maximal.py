@@ -91,7 +91,7 @@ def choose(samples: Samples, settings: Settings, *, jobs: int, progress: Progres
     )
 
 
-def _share(work: Callable[[Any], FloatArray], pieces: Sequence[Any]) -> Iterator[FloatArray]:
+def _share(work: Callable[[Any], Any], pieces: Sequence[Any]) -> Iterator[FloatArray]:
     for found in work_through(work, pieces, jobs=1):
         if isinstance(found, str):
             raise FitError(found)

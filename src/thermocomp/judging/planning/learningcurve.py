@@ -176,7 +176,7 @@ def _sizes(blocks: int) -> list[int]:
     return sorted({round(x) for x in np.linspace(1, blocks - 1, min(MOST_SIZES, blocks - 1))})
 
 
-def _judged(samples: Samples, blocks: Sequence[BoolArray], model: str, piece: tuple[int, list[int]]) -> float:
+def _judged(samples: Samples, blocks: Sequence[BoolArray], model: str, piece: tuple[int, list[int]]) -> float | str:
     unseen, own = piece
     learn = np.any([blocks[k] for k in own], axis=0)
     return float(np.mean(unseen_rms(samples, model, learn, blocks[unseen])))
