@@ -286,9 +286,10 @@ def _together(parts: Sequence[Assessment]) -> Assessment:
         return replace(parts[0], overall=True)
     first = parts[0]
     failures = [a.failure for a in parts if a.failure]
+    joined: dict[str, Any] = {name: np.concatenate([getattr(a, name) for a in parts]) for name in _PER_ROW}
     return replace(
         first,
-        **{name: np.concatenate([getattr(a, name) for a in parts]) for name in _PER_ROW},
+        **joined,
         block=ALL,
         verdict=do_no_harm.join_verdicts([a.verdict for a in parts]),
         sensors=tuple(dict.fromkeys(s for a in parts for s in a.sensors)),
