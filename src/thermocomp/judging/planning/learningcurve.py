@@ -114,7 +114,6 @@ def learning_curve(
     model: str = "averaged",
     *,
     jobs: int = 1,
-    seed: int = 0,
     progress: Progress = lambda _, steps=1: None,  # noqa: ARG005
 ) -> LearningCurve:
     """Train on some cycles and judge on others: for each unseen cycle, train on 1, 2, ... of the remaining ones.
@@ -128,8 +127,6 @@ def learning_curve(
         Name of the method.
     jobs : int
         Number of parallel processes; -1: one per core.
-    seed : int
-        Seed of the random draws.
     progress : callable
         Called with a line of text after each task; there are `n_pieces` of them.
 
@@ -145,7 +142,7 @@ def learning_curve(
     blocks = [split.judge for split in judging.splits]
     if len(blocks) < 3:
         raise FitError(f"a learning curve needs at least three thermal cycles or files; there are {len(blocks)}")
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     pieces: list[tuple[int, list[int]]] = []
     for unseen in range(len(blocks)):
         others = np.delete(np.arange(len(blocks)), unseen)
