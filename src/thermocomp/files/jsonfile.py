@@ -13,6 +13,7 @@ from pydantic_core import ErrorDetails, SchemaValidator
 
 from thermocomp.core.exceptions import InputError, ModelFileError, SettingError
 from thermocomp.core.shown import replace_unprintable
+from thermocomp.files.draft import write_text
 from thermocomp.files.plaintext import find_keys, list_errors, read_text, strict_adapter
 
 #: maximum size of a file [bytes]; models of additive curves over 9,000 rows had 8 million each before thinning
@@ -157,6 +158,17 @@ def _stop_at_first(schema: Any) -> None:
     elif isinstance(schema, list):
         for inner in schema:
             _stop_at_first(inner)
+
+
+def write(text: str, path: str | Path, *, overwrite: bool) -> None:
+    """Write the text of a file.
+
+    Raises
+    ------
+    InputError
+        See `thermocomp.files.draft.drafts`.
+    """
+    write_text(text, Path(path), overwrite=overwrite)
 
 
 def read(kind: Format, path: str | Path) -> tuple[str, str]:

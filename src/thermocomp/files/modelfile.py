@@ -17,7 +17,6 @@ from thermocomp.core.paceddynamic import PacedDynamic
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.watch import Watch
 from thermocomp.files import jsonfile
-from thermocomp.files.draft import write_text
 
 #: all families that a file can contain
 Family = Polynomial | LinearDynamic | PacedDynamic | Network | Additive | Autoregressive | AutoregressiveNet
@@ -75,7 +74,7 @@ def write(models: Sequence[ErrorModel], path: str | Path, *, overwrite: bool = F
     InputError
         The file exists and `overwrite` is False.
     """
-    write_text(dumps(models), path, overwrite=overwrite)
+    jsonfile.write(dumps(models), path, overwrite=overwrite)
 
 
 def read(path: str | Path) -> tuple[ErrorModel, ...]:

@@ -11,7 +11,6 @@ from thermocomp.core.position import PositionModel
 from thermocomp.core.profile import Profile
 from thermocomp.core.provenance import Provenance
 from thermocomp.files import jsonfile, modelfile
-from thermocomp.files.draft import write_text
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +66,7 @@ def write(models: Sequence[PositionModel], path: str | Path, *, overwrite: bool 
     InputError
         The file exists and `overwrite` is False.
     """
-    write_text(dumps(models), path, overwrite=overwrite)
+    jsonfile.write(dumps(models), path, overwrite=overwrite)
 
 
 def read(path: str | Path) -> tuple[PositionModel, ...]:

@@ -14,7 +14,6 @@ from pydantic import AwareDatetime
 from thermocomp.core.exceptions import InputError, ModelFileError
 from thermocomp.core.zero import MOST, Gathered
 from thermocomp.files import jsonfile
-from thermocomp.files.draft import write_text
 from thermocomp.files.modelfile import entry_of
 from thermocomp.files.typed import decode, encode, want
 from thermocomp.runtime.compensator import Compensator
@@ -130,7 +129,7 @@ def write(state: CompensatorState, compensator: Compensator, path: str | Path, w
     InputError
         The file cannot be written.
     """
-    write_text(dumps(state, compensator, written), path, overwrite=True)
+    jsonfile.write(dumps(state, compensator, written), path, overwrite=True)
 
 
 def read(path: str | Path, compensator: Compensator) -> Saved:

@@ -8,7 +8,6 @@ from pydantic import AwareDatetime
 
 from thermocomp.core.exceptions import InputError, ModelFileError
 from thermocomp.files import jsonfile
-from thermocomp.files.draft import write_text
 from thermocomp.nc.thermal.jobstate import JobState
 
 KIND = jsonfile.Format("thermocomp-job-state", 1, "state file of a job", "thermocomp revise")
@@ -80,7 +79,7 @@ def write(state: JobState, written: datetime, path: str | Path, *, overwrite: bo
     InputError
         The file exists and `overwrite` is False.
     """
-    write_text(dumps(state, written), path, overwrite=overwrite)
+    jsonfile.write(dumps(state, written), path, overwrite=overwrite)
 
 
 def read(path: str | Path) -> SavedJob:
