@@ -1,6 +1,7 @@
 """Figures of the report as SVG text. Each docstring states the purpose of the figure."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -203,7 +204,7 @@ def clock(block: Assessment, time: Sequence[FloatArray]) -> FloatArray:
     return np.asarray((seconds - seconds[0]) / 3600)
 
 
-def line_style(number: int) -> dict[str, str]:
+def line_style(number: int) -> dict[str, Any]:
     """Return colour and dashes of one of many curves, by its number from 0."""
     return {
         "color": COLOURS[number % len(COLOURS)],
