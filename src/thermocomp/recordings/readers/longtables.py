@@ -1,20 +1,17 @@
 """Error profiles from long tables: one row per position."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from thermocomp.core.arrays import FloatArray, IntArray
 from thermocomp.core.exceptions import InputError, RecordingError, UnitError
-from thermocomp.recordings.profiles import QUANTITY, Profiles
+from thermocomp.recordings.profiles import QUANTITY, ProfileOptions, Profiles
 from thermocomp.recordings.readers.mapping import Mapping
 from thermocomp.recordings.readers.recordings import make_recording, read_rows
 from thermocomp.recordings.rows import Rows
-
-if TYPE_CHECKING:
-    from thermocomp.recordings.readers.profiles import ProfileOptions
 
 #: column names of the position, in addition to the name of the axis
 _POSITIONS = ("position_mm", "pos_mm")
@@ -22,7 +19,7 @@ _POSITIONS = ("position_mm", "pos_mm")
 _STATES = ("state", "State", "profile", "Profile")
 
 
-def read_long(path: str | Path, mapping: Mapping | None, options: "ProfileOptions") -> Profiles:
+def read_long(path: str | Path, mapping: Mapping | None, options: ProfileOptions) -> Profiles:
     """Read profiles from a table with one row per position.
 
     Parameters
