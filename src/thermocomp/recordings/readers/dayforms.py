@@ -21,9 +21,11 @@ _MOST = 100
 _DAY = 86_400
 #: factors for digits after yyyymmdd: none, hh, hhmm, hhmmss, milliseconds
 _BEHIND = (1, 10**2, 10**4, 10**6, 10**9)
-#: seconds since 1970 in the years 2000 to 2100, in fractions of a second; spreadsheet day numbers of the same years
-_EPOCH, _PARTS = (946_684_800, 2_240_611_200), (1, 10**3, 10**6, 10**9)
-_SERIAL = (36_526, 73_050)
+#: seconds since 1970 in the years 2000 to 2100, in whole or fractional seconds
+EPOCH = (946_684_800, 2_240_611_200)
+PARTS = {1: "seconds", 10**3: "milliseconds", 10**6: "microseconds", 10**9: "nanoseconds"}
+#: spreadsheet day numbers (days since 1899-12-30) of the same years
+SERIAL = (36_526, 73_050)
 #: Julian days of the same years
 _JULIAN = (2_451_544, 2_488_070)
 #: headings of a date or a day, under which numbers in other forms may also be dates
@@ -152,10 +154,10 @@ def _read_numbers(numbers: FloatArray, *, named: bool) -> list[IntArray]:
         if named and rises and high <= 366:
             found.append(whole)
     if rises and not found:
-        for parts in _PARTS:
-            if _EPOCH[0] * parts <= low and high < _EPOCH[1] * parts:
+        for parts in PARTS:
+            if EPOCH[0] * parts <= low and high < EPOCH[1] * parts:
                 found.append((numbers // (parts * _DAY)).astype(np.int64))
-    for begin, end in (_SERIAL, _JULIAN):
+    for begin, end in (SERIAL, _JULIAN):
         if named and rises and begin <= low and high < end:
             found.append(np.floor(numbers).astype(np.int64))
     return found
