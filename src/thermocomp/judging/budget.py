@@ -343,7 +343,21 @@ def _judge_subset(samples: Samples, piece: tuple[Split, Sequence[str], str]) -> 
 
 
 def unseen_rms(samples: Samples, name: str, learn: BoolArray, judge: BoolArray) -> FloatArray:
-    """Return the residual RMS of a method on unseen rows for each target, (n_targets,)."""
+    """Train a method on some rows, and judge it on others.
+
+    Parameters
+    ----------
+    samples : Samples
+    name : str
+        Name of the method.
+    learn, judge : ndarray of bool of shape (n_rows,)
+        Rows for training, and unseen rows.
+
+    Returns
+    -------
+    ndarray of shape (n_targets,)
+        Residual RMS on the unseen rows [unit of the target].
+    """
     left = []
     for target in range(len(samples.targets)):
         model = train(name, samples, target, learn, joint=False).model

@@ -45,7 +45,7 @@ class ParquetTable(FileTable):
 
     Parameters
     ----------
-    path, headings, embedded, decimal, notes
+    path, headings
         See `thermocomp.recordings.readers.tables.FileTable`.
     names : tuple of str
         Names of the columns, as in the file.
@@ -55,6 +55,8 @@ class ParquetTable(FileTable):
         Positions of the columns without a numeric type.
     n_rows : int
     limits : FileLimits
+    embedded, decimal, notes
+        See `thermocomp.recordings.readers.tables.FileTable`.
     """
 
     names: tuple[str, ...]

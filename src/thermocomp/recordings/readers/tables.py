@@ -85,12 +85,14 @@ class FrameTable(FileTable):
 
     Parameters
     ----------
-    path, headings, embedded, decimal, notes
+    path, headings
         See `FileTable`.
     frame : DataFrame
         Unconverted cells; columns named by position.
     rows : sequence of int
         Row number in the file (1-based) of each row of `frame`.
+    embedded, decimal, notes
+        See `FileTable`.
     """
 
     frame: pd.DataFrame

@@ -53,7 +53,7 @@ class CsvTable(FileTable):
 
     Parameters
     ----------
-    path, headings, embedded, decimal, notes
+    path, headings
         See `thermocomp.recordings.readers.tables.FileTable`.
     sample : tuple of tuple of str
         Cells of the first rows.
@@ -67,6 +67,8 @@ class CsvTable(FileTable):
     n_rows : int
     data : bytes or None
         Content of the whole file in UTF-8, if conversion was necessary.
+    embedded, decimal, notes
+        See `thermocomp.recordings.readers.tables.FileTable`.
     """
 
     sample: tuple[tuple[str, ...], ...]
