@@ -8,7 +8,7 @@ import pytest
 from smallmachine import small_machine
 
 from thermocomp.core.exceptions import FitError
-from thermocomp.judging.planning import learningcurve
+from thermocomp.judging import budget
 from thermocomp.judging.planning.learningcurve import LearningCurve, Point, learning_curve, n_pieces
 from thermocomp.judging.splits import Judging, Split, leave_one_cycle_out
 from thermocomp.recordings.samples import Samples
@@ -55,8 +55,8 @@ def test_what_is_learned_from_never_holds_the_unseen_cycle(monkeypatch: pytest.M
         pairs.append((set(given.cycle[learned[-1]].tolist()), set(given.cycle[rows].tolist())))
         return SimpleNamespace(compensated=np.zeros(int(rows.sum())))
 
-    monkeypatch.setattr(learningcurve, "train", train)
-    monkeypatch.setattr(learningcurve, "replay_compensated", replay)
+    monkeypatch.setattr(budget, "train", train)
+    monkeypatch.setattr(budget, "replay_compensated", replay)
     found = learning_curve(samples, leave_one_cycle_out(samples))
     assert len(pairs) == len(found.points)
     assert all(len(judged) == 1 and judged.isdisjoint(own) for own, judged in pairs)

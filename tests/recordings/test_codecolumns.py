@@ -7,8 +7,9 @@ import pandas as pd
 import pytest
 
 from thermocomp.core.exceptions import RecordingError, UnitError
+from thermocomp.recordings.profiles import ProfileOptions
 from thermocomp.recordings.readers import codecolumns
-from thermocomp.recordings.readers.profiles import NOT_TAKEN, ProfileOptions, from_recording, read, read_components
+from thermocomp.recordings.readers.profiles import NOT_TAKEN, from_recording, read, read_components
 from thermocomp.recordings.readers.recordings import read as read_recording
 
 N = 12

@@ -9,9 +9,9 @@ import pytest
 from profilemachine import profiles
 
 from thermocomp.core.exceptions import InputError, RecordingError, ThermocompError, UnitError
-from thermocomp.recordings.profiles import Profiles
+from thermocomp.recordings.profiles import ProfileOptions, Profiles
 from thermocomp.recordings.readers.mapping import ColumnMap, Mapping
-from thermocomp.recordings.readers.profiles import ProfileOptions, from_recording, read, read_places
+from thermocomp.recordings.readers.profiles import from_recording, read, read_places
 
 
 def made() -> Profiles:

@@ -8,13 +8,13 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NoReturn
 
-from pydantic import ConfigDict, TypeAdapter, ValidationError, with_config
+from pydantic import ValidationError
 from pydantic_core import ErrorDetails, SchemaValidator
 
 from thermocomp.core.exceptions import InputError, ModelFileError, SettingError
 from thermocomp.core.shown import replace_unprintable
 from thermocomp.files.draft import write_text
-from thermocomp.files.plaintext import list_errors, read_text
+from thermocomp.files.plaintext import find_keys, list_errors, read_text, strict_adapter
 
 #: maximum size of a file [bytes]; models of additive curves over 9,000 rows had 8 million each before thinning
 MOST = 64_000_000
@@ -52,7 +52,6 @@ class Format:
 
 MODELS = Format(name="thermocomp-model", version=1, words="model file", command="thermocomp fit", shared=("watch",))
 POSITION_MODELS = Format("thermocomp-position-model", 1, "position model file", "thermocomp position")
-_STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 _KNOWN = {f.name: f for f in (MODELS, POSITION_MODELS)}
 
 
@@ -144,7 +143,7 @@ def _reader_of(entry: Any, **shared: Any) -> SchemaValidator:
     head = [("format", str), ("version", int), ("sha256", str), ("models", list[entry])]
     rest = [(name, kind | None, field(default=None)) for name, kind in shared.items()]
     whole = make_dataclass("whole", [*head, *rest])
-    schema = TypeAdapter(with_config(_STRICT)(whole)).core_schema
+    schema = strict_adapter(whole).core_schema
     _stop_at_first(schema)
     return SchemaValidator(schema)
 
@@ -270,13 +269,7 @@ def _check_kind(kind: Format, content: Any, source: str) -> None:
 
 def _tell(error: ErrorDetails, content: Any) -> str:
     message, found, context = error["msg"], error["input"], error.get("ctx", {})
-    keys: list[str | int] = []
-    for key in error["loc"]:  # the other keys are members of a union, which are not in the file
-        try:
-            content = content[key]
-        except (KeyError, IndexError, TypeError):
-            continue
-        keys.append(key)
+    keys = list(find_keys(error["loc"], content))
     match error["type"]:
         case "value_error":
             cause = context["error"]

@@ -18,8 +18,6 @@ from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.watch import Watch
 from thermocomp.files import jsonfile
 
-#: name of the format in the file
-FORMAT = jsonfile.MODELS.name
 #: all families that a file can contain
 Family = Polynomial | LinearDynamic | PacedDynamic | Network | Additive | Autoregressive | AutoregressiveNet
 #: entry of a file, distinguished by its ``family``

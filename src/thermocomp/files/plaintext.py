@@ -1,12 +1,16 @@
 """Small text files, read completely: limited size, no pipes or devices, UTF-8; and their error messages."""
 
 import stat
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import ConfigDict, TypeAdapter, with_config
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.shown import replace_unprintable
 
+_T = TypeVar("_T")
 #: maximum number of errors listed
 _LISTED = 20
 #: maximum number of characters per error
@@ -54,6 +58,23 @@ def read_text(path: str | Path, what: str, most: int, failure: type[InputError] 
         raise failure(f"{source}: cannot be read as a {what}: {e}") from e
     except ValueError as e:  # a null character
         raise failure(f"{str(source)!a}: is not the name of a {what}: {e}") from e
+
+
+def strict_adapter(kind: type[_T]) -> TypeAdapter[_T]:
+    """Return the validator of a file's content: an unknown key, a number in quotes and NaN are errors, not guesses."""
+    return TypeAdapter(with_config(ConfigDict(strict=True, extra="forbid", allow_inf_nan=False))(kind))
+
+
+def find_keys(location: Iterable[str | int], content: Any) -> tuple[str | int, ...]:
+    """Return the keys of an error's location that are in the content; the others are members of a union."""
+    keys = []
+    for key in location:
+        try:
+            content = content[key]
+        except (KeyError, IndexError, TypeError):
+            continue
+        keys.append(key)
+    return tuple(keys)
 
 
 def list_errors(source: str | Path, errors: Sequence[str]) -> str:

@@ -12,9 +12,6 @@ from thermocomp.core.profile import Profile
 from thermocomp.core.provenance import Provenance
 from thermocomp.files import jsonfile, modelfile
 
-#: name of the format in the file
-FORMAT = jsonfile.POSITION_MODELS.name
-
 
 @dataclass(frozen=True, kw_only=True)
 class _Entry(PositionModel):

@@ -3,18 +3,15 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
 from thermocomp.judging.leaks import find_learned_rows
-from thermocomp.judging.replay import are_absolute, replay_compensated
+from thermocomp.judging.replay import are_absolute, replay_compensated, stack_for
 from thermocomp.recordings.recording import Recording
-from thermocomp.recordings.stacking import stack
 from thermocomp.recordings.starts import Start, find_starts
-
-FloatArray = NDArray[np.float64]
 
 
 def replay_models(
@@ -58,14 +55,7 @@ def replay_models(
         if target not in names:
             notes.append(f"the model of {model.target} has nothing to do here: there is no such channel")
             continue
-        samples = stack(
-            [recording],
-            [target],
-            [i.name for i in model.inputs],
-            rezero=any(i.rezero for i in model.inputs),
-            zeroing=model.zeroing,
-            starts=start,
-        )
+        samples = stack_for(model, [recording], start)
         own = samples.cycle >= 0
         ran = replay_compensated(model, samples, own, limits)
         found[target] = samples.deviations[own, 0] - ran.compensated

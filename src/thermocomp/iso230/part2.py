@@ -19,11 +19,9 @@ results, cannot be determined from the deviations and is not reported here.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.volumetric.positioning import Positioning
-
-FloatArray = NDArray[np.float64]
 
 #: ISO 230-2 requirements for an axis up to 2 m: targets per axis, targets per metre, runs in each direction
 TARGETS, TARGETS_PER_METRE, RUNS = 5, 5.0, 5
@@ -93,16 +91,16 @@ class PositioningResult:
     test: Positioning
     up: Direction | None
     down: Direction | None
-    mean: FloatArray | None
-    reversal: FloatArray | None
-    repeatability: FloatArray | None
-    A: float
-    E: float
-    M: float
-    R: float
-    B: float
-    B_mean: float
-    notes: tuple[str, ...]
+    mean: FloatArray | None = None
+    reversal: FloatArray | None = None
+    repeatability: FloatArray | None = None
+    A: float = float("nan")
+    E: float = float("nan")
+    M: float = float("nan")
+    R: float = float("nan")
+    B: float = float("nan")
+    B_mean: float = float("nan")
+    notes: tuple[str, ...] = ()
 
     @property
     def directions(self) -> dict[str, Direction]:
@@ -134,23 +132,8 @@ def assess(test: Positioning) -> PositioningResult:
     PositioningResult
     """
     up, down = (None if d is None else _direction(d) for d in (test.up, test.down))
-    nan = float("nan")
     if up is None or down is None:
-        return PositioningResult(
-            test=test,
-            up=up,
-            down=down,
-            mean=None,
-            reversal=None,
-            repeatability=None,
-            A=nan,
-            E=nan,
-            M=nan,
-            R=nan,
-            B=nan,
-            B_mean=nan,
-            notes=_shortfalls(test),
-        )
+        return PositioningResult(test=test, up=up, down=down, notes=_shortfalls(test))
     mean, reversal = (up.mean + down.mean) / 2.0, up.mean - down.mean
     both = 2.0 * up.s + 2.0 * down.s + np.abs(reversal)
     repeatability = np.maximum.reduce([both, up.repeatability, down.repeatability])

@@ -13,8 +13,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
@@ -25,8 +25,6 @@ from thermocomp.judging.settling.averaging import WINDOW, average_test
 from thermocomp.judging.settling.settling import Phase, find_driven_rows, find_phases, settle
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.starts import Start
-
-FloatArray = NDArray[np.float64]
 
 _PAIR = re.compile(r"([xy])([12])", re.IGNORECASE)
 # EXX_0, EYX_z600_100: error of an axis at a station (ISO 230-1 code)

@@ -55,16 +55,14 @@ def _curves(test: ThermalTest, title: str, curves: Sequence[ThermalCurve]) -> Ta
     about = _CAPTION_60.format(minutes=max(c.course.noise.window for c in curves) / 60) + _CAPTION_U
     if test.kind == "etve":
         columns: tuple[str, ...] = ("", "range, 60 min", "range, all", "largest", "at the end")
-        return Table(
-            title=title, columns=columns, rows=tuple(rows), marked=None, caption="Range, all: the ETVE. " + about
-        )
+        return Table(title=title, columns=columns, rows=tuple(rows), caption="Range, all: the ETVE. " + about)
     hours = f"{test.running / 3600:.3g} h"
     columns = ("", "range, 60 min", f"range, {hours}", "range, all", "at 60 min", f"at {hours}", "largest", "cool-down")
     ends = "The drives stop" if test.stop < test.end else "The recording ends"
     caption = f"{about} {ends} at {hours}. t90: to 90 % of the change up to then"
     told = {cell.split()[0] for c in curves for cell in _settled(test, c) if cell}
     caption += "".join(text for word, text in _WORDS.items() if word in told) + "."
-    return Table(title=title, columns=(*columns, "t90 [min]"), rows=tuple(rows), marked=None, caption=caption)
+    return Table(title=title, columns=(*columns, "t90 [min]"), rows=tuple(rows), caption=caption)
 
 
 def _figures(test: ThermalTest, f: Figures) -> tuple[Cell, ...]:
@@ -129,7 +127,6 @@ def _slopes(test: ThermalTest, targets: Targets) -> Table:
         title=title,
         columns=("", "at 60 min", *hours),
         rows=tuple(rows),
-        marked=None,
         caption="Change of the length, per metre of it.",
     )
 
@@ -158,10 +155,10 @@ def time_constant_tables(settlings: Sequence[Settling]) -> tuple[Table, ...]:
             "has not settled at the end; still: its averages do not move beyond their noise; faint: it moves, but too "
             "little above its noise for a time; returns: it comes back before the end; peaks: it overshoots its last "
             "value, then settles back. tau: of one exponential, fast and slow: of two, where they are called "
-            "for; each with its standard error, in brackets if it is longer than "
-            "the phase or less sure than half of itself."
+            "for; each with its standard error, in brackets if it is longer than the phase or less sure than half of "
+            "itself."
         )
-        tables.append(Table(title=title, columns=columns, rows=rows, marked=None, caption=caption))
+        tables.append(Table(title=title, columns=columns, rows=rows, caption=caption))
     return tuple(tables)
 
 
@@ -211,7 +208,7 @@ def positioning_tables(results: Sequence[PositioningResult]) -> tuple[Table, ...
         named = f"Axis {key[0]}" if key[0] else "Axis"
         columns = ("", *(r.test.state or "value" for r in mine))
         title = f"{named}: accuracy, repeatability, reversal [{key[1]}]"
-        tables.append(Table(title=title, columns=columns, rows=axis_rows, marked=None, caption=UNCERTAINTY))
+        tables.append(Table(title=title, columns=columns, rows=axis_rows, caption=UNCERTAINTY))
         tables += [_at_targets(r, named) for r in mine]
     return tuple(tables)
 
@@ -306,12 +303,7 @@ def settling_content(s: Settling) -> dict[str, Any]:
         **{
             name: None
             if f is None
-            else {
-                "terms": [asdict(e) for e in f.terms],
-                "r_squared": f.r_squared,
-                "rms": f.rms,
-                "reliable": f.reliable,
-            }
+            else {"terms": [asdict(e) for e in f.terms], "r_squared": f.r_squared, "rms": f.rms, "reliable": f.reliable}
             for name, f in (("one_exponential", s.one), ("two_exponentials", s.two))
         },
     }

@@ -7,15 +7,13 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
 from thermocomp.judging.settling.averaging import AveragedCurve, K
 from thermocomp.judging.settling.settling import Settling
 from thermocomp.recordings.recording import Recording
-
-FloatArray = NDArray[np.float64]
 
 Kind = Literal["etve", "spindle", "axis"]
 #: titles of the tests
@@ -103,14 +101,14 @@ class Figures:
         nan if unknown.
     """
 
-    range_60: float
-    range_run: float
-    range_all: float
-    at_60: float
-    at_end: float
-    largest: float
-    cool_down: float
-    range_last: float
+    range_60: float = float("nan")
+    range_run: float = float("nan")
+    range_all: float = float("nan")
+    at_60: float = float("nan")
+    at_end: float = float("nan")
+    largest: float = float("nan")
+    cool_down: float = float("nan")
+    range_last: float = float("nan")
     range_rows: float = float("nan")
     U_60: float = float("nan")
     U_end: float = float("nan")
@@ -311,16 +309,7 @@ def evaluate_curve(time: FloatArray, values: FloatArray, stop: int) -> Figures:
     there = np.isfinite(values)
     run = there & (np.arange(len(values)) <= stop)
     if not run.any():
-        return Figures(
-            range_60=nan,
-            range_run=nan,
-            range_all=nan,
-            at_60=nan,
-            at_end=nan,
-            largest=nan,
-            cool_down=nan,
-            range_last=nan,
-        )
+        return Figures()
     first = there & (time <= HOUR)
     at_60 = float(np.interp(HOUR, time[there], values[there]))
     hour = time[run][-1] >= HOUR

@@ -5,8 +5,8 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
@@ -20,18 +20,14 @@ from thermocomp.judging.judge import cap_alike_units, judge
 from thermocomp.judging.leaks import find_learned_rows
 from thermocomp.judging.pieces import explain
 from thermocomp.judging.probing import Probings
-from thermocomp.judging.replay import are_absolute
+from thermocomp.judging.replay import are_absolute, stack_for
 from thermocomp.judging.results import Assessment, Rules
 from thermocomp.judging.splits import Judging, Split, join_short_cycles, name_cycles
 from thermocomp.judging.watched import believe, can_look, stack_watched
 from thermocomp.recordings.checks.sound import drop_unsound
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
-from thermocomp.recordings.stacking import stack
 from thermocomp.recordings.starts import Start, find_starts
-
-BoolArray = NDArray[np.bool_]
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -127,7 +123,7 @@ def assess(
     for model in models:
         progress(f"{model.target} {model.family}")
         try:
-            samples = _stacked(model, recordings, starts)
+            samples = drop_unsound(stack_for(model, recordings, starts), recordings)
             watched = None if model.watch is None else stack_watched(model.watch, model.target, recordings, starts)
             samples = _called_as_in(model, samples)
             known, every = find_learned_rows(model, samples), np.ones(len(samples), np.bool_)
@@ -161,19 +157,6 @@ def _known_targets(models: Sequence[ErrorModel], recordings: Sequence[Recording]
     return found
 
 
-def _stacked(model: ErrorModel, recordings: Sequence[Recording], starts: Start | Sequence[Start]) -> Samples:
-    """Return the data of recordings that a model needs, without faulty rows."""
-    samples = stack(
-        recordings,
-        [model.target],
-        [i.name for i in model.inputs],
-        rezero=any(i.rezero for i in model.inputs),
-        zeroing=model.zeroing,
-        starts=starts,
-    )
-    return drop_unsound(samples, recordings)
-
-
 def _refused(model: ErrorModel, why: str) -> Assessment:
     """Return the assessment of a model without data for judging."""
     nothing, nowhere = np.empty(0), np.empty(0, np.intp)
@@ -187,9 +170,6 @@ def _refused(model: ErrorModel, why: str) -> Assessment:
         test=nowhere,
         cycle=nowhere,
         verdict=Verdict((), refusal=why),
-        sensors=(),
-        fit_s=0.0,
-        n_effective=float("nan"),
         failure=why,
         overall=True,
     )

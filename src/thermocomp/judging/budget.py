@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.judging.choice import Progress
 from thermocomp.judging.diagnostics import collinearity
@@ -19,9 +19,6 @@ from thermocomp.models.methods import expand
 from thermocomp.models.selection.standins import SensorSets, StandInAnswer
 from thermocomp.models.training import train
 from thermocomp.recordings.samples import Samples
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 #: minimum gain of further sensors that justifies their cost [um, urad] ...
 WORTH = 0.5
@@ -265,7 +262,7 @@ def _chosen(
 ) -> list[SensorSets]:
     """Return the sets of each size, first for all rows, then for the training rows of each split."""
     learned, chosen = [samples.cycle >= 0, *(split.learn for split in splits)], []
-    for sets in work_through(partial(choose_sets, samples, max_sensors), learned, _no_sets, jobs=jobs):
+    for sets in work_through(partial(choose_sets, samples, max_sensors), learned, jobs=jobs):
         if isinstance(sets, str):
             raise FitError(sets)
         progress("sensors chosen")
@@ -289,7 +286,7 @@ def _judged(
         for subset in subsets
     ]
     found, failures = [], dict[str, str]()
-    for piece, value in zip(pieces, work_through(partial(_unseen_rms, samples), pieces, _why, jobs=jobs), strict=True):
+    for piece, value in zip(pieces, work_through(partial(_judge_subset, samples), pieces, jobs=jobs), strict=True):
         progress(f"{piece[2]} with {len(piece[1])} sensors: judged")
         found.append(np.full(len(samples.targets), np.nan) if isinstance(value, str) else value)
         if isinstance(value, str):
@@ -338,22 +335,32 @@ def _conditions(samples: Samples, sets: Sequence[Sequence[str]]) -> FloatArray:
     )
 
 
-def _unseen_rms(samples: Samples, piece: tuple[Split, Sequence[str], str]) -> FloatArray | str:
-    """Return the residual RMS of a model on unseen rows for each target, (n_targets,)."""
+def _judge_subset(samples: Samples, piece: tuple[Split, Sequence[str], str]) -> FloatArray | str:
+    """Return the RMS of a model of some temperatures on the unseen rows of a split, see `unseen_rms`."""
     split, sensors, name = piece
     speeds = [c.name for c in samples.inputs if c.quantity == "spindle_speed"]
-    reduced = samples.only([*sensors, *speeds])
+    return unseen_rms(samples.only([*sensors, *speeds]), name, split.learn, split.judge)
+
+
+def unseen_rms(samples: Samples, name: str, learn: BoolArray, judge: BoolArray) -> FloatArray:
+    """Train a method on some rows, and judge it on others.
+
+    Parameters
+    ----------
+    samples : Samples
+    name : str
+        Name of the method.
+    learn, judge : ndarray of bool of shape (n_rows,)
+        Rows for training, and unseen rows.
+
+    Returns
+    -------
+    ndarray of shape (n_targets,)
+        Residual RMS on the unseen rows [unit of the target].
+    """
     left = []
     for target in range(len(samples.targets)):
-        model = train(name, reduced, target, split.learn, joint=False).model
-        rows = split.judge & np.isfinite(samples.deviations[:, target])
-        left.append(rms(samples.deviations[rows, target], replay_compensated(model, reduced, rows).compensated))
+        model = train(name, samples, target, learn, joint=False).model
+        rows = judge & np.isfinite(samples.deviations[:, target])
+        left.append(rms(samples.deviations[rows, target], replay_compensated(model, samples, rows).compensated))
     return np.array(left)
-
-
-def _no_sets(_: BoolArray, why: str) -> SensorSets | str:
-    return why
-
-
-def _why(_: tuple[Split, Sequence[str], str], why: str) -> FloatArray | str:
-    return why

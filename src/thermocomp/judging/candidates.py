@@ -7,12 +7,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.judging.choice import Table
 from thermocomp.judging.diagnostics import diagnose
 from thermocomp.recordings.samples import Samples
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +75,5 @@ class Candidates:
             title=title,
             columns=("sensor", "correlation with the error", "VIF"),
             rows=rows,
-            marked=None,
             caption=caption,
         )

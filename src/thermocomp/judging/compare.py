@@ -6,7 +6,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermocomp.core.correction import Limits
 from thermocomp.core.inputs import Support
@@ -26,10 +25,8 @@ from thermocomp.models.numerics.leastsquares import effective_sample_size
 from thermocomp.models.training import train
 from thermocomp.recordings.samples import Samples
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.intp]
-
+#: fields of an assessment with a value for each judged row
+_PER_ROW = ("measured", "predicted", "row", "test", "cycle")
 #: name of the block of all unseen cycles together
 ALL = "all unseen cycles"
 
@@ -98,7 +95,7 @@ def compare(
     scores: dict[int, dict[str, list[list[float]]]] = {}
     inners = [_inners(names, own, rules) for own in by_target]
     try:
-        for a in work_through(work, pieces, partial(_refused, samples), jobs=jobs):
+        for a in work_through(work, pieces, partial(refuse_method, samples), jobs=jobs):
             progress(f"{a.target} {a.model} {a.block}")
             done.append(a)
         scores = _scores(samples, names, by_target, inners, jobs, progress)
@@ -202,7 +199,7 @@ def _scores(
     found: dict[int, dict[str, list[list[float]]]] = {
         k: {name: [] for name in kept} for k, own in enumerate(inners) if own
     }
-    results = work_through(partial(_score, samples, by_target), pieces, _no_score, jobs=jobs)
+    results = work_through(partial(score, samples, by_target), pieces, _no_score, jobs=jobs)
     for (k, name, inner), values in zip(pieces, results, strict=True):
         progress(f"{samples.targets[k].name} {name} without {inner.split.block}")
         found[k][name].append(values)
@@ -233,23 +230,19 @@ def split_by_cycle(whole: Assessment) -> list[Assessment]:
     blocks = [b for b in join_short_cycles(whole.cycle, whole.test) if np.isin(whole.cycle, b).sum() >= MIN_ROWS]
     for unit, block in zip(whole.verdict.units, blocks, strict=True):
         rows = np.isin(whole.cycle, block)
-        measured, predicted = whole.measured[rows], whole.predicted[rows]
+        cut = {name: getattr(whole, name)[rows] for name in _PER_ROW}
         half_widths = None if whole.half_widths is None else whole.half_widths[rows]
         found.append(
             replace(
                 whole,
+                **cut,
                 block=f"cycle {unit.name}",
-                measured=measured,
-                predicted=predicted,
                 alone=None if whole.alone is None else whole.alone[rows],
                 half_widths=half_widths,
                 band=whole.band if half_widths is not None and np.isfinite(half_widths).any() else "",
                 probed=whole.probed and whole.probed.take(rows),
-                row=whole.row[rows],
-                test=whole.test[rows],
-                cycle=whole.cycle[rows],
                 verdict=replace(whole.verdict, units=(unit,)),
-                n_effective=effective_sample_size(measured - predicted),
+                n_effective=effective_sample_size(cut["measured"] - cut["predicted"]),
                 robustness=None,
                 overall=False,
             )
@@ -284,17 +277,6 @@ def _assess_method(
     )
 
 
-def _refused(samples: Samples, piece: tuple[int, str, Split], why: str) -> Assessment:
-    """Return the assessment of a method that failed, in its fit or in the replay with noise."""
-    target, name, split = piece
-    return refuse_method(samples, name, target, split, why)
-
-
-def _score(samples: Samples, by_target: Sequence[Judging], piece: tuple[int, str, Inner]) -> list[float]:
-    target, name, inner = piece
-    return score(samples, name, target, by_target[target], inner)
-
-
 def _no_score(piece: tuple[int, str, Inner], _: str) -> list[float]:
     return [np.inf] * len(piece[2].scores)
 
@@ -304,14 +286,11 @@ def _together(parts: Sequence[Assessment]) -> Assessment:
         return replace(parts[0], overall=True)
     first = parts[0]
     failures = [a.failure for a in parts if a.failure]
+    joined: dict[str, Any] = {name: np.concatenate([getattr(a, name) for a in parts]) for name in _PER_ROW}
     return replace(
         first,
+        **joined,
         block=ALL,
-        measured=np.concatenate([a.measured for a in parts]),
-        predicted=np.concatenate([a.predicted for a in parts]),
-        row=np.concatenate([a.row for a in parts]),
-        test=np.concatenate([a.test for a in parts]),
-        cycle=np.concatenate([a.cycle for a in parts]),
         verdict=do_no_harm.join_verdicts([a.verdict for a in parts]),
         sensors=tuple(dict.fromkeys(s for a in parts for s in a.sensors)),
         n_sensors=(min(a.n_sensors[0] for a in parts), max(a.n_sensors[1] for a in parts)),

@@ -11,16 +11,14 @@ similar day, adds no information. Alike units count once (single linkage).
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
 
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.validity import Validity
 from thermocomp.judging.choice import Cell, Table
 from thermocomp.judging.splits import Judging
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 #: distance below which two units are alike [standard deviations of the inputs]
 ALIKE = 0.1
@@ -54,7 +52,7 @@ def find_validity(samples: Samples, judging: Judging, recordings: Sequence[Recor
     name, ambient = _ambient(samples, judged, recordings)
     return Validity(
         units=len(blocks),
-        independent=_groups(distances < ALIKE),
+        independent=int(connected_components(distances < ALIKE)[0]) if blocks else 0,
         nearest=float(distances[np.triu_indices(len(blocks), 1)].min()) if len(blocks) > 1 else None,
         speeds=_speeds(samples, judged, recordings),
         ambient=ambient,
@@ -105,20 +103,6 @@ def _curve(values: FloatArray, steps: FloatArray) -> FloatArray:
     return np.stack([np.interp(np.arange(PLACES), known, v) for v in means.T], axis=1)
 
 
-def _groups(alike: BoolArray) -> int:
-    """Return the number of groups of similar units."""
-    left, found = set(range(len(alike))), 0
-    while left:
-        found += 1
-        reached = [left.pop()]
-        while reached:
-            near = {k for k in left if alike[reached[-1], k]}
-            reached.pop()
-            left -= near
-            reached += sorted(near)
-    return found
-
-
 def _speeds(samples: Samples, judged: BoolArray, recordings: Sequence[Recording]) -> tuple[float, ...]:
     columns = [j for j, c in enumerate(samples.inputs) if c.quantity == "spindle_speed"]
     measured = [samples.values[judged][:, columns].ravel()]
@@ -164,9 +148,7 @@ def table(named: dict[str, Validity]) -> Table:
     columns = [_cells(v) for v in named.values()]
     rows: list[tuple[Cell, ...]] = [(heading, *(c[heading] for c in columns)) for heading in columns[0]]
     caption = f"Alike: inputs less than {ALIKE:g} of their spread apart all the way; copies count once."
-    return Table(
-        title="What the judged units covered", columns=("", *named), rows=tuple(rows), marked=None, caption=caption
-    )
+    return Table(title="What the judged units covered", columns=("", *named), rows=tuple(rows), caption=caption)
 
 
 def _cells(v: Validity) -> dict[str, str]:

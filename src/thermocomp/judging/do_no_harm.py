@@ -12,14 +12,13 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.learned import Learned
+from thermocomp.core.size import Size
 from thermocomp.judging.splits import MIN_ROWS
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 Word = Literal["accepted", "unproven", "refused"]
 
 #: minimum number of units for a significance test
@@ -298,20 +297,21 @@ def measure(
     JudgedUnit
     """
     residual = measured - predicted
+    size = Size.of(residual)
     allowed = margin_of(learned, unit) if margin is None else margin
     baselines = (0.0, learned.mean, learned.last)
     span = float(np.ptp(measured)) - 4 * learned.noise  # minus the span of the noise alone
     return JudgedUnit(
         name=name,
         rows=len(measured),
-        rms=_rms(residual),
-        largest=float(np.abs(residual).max()),
-        baselines=tuple(_rms(measured - b) for b in baselines),
+        rms=size.rms,
+        largest=size.largest,
+        baselines=tuple(Size.of(measured - b).rms for b in baselines),
         none_largest=float(np.abs(measured).max()),
         noise=learned.noise,
         margin=allowed,
         moves=span > max(TIMES_NOISE * learned.noise, MOVES * learned.largest),
-        rezeroed=(_rms(residual - _start(residual)), _rms(measured - _start(measured))) if stretch else None,
+        rezeroed=(_rezeroed_rms(residual), _rezeroed_rms(measured)) if stretch else None,
     )
 
 
@@ -353,12 +353,9 @@ def holm(verdicts: Sequence[Verdict]) -> list[Verdict]:
     return [replace(v, p=float(p), tried=n) for v, p in zip(verdicts, corrected, strict=True)]
 
 
-def _start(x: FloatArray) -> float:
-    return float(x[:REZERO_ROWS].mean())
-
-
-def _rms(x: FloatArray) -> float:
-    return float(np.sqrt(np.mean(x**2)))
+def _rezeroed_rms(x: FloatArray) -> float:
+    """Return the RMS relative to the mean of the first rows."""
+    return Size.of(x - x[:REZERO_ROWS].mean()).rms
 
 
 def _count(n: int, what: str) -> str:

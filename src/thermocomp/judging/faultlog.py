@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.watch import Watch
 from thermocomp.judging.assessing import Judged
@@ -18,7 +19,6 @@ from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
 from thermocomp.runtime.watch import GOOD, MISSING, WORDS
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int8]
 
 

@@ -7,14 +7,12 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.watch import Watch
 from thermocomp.judging.replay import rows_until
 from thermocomp.models.watching import find_watch
 from thermocomp.recordings.samples import Samples
 from thermocomp.runtime.watch import begin, look
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 #: largest number of temperatures for which simultaneous failures of two are tried
 FEW = 6

@@ -4,8 +4,8 @@ from collections.abc import Collection, Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.correction import Limits
 from thermocomp.core.learned import Learned
 from thermocomp.core.model import ErrorModel
@@ -19,9 +19,6 @@ from thermocomp.judging.robustness import stress
 from thermocomp.judging.splits import MIN_ROWS, Judging, Split, join_short_cycles, name_cycles
 from thermocomp.models.numerics.leastsquares import effective_sample_size
 from thermocomp.recordings.samples import Samples
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 
 def drop_unreadable(samples: Samples, target: int, judging: Judging) -> Judging:
@@ -99,11 +96,9 @@ def judge(
 
     """
     target = [c.name for c in samples.targets].index(model.target)
-    rows = split.judge & np.isfinite(samples.deviations[:, target])
+    rows, piece = split.judge & np.isfinite(samples.deviations[:, target]), (target, name, split)
     if not rows.any():
-        return refuse_method(
-            samples, name, target, split, f"{model.target} has no number in {split.block} to judge against"
-        )
+        return refuse_method(samples, piece, f"{model.target} has no number in {split.block} to judge against")
     measured = samples.deviations[rows, target]
     if learned is None and model.provenance is not None:
         learned = model.provenance.learned
@@ -111,7 +106,7 @@ def judge(
     stressed = stress(model, samples, measured, rows, guard=guard) if robustness else None
     predicted = ran.deviation if limits is None else ran.compensated
     if not np.isfinite(metrics.rms(measured, ran.deviation)):
-        return refuse_method(samples, name, target, split, f"the residual of {model.target} is beyond all numbers")
+        return refuse_method(samples, piece, f"the residual of {model.target} is beyond all numbers")
     return Assessment(
         model=name,
         target=model.target,
@@ -209,24 +204,22 @@ def _caps(
     return tuple(found)
 
 
-def refuse_method(samples: Samples, name: str, target: int, split: Split, why: str) -> Assessment:
+def refuse_method(samples: Samples, piece: tuple[int, str, Split], why: str) -> Assessment:
     """Return the assessment of a method without a prediction: refused.
 
     Parameters
     ----------
     samples : Samples
-    name : str
-        Name of the method.
-    target : int
-        Index into ``samples.targets``.
-    split : Split
+    piece : tuple of (int, str, Split)
+        Index into ``samples.targets``, name of the method, and split.
     why : str
-        Reason for the missing prediction.
+        Reason for the missing prediction: in the fit, or in the replay with noise.
 
     Returns
     -------
     Assessment
     """
+    target, name, split = piece
     rows = split.judge & np.isfinite(samples.deviations[:, target])
     measured = samples.deviations[rows, target]
     return Assessment(
@@ -239,9 +232,6 @@ def refuse_method(samples: Samples, name: str, target: int, split: Split, why: s
         test=samples.test[rows],
         cycle=samples.cycle[rows],
         verdict=do_no_harm.Verdict((), refusal=why),
-        sensors=(),
-        fit_s=0.0,
-        n_effective=float("nan"),
         failure=why,
     )
 

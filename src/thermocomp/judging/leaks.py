@@ -1,31 +1,26 @@
 """Rows used for both training and judging: detect them, and leave them out or reject the judging scheme."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, IntArray
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
 from thermocomp.judging.splits import Judging
 from thermocomp.recordings.overlaps import overlap, repeats
 from thermocomp.recordings.samples import Samples
 
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.intp]
-
 #: a test with a smaller fraction of new rows is not judged
 LEAST_NEW = 0.05
 
 
-def find_learned_rows(model: ErrorModel, samples: Samples, target: int = 0) -> BoolArray:
+def find_learned_rows(model: ErrorModel, samples: Samples) -> BoolArray:
     """Return the rows that were used for training a model.
 
     Parameters
     ----------
     model : ErrorModel
     samples : Samples
-        With the inputs and the target of the model.
-    target : int
-        Index of the model's target in ``samples.targets``.
+        With the inputs and the only target of the model.
 
     Returns
     -------
@@ -38,8 +33,8 @@ def find_learned_rows(model: ErrorModel, samples: Samples, target: int = 0) -> B
         return known
     known |= np.isin(samples.hashes, model.provenance.data_sha256)[samples.test]
     if model.provenance.prints is not None:
-        known |= overlap(model.provenance.prints, samples, target) >= 0
-    judged = np.isfinite(samples.deviations[:, target])
+        known |= overlap(model.provenance.prints, samples, 0) >= 0
+    judged = np.isfinite(samples.deviations[:, 0])
     for test in np.unique(samples.test[known]):
         mine = samples.test == test
         if np.count_nonzero(mine & judged & ~known) < LEAST_NEW * np.count_nonzero(mine & judged):

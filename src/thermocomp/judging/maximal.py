@@ -4,8 +4,8 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import FitError
 from thermocomp.judging.choice import Choice, Progress, Settings, Table
 from thermocomp.judging.pieces import elsewhere, work_through
@@ -17,8 +17,6 @@ from thermocomp.models.selection.maximal_correlation import (
     subsets_up_to,
 )
 from thermocomp.recordings.samples import Samples
-
-FloatArray = NDArray[np.float64]
 
 #: half-width N of the boxcar of maximal correlation (W-04)
 HALF_WINDOW = 10
@@ -86,23 +84,18 @@ def choose(samples: Samples, settings: Settings, *, jobs: int, progress: Progres
         target=", ".join(targets),
         sensors=tuple(names[j] for j in chosen),
         reason=f"greatest sum of Psi among the sets of up to {max(map(len, small))} sensors "
-        "that are as good as the best for "
-        f"all displacements ({len(same.common)} sets are)",
+        f"that are as good as the best for all displacements ({len(same.common)} sets are)",
         tables=(_best_sets(psi, same, names, targets), _listed_sets(psi, same, names, targets, chosen)),
         notes=tuple(notes),
         details=same,
     )
 
 
-def _share(work: Callable[[Any], FloatArray], pieces: Sequence[Any]) -> Iterator[FloatArray]:
-    for found in work_through(work, pieces, _why, jobs=1):
+def _share(work: Callable[[Any], Any], pieces: Sequence[Any]) -> Iterator[FloatArray]:
+    for found in work_through(work, pieces, jobs=1):
         if isinstance(found, str):
             raise FitError(found)
         yield found
-
-
-def _why(_: Any, why: str) -> FloatArray | str:
-    return why
 
 
 def _best_sets(psi: MaximalCorrelations, same: Equivalents, names: Sequence[str], targets: Sequence[str]) -> Table:
@@ -119,7 +112,6 @@ def _best_sets(psi: MaximalCorrelations, same: Equivalents, names: Sequence[str]
             )
             for d, (t, k) in enumerate(zip(targets, same.best, strict=True))
         ),
-        marked=None,
         caption=f"{len(psi.subsets)} sets, {done} thermal cycles, {len(targets)} displacements: "
         f"{len(psi.subsets) * done * len(targets)} models.",
     )

@@ -137,8 +137,8 @@ def _errors(found: Budget, judging: Judging, model: str, place: int | None) -> T
         rows=rows,
         marked=place,
         caption=f"RMS on each unseen block, mean over the blocks{_mean(found)}; "
-        f"without compensation {found.none_mean():.2f} "
-        f"{found.unit}. Next gains: what {model} gains by the sensors of the next row. Enough, each model by itself: "
+        f"without compensation {found.none_mean():.2f} {found.unit}. Next gains: what {model} gains by the sensors of "
+        "the next row. Enough, each model by itself: "
         + ", ".join(f"{found.enough(m) or 'none'} for {m}" for m in found.models)
         + ".",
     )
@@ -179,8 +179,7 @@ def _next(found: Budget, model: str, place: int) -> Table:
         ),
         marked=place if place < len(gains) else None,
         caption=f"By {model}; below zero it is worse with the sensor than without it. "
-        "In each block the sensors are those that "
-        "were chosen without it.",
+        "In each block the sensors are those that were chosen without it.",
     )
 
 
@@ -240,7 +239,6 @@ def _frequency(found: Budget, place: int) -> Table:
             for j in order
             if found.frequency[place, j] > 0
         ),
-        marked=None,
         caption="Chosen again without each block: a sensor far below 100 % was a matter of luck.",
     )
 
@@ -278,12 +276,11 @@ def _stand_ins(found: Budget, place: int) -> Table:
             f"loses [{found.unit}]",
         ),
         rows=rows,
-        marked=None,
         caption="Each is made up from the one other that misses it least, and from the chosen sensors "
-        "(a chosen one from the "
-        f"others of them, as if it failed), with {found.answer.noise:g} degC of noise in use. Miss: RMS of what is "
-        "left of it. Loses: what the answer of `averaged` with all temperatures changes by if this one alone is made "
-        f"up from the chosen{_mean(found)}. Those with less than {100 * PART:g} % part in it are not named.",
+        f"(a chosen one from the others of them, as if it failed), with {found.answer.noise:g} degC of noise in use. "
+        "Miss: RMS of what is left of it. Loses: what the answer of `averaged` with all temperatures changes by if "
+        f"this one alone is made up from the chosen{_mean(found)}. Those with less than {100 * PART:g} % part in it "
+        "are not named.",
     )
 
 
@@ -343,6 +340,5 @@ def _rule(found: Budget) -> str:
     return (
         "Rule: the fewest sensors that are better than no compensation and whose mean RMS over the unseen blocks, that "
         f"of the table, is within {margin:.2f} {unit} of the smallest: the larger of one standard error between the "
-        f"blocks (Breiman 1984), {error:.2f} {unit}, and of "
-        f"{least:.2f} {unit}, {what}."
+        f"blocks (Breiman 1984), {error:.2f} {unit}, and of {least:.2f} {unit}, {what}."
     )

@@ -19,10 +19,15 @@ DIED = "its process died: it crashed, or was killed, as the system does if the m
 elsewhere: ContextVar[Callable[[Any, Sequence[Any], Any], Iterator[Any]] | None] = ContextVar("elsewhere", default=None)
 
 
+def return_reason(_piece: Any, why: str) -> Any:
+    """Return the reason of a failure in place of the result."""
+    return why
+
+
 def work_through(
     work: Callable[[_Piece], _Found],
     pieces: Sequence[_Piece],
-    failed: Callable[[_Piece, str], _Found],
+    failed: Callable[[_Piece, str], _Found] = return_reason,
     *,
     jobs: int,
 ) -> Iterator[_Found]:
@@ -37,7 +42,7 @@ def work_through(
         Function of a task.
     pieces : sequence
     failed : callable
-        Called with a task and the reason of its failure; returns the replacement of the result.
+        Called with a task and the reason of its failure; returns the replacement of the result. Default: the reason.
     jobs : int
         Number of parallel processes; 1: in this process, -1: one per core. Ignored within
         `thermocomp.judging.sharing.shared_among`.

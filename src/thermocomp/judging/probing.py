@@ -6,10 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.exceptions import InputError
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 _WRITTEN = re.compile(r"every (?P<n>\d*\.?\d+) ?(?P<unit>h|hours?|min|minutes?)(, ?(?P<um>\d*\.?\d+) ?um)?")
 _SECONDS = {"h": 3600.0, "m": 60.0}

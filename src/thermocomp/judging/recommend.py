@@ -9,15 +9,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermocomp.judging import do_no_harm
 from thermocomp.judging.splits import Judging, Split
 from thermocomp.models.training import fit_method
 from thermocomp.recordings.samples import Samples
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
 
 #: up to this number of units every pair is left out; above, the other units are left out in `GROUPS` groups per unit
 PAIRS = 8
@@ -76,19 +72,16 @@ def _inner(splits: Sequence[Split], out: Sequence[int], scores: tuple[tuple[int,
     return Inner(Split(" and ".join(splits[u].block for u in out), learn, judge), scores)
 
 
-def score(samples: Samples, name: str, target: int, judging: Judging, inner: Inner) -> list[float]:
+def score(samples: Samples, by_target: Sequence[Judging], piece: tuple[int, str, Inner]) -> list[float]:
     """Return a method's RMS for each score of an inner split.
 
     Parameters
     ----------
     samples : Samples
-    name : str
-        Name of the method.
-    target : int
-        Index into ``samples.targets``.
-    judging : Judging
-        Scheme whose blocks are the units.
-    inner : Inner
+    by_target : sequence of Judging
+        Scheme of each target, whose blocks are the units.
+    piece : tuple of (int, str, Inner)
+        Index into ``samples.targets``, name of the method, and inner split.
 
     Returns
     -------
@@ -100,10 +93,11 @@ def score(samples: Samples, name: str, target: int, judging: Judging, inner: Inn
     FitError
         The method cannot be fitted.
     """
+    target, name, inner = piece
     predicted = fit_method(name, samples, target, inner.split.learn).predicted
     found = []
     for _, v in inner.scores:
-        residual = (samples.deviations[:, target] - predicted)[judging.splits[v].judge]
+        residual = (samples.deviations[:, target] - predicted)[by_target[target].splits[v].judge]
         residual = residual[np.isfinite(residual)]
         found.append(float(np.sqrt(np.mean(residual**2))) if residual.size else np.inf)
     return found

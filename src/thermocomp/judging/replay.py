@@ -6,17 +6,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.correction import Limits
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.state import State
 from thermocomp.core.zero import Zeroing, first_rows, robust_mean
 from thermocomp.judging.probing import Probed, Probings
 from thermocomp.judging.watched import believe
+from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
+from thermocomp.recordings.stacking import stack
+from thermocomp.recordings.starts import Start
 from thermocomp.runtime import batch
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 #: converts one reading (n_inputs,) to a batch of disturbed readings (n_variants, n_inputs); its other arguments are the
 #: row and the reference of the test
@@ -220,6 +221,18 @@ def are_absolute(models: Sequence[ErrorModel]) -> bool:
     """Return whether models use absolute temperatures, so that the zero of a recording does not affect them."""
     heat = [i for m in models for i in m.inputs if i.quantity == "temperature"]
     return bool(heat) and not any(i.rezero for i in heat)
+
+
+def stack_for(model: ErrorModel, recordings: Sequence[Recording], starts: Start | Sequence[Start] | None) -> Samples:
+    """Return the samples of a model: its inputs and its target, stacked as in its training."""
+    return stack(
+        recordings,
+        [model.target],
+        [i.name for i in model.inputs],
+        rezero=any(i.rezero for i in model.inputs),
+        zeroing=model.zeroing,
+        starts=starts,
+    )
 
 
 def _begun(

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray, IntArray
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
@@ -17,9 +18,6 @@ from thermocomp.judging.robustness import Robustness
 from thermocomp.judging.splits import Judging
 from thermocomp.models.methods import deployable
 from thermocomp.recordings.starts import Start
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -107,9 +105,9 @@ class Assessment:
     test: IntArray
     cycle: IntArray
     verdict: do_no_harm.Verdict
-    sensors: tuple[str, ...]
-    fit_s: float
-    n_effective: float
+    sensors: tuple[str, ...] = ()
+    fit_s: float = 0.0
+    n_effective: float = float("nan")
     robustness: Robustness | None = None
     frozen: ErrorModel | None = None
     failure: str = ""

@@ -4,15 +4,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.model import ErrorModel
+from thermocomp.core.size import Size
 from thermocomp.judging.guards import Guard
 from thermocomp.judging.replay import walk
 from thermocomp.recordings.samples import Samples
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
+#: amplitude of the noise on every temperature (C-33) [degC]
+NOISE = 0.4
 
 
 @dataclass(frozen=True)
@@ -166,15 +167,13 @@ def stress(
     measured: FloatArray,
     rows: BoolArray,
     *,
-    noise: float = 0.4,
     draws: int = 100,
-    seed: int = 0,
     guard: Guard | None = None,
 ) -> Replayed:
     """Replay a model once, undisturbed and disturbed in parallel.
 
     - Noise on every temperature, independent from row to row (C-33). The paper states an amplitude but no distribution
-      (E-C9), so both are drawn: uniform within +-`noise`, and normal with `noise` as standard deviation.
+      (E-C9), so both are drawn: uniform within +-`NOISE`, and normal with `NOISE` as standard deviation.
     - Each sensor cut off: its change reads zero from the start on (C-34), the worst kind of failure. With a guard, a
       watch may detect it; without, it goes undetected.
 
@@ -186,12 +185,8 @@ def stress(
         Deviations in `rows` [um].
     rows : ndarray of bool of shape (n_rows,)
         Rows to judge.
-    noise : float
-        [degC]
     draws : int
         Number of noise draws per distribution.
-    seed : int
-        Seed of the noise.
     guard : Guard, optional
         Readings passed by a watch while sensors fail, also several at once.
 
@@ -209,13 +204,13 @@ def stress(
         {columns[c]: v for c, v in guard.readings.get(names, {}).items() if c in columns} if guard else {}
         for names in lost
     ]
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     n_inputs = len(model.inputs)
 
     def disturb(row: int, reading: FloatArray, reference: FloatArray) -> FloatArray:
         batch = np.broadcast_to(reading, (1 + 2 * draws + len(lost), n_inputs)).copy()
-        batch[1 : 1 + draws, temperatures] += rng.uniform(-noise, noise, (draws, temperatures.sum()))
-        batch[1 + draws : 1 + 2 * draws, temperatures] += rng.normal(0.0, noise, (draws, temperatures.sum()))
+        batch[1 : 1 + draws, temperatures] += rng.uniform(-NOISE, NOISE, (draws, temperatures.sum()))
+        batch[1 + draws : 1 + 2 * draws, temperatures] += rng.normal(0.0, NOISE, (draws, temperatures.sum()))
         for variant, (places, through) in enumerate(zip(cut, let, strict=True), start=1 + 2 * draws):
             if guard and lost[variant - 1 - 2 * draws] in guard.readings:
                 for k, values in through.items():
@@ -236,15 +231,15 @@ def stress(
     laws = {"uniform": rms[1 : 1 + draws], "normal": rms[1 + draws : 1 + 2 * draws]}
     unlike = unlike_rows(model, samples, rows)
     robustness = Robustness(
-        noise=noise,
+        noise=NOISE,
         noise_rms={law: (float(v.mean()), float(v.max())) for law, v in laws.items() if v.size},
         lost_rms={names[0]: float(v) for names, v in zip(lost, rms[1 + 2 * draws :], strict=True) if len(names) == 1},
         together_rms={", ".join(n): float(v) for n, v in zip(lost, rms[1 + 2 * draws :], strict=True) if len(n) > 1},
         outside=float(beyond.mean()),
-        outside_rms=_rms((measured - predicted)[beyond]),
-        none_rms=_rms(measured),
+        outside_rms=Size.of((measured - predicted)[beyond]).rms,
+        none_rms=Size.of(measured).rms,
         unlike=float(unlike.mean()),
-        unlike_rms=_rms((measured - predicted)[unlike]),
+        unlike_rms=Size.of((measured - predicted)[unlike]).rms,
     )
     return Replayed(predicted, beyond, robustness)
 
@@ -266,7 +261,3 @@ def unlike_rows(model: ErrorModel, samples: Samples, rows: BoolArray) -> BoolArr
         return np.zeros(int(rows.sum()), dtype=np.bool_)
     columns = [[c.name for c in samples.inputs].index(i.name) for i in model.inputs]
     return np.asarray(model.joint.distance(samples.change()[rows][:, columns]) > 1.0)
-
-
-def _rms(residual: FloatArray) -> float:
-    return float(np.sqrt(np.mean(residual**2))) if residual.size else float("nan")

@@ -7,7 +7,6 @@ from itertools import groupby
 
 import numpy as np
 from joblib import effective_n_jobs
-from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.judging import budget, maximal, pareto
@@ -24,8 +23,6 @@ from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.models.selection import grouping
 from thermocomp.models.subsets import BestSubset
 from thermocomp.recordings.samples import Samples
-
-FloatArray = NDArray[np.float64]
 
 #: methods whose tasks can be shared among the workers of a cluster
 SHARED = ("pareto", "ace")
@@ -166,8 +163,7 @@ def _by_grouping(candidates: Candidates, settings: Settings) -> Choice:
         target=candidates.target,
         sensors=needed,
         reason=f"smallest residual mean square, {found.mse_:.4g} um^2, "
-        f"among the members of {len(found.participating_)} of "
-        f"{len(found.groups_)} groups",
+        f"among the members of {len(found.participating_)} of {len(found.groups_)} groups",
         tables=(groups, curve, candidates.repeats(sensors), _other_thresholds(candidates, found, settings)),
         notes=_dependence(found.n_effective_, len(candidates.y)),
         details=found,

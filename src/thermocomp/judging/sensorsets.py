@@ -1,17 +1,14 @@
 """Sets of 1, 2, ... temperatures for all targets together, selected on the training rows."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.exceptions import FitError
 from thermocomp.judging.splits import MIN_ROWS
 from thermocomp.models.averaged import AveragedDynamic
 from thermocomp.models.numerics.folds import number_folds
 from thermocomp.models.selection.standins import SensorSets, reduce_sensors
 from thermocomp.recordings.samples import Samples
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 #: common unit for targets of different units: percent of the error without compensation
 PERCENT = "%"

@@ -3,14 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, IntArray
 from thermocomp.core.exceptions import InputError
 from thermocomp.recordings.samples import Samples
-
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.intp]
-
 
 #: length of a day [s]
 DAY = 86400.0

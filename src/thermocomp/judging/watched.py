@@ -4,8 +4,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.watch import Watch
 from thermocomp.recordings.recording import Recording
@@ -13,9 +13,6 @@ from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.stacking import stack
 from thermocomp.recordings.starts import Start
 from thermocomp.runtime.watch import WatchState, begin, look
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 
 def believe(

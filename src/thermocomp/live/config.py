@@ -8,7 +8,7 @@ from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_type_hints
 
-from pydantic import ConfigDict, Discriminator, Field, TypeAdapter, ValidationError, with_config
+from pydantic import Discriminator, Field, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
 from thermocomp.core.correction import Limits
@@ -16,6 +16,7 @@ from thermocomp.core.exceptions import InputError, SettingError
 from thermocomp.core.plugins import describe_plugin, find_plugins, load_plugin
 from thermocomp.core.shown import explain_unfit
 from thermocomp.core.units import HOUSE_UNITS
+from thermocomp.files.plaintext import strict_adapter
 from thermocomp.files.tomlfile import as_json, read_toml
 from thermocomp.live.adapters.network import MqttIn, MqttOut, MqttProbing, OnBroker, explain_host_name
 from thermocomp.live.adapters.sections import (
@@ -251,7 +252,7 @@ def _adapter(content: dict[str, Any]) -> TypeAdapter[Config]:
     """Return the validator of a configuration: sections of this package, and of the plug-ins that it names."""
     fields = [(group, tuple[_section_of(group, content.get(group)), ...], ()) for group in _KINDS]  # type: ignore[misc]
     made = make_dataclass("Config", [fields[0][:2], fields[1]], bases=(Config,), frozen=True, kw_only=True)
-    return TypeAdapter(with_config(ConfigDict(strict=True, extra="forbid", allow_inf_nan=False))(made))
+    return strict_adapter(made)
 
 
 def _section_of(group: Literal["sources", "sinks"], tables: Any) -> Any:

@@ -39,12 +39,6 @@ class Step:
     do: str = ""
     reason: str = ""
 
-    def __post_init__(self) -> None:
-        self.check()
-
-    def check(self) -> None:
-        """Raise `InputError` if the step is empty or contradictory."""
-
     def apply(self, rows: Rows) -> Rows:
         """Return the cleaned rows, with a note on the changes."""
         raise NotImplementedError
@@ -74,8 +68,7 @@ class Cut(Step):
     times: tuple[Instant | tuple[Instant, Instant], ...] = ()
     do: Literal["cut"] = "cut"
 
-    def check(self) -> None:
-        """Reject a cut without times."""
+    def __post_init__(self) -> None:
         if not self.times:
             raise self._refuse('name what is cut, such as times = [50.0, [600.0, 660.0]] or ["2024-05-06T08:00:00"]')
 
@@ -121,8 +114,7 @@ class Shift(Step):
     by_s: float = 0.0
     do: Literal["shift"] = "shift"
 
-    def check(self) -> None:
-        """Reject a shift without channels or offset."""
+    def __post_init__(self) -> None:
         if not self.channels or self.by_s == 0:
             raise self._refuse('name whose clock is wrong, and by how much: channels = ["t1_C"] and by_s = -1200.0')
 
@@ -168,8 +160,7 @@ class Rezero(Step):
     until: Instant | None = None
     do: Literal["rezero"] = "rezero"
 
-    def check(self) -> None:
-        """Reject a step without channels."""
+    def __post_init__(self) -> None:
         if not self.channels:
             raise self._refuse('name which probe, and when: channels = ["z_um"] and at = 3600.0')
 
@@ -208,8 +199,7 @@ class Swap(Step):
     at: Instant = 0.0
     do: Literal["swap"] = "swap"
 
-    def check(self) -> None:
-        """Reject any number of channels other than two."""
+    def __post_init__(self) -> None:
         if len(set(self.channels)) != 2:
             raise self._refuse('name the two that change places, and when: channels = ["t1_C", "t2_C"] and at = 3600.0')
 
@@ -243,8 +233,7 @@ class Resample(Step):
     every_s: float = 0.0
     do: Literal["resample"] = "resample"
 
-    def check(self) -> None:
-        """Reject intervals without length, and a selection of channels: a recording has one clock."""
+    def __post_init__(self) -> None:
         if self.channels or not self.every_s > 0:
             raise self._refuse("give the interval of all rows, such as every_s = 60.0, and no channels")
 

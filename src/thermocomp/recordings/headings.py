@@ -8,7 +8,7 @@ from functools import lru_cache
 
 from thermocomp.core.exceptions import UnitError
 from thermocomp.core.units import SPELLINGS, Unit, find_unit, is_unit
-from thermocomp.recordings.words import split_words
+from thermocomp.recordings.words import read_words
 
 # Units allowed after the last underscore. Not m, in, Hz, 1: coolant_in, mains_Hz, t_1 have other meanings.
 SUFFIXES = {
@@ -26,12 +26,7 @@ _BEHIND = re.compile(
     r"|(?P<base2>.*\S)\s+(?:/|in)\s+(?P<unit2>K|s|ms|min|h)"
 )
 #: units of quantities that are not used; they are not typing errors
-_OTHERS = split_words(
-    "%, °, deg, grad, rad, rev, v, mv, vdc, vac, a, ma, adc, aac, w, kw, va, wh, kwh, n, kn, nm, ncm, bar",
-    "mbar, pa, kpa, mpa, hpa, psi, l/min, l/h, m3/h, ml/min, gpm, kg, g, mg, ohm, ω, kohm, kω, mm/s, m/s",
-    "mm/rev, g/m3, db, dba, khz, mhz, %rh, %rf, % rh, % rf, bit, inc, counts, digits, w/m2, j, kj, var",
-    "cos phi, ppm, 1/k, um/s, rad/s",
-)
+_OTHERS = frozenset(read_words("foreign_units"))
 # In brackets all units except those that would make a frequency a spindle speed, or a plain number a channel.
 _NOT_IN_BRACKETS = ("", "1")
 _FREQUENCIES = ("Hz", "1/s")
@@ -55,16 +50,7 @@ _DIFFERENCE = re.compile(
     r"Δ.*|.*\b(?:delta|diff\w*|rise|dT\d*|d[Tt]emp\w*)\b.*|.*(?:erwärmung|übertemp|temperaturdiff|-änderung).*", re.I
 )
 #: headings of a time column, without their unit, in several languages
-_TIMES = split_words(
-    "time, timestamp, date, datetime, date_time, t, elapsed, zeit, zeitstempel, messzeit, laufzeit, temps",
-    "horodatage, tempo, tiempo, timestamps, time stamp, date time, elapsed time, date/time, datum/uhrzeit",
-    "datum/zeit, datum uhrzeit, datum und uhrzeit, date/heure, fecha/hora, data/ora, date and time",
-    "date & time, date&time, datumzeit, datum_uhrzeit, datetime64, _time, zeitpunkt, time (utc), utc",
-    "utc time, local time, run time, test time, epoch, unix time, unix, dauer, duration, durée, durata",
-    "duración, czas, čas, tijd, tid, time of measurement, dattim, date time stamp, datum, fecha, data, tag",
-    "day, messzeitpunkt, abs. time, rel. time, absolute time, relative time, relativzeit, absolutzeit",
-    "uhrzeit, clock, time of day, x_value",
-)
+_TIMES = frozenset(read_words("times"))
 #: letters of a date or time in a heading, such as hh:mm:ss and TT.MM.JJJJ
 _FORMAT = re.compile(r"(?i)[dtgmyjahsf]{1,4}(?:[^a-zäöü]+[dtgmyjahsfp]{1,4})+")
 

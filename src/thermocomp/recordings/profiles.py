@@ -1,10 +1,10 @@
 """`Profiles`: the error of one component along its axis, measured in several thermal states."""
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Literal, cast
 
 import numpy as np
 
@@ -15,8 +15,68 @@ from thermocomp.recordings.recording import Recording
 
 #: measured quantity, by the unit of the error
 QUANTITY = {"um": "displacement", "urad": "angle"}
+#: a position as coordinates by axis, such as {"Y": 250.0} [mm]
+Place = Mapping[str, float]
 #: minimum number of positions of a profile
 MIN_POSITIONS = 3
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProfileOptions:
+    """Definition of the contents of a table of profiles.
+
+    Parameters
+    ----------
+    target : str
+        Code of the component, such as ``EYY``, or any other name.
+    axis : str
+        Axis of the profiles; empty: the axis of the component.
+    unit : str
+        um or urad; empty: the unit of the component.
+    columns : str
+        Wide: names of the columns, with ``*`` in place of the position in mm, such as ``y_laser_*``. Long: the column
+        of the error. Empty: columns named after the component, such as ``EYY_250_um`` (see
+        `thermocomp.recordings.readers.codecolumns`); if there are none, found by unit and position in the name.
+    places : mapping of str to Place
+        Wide: position of each column by its name, instead of `columns`; see
+        `thermocomp.recordings.readers.profiles.read_places`.
+    position : str
+        Long: column of the position of the axis; empty: ``position_mm``, or the axis column, such as ``y_mm``.
+    state : str
+        Long: column with the state of each row; empty: the column named state or profile, else the time, else a new
+        state starts where a position recurs.
+    """
+
+    target: str
+    axis: str = ""
+    unit: str = ""
+    columns: str = ""
+    places: Mapping[str, Place] | None = None
+    position: str = ""
+    state: str = ""
+
+    @property
+    def about(self) -> tuple[str, Literal["um", "urad"]]:
+        """Axis and unit of the profiles.
+
+        Raises
+        ------
+        InputError
+            Axis or unit is neither given nor defined by the component.
+        """
+        component = BY_CODE.get(self.target)
+        axis = self.axis or (component.depends_on if component else "") or ""
+        unit = self.unit or (component.unit if component else "")
+        if not axis:
+            hint = (
+                f"{component.description} does not depend on a position"
+                if component
+                else "it is not the code of a component"
+            )
+            raise InputError(f"{self.target}: {hint}; name a component such as EYY, or specify the axis")
+        if unit not in QUANTITY:
+            raise InputError(f"{self.target}: unit {unit!r}: state whether it is in um or urad")
+        return axis, cast(Literal["um", "urad"], unit)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,6 +1,21 @@
-"""Sets of words in a compact, readable notation."""
+"""Words of loggers and spreadsheets in several languages, from ``vocabulary.toml``."""
+
+import re
+import tomllib
+from pathlib import Path
+
+_VOCABULARY = tomllib.loads(Path(__file__).with_name("vocabulary.toml").read_text(encoding="utf-8"))
 
 
-def split_words(*lines: str) -> frozenset[str]:
-    """Return the words of comma-separated lines."""
-    return frozenset(word for line in lines for word in line.split(", "))
+def read_words(key: str) -> tuple[str, ...]:
+    """Return the words of an entry of the vocabulary, in its order."""
+    return _split(_VOCABULARY[key])
+
+
+def read_word_groups(key: str) -> tuple[tuple[str, ...], ...]:
+    """Return the groups of words of an entry of the vocabulary, in its order."""
+    return tuple(map(_split, _VOCABULARY[key]))
+
+
+def _split(text: str) -> tuple[str, ...]:
+    return tuple(re.split(r",\s+", text.strip()))

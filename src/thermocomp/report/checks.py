@@ -7,12 +7,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.machine import Channel
 from thermocomp.recordings.checks.findings import Finding
 from thermocomp.recordings.recording import Recording
 from thermocomp.report import records
-from thermocomp.report.drawing import add_legend, drawing, svg
-from thermocomp.report.figures import COLOURS, POINTS, SHADE, FloatArray, thin_points
+from thermocomp.report.drawing import BESIDE, add_legend, drawing, svg
+from thermocomp.report.figures import POINTS, line_style, shade_cycles, thin_points
 from thermocomp.report.html import page
 from thermocomp.report.layout import Column, Layout
 
@@ -91,9 +92,7 @@ def _panel(
 ) -> None:
     """Draw the channels of one quantity with their findings."""
     hours = recording.time / 3600
-    for k, cycle in enumerate(recording.cycles):
-        if k % 2 == 0:
-            ax.axvspan(float(hours[cycle.start]), float(hours[cycle.stop - 1]), color=SHADE, lw=0, zorder=0)
+    shade_cycles(ax, recording)
     low, high = _limits(recording, channels, numbers)
     ax.set_ylim(low, high)
     # channels with a finding are named first
@@ -104,9 +103,7 @@ def _panel(
     labels: dict[float, list[tuple[int, Finding]]] = {}
     for k, c in enumerate(ordered):
         values = np.clip(recording.table[c.name].to_numpy(dtype=np.float64), -1e30, 1e30)
-        style = ("-", "--", ":", "-.")[k // len(COLOURS) % 4]
-        colour = COLOURS[k % len(COLOURS)]
-        ax.plot(*thin_points(hours, values), style, color=colour, lw=1.0, zorder=3, label=names[k])
+        ax.plot(*thin_points(hours, values), **line_style(k), lw=1.0, zorder=3, label=names[k])
         for number, f in numbers.get(c.name, ()):
             _mark(ax, hours, np.clip(values, low, high), f, "--")
             if (row := _first(f)) is not None:
@@ -119,7 +116,7 @@ def _panel(
         _label(ax, hour, mine)
     ax.set_ylabel(channels[0].unit)
     ax.set_title(quantity.replace("_", " "))
-    add_legend(ax, loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7, handlelength=1.4)
+    add_legend(ax, **BESIDE, fontsize=7, handlelength=1.4)
 
 
 def _limits(

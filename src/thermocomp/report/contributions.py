@@ -5,12 +5,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.contributions import contributions, gains
 from thermocomp.core.paceddynamic import PacedDynamic
 from thermocomp.core.shown import shorten
 from thermocomp.recordings.samples import Samples, usual_step
-from thermocomp.report.drawing import Drawn, add_legend, drawing, svg
-from thermocomp.report.figures import COLOURS, LONGEST, MEASURED, NONE, FloatArray, thin_points
+from thermocomp.report.drawing import BESIDE, Drawn, add_legend, drawing, svg
+from thermocomp.report.figures import COLOURS, LONGEST, MEASURED, NONE, thin_points
 from thermocomp.report.layout import Column, Layout
 
 #: maximum number of inputs drawn separately; the others are summed
@@ -68,7 +69,7 @@ def _draw(model: PacedDynamic, samples: Samples) -> Drawn:
         ax.set_ylabel(f"{shorten(model.target.removesuffix('_um'), LONGEST)} [{model.unit}]")
         ax.set_xlabel("time [h]")
         ax.margins(x=0)
-        add_legend(ax, loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7, handlelength=1.4)
+        add_legend(ax, **BESIDE, fontsize=7, handlelength=1.4)
         return svg(figure)
 
 

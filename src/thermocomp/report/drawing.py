@@ -46,6 +46,10 @@ _STYLE = {
 }
 
 
+#: place of a legend on the right of its panel
+BESIDE: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
+
+
 class Drawn(str):
     """A figure as SVG text, with the figure itself as an attribute."""
 

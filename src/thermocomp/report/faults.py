@@ -8,13 +8,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.correction import Limits
 from thermocomp.core.shown import shorten
 from thermocomp.judging.assessing import Judged
 from thermocomp.judging.faultlog import Cost, Fault, FaultLog, find_costs, find_faults
 from thermocomp.recordings.recording import Recording
 from thermocomp.report.drawing import Drawn, add_legend, drawing, name_ticks, svg
-from thermocomp.report.figures import LETTERS, LONGEST, MEASURED, POINTS, PREDICTED, SHADE, FloatArray
+from thermocomp.report.figures import LETTERS, LONGEST, MEASURED, POINTS, PREDICTED, SHADE
 from thermocomp.report.layout import Column, Layout
 from thermocomp.report.sections import Section, Shown
 

@@ -1,18 +1,17 @@
 """Figures of the report as SVG text. Each docstring states the purpose of the figure."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.shown import shorten
 from thermocomp.judging.results import Assessment, Comparison
 from thermocomp.recordings.recording import Recording
-from thermocomp.report.drawing import Drawn, add_legend, drawing, log_ticks, name_ticks, svg
-
-FloatArray = NDArray[np.float64]
+from thermocomp.report.drawing import BESIDE, Drawn, add_legend, drawing, log_ticks, name_ticks, svg
 
 #: colour-blind safe palette (Okabe, Ito 2008)
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -37,7 +36,7 @@ def measured(recording: Recording) -> Drawn:
         figure = Figure(figsize=(9.6, 1.0 + 1.15 * sum(heights)), layout="constrained")
         axes: list[Axes] = list(np.atleast_1d(figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)))
         for ax in axes:
-            _shade_cycles(ax, recording)
+            shade_cycles(ax, recording)
         rest = list(axes)
         if speed is not None:
             ax = rest.pop(0)
@@ -56,22 +55,13 @@ def measured(recording: Recording) -> Drawn:
             (rest[1], recording.displacements, "um", "displacements: what a part would be wrong by"),
         ):
             for k, c in enumerate(channels):
-                colour = COLOURS[k % len(COLOURS)]
-                style = ("-", "--", ":", "-.")[k // len(COLOURS) % 4]
-                ax.plot(
-                    *thin_points(hours, recording.table[c.name].to_numpy()),
-                    style,
-                    color=colour,
-                    label=c.name,
-                )
+                ax.plot(*thin_points(hours, recording.table[c.name].to_numpy()), **line_style(k), label=c.name)
             ax.set_ylabel(unit)
             ax.set_title(title)
             if channels:
                 short = max(len(c.name) for c in channels) < 8
                 columns = 2 if short and len(channels) > 8 else 1
-                add_legend(
-                    ax, loc="center left", bbox_to_anchor=(1.0, 0.5), ncols=columns, fontsize=7, handlelength=1.4
-                )
+                add_legend(ax, **BESIDE, ncols=columns, fontsize=7, handlelength=1.4)
         rest[-1].set_xlabel("time [h]")
         rest[-1].margins(x=0)
         return svg(figure)
@@ -202,7 +192,7 @@ def robustness(comparison: Comparison, model: str) -> Drawn:
         name_ticks(ax.yaxis, [a.target for a in found])
         ax.set_ylim(len(found) - 0.5, -0.5)
         ax.set_xlabel(f"{model}: RMS of the residual where it was judged [um]")
-        add_legend(ax, loc="center left", bbox_to_anchor=(1.0, 0.5))
+        add_legend(ax, **BESIDE)
         return svg(figure)
 
 
@@ -214,7 +204,16 @@ def clock(block: Assessment, time: Sequence[FloatArray]) -> FloatArray:
     return np.asarray((seconds - seconds[0]) / 3600)
 
 
-def _shade_cycles(ax: Axes, recording: Recording) -> None:
+def line_style(number: int) -> dict[str, Any]:
+    """Return colour and dashes of one of many curves, by its number from 0."""
+    return {
+        "color": COLOURS[number % len(COLOURS)],
+        "linestyle": ("-", "--", ":", "-.")[number // len(COLOURS) % 4],
+    }
+
+
+def shade_cycles(ax: Axes, recording: Recording) -> None:
+    """Shade every second thermal cycle."""
     hours = recording.time / 3600
     for k, cycle in enumerate(recording.cycles):
         if k % 2 == 0:

@@ -35,7 +35,7 @@ def recording(r: Recording, found: Sequence[Finding]) -> dict[str, Any]:
         "hours": float(r.time[-1] - r.time[0]) / 3600,
         "sampling_interval_s": r.sampling_interval,
         "channels": [_channel(r, c) for c in r.channels],
-        "cycles": [{"name": c.name, "start": c.start, "stop": c.stop} for c in r.cycles],
+        "cycles": [asdict(c) for c in r.cycles],
         "notes": list(r.notes),
         "worst": found[0].severity if found else None,
         "findings": [
@@ -74,15 +74,7 @@ def _channel(r: Recording, c: Channel) -> dict[str, Any]:
     values = r.table[c.name].to_numpy(dtype=np.float64)
     finite = values[np.isfinite(values)]
     low, high = (float(finite.min()), float(finite.max())) if finite.size else (None, None)
-    return {
-        "name": c.name,
-        "quantity": c.quantity,
-        "unit": c.unit,
-        "place": c.place,
-        "smallest": low,
-        "largest": high,
-        "missing": len(values) - finite.size,
-    }
+    return {**asdict(c), "smallest": low, "largest": high, "missing": len(values) - finite.size}
 
 
 def stretches(rows: Sequence[int] | np.ndarray[Any, Any]) -> list[list[int]]:

@@ -10,7 +10,7 @@ from matplotlib.ticker import MaxNLocator
 from thermocomp.core.shown import shorten
 from thermocomp.judging.budget import Budget
 from thermocomp.judging.choice import Choice, Table
-from thermocomp.report.drawing import Drawn, add_legend, drawing, log_ticks, name_ticks, svg
+from thermocomp.report.drawing import BESIDE, Drawn, add_legend, drawing, log_ticks, name_ticks, svg
 from thermocomp.report.figures import COLOURS, LONGEST, NONE
 
 #: maximum length of the displacement names above a figure [characters]
@@ -143,7 +143,7 @@ def budget(b: Budget) -> Drawn:
         title = names_of if len(names_of) <= TITLE or len(b.targets) == 1 else f"{len(b.targets)} displacements"
         title = f"{shorten(title, TITLE)}: error against the number of temperature sensors"
         figure.suptitle(title, x=0.01, ha="left", fontsize=9.5, fontweight="bold")
-        add_legend(errors, loc="center left", bbox_to_anchor=(1.0, 0.5))
+        add_legend(errors, **BESIDE)
         finite = np.isfinite(b.condition)
         repeats.plot(sizes[finite], b.condition[finite], "-s", color="#444", ms=4)
         log_ticks(repeats, "y", dense=0.35)
@@ -163,7 +163,7 @@ def budget(b: Budget) -> Drawn:
             ms=6,
             label="without any one block (lighter: some)",
         )
-        add_legend(chosen, loc="center left", bbox_to_anchor=(1.0, 0.5))
+        add_legend(chosen, **BESIDE)
         chosen.set_xlabel("number of temperature sensors")
         chosen.set_xticks(sizes, names)
         return svg(figure)

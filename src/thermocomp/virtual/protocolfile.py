@@ -6,11 +6,11 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
-from pydantic import ConfigDict, TypeAdapter, ValidationError, with_config
-from pydantic_core import ErrorDetails
+from pydantic import ValidationError
 
 from thermocomp.core.exceptions import InputError, SettingError, UnitError, explain_unknown
 from thermocomp.core.units import read_with_unit
+from thermocomp.files.plaintext import find_keys, strict_adapter
 from thermocomp.files.tomlfile import as_json, read_toml
 from thermocomp.virtual.climate import CLIMATES, Climate
 from thermocomp.virtual.instruments import Touch
@@ -20,7 +20,7 @@ from thermocomp.virtual.segments import Path as Keys
 from thermocomp.virtual.sensors import SensorFault
 
 #: validator of external protocols
-ADAPTER = TypeAdapter(with_config(ConfigDict(strict=True, extra="forbid", allow_inf_nan=False))(Experiment))
+ADAPTER = strict_adapter(Experiment)
 
 #: keys of durations, which are written with a unit
 TIMES = ("sampling", "duration", "every", "start", "end", "memory", "begin")
@@ -157,12 +157,12 @@ def _seconds(value: Any, path: Keys) -> Any:
 def _explain(failure: ValidationError, given: Mapping[str, Any]) -> tuple[Keys, str]:
     """Return location and remedy of pydantic's first error; for a union, of the nearest type."""
     errors = failure.errors()
-    first = _keys(errors[0], given)
+    first = find_keys(errors[0]["loc"], given)
     error = max(
-        (e for e in errors if _keys(e, given)[: len(first)] == first),
-        key=lambda e: (len(_keys(e, given)), e["type"] == "value_error"),
+        (e for e in errors if find_keys(e["loc"], given)[: len(first)] == first),
+        key=lambda e: (len(find_keys(e["loc"], given)), e["type"] == "value_error"),
     )
-    keys, cause = _keys(error, given), error.get("ctx", {}).get("error")
+    keys, cause = find_keys(error["loc"], given), error.get("ctx", {}).get("error")
     if isinstance(cause, SettingError):
         return (*keys, *cause.path), str(cause)
     if error["type"] == "unexpected_keyword_argument":
@@ -171,18 +171,6 @@ def _explain(failure: ValidationError, given: Mapping[str, Any]) -> tuple[Keys, 
     if error["type"] == "missing" and isinstance(error["loc"][-1], str):
         return (*keys, error["loc"][-1]), "is missing"
     return keys, _PLAIN.get(error["type"], error["msg"])
-
-
-def _keys(error: ErrorDetails, given: Any) -> Keys:
-    """Return the keys and list positions of an error that occur in the file, without the types tried by pydantic."""
-    keys = []
-    for key in error["loc"]:
-        try:
-            given = given[key]
-        except (KeyError, IndexError, TypeError):
-            continue
-        keys.append(key)
-    return tuple(keys)
 
 
 def _where(keys: Keys, content: Mapping[str, Any]) -> str:

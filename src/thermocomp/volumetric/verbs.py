@@ -17,7 +17,7 @@ from thermocomp.core.position import PositionModel
 from thermocomp.files import positionfile
 from thermocomp.files.machines import read_machine
 from thermocomp.models.methods import find_method
-from thermocomp.recordings.profiles import Profiles
+from thermocomp.recordings.profiles import ProfileOptions, Profiles
 from thermocomp.recordings.readers import mapping as mappings
 from thermocomp.recordings.readers import profiles as tables
 from thermocomp.recordings.readers.mapping import Mapping
@@ -308,5 +308,5 @@ def _read(paths: Sequence[Path], components: Sequence[str], s: PositionSettings)
         wanted = [] if ALL in components else list(dict.fromkeys(components))
         return list(tables.read_components(paths, wanted, given).values())
     places = tables.read_places(s.positions) if s.positions is not None else None
-    options = tables.ProfileOptions(target=components[0], columns=s.columns, places=places)
+    options = ProfileOptions(target=components[0], columns=s.columns, places=places)
     return [tuple(tables.read(path, options, given, layout=s.layout) for path in paths)]

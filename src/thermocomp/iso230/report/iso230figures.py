@@ -7,17 +7,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
-from numpy.typing import NDArray
 
 from thermocomp.iso230.part2 import PositioningResult
 from thermocomp.iso230.thermaltest import HOUR, ThermalCurve, ThermalTest
 from thermocomp.judging.settling.settling import Settling
-from thermocomp.report.drawing import add_legend, drawing, name_ticks, svg
-from thermocomp.report.figures import COLOURS, MEASURED, NONE, PREDICTED, RESIDUAL, SHADE, thin_points
+from thermocomp.report.drawing import BESIDE, add_legend, drawing, name_ticks, svg
+from thermocomp.report.figures import COLOURS, MEASURED, NONE, PREDICTED, RESIDUAL, SHADE, line_style, thin_points
 
-FloatArray = NDArray[np.float64]
-
-_BESIDE = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5), "fontsize": 7, "handlelength": 1.6}
+_BESIDE = {**BESIDE, "fontsize": 7, "handlelength": 1.6}
 #: maximum number of temperatures drawn with names
 _NAMED = 24
 
@@ -96,14 +93,7 @@ def _temperatures(ax: Axes, test: ThermalTest) -> None:
     channels = test.recording.temperatures
     others = [c for c in channels if c != test.ambient]
     for k, c in enumerate(others):
-        style = ("-", "--", ":", "-.")[k // len(COLOURS) % 4]
-        ax.plot(
-            *thin_points(hours, table[c.name].to_numpy()[rows]),
-            style,
-            color=COLOURS[k % len(COLOURS)],
-            lw=0.9,
-            label=c.name,
-        )
+        ax.plot(*thin_points(hours, table[c.name].to_numpy()[rows]), **line_style(k), lw=0.9, label=c.name)
     if test.ambient is not None:
         values = table[test.ambient.name].to_numpy()[rows]
         ax.plot(*thin_points(hours, values), color="black", lw=2.2, label=f"{test.ambient.name}: surroundings")

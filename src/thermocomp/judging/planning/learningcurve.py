@@ -6,20 +6,15 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray
 from thermocomp.core.exceptions import FitError
-from thermocomp.judging.budget import SHARE, WORTH
+from thermocomp.judging.budget import SHARE, WORTH, unseen_rms
 from thermocomp.judging.choice import Progress
 from thermocomp.judging.metrics import rms
 from thermocomp.judging.pieces import work_through
-from thermocomp.judging.replay import replay_compensated
 from thermocomp.judging.splits import Judging
-from thermocomp.models.training import train
 from thermocomp.recordings.samples import Samples
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 #: random draws of training cycles, for each number and each unseen cycle
 DRAWS = 2
@@ -119,7 +114,6 @@ def learning_curve(
     model: str = "averaged",
     *,
     jobs: int = 1,
-    seed: int = 0,
     progress: Progress = lambda _, steps=1: None,  # noqa: ARG005
 ) -> LearningCurve:
     """Train on some cycles and judge on others: for each unseen cycle, train on 1, 2, ... of the remaining ones.
@@ -133,8 +127,6 @@ def learning_curve(
         Name of the method.
     jobs : int
         Number of parallel processes; -1: one per core.
-    seed : int
-        Seed of the random draws.
     progress : callable
         Called with a line of text after each task; there are `n_pieces` of them.
 
@@ -150,7 +142,7 @@ def learning_curve(
     blocks = [split.judge for split in judging.splits]
     if len(blocks) < 3:
         raise FitError(f"a learning curve needs at least three thermal cycles or files; there are {len(blocks)}")
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     pieces: list[tuple[int, list[int]]] = []
     for unseen in range(len(blocks)):
         others = np.delete(np.arange(len(blocks)), unseen)
@@ -160,7 +152,7 @@ def learning_curve(
     points = []
     work = partial(_judged, samples, blocks, model)
     errors: list[str] = []
-    for (unseen, own), found in zip(pieces, work_through(work, pieces, _why, jobs=jobs), strict=True):
+    for (unseen, own), found in zip(pieces, work_through(work, pieces, jobs=jobs), strict=True):
         progress(f"{model} from {len(own)} cycle(s)")
         errors += [found] if isinstance(found, str) else []
         speeds = _n_speeds(samples, np.any([blocks[k] for k in own], axis=0))
@@ -181,19 +173,10 @@ def _sizes(blocks: int) -> list[int]:
     return sorted({round(x) for x in np.linspace(1, blocks - 1, min(MOST_SIZES, blocks - 1))})
 
 
-def _judged(samples: Samples, blocks: Sequence[BoolArray], model: str, piece: tuple[int, list[int]]) -> float:
+def _judged(samples: Samples, blocks: Sequence[BoolArray], model: str, piece: tuple[int, list[int]]) -> float | str:
     unseen, own = piece
     learn = np.any([blocks[k] for k in own], axis=0)
-    left = []
-    for target in range(len(samples.targets)):
-        rows = blocks[unseen] & np.isfinite(samples.deviations[:, target])
-        frozen = train(model, samples, target, learn, joint=False).model
-        left.append(rms(samples.deviations[rows, target], replay_compensated(frozen, samples, rows).compensated))
-    return float(np.mean(left))
-
-
-def _why(_: tuple[int, list[int]], why: str) -> float | str:
-    return why
+    return float(np.mean(unseen_rms(samples, model, learn, blocks[unseen])))
 
 
 def _none(samples: Samples, rows: BoolArray) -> float:

@@ -5,16 +5,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.exceptions import InputError
 from thermocomp.judging.planning.trial import Kind, Trial
 from thermocomp.models.doubt import Doubt, find_doubt
 from thermocomp.recordings.recording import AMBIENT
 from thermocomp.recordings.samples import Samples
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 #: fractions of the top speed in the grid
 SPEEDS = (0.2, 0.4, 0.6, 0.8, 1.0)

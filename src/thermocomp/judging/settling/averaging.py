@@ -10,11 +10,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 from scipy.stats import t as student
 
-FloatArray = NDArray[np.float64]
+from thermocomp.core.arrays import FloatArray
 
 #: averaging time [s]
 WINDOW = 600.0
@@ -52,7 +51,7 @@ class Noise:
     inflation: float
     resolution: float
     window: float
-    moves: bool
+    moves: bool = False
 
     def of_mean(self, rows: FloatArray | float) -> FloatArray:
         """Return the standard uncertainty of means over a number of rows [unit of the curve]."""
@@ -168,7 +167,7 @@ def noise_of(time: FloatArray, values: FloatArray, stop: int | None = None) -> N
     there = np.isfinite(values)
     t, y = time[there], values[there]
     if len(y) < 3:
-        return Noise(sigma=float("nan"), inflation=1.0, resolution=0.0, window=WINDOW, moves=False)
+        return Noise(sigma=float("nan"), inflation=1.0, resolution=0.0, window=WINDOW)
     sigma, window = scatter(y), window_of(float(t[-1] - t[0]))
     steps = np.diff(np.unique(y))
     # rounding errors of the arithmetic are not a resolution
@@ -186,7 +185,6 @@ def noise_of(time: FloatArray, values: FloatArray, stop: int | None = None) -> N
         inflation=float(max(1.0, own / white)) if white > 0 else 1.0,
         resolution=resolution,
         window=window,
-        moves=False,
     )
     white = max(white, float(noise.of_mean(np.inf)))
     return replace(noise, moves=_moves(means, white, len(y), own))

@@ -5,12 +5,10 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.models.numerics.leastsquares import effective_sample_size
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -12,14 +12,11 @@ from itertools import pairwise
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.judging.settling.averaging import WINDOW, AveragedCurve, K, Noise, average_test
 from thermocomp.judging.settling.exponentials import ExponentialFit, fit
 from thermocomp.recordings.recording import Recording
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 Kind = Literal["warm-up", "cool-down"]
 #: shorter stops (a spindle test with a speed spectrum has some) do not end a warm-up, shorter runs do not start one [s]

@@ -12,15 +12,13 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import InputError
 from thermocomp.judging.settling.settling import Phase, find_phases
 from thermocomp.models.numerics.leastsquares import effective_sample_size
 from thermocomp.recordings.cycles import SPLITS
 from thermocomp.recordings.recording import Recording
-
-FloatArray = NDArray[np.float64]
 
 #: expanded uncertainty of the steady state at which a phase may end: this fraction of the largest change ...
 SHARE = 0.1

@@ -14,15 +14,18 @@ from thermocomp.recordings.readers.dateorder import IntArray
 from thermocomp.recordings.readers.numbers import is_filler
 from thermocomp.recordings.readers.stamps import parse, read_days
 from thermocomp.recordings.readers.tables import FileTable
+from thermocomp.recordings.words import read_word_groups
 
 #: maximum number of numeric columns examined
 _MOST = 100
 _DAY = 86_400
 #: factors for digits after yyyymmdd: none, hh, hhmm, hhmmss, milliseconds
 _BEHIND = (1, 10**2, 10**4, 10**6, 10**9)
-#: seconds since 1970 in the years 2000 to 2100, in fractions of a second; spreadsheet day numbers of the same years
-_EPOCH, _PARTS = (946_684_800, 2_240_611_200), (1, 10**3, 10**6, 10**9)
-_SERIAL = (36_526, 73_050)
+#: seconds since 1970 in the years 2000 to 2100, in whole or fractional seconds
+EPOCH = (946_684_800, 2_240_611_200)
+PARTS = {1: "seconds", 10**3: "milliseconds", 10**6: "microseconds", 10**9: "nanoseconds"}
+#: spreadsheet day numbers (days since 1899-12-30) of the same years
+SERIAL = (36_526, 73_050)
 #: Julian days of the same years
 _JULIAN = (2_451_544, 2_488_070)
 #: headings of a date or a day, under which numbers in other forms may also be dates
@@ -44,23 +47,12 @@ _WITHIN = (
 )
 #: headings that name a day in one language and have another meaning in others
 _NO_DAY = ("tag", "data", "stamp", "stempel", "dag", "dat")
-_DAYS = (
-    *("monday tuesday wednesday thursday friday saturday sunday", "mon tue wed thu fri sat sun"),
-    *("montag dienstag mittwoch donnerstag freitag samstag sonntag", "mo di mi do fr sa so"),
-    *("lunedì martedì mercoledì giovedì venerdì sabato domenica", "lun mar mer gio ven sab dom"),
-    *("lunes martes miércoles jueves viernes sábado domingo", "lun mar mié jue vie sáb dom"),
-    *("maandag dinsdag woensdag donderdag vrijdag zaterdag zondag", "ma di wo do vr za zo"),
-    *("segunda terça quarta quinta sexta sábado domingo", "seg ter qua qui sex sáb dom"),
-    *("poniedziałek wtorek środa czwartek piątek sobota niedziela", "pon wt śr czw pt sob ndz"),
-    *("pondělí úterý středa čtvrtek pátek sobota neděle", "po út st čt pá so ne"),
-    *("måndag tisdag onsdag torsdag fredag lördag söndag", "mån tis ons tors fre lör sön"),
-    *("lundi mardi mercredi jeudi vendredi samedi dimanche", "lun mar mer jeu ven sam dim"),
-)
+_DAYS = read_word_groups("weekdays")
 
 
 #: a number that is not a date, unless the heading names one
 _SMALL = re.compile(r"[-+]?\d{1,7}(?:[.,]\d+)?")
-_WEEKDAYS = frozenset(day for names in _DAYS for day in names.split())
+_WEEKDAYS = frozenset(day for names in _DAYS for day in names)
 
 
 def find_day_columns(table: FileTable, columns: Sequence[int], *, beside_clock: bool = False) -> list[int]:
@@ -162,10 +154,10 @@ def _read_numbers(numbers: FloatArray, *, named: bool) -> list[IntArray]:
         if named and rises and high <= 366:
             found.append(whole)
     if rises and not found:
-        for parts in _PARTS:
-            if _EPOCH[0] * parts <= low and high < _EPOCH[1] * parts:
+        for parts in PARTS:
+            if EPOCH[0] * parts <= low and high < EPOCH[1] * parts:
                 found.append((numbers // (parts * _DAY)).astype(np.int64))
-    for begin, end in (_SERIAL, _JULIAN):
+    for begin, end in (SERIAL, _JULIAN):
         if named and rises and begin <= low and high < end:
             found.append(np.floor(numbers).astype(np.int64))
     return found
@@ -217,7 +209,7 @@ def _are_parts(texts: "pd.Series[str]") -> bool:
 
 def _read_weekdays(texts: "pd.Series[str]") -> list[IntArray]:
     words = texts.str.casefold().str.rstrip(".")
-    fitting = (names for names in map(str.split, _DAYS) if words.isin(names).all())
+    fitting = (names for names in _DAYS if words.isin(names).all())
     return [_unwrap(words.map(names.index).to_numpy(dtype=np.int64), 7) for names in fitting]
 
 

@@ -10,17 +10,12 @@ import pandas as pd
 from thermocomp.core.exceptions import RecordingError, Remedy, TwoReadingsError
 from thermocomp.recordings.readers.numbers import is_number_like
 from thermocomp.recordings.readers.tables import FileTable, skip_row
+from thermocomp.recordings.words import read_word_groups
 
 #: words for the two halves of a day, in lower case without points and blanks: first the unambiguous ones
-_CERTAIN = (
-    ("am", "vorm", "vormittag", "vormittags", "πμ", "上午", "午前", "오전"),
-    ("pm", "nachm", "nachmittag", "nachmittags", "μμ", "下午", "午後", "오후"),
-)
+_CERTAIN = read_word_groups("halves")
 #: then those that also denote shifts; then single letters
-_MAYBE = (
-    ("früh", "morgens", "matin", "mattina", "mañana", "manhã", "dop", "morning"),
-    ("abends", "après-midi", "soir", "pomeriggio", "tarde", "odp", "afternoon"),
-)
+_MAYBE = read_word_groups("shifts")
 _LETTERS = (("a",), ("p",))
 _BEFORE, _AFTER = ({*c, *m, *x} for c, m, x in zip(_CERTAIN, _MAYBE, _LETTERS, strict=True))
 _HEADING = re.compile(

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from thermocomp.core.units import is_unit
 from thermocomp.recordings.headings import BRACKETS, find_date_order, is_foreign_unit, is_time_name, is_understood
 from thermocomp.recordings.readers.numbers import is_filler, is_number_like
-from thermocomp.recordings.words import split_words
+from thermocomp.recordings.words import read_words
 
 #: dates and times of day, in all usual forms
 _TIME = re.compile(
@@ -22,21 +22,13 @@ _LONGEST = 60
 #: minimum fraction of the numeric columns with a value in a row of the table
 _ROW = 0.5
 #: words that denote no unit in a row of units, in lower case: for numbers without unit, and in the first cell
-_NO_UNIT = {""} | split_words(
-    "-, --, ---, 1, n/a, na, none, unitless, ohne, rn, no, nr, #, count, index, unit, units, einheit",
-    "einheiten, unité, unités, unità, unidad, unidades, eenheid, jednotka, jednostka, enhet, enhed, 单位, 単位",
-)
+_NO_UNIT = frozenset(("", *read_words("no_unit")))
 #: maximum number of text rows between the headings and the first row of numbers
 _MOST_BETWEEN = 12
 #: maximum number of rows at the end of a file that are not part of the table
 MOST_REMARKS = 40
 #: labels of rows of statistics, in lower case
-_STATISTICS = split_words(
-    "min, max, avg, mean, std, stdev, std dev, sum, total, count, range, median, rms, minimum, maximum",
-    "average, standard deviation, mittel, mittelwert, durchschnitt, summe, anzahl, spannweite",
-    "standardabweichung, stabw, moyenne, somme, media, promedio, max-min, average value, minwert, maxwert",
-    "minimalwert, maximalwert, ø, sigma, peak-peak, delta",
-)
+_STATISTICS = frozenset(read_words("statistics"))
 
 
 class FileLayout(NamedTuple):

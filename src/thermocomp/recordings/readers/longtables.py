@@ -1,14 +1,14 @@
 """Error profiles from long tables: one row per position."""
 
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from thermocomp.core.arrays import FloatArray, IntArray
 from thermocomp.core.exceptions import InputError, RecordingError, UnitError
-from thermocomp.recordings.profiles import QUANTITY, Profiles
+from thermocomp.recordings.profiles import QUANTITY, ProfileOptions, Profiles
 from thermocomp.recordings.readers.mapping import Mapping
 from thermocomp.recordings.readers.recordings import make_recording, read_rows
 from thermocomp.recordings.rows import Rows
@@ -19,17 +19,7 @@ _POSITIONS = ("position_mm", "pos_mm")
 _STATES = ("state", "State", "profile", "Profile")
 
 
-def read_long(
-    path: str | Path,
-    mapping: Mapping | None,
-    target: str,
-    unit: Literal["um", "urad"],
-    axis: str,
-    *,
-    error: str = "",
-    position: str = "",
-    state: str = "",
-) -> Profiles:
+def read_long(path: str | Path, mapping: Mapping | None, options: ProfileOptions) -> Profiles:
     """Read profiles from a table with one row per position.
 
     Parameters
@@ -37,17 +27,8 @@ def read_long(
     path : str or Path
     mapping : Mapping or None
         Roles and units of columns whose headings do not give them.
-    target : str
-        Code of the component.
-    unit : {'um', 'urad'}
-    axis : {'X', 'Y', 'Z'}
-    error : str
-        Column of the error; empty: the only one of its quantity.
-    position : str
-        Column of the position of the axis; empty: ``position_mm``, or the axis column, such as ``y_mm``.
-    state : str
-        Column with the state of each row; empty: the column named state or profile, else the time, else a new state
-        starts where a position recurs.
+    options : ProfileOptions
+        Contents of the table; without a column of the error: the only one of its quantity.
 
     Returns
     -------
@@ -59,10 +40,11 @@ def read_long(
     RecordingError
         A column does not exist, or rows are not in order; the message names the line.
     """
-    rows = read_rows(path, mapping, rising=False, extra=(state,) if state else _STATES)
-    owner = f"{rows.source}: {target}"
-    column = _error_column(rows, error, unit, owner)
-    places = _place_columns(rows, position, axis, owner)
+    axis, unit = options.about
+    rows = read_rows(path, mapping, rising=False, extra=(options.state,) if options.state else _STATES)
+    owner = f"{rows.source}: {options.target}"
+    column = _error_column(rows, options.columns, unit, owner)
+    places = _place_columns(rows, options.position, axis, owner)
     names = [*places.values()]
     where = rows.table[names].to_numpy(dtype=np.float64)
     missing = np.flatnonzero(~np.isfinite(where).all(axis=1))
@@ -74,7 +56,7 @@ def read_long(
         )
     at = np.zeros((len(where), 3))
     at[:, ["XYZ".index(a) for a in places]] = where
-    number = _states(rows, state, at)
+    number = _states(rows, options.state, at)
     _refuse_unsorted(rows, at, number, "XYZ".index(axis), names[0])
     points = _in_order(at, axis)
     most = int(np.bincount(number).max())
@@ -99,7 +81,7 @@ def read_long(
             "the column of states"
         )
     return Profiles(
-        target=target,
+        target=options.target,
         unit=unit,
         axis=axis,
         points=points,

@@ -10,11 +10,12 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
-from pydantic import ConfigDict, Field, TypeAdapter, ValidationError, with_config
+from pydantic import Field, ValidationError
 from pydantic_core import ErrorDetails
 
 from thermocomp.core.exceptions import InputError, UnitError
 from thermocomp.core.units import HOUSE_UNITS, Unit, find_unit
+from thermocomp.files.plaintext import strict_adapter
 from thermocomp.files.tomlfile import as_json, read_toml
 from thermocomp.recordings.cleaning import Cut, Resample, Rezero, Shift, Swap
 from thermocomp.recordings.readers.limits import FileLimits
@@ -223,7 +224,7 @@ class Mapping:
 
 
 #: only validator of external mappings; also used for the mapping that thermocomp writes into its own files
-ADAPTER = TypeAdapter(with_config(ConfigDict(strict=True, extra="forbid", allow_inf_nan=False))(Mapping))
+ADAPTER = strict_adapter(Mapping)
 
 _STEPS: dict[str, type] = {step.do: step for step in (Cut, Shift, Rezero, Swap, Resample)}
 _TABLES: dict[str, type] = {

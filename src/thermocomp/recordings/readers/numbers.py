@@ -6,18 +6,12 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from thermocomp.core.exceptions import RecordingError
-from thermocomp.recordings.words import split_words
+from thermocomp.recordings.words import read_words
 
 #: texts that denote a missing value, besides an empty cell
 MISSING_TEXT = ("", "nan", "na", "n/a", "none", "null", "#n/a", "<na>", "-nan")
 #: placeholders of loggers and spreadsheets for a missing number, in lower case
-_FILLERS = split_words(
-    "ol, +ol, -ol, over, +over, -over, under, overload, overflow, overrange, over range, underrange",
-    "under range, ovld, ovl, ovrng, burnout, burn out, b.out, open, open tc, no sensor, sensor error, error",
-    "err, invalid, no data, nodata, missing, bad, skip, fehler, bruch, fühlerbruch, ungültig, kein fühler",
-    "fehlt, erreur, nat, n.a., #nv, #n/v, #wert!, #value!, #div/0!, #ref!, #bezug!, #name?, #num!, #zahl!",
-    "#null!, #valeur!, nan(ind), -nan(ind), nan(snan), -1.#ind, 1.#ind, 1.#qnan, -1.#qnan, 1.#inf, -1.#inf",
-)
+_FILLERS = frozenset(read_words("missing_numbers"))
 _RUN = re.compile(r"([-+*?#.])\1*|err:\d+")
 #: thousands separators besides point and comma
 _SPACES = "'’\u00a0\u202f "

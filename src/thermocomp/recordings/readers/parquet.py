@@ -40,37 +40,30 @@ _INDEX = "__index_level_0__"
 
 
 @dataclass(frozen=True)
-class ParquetTable:
-    """A Parquet file; made by `open_parquet`. A `thermocomp.recordings.readers.tables.FileTable`.
+class ParquetTable(FileTable):
+    """A Parquet file; made by `open_parquet`.
 
     Parameters
     ----------
-    path : Path
+    path, headings
+        See `thermocomp.recordings.readers.tables.FileTable`.
     names : tuple of str
         Names of the columns, as in the file.
-    headings : tuple of str
     texts : tuple of str
         Names of the text columns.
     others : tuple of int
         Positions of the columns without a numeric type.
     n_rows : int
-    embedded : str
     limits : FileLimits
-    decimal : str
-        Decimal sign of numbers stored as text, if it is known beforehand.
-    notes : tuple of str
+    embedded, decimal, notes
+        See `thermocomp.recordings.readers.tables.FileTable`.
     """
 
-    path: Path
     names: tuple[str, ...]
-    headings: tuple[str, ...]
     texts: tuple[str, ...]
     others: tuple[int, ...]
     n_rows: int
-    embedded: str
     limits: FileLimits
-    decimal: str = ""
-    notes: tuple[str, ...] = ()
 
     def is_number(self, column: int, *, empty: bool = True) -> bool:
         """Return whether the first non-empty cell of a column is a number; `empty` if there is none."""

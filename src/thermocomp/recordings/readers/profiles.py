@@ -1,11 +1,10 @@
 """Error profiles from tables: wide, with one column per position, or long, with one row per position."""
 
 import re
-from collections.abc import Mapping as AbstractMapping
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any, Literal
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from thermocomp.core.exceptions import InputError, RecordingError, UnitError
 from thermocomp.core.machine import Channel
 from thermocomp.core.units import read_with_unit
 from thermocomp.files.tomlfile import read_toml
-from thermocomp.recordings.profiles import MIN_POSITIONS, QUANTITY, Profiles
+from thermocomp.recordings.profiles import MIN_POSITIONS, QUANTITY, Place, ProfileOptions, Profiles
 from thermocomp.recordings.readers.codecolumns import codes, columns_of
 from thermocomp.recordings.readers.codecolumns import is_code_column as is_profile
 from thermocomp.recordings.readers.longtables import read_long
@@ -23,8 +22,6 @@ from thermocomp.recordings.readers.recordings import read as read_recording
 from thermocomp.recordings.readers.recordings import read_rows
 from thermocomp.recordings.recording import Recording
 
-#: a position as coordinates by axis, such as {"Y": 250.0} [mm]
-Place = AbstractMapping[str, float]
 Layout = Literal["wide", "long"]
 
 #: start of a note on columns of a component that could not be used
@@ -32,63 +29,6 @@ NOT_TAKEN = "not taken:"
 
 #: default column names of a wide table: y_laser_250_um, a_y_-50_urad
 _PLACED = re.compile(r"(?P<base>.+)_(?P<position>-?\d+(?:\.\d+)?)_(?:um|urad)")
-
-
-@dataclass(frozen=True, kw_only=True)
-class ProfileOptions:
-    """Definition of the contents of a table of profiles.
-
-    Parameters
-    ----------
-    target : str
-        Code of the component, such as ``EYY``, or any other name.
-    axis : str
-        Axis of the profiles; empty: the axis of the component.
-    unit : str
-        um or urad; empty: the unit of the component.
-    columns : str
-        Wide: names of the columns, with ``*`` in place of the position in mm, such as ``y_laser_*``. Long: the column
-        of the error. Empty: columns named after the component, such as ``EYY_250_um`` (see
-        `thermocomp.recordings.readers.codecolumns`); if there are none, found by unit and position in the name.
-    places : mapping of str to Place
-        Wide: position of each column by its name, instead of `columns`; see `read_places`.
-    position : str
-        Long: column of the position of the axis; empty: ``position_mm``, or the axis column, such as ``y_mm``.
-    state : str
-        Long: column with the state of each row; empty: the column named state or profile, else the time, else a new
-        state starts where a position recurs.
-    """
-
-    target: str
-    axis: str = ""
-    unit: str = ""
-    columns: str = ""
-    places: AbstractMapping[str, Place] | None = None
-    position: str = ""
-    state: str = ""
-
-    @property
-    def about(self) -> tuple[str, Literal["um", "urad"]]:
-        """Axis and unit of the profiles.
-
-        Raises
-        ------
-        InputError
-            Axis or unit is neither given nor defined by the component.
-        """
-        component = BY_CODE.get(self.target)
-        axis = self.axis or (component.depends_on if component else "") or ""
-        unit = self.unit or (component.unit if component else "")
-        if not axis:
-            hint = (
-                f"{component.description} does not depend on a position"
-                if component
-                else "it is not the code of a component"
-            )
-            raise InputError(f"{self.target}: {hint}; name a component such as EYY, or specify the axis")
-        if unit not in QUANTITY:
-            raise InputError(f"{self.target}: unit {unit!r}: state whether it is in um or urad")
-        return axis, cast(Literal["um", "urad"], unit)
 
 
 def read(
@@ -128,10 +68,7 @@ def read(
         layout = "long" if has_position and not named else "wide"
     if layout == "wide":
         return from_recording(read_recording(path, mapping), wanted)
-    axis, unit = wanted.about
-    return read_long(
-        path, mapping, wanted.target, unit, axis, error=wanted.columns, position=wanted.position, state=wanted.state
-    )
+    return read_long(path, mapping, wanted)
 
 
 def read_components(

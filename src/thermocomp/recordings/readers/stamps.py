@@ -8,6 +8,7 @@ import pandas as pd
 
 from thermocomp.recordings.headings import find_date_order
 from thermocomp.recordings.readers.dateorder import DateChoice, IntArray, find_longest_step, find_order, rises
+from thermocomp.recordings.words import read_word_groups
 
 _CHUNK = 100_000
 #: steps between rows caused only by a wrong order [d]: of day and month, of day and year
@@ -22,21 +23,7 @@ _ISO = re.compile(
     r"\d{4}-\d\d-\d\d(?:[T ]\d\d:\d\d(?::\d\d(?:\.\d+)?)?(?:Z|[+-]\d\d:?\d\d)?)?|\d{8}T\d{4,6}(?:\.\d+)?Z?"
 )
 #: month names and similar words in languages other than English, in lower case
-_MONTHS = {
-    word: str(number)
-    for number, words in enumerate(
-        (
-            *("jan januar janvier gennaio gen enero ene january", "feb februar février févr febbraio febrero february"),
-            *("mär märz mrz mar mars marzo march", "apr april avril avr aprile abril abr", "mai may mag maggio mayo"),
-            *("jun juni juin giugno giu junio june", "jul juli juillet juil luglio lug julio july"),
-            *("aug august août aou agosto ago", "sep sept september septembre settembre set septiembre"),
-            *("okt oktober oct octobre ottobre ott octubre october", "nov november novembre noviembre"),
-            "dez dezember dec décembre déc dicembre dic diciembre december",
-        ),
-        start=1,
-    )
-    for word in words.split()
-}
+_MONTHS = {name: str(k) for k, names in enumerate(read_word_groups("months"), start=1) for name in names}
 #: names of time zones with a unique offset from UTC
 _ZONES = {
     **dict.fromkeys(("UTC", "GMT", "WET", "UT"), "+00:00"),

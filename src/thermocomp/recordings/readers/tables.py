@@ -1,10 +1,11 @@
 """Raw tables with uninterpreted cells: common part of all file formats."""
 
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NoReturn, Protocol
+from typing import Any, NoReturn
 
 import numpy as np
 import pandas as pd
@@ -29,31 +30,39 @@ _LINE_ENDS, _LINE_SIGNS = {13: "\u240d", 10: "\u240a"}, {0x240D: "\r", 0x240A: "
 _NAMELESS = re.compile(r"Unnamed: \d+")
 
 
-class FileTable(Protocol):
-    """The cells of a file before the meaning of its columns is determined."""
+@dataclass(frozen=True)
+class FileTable(ABC):
+    """The cells of a file before the meaning of its columns is determined.
 
-    @property
-    def path(self) -> Path:
-        """Path of the file, for messages."""
+    Parameters
+    ----------
+    path : Path
+        Path of the file, for messages.
+    headings : tuple of str
+        Stripped headings; empty where there is none.
+    embedded : str
+        JSON of the mapping that thermocomp wrote into the file; empty if there is none.
+    decimal : str
+        Decimal sign of numbers stored as text, if it is known beforehand.
+    notes : tuple of str
+        Notes for the user.
+    """
 
-    @property
-    def headings(self) -> tuple[str, ...]:
-        """Stripped headings; empty where there is none."""
+    path: Path
+    headings: tuple[str, ...]
+    embedded: str = field(default="", kw_only=True)
+    decimal: str = field(default="", kw_only=True)
+    notes: tuple[str, ...] = field(default=(), kw_only=True)
 
-    @property
-    def embedded(self) -> str:
-        """JSON of the mapping that thermocomp wrote into the file; empty if there is none."""
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """Notes for the user."""
-
+    @abstractmethod
     def is_number(self, column: int, *, empty: bool = True) -> bool:
         """Return whether the first non-empty cell of a column is a number; `empty` if there is none."""
 
+    @abstractmethod
     def head(self, column: int) -> list[str]:
         """Return the first non-empty cells of a column as text; none for a column of a numeric type."""
 
+    @abstractmethod
     def load(self, numbers: Sequence[int], texts: Sequence[int]) -> tuple[pd.DataFrame, tuple[str, ...]]:
         """Read columns as float64 and as text, and return notes on the conversions.
 
@@ -65,35 +74,29 @@ class FileTable(Protocol):
             A cell of `numbers` contains text.
         """
 
+    @abstractmethod
     def place(self, row: int) -> str:
         """Return the location of a row in the file, such as ``line 7``."""
 
 
 @dataclass(frozen=True)
-class FrameTable:
+class FrameTable(FileTable):
     """A sheet that is read as a whole.
 
     Parameters
     ----------
-    path : Path
-    headings : tuple of str
+    path, headings
+        See `FileTable`.
     frame : DataFrame
         Unconverted cells; columns named by position.
     rows : sequence of int
         Row number in the file (1-based) of each row of `frame`.
-    embedded : str
-    notes : tuple of str
-    decimal : str
-        Decimal sign of numbers stored as text, if it is known beforehand.
+    embedded, decimal, notes
+        See `FileTable`.
     """
 
-    path: Path
-    headings: tuple[str, ...]
     frame: pd.DataFrame
     rows: Sequence[int]
-    embedded: str = ""
-    notes: tuple[str, ...] = ()
-    decimal: str = ""
 
     def is_number(self, column: int, *, empty: bool = True) -> bool:
         """Return whether the first non-empty cell of a column is a number; `empty` if there is none."""

@@ -27,7 +27,14 @@ from thermocomp.recordings.readers.layout import (
 from thermocomp.recordings.readers.limits import FileLimits
 from thermocomp.recordings.readers.mapping import ReadOptions
 from thermocomp.recordings.readers.numbers import MISSING_TEXT, Notation, Signs, is_filler, is_number_like
-from thermocomp.recordings.readers.tables import check_headings, clean_heading, convert, decide, tell_notation
+from thermocomp.recordings.readers.tables import (
+    FileTable,
+    check_headings,
+    clean_heading,
+    convert,
+    decide,
+    tell_notation,
+)
 from thermocomp.recordings.readers.textlines import Lines, count_cells, describe_ragged, is_utf8, open_lines, split_line
 
 #: maximum number of lines used to detect the format; fewer if they are long
@@ -41,42 +48,35 @@ _EXACT: dict[str, Any] = {} if _PANDAS >= (3, 1) else {"float_precision": "round
 
 
 @dataclass(frozen=True)
-class CsvTable:
-    """A text file with a heading line; made by `open_csv`. A `thermocomp.recordings.readers.tables.FileTable`.
+class CsvTable(FileTable):
+    """A text file with a heading line; made by `open_csv`.
 
     Parameters
     ----------
-    path : Path
-    headings : tuple of str
+    path, headings
+        See `thermocomp.recordings.readers.tables.FileTable`.
     sample : tuple of tuple of str
         Cells of the first rows.
     delimiter : str
         One character; a space denotes any white space.
-    decimal : str
-        Decimal sign, if it is known beforehand.
     encoding : str
     errors : {'strict', 'replace'}
         Handling of bytes that are invalid in the encoding.
     skipped : tuple of int
         Line numbers (0-based) of lines that are not rows: headings, comments, blank lines.
     n_rows : int
-    embedded : str
-    notes : tuple of str
     data : bytes or None
         Content of the whole file in UTF-8, if conversion was necessary.
+    embedded, decimal, notes
+        See `thermocomp.recordings.readers.tables.FileTable`.
     """
 
-    path: Path
-    headings: tuple[str, ...]
     sample: tuple[tuple[str, ...], ...]
     delimiter: str
-    decimal: str
     encoding: str
     errors: str
     skipped: tuple[int, ...]
     n_rows: int
-    embedded: str
-    notes: tuple[str, ...] = ()
     data: bytes | None = None
 
     def is_number(self, column: int, *, empty: bool = True) -> bool:

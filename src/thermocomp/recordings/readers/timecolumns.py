@@ -11,28 +11,19 @@ from thermocomp.recordings.readers.dayforms import names_day
 from thermocomp.recordings.readers.dayhalves import are_halves, says_halves
 from thermocomp.recordings.readers.mapping import Mapping, Place
 from thermocomp.recordings.readers.tables import FileTable
+from thermocomp.recordings.words import read_word_groups, read_words
 
 #: headings of a time without unit, the more specific ones first
-_BARE = (
-    *("timestamp", "datetime", "date_time", "date time", "date/time", "datum/uhrzeit", "datum/zeit", "datum uhrzeit"),
-    *("datum und uhrzeit", "zeitstempel", "time stamp", "timestamps", "date and time", "date & time", "date&time"),
-)
+_BARE = read_words("stamps")
 #: headings that denote a time only with a unit or next to another time column
 _NEEDS_UNIT = ("t", "data", "tag", "day")
 #: headings of a date, and of a time of day next to it
-_DATES = ("date", "datum", "fecha", "data", "tag", "day")
-_CLOCKS = ("time", "uhrzeit", "zeit", "heure", "hora", "ora", "clock", "time of day", "tijd", "čas", "czas")
+_DATES = read_words("dates")
+_CLOCKS = read_words("clocks")
 #: headings of separate columns for year, month, day, hour, minute and second
-_PARTS = (
-    ("year", "jahr", "année", "anno", "año", "yyyy", "yr"),
-    ("month", "monat", "mois", "mese", "mes", "mon", "mm"),
-    ("day", "tag", "jour", "giorno", "día", "dd"),
-    ("hour", "hours", "stunde", "heure", "ora", "hora", "hh", "hr"),
-    ("minute", "minutes", "minuto", "min", "mi"),
-    ("second", "seconds", "sekunde", "seconde", "secondo", "segundo", "sec", "ss"),
-)
+_PARTS = read_word_groups("time_parts")
 #: headings of milliseconds in addition to a time in whole seconds
-_FRACTIONS = ("ms", "msec", "millisecond", "milliseconds", "millisekunden")
+_FRACTIONS = read_words("milliseconds")
 #: names of a time since the start of a test, even if it is written as a time of day
 _PASSED = re.compile(
     r"elapsed|relativ|\brel\b|dauer|laufzeit|duration|dur[ée]e|durata|duraci|run[ _]?time|test[ _]?time|\bsince\b"

@@ -10,17 +10,14 @@ from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.exceptions import RecordingError, TwoReadingsError
 from thermocomp.core.units import find_unit
 from thermocomp.recordings.readers.cellkinds import CLOCK, HALF, plain_clocks, plain_dates
+from thermocomp.recordings.readers.dayforms import EPOCH, PARTS, SERIAL
 from thermocomp.recordings.readers.filecells import FileCells
 from thermocomp.recordings.readers.stamps import AmbiguousDatesError, Parsed, has_day, parse, parse_stamps
 from thermocomp.recordings.readers.tables import tell_places
 from thermocomp.recordings.readers.timefaults import refuse_falling, refuse_passed, refuse_set_forward
 from thermocomp.recordings.readers.timehints import find_formats
 
-#: seconds since 1970 in the years 2000 to 2100, in whole or fractional seconds
-_EPOCH = 946684800.0, 2240611200.0
-_PARTS = {1: "seconds", 1000: "milliseconds", 1000000: "microseconds", 1000000000: "nanoseconds"}
-#: spreadsheet day numbers (days since 1899-12-30) of the same years
-_SERIAL = 36526.0, 73050.0
+#: first day of a spreadsheet, from 1970 [s]
 _SERIAL_BEGIN = -25569 * 86400
 _DATE_WORDS = ("date", "datum", "dat", "stamp", "stempel", "fecha")
 _DAY = 86_400_000_000_000  # [ns]
@@ -206,18 +203,18 @@ def _read_numbers(raw: FloatArray, file: FileCells) -> tuple[FloatArray, str, tu
         unit = find_unit(file.columns.time_unit, "time")
         time = (raw - raw[0]) * unit.scale if unit.scale >= 1 else (raw - raw[0]) / round(1 / unit.scale)
         known = unit.scale in (1, 1e-3)
-        counted = known and _EPOCH[0] <= raw[0] * unit.scale < _EPOCH[1] and not file.mapping.time.start
+        counted = known and EPOCH[0] <= raw[0] * unit.scale < EPOCH[1] and not file.mapping.time.start
         if not counted:
             return time, "", ()
         note = f"{heading!r} counts from 1970-01-01 UTC"
         return time, pd.Timestamp(raw[0] * unit.scale, unit="s", tz="UTC").isoformat(), (note,)
-    for parts, word in _PARTS.items():
-        if _EPOCH[0] * parts <= raw.min() and raw.max() < _EPOCH[1] * parts:
+    for parts, word in PARTS.items():
+        if EPOCH[0] * parts <= raw.min() and raw.max() < EPOCH[1] * parts:
             # whole microseconds are exact
             time = raw - raw[0] if parts == 1 else (raw - raw[0]) / parts
             start = pd.Timestamp(raw[0] / parts, unit="s", tz="UTC").isoformat()
             return time, start, (f"{heading!r} is taken as {word} since 1970-01-01 UTC",)
-    if _SERIAL[0] <= raw.min() and raw.max() < _SERIAL[1] and any(w in heading.casefold() for w in _DATE_WORDS):
+    if SERIAL[0] <= raw.min() and raw.max() < SERIAL[1] and any(w in heading.casefold() for w in _DATE_WORDS):
         milliseconds = np.rint(raw * 86400e3)
         start = pd.Timestamp(milliseconds[0] / 1e3 + _SERIAL_BEGIN, unit="s").isoformat()
         note = f"{heading!r} is taken as days since 1899-12-30, as Excel counts"

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import RecordingError, UnitError
 from thermocomp.core.units import Unit, find_unit
 from thermocomp.recordings.headings import understand
@@ -15,8 +15,6 @@ from thermocomp.recordings.readers.limits import FileLimits, check_file
 from thermocomp.recordings.readers.mapping import ReadOptions
 from thermocomp.recordings.readers.textfile import CsvTable, open_csv
 from thermocomp.volumetric.positioning import Positioning
-
-FloatArray = NDArray[np.float64]
 
 ENDINGS = (".csv", ".tsv", ".txt")
 #: accepted names of the columns, without their unit

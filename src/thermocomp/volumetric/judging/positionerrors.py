@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.exceptions import FitError
 from thermocomp.core.learned import Learned
 from thermocomp.core.provenance import RULES, HonestError
@@ -18,9 +19,6 @@ from thermocomp.recordings.profiles import Profiles
 from thermocomp.recordings.samples import Samples
 from thermocomp.volumetric.models.position import PositionFit, slope_samples
 from thermocomp.volumetric.models.positionoptions import PositionOptions, reference_position
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 #: minimum number of profiles to judge a cycle by; each has many points, and profiles are far apart in time
 MIN_STATES = 8

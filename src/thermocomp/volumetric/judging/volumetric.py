@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.components import COMPONENTS
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.inputs import Input
@@ -20,8 +20,6 @@ from thermocomp.runtime.geometry.kinematics import Kinematics
 from thermocomp.runtime.geometry.straight import StraightLines, find_remaining_error, straight_lines
 from thermocomp.runtime.geometry.volumetric import ThermalStates, VolumetricModel
 from thermocomp.volumetric import notes
-
-FloatArray = NDArray[np.float64]
 
 #: maximum number of grid points along each axis; more need memory without adding information
 FINEST = 50

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import f as fisher
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.profile import Profile
 from thermocomp.recordings.profiles import MIN_POSITIONS
 from thermocomp.volumetric.models.shapes import Order, PolynomialShape, SplineShape, ThroughMeans
 
-FloatArray = NDArray[np.float64]
 Kind = Literal["polynomial", "spline"]
 
 #: minimum number of positions between the ends to judge by these alone

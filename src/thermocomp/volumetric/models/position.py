@@ -8,6 +8,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from thermocomp import __version__
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.exceptions import FitError, InputError, RecordingError
 from thermocomp.core.machine import Channel
 from thermocomp.core.model import ErrorModel
@@ -33,9 +34,6 @@ from thermocomp.volumetric.models.positionoptions import (
     remainder,
     set_cold_profiles,
 )
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 __all__ = ["PositionFit", "PositionOptions", "fit_position", "slope_samples"]
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.inputs import Support
 from thermocomp.models.base import ThermalRegressor
@@ -14,7 +14,6 @@ from thermocomp.recordings.profiles import Profiles
 from thermocomp.volumetric.models.geometric import Kind
 from thermocomp.volumetric.models.shapes import Order
 
-BoolArray = NDArray[np.bool_]
 Setting = Literal["slopes", "offset", "reference_position"]
 
 #: all settings that can be determined from profiles

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline, CubicSpline, PPoly
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.profile import PolynomialProfile, SplineProfile
 
-FloatArray = NDArray[np.float64]
 #: polynomial: degree in the own coordinate and in the others; spline: number of inner knots and 0
 Order = tuple[int, int]
 

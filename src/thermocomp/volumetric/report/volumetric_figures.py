@@ -2,15 +2,12 @@
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from thermocomp.core.components import BY_CODE, COMPONENTS
-from thermocomp.report.drawing import add_legend, drawing, svg
-from thermocomp.report.figures import COLOURS, MEASURED, thin_points
+from thermocomp.report.drawing import BESIDE, add_legend, drawing, svg
+from thermocomp.report.figures import COLOURS, MEASURED, line_style, thin_points
 from thermocomp.runtime.geometry.kinematics import INDEX
 from thermocomp.volumetric.judging.volumetric import Moment, Volumetric
-
-FloatArray = NDArray[np.float64]
 
 WIDTH = 9.6
 MAX_MOMENTS = 3
@@ -55,7 +52,7 @@ def over_time(study: Volumetric) -> str:
         if tilted:
             axes[1].set_title("tilt of the tool")
         for ax in axes:
-            add_legend(ax, loc="center left", bbox_to_anchor=(1.0, 0.5))
+            add_legend(ax, **BESIDE)
             ax.margins(x=0)
         axes[-1].set_xlabel("time [h]")
         return svg(figure)
@@ -103,17 +100,11 @@ def scalars(study: Volumetric) -> str:
         for ax, unit in zip(figure.subplots(len(units), 1, sharex=True, squeeze=False)[:, 0], units, strict=True):
             ax.axhline(0, color="#aaa", lw=0.8)
             for k, c in enumerate(c for c in known if c.unit == unit):
-                style = ("-", "--", ":")[k // len(COLOURS)]
                 values = course.values[:, INDEX[c.code]]
-                ax.plot(
-                    *thin_points(hours, values),
-                    style,
-                    color=COLOURS[k % len(COLOURS)],
-                    label=f"{c.code} {c.description}",
-                )
+                ax.plot(*thin_points(hours, values), **line_style(k), label=f"{c.code} {c.description}")
             ax.set_ylabel(unit)
             ax.margins(x=0)
-            add_legend(ax, loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7)
+            add_legend(ax, **BESIDE, fontsize=7)
         ax.set_xlabel("time [h]")
         return svg(figure)
 

@@ -15,12 +15,11 @@ from matplotlib.quiver import Quiver
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.report.drawing import drawing, svg
 from thermocomp.report.figures import MEASURED
 from thermocomp.volumetric.judging.volumetric import Moment, Volumetric, lay_grid
 from thermocomp.volumetric.report.volumetric_figures import SMALL, WIDTH, choose_moments
-
-FloatArray = NDArray[np.float64]
 
 #: light to dark, so that large values stand out on white paper, also in greyscale
 MAGNITUDE = ListedColormap(colormaps["inferno_r"](np.linspace(0.12, 0.88, 256)), name="magnitude")
