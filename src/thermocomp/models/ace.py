@@ -113,6 +113,7 @@ class TransformRegressor(StaticRegressor):
         self.falling_theta_ = float(np.mean(steps < 0)) if steps.size else 0.0
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class ACE(TransformRegressor):
     """Alternating conditional expectations with a boxcar on ranks and nearest neighbours (Wessel 2004; W-01 to W-05).
 
@@ -174,22 +175,12 @@ class ACE(TransformRegressor):
     1.0 49 um instead of 49 um
     """
 
-    def __init__(
-        self,
-        *,
-        half_window: int = 10,
-        window_share: float | None = None,
-        neighbours: int = 2,
-        tolerance: float = 0.0,
-        max_sweeps: int = 300,
-        converged: bool = False,
-    ) -> None:
-        self.half_window = half_window
-        self.window_share = window_share
-        self.neighbours = neighbours
-        self.tolerance = tolerance
-        self.max_sweeps = max_sweeps
-        self.converged = converged
+    half_window: int = 10
+    window_share: float | None = None
+    neighbours: int = 2
+    tolerance: float = 0.0
+    max_sweeps: int = 300
+    converged: bool = False
 
     def _fit(self, change: FloatArray, deviation: FloatArray) -> None:
         if self.neighbours < 1 or self.max_sweeps < 1 or not self.tolerance >= 0:

@@ -31,6 +31,7 @@ class _Setting:
     intercept: bool
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class ARX(ClockedRegressor):
     """Autoregressive model with inputs: dz(t) = sum_{i=1..k} a_i dz(t - ih) + sum_{i=0..m} b_i n(t - ih) (P-01).
 
@@ -114,28 +115,15 @@ class ARX(ClockedRegressor):
     [0.9] [[0.8]]
     """
 
-    def __init__(
-        self,
-        *,
-        inputs: Sequence[str | int] | None = None,
-        interval: float | Sequence[float] | None = 600.0,
-        k: int | None = None,
-        m: int | None = None,
-        k_max: int = 5,
-        m_max: int = 5,
-        criterion: Literal["fpe", "aic", "bic", "free-run"] = "fpe",
-        fit_intercept: bool | None = False,
-        time: Time | None = None,
-    ) -> None:
-        self.inputs = inputs
-        self.interval = interval
-        self.k = k
-        self.m = m
-        self.k_max = k_max
-        self.m_max = m_max
-        self.criterion = criterion
-        self.fit_intercept = fit_intercept
-        self.time = time
+    inputs: Sequence[str | int] | None = None
+    interval: float | Sequence[float] | None = 600.0
+    k: int | None = None
+    m: int | None = None
+    k_max: int = 5
+    m_max: int = 5
+    criterion: Literal["fpe", "aic", "bic", "free-run"] = "fpe"
+    fit_intercept: bool | None = False
+    time: Time | None = None
 
     def _learn(self, inputs: FloatArray, deviation: FloatArray, step: FloatArray, folds: IntArray) -> None:
         if self.criterion not in ("fpe", "aic", "bic", "free-run"):

@@ -1,6 +1,7 @@
 """`averaged`: many ridge regressions on lagged temperatures and speed states, merged into one model."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -29,6 +30,7 @@ RUNNING = (5 * MINUTE, 15 * MINUTE, 45 * MINUTE, 135 * MINUTE)
 DIRECTIONS = 12
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class AveragedDynamic(TimedRegressor):
     """Average of many ridge regressions on lagged temperatures and on states of the spindle speed.
 
@@ -108,28 +110,15 @@ class AveragedDynamic(TimedRegressor):
 
     columns: ClassVar[str] = "speed"
 
-    def __init__(
-        self,
-        *,
-        speed: Sequence[str | int] = (),
-        noise: float = 0.4,
-        lags: Sequence[float] = LAGS,
-        powers: Sequence[float] = POWERS,
-        stopped: Sequence[float] = STOPPED,
-        running: Sequence[float] = RUNNING,
-        structures: int = 200,
-        random_state: int = 0,
-        time: Time | None = None,
-    ) -> None:
-        self.speed = speed
-        self.noise = noise
-        self.lags = lags
-        self.powers = powers
-        self.stopped = stopped
-        self.running = running
-        self.structures = structures
-        self.random_state = random_state
-        self.time = time
+    speed: Sequence[str | int] = ()
+    noise: float = 0.4
+    lags: Sequence[float] = LAGS
+    powers: Sequence[float] = POWERS
+    stopped: Sequence[float] = STOPPED
+    running: Sequence[float] = RUNNING
+    structures: int = 200
+    random_state: int = 0
+    time: Time | None = None
 
     def _fit(self, rows: FloatArray, deviation: FloatArray, step: FloatArray, folds: IntArray) -> None:
         self._check()

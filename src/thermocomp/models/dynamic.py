@@ -53,6 +53,7 @@ class _Candidate:
     columns: IntArray
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class DynamicRidge(TimedRegressor):
     """Ridge regression on temperatures, their lagged or high-passed copies, and the lagged spindle speed.
 
@@ -125,28 +126,15 @@ class DynamicRidge(TimedRegressor):
 
     columns: ClassVar[str] = "speed"
 
-    def __init__(
-        self,
-        *,
-        speed: Sequence[str | int] = (),
-        temperature_lags: Sequence[Sequence[float]] = TEMPERATURE_LAGS,
-        speed_lags: Sequence[Sequence[float]] = SPEED_LAGS,
-        speed_powers: Sequence[int] = (1, 2),
-        copies: Literal["high-passed", "lagged"] = "high-passed",
-        strengths: Sequence[float] = STRENGTHS,
-        rule: Rule = "one-standard-error",
-        fit_intercept: bool = False,
-        time: Time | None = None,
-    ) -> None:
-        self.speed = speed
-        self.temperature_lags = temperature_lags
-        self.speed_lags = speed_lags
-        self.speed_powers = speed_powers
-        self.copies = copies
-        self.strengths = strengths
-        self.rule = rule
-        self.fit_intercept = fit_intercept
-        self.time = time
+    speed: Sequence[str | int] = ()
+    temperature_lags: Sequence[Sequence[float]] = TEMPERATURE_LAGS
+    speed_lags: Sequence[Sequence[float]] = SPEED_LAGS
+    speed_powers: Sequence[int] = (1, 2)
+    copies: Literal["high-passed", "lagged"] = "high-passed"
+    strengths: Sequence[float] = STRENGTHS
+    rule: Rule = "one-standard-error"
+    fit_intercept: bool = False
+    time: Time | None = None
 
     def _fit(self, rows: FloatArray, deviation: FloatArray, step: FloatArray, folds: IntArray) -> None:
         self._split_columns()

@@ -3,6 +3,7 @@
 import warnings
 from abc import abstractmethod
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from sklearn.exceptions import ConvergenceWarning
@@ -49,6 +50,7 @@ class _Sparse(PenalisedRegressor):
         return tuple(name for name, c in zip(self.terms_, self.coef_, strict=True) if c != 0)
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class Lasso(_Sparse):
     """Lasso (Tibshirani 1996) on standardised inputs: selector and regression in one.
 
@@ -91,21 +93,15 @@ class Lasso(_Sparse):
     ('x1', 'x4') [4.9, -2.9]
     """
 
-    def __init__(
-        self,
-        *,
-        strengths: Sequence[float] = SHARES,
-        rule: Rule = "one-standard-error",
-        fit_intercept: bool = True,
-    ) -> None:
-        self.strengths = strengths
-        self.rule = rule
-        self.fit_intercept = fit_intercept
+    strengths: Sequence[float] = SHARES
+    rule: Rule = "one-standard-error"
+    fit_intercept: bool = True
 
     def _ratios(self) -> tuple[float, ...]:
         return (1.0,)
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class ElasticNet(_Sparse):
     """Elastic net (Zou and Hastie 2005): a lasso that keeps or drops collinear inputs together.
 
@@ -153,18 +149,10 @@ class ElasticNet(_Sparse):
     ('x1', 'x2') [2.4, 2.4]
     """
 
-    def __init__(
-        self,
-        *,
-        l1_ratios: Sequence[float] = (0.1, 0.5, 0.9),
-        strengths: Sequence[float] = SHARES,
-        rule: Rule = "one-standard-error",
-        fit_intercept: bool = True,
-    ) -> None:
-        self.l1_ratios = l1_ratios
-        self.strengths = strengths
-        self.rule = rule
-        self.fit_intercept = fit_intercept
+    l1_ratios: Sequence[float] = (0.1, 0.5, 0.9)
+    strengths: Sequence[float] = SHARES
+    rule: Rule = "one-standard-error"
+    fit_intercept: bool = True
 
     def _ratios(self) -> tuple[float, ...]:
         ratios = tuple(float(r) for r in self.l1_ratios)

@@ -1,6 +1,7 @@
 """`ridge`: ridge regression on all inputs."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from sklearn.linear_model import ridge_regression
@@ -10,6 +11,7 @@ from thermocomp.models.dynamic import STRENGTHS
 from thermocomp.models.shrinkage import PenalisedRegressor, Rule, sorted_strengths
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class Ridge(PenalisedRegressor):
     """Ridge regression (Hoerl and Kennard 1970) on standardised inputs: `dynamic` without memory.
 
@@ -54,16 +56,9 @@ class Ridge(PenalisedRegressor):
     [2.0, 2.0] 1.0 um
     """
 
-    def __init__(
-        self,
-        *,
-        strengths: Sequence[float] = STRENGTHS,
-        rule: Rule = "one-standard-error",
-        fit_intercept: bool = True,
-    ) -> None:
-        self.strengths = strengths
-        self.rule = rule
-        self.fit_intercept = fit_intercept
+    strengths: Sequence[float] = STRENGTHS
+    rule: Rule = "one-standard-error"
+    fit_intercept: bool = True
 
     def _paths(self, Z: FloatArray, y: FloatArray) -> FloatArray:
         strengths = sorted_strengths(self.strengths)

@@ -2,6 +2,7 @@
 
 from abc import abstractmethod
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -149,6 +150,7 @@ class PenalisedRegressor(ShrunkRegressor):
         self.strength_ = float(sorted_strengths(self.strengths)[setting])
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class ComponentRegressor(ShrunkRegressor):
     """Linear regression on the first components of the inputs, whose number is chosen by leaving out thermal cycles.
 
@@ -169,18 +171,10 @@ class ComponentRegressor(ShrunkRegressor):
         Chosen number.
     """
 
-    def __init__(
-        self,
-        *,
-        components: int | None = None,
-        max_components: int | None = None,
-        rule: Rule = "one-standard-error",
-        fit_intercept: bool = True,
-    ) -> None:
-        self.components = components
-        self.max_components = max_components
-        self.rule = rule
-        self.fit_intercept = fit_intercept
+    components: int | None = None
+    max_components: int | None = None
+    rule: Rule = "one-standard-error"
+    fit_intercept: bool = True
 
     @abstractmethod
     def _path(self, Z: FloatArray, y: FloatArray, most: int) -> FloatArray:
