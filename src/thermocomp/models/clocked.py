@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.models.base import FloatArray, IntArray
 from thermocomp.models.numerics import ticks
 from thermocomp.models.numerics.ticks import TickedRun
 from thermocomp.models.timed import TimedRegressor
-
-BoolArray = NDArray[np.bool_]
 
 #: a recording cannot determine a memory much longer than itself: the free run must decay by a factor e within this many
 #: lengths of the longest test

@@ -3,16 +3,14 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.models.averaged import AveragedDynamic
 from thermocomp.models.numerics.folds import number_folds
 from thermocomp.models.numerics.structures import average, fit_each, share_out
 from thermocomp.models.pacedfeatures import PacedFeatures
 from thermocomp.recordings.samples import Samples
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

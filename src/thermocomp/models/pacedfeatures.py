@@ -4,15 +4,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermocomp.core import lagbank
+from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
 from thermocomp.core.bounds import LEAST
 from thermocomp.models.numerics.structures import LagStructure, Moments
 from thermocomp.recordings.samples import usual_step
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
 
 #: Temperature lags shorter than this many row intervals are omitted: the rows contain no information about them, and a
 #: model that runs at another rate would behave in an untested way.
@@ -52,7 +49,7 @@ class PacedFeatures:
         cls,
         rows: FloatArray,
         step: FloatArray,
-        learned: NDArray[np.bool_],
+        learned: BoolArray,
         speeds: Sequence[int],
         *,
         lags: Sequence[float],

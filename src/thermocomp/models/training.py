@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, clone
 from sklearn.metrics import r2_score
 
 from thermocomp import __version__
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.band import Band
 from thermocomp.core.exceptions import FitError
 from thermocomp.core.inputs import Support
@@ -30,9 +30,6 @@ from thermocomp.models.timed import TimedRegressor
 from thermocomp.models.unfrozen import UnfrozenRegressor
 from thermocomp.recordings.fingerprints import fingerprint
 from thermocomp.recordings.samples import Samples
-
-BoolArray = NDArray[np.bool_]
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

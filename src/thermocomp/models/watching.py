@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
+from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
 from thermocomp.core.bounds import GAP
 from thermocomp.core.watch import FASTER, LASTING, Watch, Watched
 from thermocomp.core.zero import STANDS
@@ -15,10 +15,6 @@ from thermocomp.models.numerics.folds import halve, number_folds
 from thermocomp.models.numerics.structures import fit_each, share_out
 from thermocomp.models.pacedfeatures import PacedFeatures
 from thermocomp.recordings.samples import Samples, usual_step
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.intp]
 
 #: noise assumed for the predicting temperatures, as in `averaged` [degC]
 NOISE = 0.2

@@ -13,7 +13,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from thermocomp.core.arrays import FloatArray
+
 RankArray = NDArray[np.uint32]
 
 compiled: Any = njit(cache=True, nogil=True)

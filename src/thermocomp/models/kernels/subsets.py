@@ -10,7 +10,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from thermocomp.core.arrays import FloatArray
+
 IntArray = NDArray[np.int64]
 ByteArray = NDArray[np.uint8]
 Lists = tuple[FloatArray, ByteArray, FloatArray, FloatArray, FloatArray, IntArray, FloatArray]

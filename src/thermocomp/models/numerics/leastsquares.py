@@ -4,11 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft, linalg
 from scipy.linalg import lapack
 
-FloatArray = NDArray[np.float64]
+from thermocomp.core.arrays import FloatArray, IntArray
 
 _EPS = float(np.finfo(np.float64).eps)
 #: condition number above which a solution is refined
@@ -203,7 +202,7 @@ def solve(X: FloatArray, y: FloatArray, tri: Triangle, *, columns: Sequence[int]
     )
 
 
-def _independent(factor: FloatArray, norms: FloatArray, noise: FloatArray) -> NDArray[np.intp]:
+def _independent(factor: FloatArray, norms: FloatArray, noise: FloatArray) -> IntArray:
     """Return the indices of linearly independent columns, in ascending order."""
     alive = np.flatnonzero(norms > noise)
     if alive.size == 0:

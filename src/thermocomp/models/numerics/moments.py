@@ -3,10 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
+from thermocomp.core.arrays import FloatArray, IntArray
 
 
 def part(moments: FloatArray, columns: IntArray) -> FloatArray:

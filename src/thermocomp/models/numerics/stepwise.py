@@ -11,14 +11,11 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import blas, lapack
 from scipy.special import fdtrc, stdtrit
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.models.numerics.leastsquares import Triangle
-
-FloatArray = NDArray[np.float64]
 
 #: smallest share of a candidate's norm that the model must leave unexplained for the candidate to enter
 TOLERANCE = 1e-8

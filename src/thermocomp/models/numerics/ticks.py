@@ -5,13 +5,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
 from thermocomp.core.autoregressive import EARLY
 from thermocomp.core.exceptions import InputError
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
 
 #: a displacement between two rows is interpolated if their distance is at most this many usual steps
 NEAR = 1.5
@@ -120,7 +118,7 @@ def _run(inputs: FloatArray, dt: FloatArray, rows: slice, h: float) -> TickedRun
 
 
 def displacements(
-    runs: Sequence[TickedRun], y: FloatArray, dt: FloatArray, known: NDArray[np.bool_], h: float
+    runs: Sequence[TickedRun], y: FloatArray, dt: FloatArray, known: BoolArray, h: float
 ) -> list[FloatArray]:
     """Return the displacement at each tick, interpolated between adjacent rows; nan where unknown.
 

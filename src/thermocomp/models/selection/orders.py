@@ -6,13 +6,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg
 
+from thermocomp.core.arrays import FloatArray, IntArray
 from thermocomp.core.autoregressive import find_largest_root
 from thermocomp.models.numerics.leastsquares import Triangle
-
-FloatArray = NDArray[np.float64]
 
 _TINY = float(np.finfo(np.float64).tiny)
 
@@ -147,7 +145,7 @@ def coefficients(tri: Triangle, columns: Sequence[int]) -> tuple[FloatArray, flo
     return weights, float(part.centre[-1] - part.centre[:-1] @ weights)
 
 
-def _independent(tri: Triangle) -> NDArray[np.intp]:
+def _independent(tri: Triangle) -> IntArray:
     """Return the linearly independent columns; dependent ones would remove directions of dz."""
     norms, noise = tri.norms[:-1], tri.noise[:-1]
     alive = np.flatnonzero(norms > noise)

@@ -5,14 +5,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.models.numerics.leastsquares import Triangle, join_columns, solve, triangle
 from thermocomp.models.selection.subsetrun import Route, Stop, run
 from thermocomp.models.selection.subsetsearch import Problem
-
-FloatArray = NDArray[np.float64]
 
 _SAME = 1e-12  # relative difference of two sums of squares due to rounding alone, in addition to the noise of y
 

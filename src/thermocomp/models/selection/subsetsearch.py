@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 from scipy import linalg
 from scipy.linalg import lapack
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.models.numerics.leastsquares import Triangle
-
-FloatArray = NDArray[np.float64]
 
 _SPARE = 7  # additional sets kept per size: those that rounding could make the best
 _MOST = 0.05  # larger margins, as a share of a sum of squares, are cut and nothing is proven: bounds the work
