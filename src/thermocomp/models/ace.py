@@ -197,9 +197,8 @@ class ACE(TransformRegressor):
 
         varied = np.flatnonzero(self.data_max_ > self.data_min_)
         order, bounds, groups, start = ranks.rank(np.ascontiguousarray(np.vstack([X[:, varied].T, y])))
-        sweeps = kernel.converge if self.converged else kernel.solve
-        by_rank, phi, self.psi_, self.errors_ = sweeps(
-            order, bounds, groups, start, self.half_window_, self.tolerance, self.max_sweeps
+        by_rank, phi, self.psi_, self.errors_ = kernel.solve(
+            order, bounds, groups, start, self.half_window_, self.tolerance, self.max_sweeps, self.converged
         )
         by_y = order[-1]
         theta, total = np.empty(len(y)), np.zeros(len(y))

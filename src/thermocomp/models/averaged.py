@@ -185,21 +185,19 @@ class AveragedDynamic(TimedRegressor):
         return features, *halve(folds, turning)
 
     def _predict(self, rows: FloatArray, step: FloatArray) -> FloatArray:
-        return np.concatenate([table @ self.coef_ for table in self._features.tables(rows, step)])
+        return np.concatenate([table @ self.coef_ for _, table in self._features.tables(rows, step)])
 
     def _leave_out(
         self, rows: FloatArray, step: FloatArray, folds: IntArray, weights: FloatArray, shares: FloatArray
     ) -> FloatArray:
         """Return mean and spread of the structures, (n_rows, 2), with the weights (n_folds, ...) of each row's fold."""
-        found, start = np.full((len(rows), 2), np.nan), 0
-        for table in self._features.tables(rows, step):
-            for k, own in enumerate(weights):
-                mine = np.flatnonzero(folds[start : start + len(table)] == k)
-                answers = table[mine] @ own.T
+        found = np.full((len(rows), 2), np.nan)
+        for own, table in self._features.tables(rows, step):
+            for k, fitted in enumerate(weights):
+                mine = folds[own] == k
+                answers = table[mine] @ fitted.T
                 mean = answers @ shares
-                found[start + mine, 0] = mean
-                found[start + mine, 1] = np.sqrt((answers - mean[:, None]) ** 2 @ shares)
-            start += len(table)
+                found[own][mine] = np.column_stack([mean, np.sqrt((answers - mean[:, None]) ** 2 @ shares)])
         return found
 
     def _copies(self) -> FloatArray:

@@ -65,9 +65,9 @@ class Doubt:
         of, weights = self.heating
         rows = np.zeros((len(speed), self.columns))
         rows[:, self.speed] = speed
-        heat = np.vstack(list(of.tables(rows[:, [self.speed]], step))) @ weights
+        heat = of.table(rows[:, [self.speed]], step) @ weights
         rows[:, list(self.features.temperatures)] = heat if room is None else heat + room
-        return np.vstack(list(self.features.tables(rows, step)))
+        return self.features.table(rows, step)
 
     def spread(self, table: FloatArray) -> FloatArray:
         """Return the expected RMS error over the given rows, (n_targets,) [unit of the target]."""

@@ -15,18 +15,9 @@ are nearly dependent, 7 the removed column. ``rss``: residual sum of squares of 
 """
 
 import numpy as np
-from numba import njit
 
-from thermocomp.models.kernels.subsets import (
-    CONTRACT,
-    ByteArray,
-    FloatArray,
-    IntArray,
-    Lists,
-    exact,
-    householder,
-    offer,
-)
+from thermocomp.core.arrays import FloatArray
+from thermocomp.models.kernels.subsets import ByteArray, IntArray, Lists, compiled, exact, householder, offer
 
 State = tuple[FloatArray, FloatArray, FloatArray, IntArray, IntArray, FloatArray]
 
@@ -34,7 +25,7 @@ State = tuple[FloatArray, FloatArray, FloatArray, IntArray, IntArray, FloatArray
 GUARD = 1e-5
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
+@compiled
 def gather(state: State, source: int, inside: ByteArray, free: IntArray, n_free: int) -> tuple[FloatArray, int]:
     """Return the triangular factor of the permanently retained columns, free columns and y, and the number retained."""
     _, _, triangles, orders, numbers, _ = state
@@ -60,7 +51,7 @@ def gather(state: State, source: int, inside: ByteArray, free: IntArray, n_free:
     return columns, kept
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
+@compiled
 def renew(state: State, source: int, level: int, inside: ByteArray, free: IntArray, n_free: int) -> None:
     """Compute W, M and b of the free columns from the triangular factor at level `source`; store them at `level`."""
     work, moments, triangles, orders, numbers, _ = state
@@ -68,14 +59,10 @@ def renew(state: State, source: int, level: int, inside: ByteArray, free: IntArr
     columns, kept = gather(state, source, inside, free, n_free)
     m = n_free
     W = np.zeros((m, m))
-    for i in range(m):
-        orders[2, level, i] = free[i]
+    orders[2, level, :m] = free[:m]
     triangles[level, :, :m] = 0.0
-    for i in range(m):
-        for r in range(m):
-            triangles[level, i, r] = columns[kept + i, kept + r]
-    for r in range(m):
-        triangles[level, p, r] = columns[kept + m, kept + r]
+    triangles[level, :m, :m] = columns[kept : kept + m, kept : kept + m]
+    triangles[level, p, :m] = columns[kept + m, kept : kept + m]
     numbers[4, level] = m
     for i in range(m):  # by rows: each is then exact for a triangle with errors only in the last digits
         W[i, i] = 1.0 / columns[kept + i, kept + i]
@@ -106,7 +93,7 @@ def renew(state: State, source: int, level: int, inside: ByteArray, free: IntArr
     numbers[3, level] = level
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
+@compiled
 def begin(triangle: FloatArray, state: State, lists: Lists, inside: ByteArray, residual: float) -> None:
     """Initialise the root node (all columns) with all its children."""
     work, _, triangles, orders, numbers, rss = state
@@ -137,7 +124,7 @@ def begin(triangle: FloatArray, state: State, lists: Lists, inside: ByteArray, r
     numbers[6, 0] = inflated
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
+@compiled
 def drop(  # noqa: PLR0912, PLR0915 - a single function is a tenth faster
     state: State, lists: Lists, inside: ByteArray, budget: int
 ) -> int:
@@ -272,7 +259,7 @@ def drop(  # noqa: PLR0912, PLR0915 - a single function is a tenth faster
     return nodes
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
+@compiled
 def pivot(A: FloatArray, k: int) -> None:
     """Sweep column k in or out: symmetric Gauss-Jordan; columns in the set have a negative diagonal."""
     d = A[k, k]
@@ -286,7 +273,7 @@ def pivot(A: FloatArray, k: int) -> None:
     A[k, k] = -1 / d
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
+@compiled
 def list_good_sets(triangle: FloatArray, least: FloatArray, lists: Lists, inside: ByteArray, largest: int) -> None:  # noqa: PLR0912
     """List good sets of every size: remove the cheapest column, then swap pairs while that improves the set.
 

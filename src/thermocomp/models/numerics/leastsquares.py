@@ -62,6 +62,16 @@ class Triangle:
         """
         return np.asarray((64 + self.factor.shape[1]) * self.last_place)
 
+    def find_independent(self) -> IntArray:
+        """Return the indices of linearly independent columns before the last, in ascending order."""
+        norms, noise = self.norms[:-1], self.noise[:-1]
+        alive = np.flatnonzero(norms > noise)
+        if alive.size == 0:
+            return alive
+        R, order = linalg.qr(self.factor[:, alive] / norms[alive], mode="r", pivoting=True)
+        order = alive[order[: min(R.shape)]]
+        return np.sort(order[np.abs(np.diag(R)) > noise[order] / norms[order]])
+
 
 def join_columns(X: FloatArray, y: FloatArray) -> FloatArray:
     """Return [X y] in Fortran order, the workspace of `triangle`."""
@@ -176,12 +186,10 @@ def solve(X: FloatArray, y: FloatArray, tri: Triangle, *, columns: Sequence[int]
     -------
     Solution
     """
-    if columns is not None:
-        tri = tri.part(columns)
-    places = np.arange(X.shape[1]) if columns is None else np.array(columns, dtype=np.intp)
-    norms, noise = tri.norms[:-1], tri.noise[:-1]
-    kept = _independent(tri.factor[:, :-1], norms, noise)
-    scale = norms[kept]
+    places = list(range(X.shape[1]) if columns is None else columns)
+    tri = tri.part(places)
+    kept = tri.find_independent()
+    scale = tri.norms[kept]
     both = tri.factor[:, [*kept, -1]]
     both[:, :-1] /= scale
     both = np.asarray(np.linalg.qr(both, mode="r"))
@@ -200,16 +208,6 @@ def solve(X: FloatArray, y: FloatArray, tri: Triangle, *, columns: Sequence[int]
         residual=residual,
         rss=float(residual @ residual),
     )
-
-
-def _independent(factor: FloatArray, norms: FloatArray, noise: FloatArray) -> IntArray:
-    """Return the indices of linearly independent columns, in ascending order."""
-    alive = np.flatnonzero(norms > noise)
-    if alive.size == 0:
-        return alive
-    R, order = linalg.qr(factor[:, alive] / norms[alive], mode="r", pivoting=True)
-    order = alive[order[: min(R.shape)]]
-    return np.sort(order[np.abs(np.diag(R)) > noise[order] / norms[order]])
 
 
 def effective_sample_size(residual: FloatArray) -> float:
