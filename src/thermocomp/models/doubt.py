@@ -99,15 +99,13 @@ class Doubt:
         )
 
 
-def find_doubt(samples: Samples, settings: AveragedDynamic | None = None) -> Doubt:
+def find_doubt(samples: Samples) -> Doubt:
     """Return the uncertainty of `averaged` after the given recordings.
 
     Parameters
     ----------
     samples : Samples
         Samples with a spindle speed and at least one temperature.
-    settings : AveragedDynamic, optional
-        Settings of the method. Default: its default settings.
 
     Returns
     -------
@@ -120,7 +118,7 @@ def find_doubt(samples: Samples, settings: AveragedDynamic | None = None) -> Dou
     FitError
         There are too few complete rows.
     """
-    of = settings if settings is not None else AveragedDynamic()
+    of = AveragedDynamic()
     complete = samples.take(samples.valid)
     speeds = [j for j, c in enumerate(complete.inputs) if c.quantity == "spindle_speed"]
     if len(speeds) != 1 or len(speeds) == len(complete.inputs):

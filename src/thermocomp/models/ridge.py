@@ -8,7 +8,7 @@ from sklearn.linear_model import ridge_regression
 
 from thermocomp.models.base import FloatArray
 from thermocomp.models.dynamic import STRENGTHS
-from thermocomp.models.shrinkage import PenalisedRegressor, Rule, sorted_strengths
+from thermocomp.models.shrinkage import PenalisedRegressor, sorted_strengths
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -57,8 +57,6 @@ class Ridge(PenalisedRegressor):
     """
 
     strengths: Sequence[float] = STRENGTHS
-    rule: Rule = "one-standard-error"
-    fit_intercept: bool = True
 
     def _paths(self, Z: FloatArray, y: FloatArray) -> FloatArray:
         strengths = sorted_strengths(self.strengths)

@@ -63,6 +63,7 @@ def choose(rms: FloatArray, rule: Rule) -> tuple[int, int]:
     return i, j
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class ShrunkRegressor(CycledRegressor, TermRegressor):
     """Linear regression on standardised inputs whose complexity is chosen by leaving out thermal cycles.
 
@@ -81,7 +82,8 @@ class ShrunkRegressor(CycledRegressor, TermRegressor):
         Names of the constant inputs.
     """
 
-    rule: Rule
+    rule: Rule = "one-standard-error"
+    fit_intercept: bool = True
 
     def _fit(self, change: FloatArray, deviation: FloatArray, folds: IntArray) -> None:
         errors = []
@@ -173,8 +175,6 @@ class ComponentRegressor(ShrunkRegressor):
 
     components: int | None = None
     max_components: int | None = None
-    rule: Rule = "one-standard-error"
-    fit_intercept: bool = True
 
     @abstractmethod
     def _path(self, Z: FloatArray, y: FloatArray, most: int) -> FloatArray:

@@ -35,10 +35,7 @@ def gather(state: State, source: int, inside: ByteArray, free: IntArray, n_free:
     kept = 0
     for i in range(had):
         k = orders[2, source, i]
-        is_free = False
-        for f in range(n_free):
-            is_free |= free[f] == k
-        if inside[k] and not is_free:
+        if inside[k] and not (free[:n_free] == k).any():
             columns[kept] = triangles[source, i, :had]
             kept += 1
     for f in range(n_free):
@@ -87,9 +84,8 @@ def renew(state: State, source: int, level: int, inside: ByteArray, free: IntArr
                 total += W[i, c] * W[j, c]
             M[k, free[j]] = M[free[j], k] = total
         D[k] = M[k, k]
-    for k in range(len(D)):
-        C[k] = B[k] * B[k] / D[k]
-        limits[k] = GUARD * D[k]
+    C[:] = B * B / D
+    limits[:] = GUARD * D
     numbers[3, level] = level
 
 
@@ -98,10 +94,8 @@ def begin(triangle: FloatArray, state: State, lists: Lists, inside: ByteArray, r
     """Initialise the root node (all columns) with all its children."""
     work, _, triangles, orders, numbers, rss = state
     p = len(inside)
-    for i in range(p):
-        orders[2, 0, i] = i
-        triangles[0, i] = triangle[:, i]
-    triangles[0, p] = triangle[:, p]
+    orders[2, 0, :p] = np.arange(p)
+    triangles[0] = triangle.T
     numbers[4, 0] = p
     inside[:] = 1
     renew(state, 0, 0, inside, np.arange(p), p)
@@ -283,7 +277,6 @@ def list_good_sets(triangle: FloatArray, least: FloatArray, lists: Lists, inside
     columns = np.ascontiguousarray(triangle.T)
     A = columns @ columns.T
     inside[:] = 1
-    chosen = np.empty(p, np.int64)
     for k in range(p):
         pivot(A, k)
     for size in range(p - 1, 0, -1):
@@ -313,10 +306,4 @@ def list_good_sets(triangle: FloatArray, least: FloatArray, lists: Lists, inside
             pivot(A, enter)
             pivot(A, out)
         if size <= largest:
-            n = 0
-            for i in range(p):
-                if inside[i]:
-                    chosen[n] = i
-                    n += 1
-            lists_value = exact(columns, least, chosen, size)
-            offer(lists, size, lists_value, inside, -1, -1)
+            offer(lists, size, exact(columns, least, np.flatnonzero(inside), size), inside, -1, -1)

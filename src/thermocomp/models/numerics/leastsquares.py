@@ -186,8 +186,9 @@ def solve(X: FloatArray, y: FloatArray, tri: Triangle, *, columns: Sequence[int]
     -------
     Solution
     """
-    places = list(range(X.shape[1]) if columns is None else columns)
-    tri = tri.part(places)
+    if columns is not None:
+        tri = tri.part(columns)
+    places = np.arange(X.shape[1]) if columns is None else np.array(columns, dtype=np.intp)
     kept = tri.find_independent()
     scale = tri.norms[kept]
     both = tri.factor[:, [*kept, -1]]
