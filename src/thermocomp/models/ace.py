@@ -11,7 +11,7 @@ from thermocomp.core.additive import Additive, Curve
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.inputs import Input
 from thermocomp.core.terms import Variable
-from thermocomp.models.ace_thinning import thin
+from thermocomp.models.ace_thinning import sum_curves, thin
 from thermocomp.models.base import FloatArray, StaticRegressor
 
 _NOTHING = Curve((), (0.0,), "step")
@@ -58,10 +58,7 @@ class TransformRegressor(StaticRegressor):
     """
 
     def _predict(self, change: FloatArray) -> FloatArray:
-        total = np.zeros(len(change))
-        for j, curve in enumerate(self._curves):
-            total = total + curve(change[:, j])
-        return self._inverse(total)
+        return self._inverse(sum_curves(self._curves, list(change.T)))
 
     def outside(self, X: ArrayLike) -> NDArray[np.bool_]:
         """Return a mask of the values outside the trained range, where the prediction is clipped (W-07).

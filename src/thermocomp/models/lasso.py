@@ -25,12 +25,12 @@ class Lasso(PenalisedRegressor):
 
     Parameters
     ----------
-    strengths : sequence of float
-        Strengths to choose from, relative to the strength at which the last input is dropped.
     rule : {'one-standard-error', 'minimum'}
         Rule for the choice of the strength.
     fit_intercept : bool
         False: the model returns zero in the reference state.
+    strengths : sequence of float
+        Strengths to choose from, relative to the strength at which the last input is dropped.
 
     Attributes
     ----------
@@ -100,14 +100,14 @@ class ElasticNet(Lasso):
 
     Parameters
     ----------
-    l1_ratios : sequence of float
-        L1 shares of the penalty to choose from; the rest of the penalty is quadratic. 1 gives the lasso.
-    strengths : sequence of float
-        Strengths to choose from, relative to the strength at which the last input is dropped.
     rule : {'one-standard-error', 'minimum'}
         Rule for the choice of the strength, within the best share.
     fit_intercept : bool
         False: the model returns zero in the reference state.
+    strengths : sequence of float
+        Strengths to choose from, relative to the strength at which the last input is dropped.
+    l1_ratios : sequence of float
+        L1 shares of the penalty to choose from; the rest of the penalty is quadratic. 1 gives the lasso.
 
     Attributes
     ----------

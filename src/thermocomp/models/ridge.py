@@ -19,12 +19,12 @@ class Ridge(PenalisedRegressor):
 
     Parameters
     ----------
-    strengths : sequence of float
-        Strengths to choose from, per row and relative to each input's variance.
     rule : {'one-standard-error', 'minimum'}
         Rule for the choice of the strength.
     fit_intercept : bool
         False: the model returns zero in the reference state.
+    strengths : sequence of float
+        Strengths to choose from, per row and relative to each input's variance.
 
     Attributes
     ----------

@@ -70,6 +70,13 @@ class ShrunkRegressor(CycledRegressor, TermRegressor):
     Each thermal cycle among the training rows is left out in turn; the whole path of models is fitted to the others and
     predicts the left-out cycle. Constant inputs get the coefficient 0.
 
+    Parameters
+    ----------
+    rule : {'one-standard-error', 'minimum'}
+        Rule for the choice of the complexity.
+    fit_intercept : bool
+        False: the model returns zero in the reference state.
+
     Attributes
     ----------
     cv_rms_ : float
@@ -158,14 +165,14 @@ class ComponentRegressor(ShrunkRegressor):
 
     Parameters
     ----------
-    components : int, optional
-        Fixed number of components, or the largest possible number if smaller. Default: chosen by `rule`.
-    max_components : int, optional
-        Largest number to choose from; default: the number of inputs.
     rule : {'one-standard-error', 'minimum'}
         Rule for the choice of the number of components.
     fit_intercept : bool
         False: the model returns zero in the reference state, and the components are computed about zero.
+    components : int, optional
+        Fixed number of components, or the largest possible number if smaller. Default: chosen by `rule`.
+    max_components : int, optional
+        Largest number to choose from; default: the number of inputs.
 
     Attributes
     ----------

@@ -47,16 +47,14 @@ class TickedRun:
         return self.since is self.drive
 
 
-def check_steps(dt: ArrayLike | None, n_rows: int) -> FloatArray:
-    """Check time steps [s]; if None, every row is a separate test.
+def check_steps(dt: ArrayLike, n_rows: int) -> FloatArray:
+    """Check time steps [s].
 
     Raises
     ------
     InputError
         The number of steps differs from the number of rows, or a step is negative or nan.
     """
-    if dt is None:
-        return np.full(n_rows, np.inf)
     found = np.asarray(dt, dtype=np.float64)
     if found.shape != (n_rows,) or not (found >= 0).all():
         raise InputError(f"dt: expected {n_rows} time steps that are not negative")

@@ -46,8 +46,6 @@ class Subsets:
     ----------
     ranked : tuple of tuple of Subset
         Sets for each size from 1, the best first; empty if none was found before the search was stopped.
-    n_columns : int
-        Number of columns of X.
     left_out : tuple of int
         Columns not searched: constant columns, and copies of an earlier column (up to a factor and an offset).
     rank : int
@@ -69,7 +67,6 @@ class Subsets:
     """
 
     ranked: tuple[tuple[Subset, ...], ...]
-    n_columns: int
     left_out: tuple[int, ...]
     rank: int
     total: float
@@ -194,7 +191,6 @@ def best_subsets(
         ranked.append(_certified(sorted(fitted), n_best, beyond, complete and same))
     return Subsets(
         ranked=tuple(ranked),
-        n_columns=X.shape[1],
         left_out=tuple(sorted(set(range(X.shape[1])) - set(kept))),
         rank=problem.rank,
         total=tri.total,
