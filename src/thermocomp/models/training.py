@@ -113,7 +113,8 @@ def fit_method(name: str | BaseEstimator, samples: Samples, target: int, learn: 
         There are too few rows, the method cannot be fitted to them, or its predictions are not one finite number per
         row.
     """
-    (name,) = expand([name])
+    if not isinstance(name, str):
+        (name,) = expand([name])
     how, own = find_method(name), getattr(name, "estimator", None)
     columns = tuple(j for j, c in enumerate(samples.inputs) if how.speed or c.quantity != "spindle_speed")
     if not columns:
