@@ -158,7 +158,7 @@ class NetARX(ClockedRegressor):
         if not sizes or min(sizes) < 1:
             raise InputError(f"hidden = {self.hidden}: expected numbers of nodes, at least 1")
         h = self._intervals(self.interval, step)[0]
-        data = Clocked(interval=h, runs=ticks.put_on_clock(inputs, step, h), y=deviation, dt=step, folds=folds)
+        data = Clocked.of(inputs, deviation, step, folds, h)
         self.k_, self.m_ = (0, 0) if self.time == "none" else self._chosen_orders(inputs, deviation, step, folds)
         judged: list[TriedSetting] = []
         if len(sizes) > 1 and self.time != "none":

@@ -69,6 +69,11 @@ class Clocked:
     dt: FloatArray
     folds: IntArray
 
+    @classmethod
+    def of(cls, inputs: FloatArray, y: FloatArray, dt: FloatArray, folds: IntArray, interval: float) -> "Clocked":
+        """Resample the rows."""
+        return cls(interval, ticks.put_on_clock(inputs, dt, interval), y, dt, folds)
+
     def targets(self, without: int | None = None) -> list[FloatArray]:
         """Return the known displacement at each tick of each run, nan elsewhere and in the left-out fold."""
         known = (self.folds >= 0) & (self.folds != without) if without is not None else self.folds >= 0

@@ -1,6 +1,6 @@
 """Parameter uncertainty of `averaged`: covariance of its weights, and its reduction by a further test."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -89,14 +89,7 @@ class Doubt:
             seen = table * np.sqrt(duration / self.part / len(table)) / max(error, 1e-9)
             common = covariance @ seen.T
             left.append(covariance - common @ np.linalg.solve(np.eye(len(seen)) + seen @ common, common.T))
-        return Doubt(
-            features=self.features,
-            columns=self.columns,
-            covariance=np.array(left),
-            error=self.error,
-            part=self.part,
-            heating=self.heating,
-        )
+        return replace(self, covariance=np.array(left))
 
 
 def find_doubt(samples: Samples) -> Doubt:
