@@ -71,7 +71,14 @@ class Clocked:
 
     @classmethod
     def of(cls, inputs: FloatArray, y: FloatArray, dt: FloatArray, folds: IntArray, interval: float) -> "Clocked":
-        """Resample the rows."""
+        """Resample rows.
+
+        Parameters
+        ----------
+        inputs : ndarray of shape (n_rows, n_inputs)
+        y, dt, folds, interval
+            As in the class.
+        """
         return cls(interval, ticks.put_on_clock(inputs, dt, interval), y, dt, folds)
 
     def targets(self, without: int | None = None) -> list[FloatArray]:
