@@ -117,7 +117,7 @@ def single(n: int, p: int, goal: float, with_ace: bool) -> bool:
 
     def fit() -> tuple[FloatArray, FloatArray, float, FloatArray]:
         ranked = ranks.rank(np.ascontiguousarray(np.vstack([T.T, y])))
-        found: tuple[FloatArray, FloatArray, float, FloatArray] = kernel.solve(*ranked, 10, 0.01, 20)
+        found: tuple[FloatArray, FloatArray, float, FloatArray] = kernel.solve(*ranked, 10, 0.01, 20, False)
         return found
 
     psi = fit()[2]

@@ -47,7 +47,7 @@ def kernel_fit(
     from thermocomp.models.kernels import ranks
 
     order, bounds, groups, start = ranks.rank(np.ascontiguousarray(np.vstack([T.T, S])))
-    by_rank, phi_by_rank, psi, errors = kernel.solve(order, bounds, groups, start, half, tolerance, max_sweeps)
+    by_rank, phi_by_rank, psi, errors = kernel.solve(order, bounds, groups, start, half, tolerance, max_sweeps, False)
     theta, phi = np.empty(len(S)), np.empty(T.T.shape)
     theta[order[-1]] = by_rank
     for j in range(T.shape[1]):
@@ -139,11 +139,11 @@ def test_converged_kernel_is_the_limit_of_its_twin(seed: int, n: int, p: int, ha
         T = np.round(T)
     ranked = ranks.rank(np.ascontiguousarray(np.vstack([T.T, S])))
     one = twin_ace.fit(T, S, half, 0.0, 1, twice=True)  # not accelerated yet
-    theta, _, psi, errors = kernel.converge(*ranked, half, 0.0, 1)
+    theta, _, psi, errors = kernel.solve(*ranked, half, 0.0, 1, True)
     np.testing.assert_allclose(theta, one.theta[np.argsort(S)], atol=1e-12)
     assert psi == pytest.approx(one.psi, abs=1e-12)
     assert errors == pytest.approx(one.errors, abs=1e-12)
-    _, _, psi, errors = kernel.converge(*ranked, half, 1e-9, 50_000)
+    _, _, psi, errors = kernel.solve(*ranked, half, 1e-9, 50_000, True)
     again = twin_ace.fit(T, S, half, -1.0, 300, twice=True)
     assert psi >= again.psi - 1e-6
     assert errors[-1] <= again.errors[-1] + 1e-6 if again.errors else psi == 0

@@ -63,7 +63,7 @@ def test_the_frozen_model_is_the_estimator(samples: Samples) -> None:
     inputs = samples.model_inputs(range(len(samples.inputs)), np.ones(len(samples), dtype=bool))
     model = estimator.freeze(target="z_um", inputs=inputs)
     expected = estimator.predict(samples.frame(), dt=samples.dt())
-    table = np.concatenate(list(estimator._features.tables(samples.change(), samples.dt())))
+    table = estimator._features.table(samples.change(), samples.dt())
     spread = np.sqrt(((table @ estimator._spread.T) ** 2).sum(axis=1))
     assert isinstance(model, PacedDynamic)
     state, values = model.init(samples.reference()[0]), samples.values
@@ -116,7 +116,7 @@ def test_the_noise_that_is_added_is_that_of_the_features() -> None:
     for _ in range(300):
         noise = 0.4 * rng.normal(size=(400, 2))
         noise -= noise[:5].mean(axis=0)
-        drawn.append(np.concatenate(list(of.tables(np.column_stack([noise, rows[:, 2]]), step)))[-1, :6])
+        drawn.append(of.table(np.column_stack([noise, rows[:, 2]]), step)[-1, :6])
     expected = of.moments(rows, rows[:, :1], step, np.zeros(400, dtype=np.intp), 0.4).noise
     assert np.cov(np.array(drawn).T) == pytest.approx(expected[:6, :6], abs=0.04)
     assert np.array_equal(expected[6:], np.zeros((1, 7)))

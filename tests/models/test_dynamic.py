@@ -45,7 +45,8 @@ def test_choice_by_moments_equals_plain_refits(copies: str, intercept: bool, sam
     strengths = (1e-4, 1e-2)
     estimator = fitted(samples, copies=copies, fit_intercept=intercept, strengths=strengths, rule="minimum")
     X, y, cycle = samples.frame(), samples.deviations[:, 0], samples.cycle
-    features = np.vstack(list(estimator._features(X.to_numpy(), samples.dt())))[:, estimator._columns]
+    tables = estimator._features(X.to_numpy(), samples.dt())
+    features = np.vstack([table for _, table in tables])[:, estimator._columns]
     errors = np.empty((2, 4))
     for k in range(4):
         learn = cycle != k

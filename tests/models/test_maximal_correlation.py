@@ -61,7 +61,7 @@ def test_converged_is_the_limit_of_the_sweeps(step: float) -> None:
     for i, subset in enumerate(tight.subsets):
         limit = twin_ace.fit(T[:, list(subset)], S[:, 0], 10, -1.0, 300, twice=True).psi
         ranked = ranks.rank(np.ascontiguousarray(np.vstack([T[:, list(subset)].T, S[:, 0]])))
-        single = kernel.converge(*ranked, 10, 1e-3, 2000)
+        single = kernel.solve(*ranked, 10, 1e-3, 2000, True)
         assert tight.psi[0, i, 0] == pytest.approx(limit, abs=1e-6)
         assert usual.psi[0, i, 0] == pytest.approx(limit, abs=5e-4)
         assert usual.psi[0, i, 0] == pytest.approx(single[2], abs=1e-12)
@@ -78,7 +78,7 @@ def test_many_temperatures_that_rise_together_have_a_limit() -> None:
     T = heat + 0.05 * rng.normal(size=(300, 8))
     S = np.sqrt(heat) + 0.01 * rng.normal(size=heat.shape)
     ranked = ranks.rank(np.ascontiguousarray(np.vstack([T.T, S[:, 0]])))
-    assert kernel.solve(*ranked, 10, -1.0, 2000)[2] < 0.9
+    assert kernel.solve(*ranked, 10, -1.0, 2000, False)[2] < 0.9
     found = maximal_correlations([DataSet("t", T, S)], subsets_up_to(8))
     assert found.psi.min() > 0.999
     best = [max(p for p, s in zip(found.psi[0, :, 0], found.subsets, strict=True) if len(s) == k) for k in range(1, 9)]

@@ -1,7 +1,6 @@
 """The stepwise engine against a literal transcription of the papers' equations, and its safeguards."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -200,8 +199,7 @@ def test_alpha_to_enter_above_alpha_to_remove_is_refused(alphas: tuple[float, fl
 
 
 def test_a_rule_that_goes_round_is_stopped() -> None:
-    @dataclass(frozen=True)
-    class Fickle:
+    class Fickle(FThresholds):
         def enter_f(self, df: int) -> float:
             return 5.0
 

@@ -11,7 +11,7 @@ from thermocomp.core.additive import Additive, Curve
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.inputs import Input
 from thermocomp.core.terms import Variable
-from thermocomp.models.ace_thinning import thin
+from thermocomp.models.ace_thinning import sum_curves, thin
 from thermocomp.models.base import FloatArray, StaticRegressor
 
 _NOTHING = Curve((), (0.0,), "step")
@@ -58,10 +58,7 @@ class TransformRegressor(StaticRegressor):
     """
 
     def _predict(self, change: FloatArray) -> FloatArray:
-        total = np.zeros(len(change))
-        for j, curve in enumerate(self._curves):
-            total = total + curve(change[:, j])
-        return self._inverse(total)
+        return self._inverse(sum_curves(self._curves, list(change.T)))
 
     def outside(self, X: ArrayLike) -> NDArray[np.bool_]:
         """Return a mask of the values outside the trained range, where the prediction is clipped (W-07).
@@ -113,6 +110,7 @@ class TransformRegressor(StaticRegressor):
         self.falling_theta_ = float(np.mean(steps < 0)) if steps.size else 0.0
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class ACE(TransformRegressor):
     """Alternating conditional expectations with a boxcar on ranks and nearest neighbours (Wessel 2004; W-01 to W-05).
 
@@ -174,22 +172,12 @@ class ACE(TransformRegressor):
     1.0 49 um instead of 49 um
     """
 
-    def __init__(
-        self,
-        *,
-        half_window: int = 10,
-        window_share: float | None = None,
-        neighbours: int = 2,
-        tolerance: float = 0.0,
-        max_sweeps: int = 300,
-        converged: bool = False,
-    ) -> None:
-        self.half_window = half_window
-        self.window_share = window_share
-        self.neighbours = neighbours
-        self.tolerance = tolerance
-        self.max_sweeps = max_sweeps
-        self.converged = converged
+    half_window: int = 10
+    window_share: float | None = None
+    neighbours: int = 2
+    tolerance: float = 0.0
+    max_sweeps: int = 300
+    converged: bool = False
 
     def _fit(self, change: FloatArray, deviation: FloatArray) -> None:
         if self.neighbours < 1 or self.max_sweeps < 1 or not self.tolerance >= 0:
@@ -206,9 +194,8 @@ class ACE(TransformRegressor):
 
         varied = np.flatnonzero(self.data_max_ > self.data_min_)
         order, bounds, groups, start = ranks.rank(np.ascontiguousarray(np.vstack([X[:, varied].T, y])))
-        sweeps = kernel.converge if self.converged else kernel.solve
-        by_rank, phi, self.psi_, self.errors_ = sweeps(
-            order, bounds, groups, start, self.half_window_, self.tolerance, self.max_sweeps
+        by_rank, phi, self.psi_, self.errors_ = kernel.solve(
+            order, bounds, groups, start, self.half_window_, self.tolerance, self.max_sweeps, self.converged
         )
         by_y = order[-1]
         theta, total = np.empty(len(y)), np.zeros(len(y))

@@ -14,6 +14,7 @@ from thermocomp.models.base import FloatArray
 _SAME = 1e-9  # relative variation below which a channel counts as constant: no sensor has that many digits
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class MonotoneACE(TransformRegressor):
     """Alternating conditional expectations with an increasing theta, converged, as smooth curves (E-W5, E-W8).
 
@@ -73,24 +74,13 @@ class MonotoneACE(TransformRegressor):
     1.0 49 um instead of 49 um
     """
 
-    def __init__(
-        self,
-        *,
-        points: int = 20,
-        smoothing: float = 1e-4,
-        shrinkage: float = 1e-5,
-        extend: float = 0.25,
-        tolerance: float = 1e-6,
-        max_sweeps: int = 1000,
-        max_rows: int = 10_000,
-    ) -> None:
-        self.points = points
-        self.smoothing = smoothing
-        self.shrinkage = shrinkage
-        self.extend = extend
-        self.tolerance = tolerance
-        self.max_sweeps = max_sweeps
-        self.max_rows = max_rows
+    points: int = 20
+    smoothing: float = 1e-4
+    shrinkage: float = 1e-5
+    extend: float = 0.25
+    tolerance: float = 1e-6
+    max_sweeps: int = 1000
+    max_rows: int = 10_000
 
     def _fit(self, change: FloatArray, deviation: FloatArray) -> None:
         if self.points < 3 or self.max_sweeps < 1 or self.max_rows < 2:

@@ -52,12 +52,12 @@ def thin(curves: Sequence[Curve], response: Curve, columns: Sequence[FloatArray]
         if sum(len(c.x) for c in thinned) <= POINTS:
             break
         near *= _FACTOR
-    wanted = response(_sum(curves, columns))
+    wanted = response(sum_curves(curves, columns))
     allowed = min(TOLERANCE, SHARE * float(np.ptp(wanted)))
-    return thinned, _steps(_sum(thinned, columns), wanted, allowed)
+    return thinned, _steps(sum_curves(thinned, columns), wanted, allowed)
 
 
-def _sum(curves: Sequence[Curve], columns: Sequence[FloatArray]) -> FloatArray:
+def sum_curves(curves: Sequence[Curve], columns: Sequence[FloatArray]) -> FloatArray:
     """Add up exactly as the frozen model does, to the last bit."""
     total = np.zeros(len(columns[0]))
     for curve, x in zip(curves, columns, strict=True):

@@ -14,7 +14,6 @@ from thermocomp.core.inputs import Input
 from thermocomp.core.model import ErrorModel
 from thermocomp.models.base import FloatArray, IntArray
 from thermocomp.models.clocked import Clocked, ClockedRegressor, Recursion, TriedSetting, rms, too_few
-from thermocomp.models.numerics import ticks
 from thermocomp.models.numerics.freerun import Coefficients, output_error
 from thermocomp.models.numerics.leastsquares import triangle
 from thermocomp.models.selection import orders
@@ -31,6 +30,7 @@ class _Setting:
     intercept: bool
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class ARX(ClockedRegressor):
     """Autoregressive model with inputs: dz(t) = sum_{i=1..k} a_i dz(t - ih) + sum_{i=0..m} b_i n(t - ih) (P-01).
 
@@ -114,37 +114,21 @@ class ARX(ClockedRegressor):
     [0.9] [[0.8]]
     """
 
-    def __init__(
-        self,
-        *,
-        inputs: Sequence[str | int] | None = None,
-        interval: float | Sequence[float] | None = 600.0,
-        k: int | None = None,
-        m: int | None = None,
-        k_max: int = 5,
-        m_max: int = 5,
-        criterion: Literal["fpe", "aic", "bic", "free-run"] = "fpe",
-        fit_intercept: bool | None = False,
-        time: Time | None = None,
-    ) -> None:
-        self.inputs = inputs
-        self.interval = interval
-        self.k = k
-        self.m = m
-        self.k_max = k_max
-        self.m_max = m_max
-        self.criterion = criterion
-        self.fit_intercept = fit_intercept
-        self.time = time
+    inputs: Sequence[str | int] | None = None
+    interval: float | Sequence[float] | None = 600.0
+    k: int | None = None
+    m: int | None = None
+    k_max: int = 5
+    m_max: int = 5
+    criterion: Literal["fpe", "aic", "bic", "free-run"] = "fpe"
+    fit_intercept: bool | None = False
+    time: Time | None = None
 
     def _learn(self, inputs: FloatArray, deviation: FloatArray, step: FloatArray, folds: IntArray) -> None:
         if self.criterion not in ("fpe", "aic", "bic", "free-run"):
             raise InputError(f"criterion {self.criterion!r}: expected fpe, aic, bic or free-run")
         ks, ms = self._orders(self.k, self.k_max, "k"), self._orders(self.m, self.m_max, "m")
-        data = [
-            Clocked(interval=h, runs=ticks.put_on_clock(inputs, step, h), y=deviation, dt=step, folds=folds)
-            for h in self._intervals(self.interval, step)
-        ]
+        data = [Clocked.of(inputs, deviation, step, folds, h) for h in self._intervals(self.interval, step)]
         constants = (False, True) if self.fit_intercept is None else (self.fit_intercept,)
         if self.time == "none":  # no choice: no row has a past
             ks, ms, data, constants = ks[:1], ms[:1], data[:1], constants[:1]
@@ -180,12 +164,8 @@ class ARX(ClockedRegressor):
             Measured and predicted deviation at all ticks with a sufficient past.
         """
         rows, step = self._given(X, dt)
-        inputs = self._used(rows)
-        runs = ticks.put_on_clock(inputs, step, self.interval_)
-        measured = np.asarray(y, dtype=np.float64)
-        data = Clocked(
-            interval=self.interval_, runs=runs, y=measured, dt=step, folds=np.zeros(len(inputs), dtype=np.intp)
-        )
+        measured, folds = np.asarray(y, dtype=np.float64), np.zeros(len(rows), dtype=np.intp)
+        data = Clocked.of(self._used(rows), measured, step, folds, self.interval_)
         work = data.lagged(data.targets(), self.k_, self.m_)
         return np.column_stack([work[:, -1], self._coefficients.one_step(work[:, :-1])])
 

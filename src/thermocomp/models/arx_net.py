@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -66,6 +67,7 @@ class _Net:
         return own[:, 0]
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class NetARX(ClockedRegressor):
     """Back-propagation net for dz(t) from dz(t-h) .. dz(t-kh) and n(t) .. n(t-mh) (P-03, E-P2).
 
@@ -138,41 +140,25 @@ class NetARX(ClockedRegressor):
     4 2 of 29 um
     """
 
-    def __init__(
-        self,
-        *,
-        inputs: Sequence[str | int] | None = None,
-        interval: float | None = 600.0,
-        k: int | None = 1,
-        m: int | None = 0,
-        hidden: int | Sequence[int] = (2, 3, 4, 6, 8),
-        epochs: int = 10_000,
-        rate: float = 0.5,
-        final_rate: float = 0.02,
-        momentum: float = 0.0,
-        random_state: int = 0,
-        jobs: int = 2,
-        time: Time | None = None,
-    ) -> None:
-        self.inputs = inputs
-        self.interval = interval
-        self.k = k
-        self.m = m
-        self.hidden = hidden
-        self.epochs = epochs
-        self.rate = rate
-        self.final_rate = final_rate
-        self.momentum = momentum
-        self.random_state = random_state
-        self.jobs = jobs
-        self.time = time
+    inputs: Sequence[str | int] | None = None
+    interval: float | None = 600.0
+    k: int | None = 1
+    m: int | None = 0
+    hidden: int | Sequence[int] = (2, 3, 4, 6, 8)
+    epochs: int = 10_000
+    rate: float = 0.5
+    final_rate: float = 0.02
+    momentum: float = 0.0
+    random_state: int = 0
+    jobs: int = 2
+    time: Time | None = None
 
     def _learn(self, inputs: FloatArray, deviation: FloatArray, step: FloatArray, folds: IntArray) -> None:
         sizes = tuple(int(h) for h in np.atleast_1d(self.hidden))
         if not sizes or min(sizes) < 1:
             raise InputError(f"hidden = {self.hidden}: expected numbers of nodes, at least 1")
         h = self._intervals(self.interval, step)[0]
-        data = Clocked(interval=h, runs=ticks.put_on_clock(inputs, step, h), y=deviation, dt=step, folds=folds)
+        data = Clocked.of(inputs, deviation, step, folds, h)
         self.k_, self.m_ = (0, 0) if self.time == "none" else self._chosen_orders(inputs, deviation, step, folds)
         judged: list[TriedSetting] = []
         if len(sizes) > 1 and self.time != "none":

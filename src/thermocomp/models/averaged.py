@@ -1,6 +1,7 @@
 """`averaged`: many ridge regressions on lagged temperatures and speed states, merged into one model."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -29,6 +30,7 @@ RUNNING = (5 * MINUTE, 15 * MINUTE, 45 * MINUTE, 135 * MINUTE)
 DIRECTIONS = 12
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class AveragedDynamic(TimedRegressor):
     """Average of many ridge regressions on lagged temperatures and on states of the spindle speed.
 
@@ -108,28 +110,15 @@ class AveragedDynamic(TimedRegressor):
 
     columns: ClassVar[str] = "speed"
 
-    def __init__(
-        self,
-        *,
-        speed: Sequence[str | int] = (),
-        noise: float = 0.4,
-        lags: Sequence[float] = LAGS,
-        powers: Sequence[float] = POWERS,
-        stopped: Sequence[float] = STOPPED,
-        running: Sequence[float] = RUNNING,
-        structures: int = 200,
-        random_state: int = 0,
-        time: Time | None = None,
-    ) -> None:
-        self.speed = speed
-        self.noise = noise
-        self.lags = lags
-        self.powers = powers
-        self.stopped = stopped
-        self.running = running
-        self.structures = structures
-        self.random_state = random_state
-        self.time = time
+    speed: Sequence[str | int] = ()
+    noise: float = 0.4
+    lags: Sequence[float] = LAGS
+    powers: Sequence[float] = POWERS
+    stopped: Sequence[float] = STOPPED
+    running: Sequence[float] = RUNNING
+    structures: int = 200
+    random_state: int = 0
+    time: Time | None = None
 
     def _fit(self, rows: FloatArray, deviation: FloatArray, step: FloatArray, folds: IntArray) -> None:
         self._check()
@@ -196,21 +185,19 @@ class AveragedDynamic(TimedRegressor):
         return features, *halve(folds, turning)
 
     def _predict(self, rows: FloatArray, step: FloatArray) -> FloatArray:
-        return np.concatenate([table @ self.coef_ for table in self._features.tables(rows, step)])
+        return np.concatenate([table @ self.coef_ for _, table in self._features.tables(rows, step)])
 
     def _leave_out(
         self, rows: FloatArray, step: FloatArray, folds: IntArray, weights: FloatArray, shares: FloatArray
     ) -> FloatArray:
         """Return mean and spread of the structures, (n_rows, 2), with the weights (n_folds, ...) of each row's fold."""
-        found, start = np.full((len(rows), 2), np.nan), 0
-        for table in self._features.tables(rows, step):
-            for k, own in enumerate(weights):
-                mine = np.flatnonzero(folds[start : start + len(table)] == k)
-                answers = table[mine] @ own.T
+        found = np.full((len(rows), 2), np.nan)
+        for own, table in self._features.tables(rows, step):
+            for k, fitted in enumerate(weights):
+                mine = folds[own] == k
+                answers = table[mine] @ fitted.T
                 mean = answers @ shares
-                found[start + mine, 0] = mean
-                found[start + mine, 1] = np.sqrt((answers - mean[:, None]) ** 2 @ shares)
-            start += len(table)
+                found[own][mine] = np.column_stack([mean, np.sqrt((answers - mean[:, None]) ** 2 @ shares)])
         return found
 
     def _copies(self) -> FloatArray:

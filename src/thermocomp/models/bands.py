@@ -4,14 +4,10 @@ from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
+from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
 from thermocomp.core.band import CONFORMAL, Band
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.intp]
 
 #: share of the rows of unseen cycles that a band should cover
 LEVEL = 0.9

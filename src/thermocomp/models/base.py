@@ -19,6 +19,14 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
 
 
+def plain_inputs(names: Sequence[str], low: FloatArray, high: FloatArray) -> tuple[Input, ...]:
+    """Return inputs of which only names and trained ranges are known."""
+    return tuple(
+        Input(name, "dimensionless", "1", reference=0.0, rezero=False, low=a, high=b)
+        for name, a, b in zip(names, low.tolist(), high.tolist(), strict=True)
+    )
+
+
 class ThermalRegressor(RegressorMixin, BaseEstimator, ABC):
     """A regressor that freezes into plain numbers.
 
@@ -83,10 +91,7 @@ class ThermalRegressor(RegressorMixin, BaseEstimator, ABC):
         check_is_fitted(self)
         names = self._names()
         if inputs is None:
-            return tuple(
-                Input(name, "dimensionless", "1", reference=0.0, rezero=False, low=float(low), high=float(high))
-                for name, low, high in zip(names, self.data_min_, self.data_max_, strict=True)
-            )
+            return plain_inputs(names, self.data_min_, self.data_max_)
         if len(inputs) != len(names):
             raise InputError(
                 f"{len(inputs)} inputs given, but the model was fitted to {len(names)}: {', '.join(names)}"

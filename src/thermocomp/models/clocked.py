@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.models.base import FloatArray, IntArray
 from thermocomp.models.numerics import ticks
 from thermocomp.models.numerics.ticks import TickedRun
 from thermocomp.models.timed import TimedRegressor
-
-BoolArray = NDArray[np.bool_]
 
 #: a recording cannot determine a memory much longer than itself: the free run must decay by a factor e within this many
 #: lengths of the longest test
@@ -70,6 +68,18 @@ class Clocked:
     y: FloatArray
     dt: FloatArray
     folds: IntArray
+
+    @classmethod
+    def of(cls, inputs: FloatArray, y: FloatArray, dt: FloatArray, folds: IntArray, interval: float) -> "Clocked":
+        """Resample rows.
+
+        Parameters
+        ----------
+        inputs : ndarray of shape (n_rows, n_inputs)
+        y, dt, folds, interval
+            As in the class.
+        """
+        return cls(interval, ticks.put_on_clock(inputs, dt, interval), y, dt, folds)
 
     def targets(self, without: int | None = None) -> list[FloatArray]:
         """Return the known displacement at each tick of each run, nan elsewhere and in the left-out fold."""

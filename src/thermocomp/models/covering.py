@@ -8,14 +8,10 @@ left-out cycles lie from a cover of the other cycles, but at least the largest d
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray, IntArray
 from thermocomp.core.joint import JointSupport
 from thermocomp.core.machine import Channel
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.intp]
 
 #: share of the rows of left-out cycles that must lie inside
 SHARE = 0.95

@@ -1,18 +1,16 @@
 """Parameter uncertainty of `averaged`: covariance of its weights, and its reduction by a further test."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.models.averaged import AveragedDynamic
 from thermocomp.models.numerics.folds import number_folds
 from thermocomp.models.numerics.structures import average, fit_each, share_out
 from thermocomp.models.pacedfeatures import PacedFeatures
 from thermocomp.recordings.samples import Samples
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,9 +65,9 @@ class Doubt:
         of, weights = self.heating
         rows = np.zeros((len(speed), self.columns))
         rows[:, self.speed] = speed
-        heat = np.vstack(list(of.tables(rows[:, [self.speed]], step))) @ weights
+        heat = of.table(rows[:, [self.speed]], step) @ weights
         rows[:, list(self.features.temperatures)] = heat if room is None else heat + room
-        return np.vstack(list(self.features.tables(rows, step)))
+        return self.features.table(rows, step)
 
     def spread(self, table: FloatArray) -> FloatArray:
         """Return the expected RMS error over the given rows, (n_targets,) [unit of the target]."""
@@ -91,25 +89,16 @@ class Doubt:
             seen = table * np.sqrt(duration / self.part / len(table)) / max(error, 1e-9)
             common = covariance @ seen.T
             left.append(covariance - common @ np.linalg.solve(np.eye(len(seen)) + seen @ common, common.T))
-        return Doubt(
-            features=self.features,
-            columns=self.columns,
-            covariance=np.array(left),
-            error=self.error,
-            part=self.part,
-            heating=self.heating,
-        )
+        return replace(self, covariance=np.array(left))
 
 
-def find_doubt(samples: Samples, settings: AveragedDynamic | None = None) -> Doubt:
+def find_doubt(samples: Samples) -> Doubt:
     """Return the uncertainty of `averaged` after the given recordings.
 
     Parameters
     ----------
     samples : Samples
         Samples with a spindle speed and at least one temperature.
-    settings : AveragedDynamic, optional
-        Settings of the method. Default: its default settings.
 
     Returns
     -------
@@ -122,7 +111,7 @@ def find_doubt(samples: Samples, settings: AveragedDynamic | None = None) -> Dou
     FitError
         There are too few complete rows.
     """
-    of = settings if settings is not None else AveragedDynamic()
+    of = AveragedDynamic()
     complete = samples.take(samples.valid)
     speeds = [j for j, c in enumerate(complete.inputs) if c.quantity == "spindle_speed"]
     if len(speeds) != 1 or len(speeds) == len(complete.inputs):

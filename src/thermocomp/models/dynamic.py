@@ -53,6 +53,7 @@ class _Candidate:
     columns: IntArray
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class DynamicRidge(TimedRegressor):
     """Ridge regression on temperatures, their lagged or high-passed copies, and the lagged spindle speed.
 
@@ -125,33 +126,21 @@ class DynamicRidge(TimedRegressor):
 
     columns: ClassVar[str] = "speed"
 
-    def __init__(
-        self,
-        *,
-        speed: Sequence[str | int] = (),
-        temperature_lags: Sequence[Sequence[float]] = TEMPERATURE_LAGS,
-        speed_lags: Sequence[Sequence[float]] = SPEED_LAGS,
-        speed_powers: Sequence[int] = (1, 2),
-        copies: Literal["high-passed", "lagged"] = "high-passed",
-        strengths: Sequence[float] = STRENGTHS,
-        rule: Rule = "one-standard-error",
-        fit_intercept: bool = False,
-        time: Time | None = None,
-    ) -> None:
-        self.speed = speed
-        self.temperature_lags = temperature_lags
-        self.speed_lags = speed_lags
-        self.speed_powers = speed_powers
-        self.copies = copies
-        self.strengths = strengths
-        self.rule = rule
-        self.fit_intercept = fit_intercept
-        self.time = time
+    speed: Sequence[str | int] = ()
+    temperature_lags: Sequence[Sequence[float]] = TEMPERATURE_LAGS
+    speed_lags: Sequence[Sequence[float]] = SPEED_LAGS
+    speed_powers: Sequence[int] = (1, 2)
+    copies: Literal["high-passed", "lagged"] = "high-passed"
+    strengths: Sequence[float] = STRENGTHS
+    rule: Rule = "one-standard-error"
+    fit_intercept: bool = False
+    time: Time | None = None
 
     def _fit(self, rows: FloatArray, deviation: FloatArray, step: FloatArray, folds: IntArray) -> None:
         self._split_columns()
         candidates = self._candidates(step)
-        moments = self._moments(rows, deviation, step, folds)
+        targets = np.column_stack([np.ones(len(deviation)), deviation])
+        moments = ridge.accumulate(self._features(rows, step), targets, folds)
         chosen, self.strength_, self.cv_rms_ = self._choose(candidates, moments)
         self.temperature_lags_, self.speed_lags_ = chosen.temperature_lags, chosen.speed_lags
         self._columns = chosen.columns
@@ -160,9 +149,8 @@ class DynamicRidge(TimedRegressor):
         self.coef_, self.intercept_ = weights[:, 0], float(intercepts[0])
 
     def _predict(self, rows: FloatArray, step: FloatArray) -> FloatArray:
-        table = self._features(rows, step)
-        parts = [features[:, self._columns] @ self.coef_ + self.intercept_ for features in table]
-        return np.concatenate(parts)
+        tables = self._features(rows, step)
+        return np.concatenate([table[:, self._columns] @ self.coef_ + self.intercept_ for _, table in tables])
 
     @property
     def feature_labels_(self) -> tuple[str, ...]:
@@ -235,38 +223,23 @@ class DynamicRidge(TimedRegressor):
                 found.append(_Candidate(tuple(sorted(t_lags)), tuple(sorted(n_lags)), np.array(columns, dtype=np.intp)))
         return found
 
-    def _features(self, X: FloatArray, dt: FloatArray) -> Iterator[FloatArray]:
+    def _features(self, X: FloatArray, dt: FloatArray) -> Iterator[tuple[slice, FloatArray]]:
         """Yield the table of all features in chunks of rows."""
         memory = None
         for start in range(0, len(X), _CHUNK):
-            rows = X[start : start + _CHUNK]
+            own = slice(start, start + _CHUNK)
+            rows = X[own]
             temperatures = rows[:, self._temperatures]
             speeds = np.hstack([rows[:, self._speeds] ** power for power in self.speed_powers])
             signals = np.hstack([temperatures] * len(self._t_taus) + [speeds] * len(self._n_taus) + [speeds[:, :0]])
             taus = np.repeat(self._t_taus, temperatures.shape[1]).tolist()
             taus += np.repeat(self._n_taus, speeds.shape[1]).tolist()
-            lags = lagbank.run(signals, dt[start : start + _CHUNK], np.array(taus), memory)
+            lags = lagbank.run(signals, dt[own], np.array(taus), memory)
             memory = lags[-1].copy()
             copies = temperatures.shape[1] * len(self._t_taus)
             if self.copies == "high-passed":
                 lags[:, :copies] = signals[:, :copies] - lags[:, :copies]
-            yield np.hstack([temperatures, lags])
-
-    def _moments(self, X: FloatArray, y: FloatArray, dt: FloatArray, folds: IntArray) -> FloatArray:
-        """Return the sums of products of [features, 1, y] per fold; ridge and its errors need nothing else."""
-        moments: Any = 0.0
-        n_folds = int(folds.max()) + 1
-        start = 0
-        for features in self._features(X, dt):
-            rows = slice(start, start + len(features))
-            table = np.column_stack([features, np.ones(len(features)), y[rows]])
-            part = np.zeros((n_folds, table.shape[1], table.shape[1]))
-            for k in range(n_folds):
-                mine = table[folds[rows] == k]
-                part[k] = mine.T @ mine
-            moments = moments + part
-            start += len(features)
-        return np.asarray(moments)
+            yield own, np.hstack([temperatures, lags])
 
     # -- choice --------------------------------------------------------------------------------------------------------
 

@@ -1,6 +1,7 @@
 """`gp`: Gaussian process regression."""
 
 import warnings
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -16,6 +17,7 @@ from thermocomp.models.unfrozen import UnfrozenRegressor
 _CHUNK = 2_000  # rows predicted at once: bounds the memory
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class GaussianProcess(UnfrozenRegressor):
     """Gaussian process regression (Rasmussen and Williams 2006) on standardised inputs.
 
@@ -54,8 +56,7 @@ class GaussianProcess(UnfrozenRegressor):
 
     name: ClassVar[str] = "gp"
 
-    def __init__(self, *, max_rows: int = 500) -> None:
-        self.max_rows = max_rows
+    max_rows: int = 500
 
     def _fit(self, change: FloatArray, deviation: FloatArray) -> None:
         if self.max_rows < 2:

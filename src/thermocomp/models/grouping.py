@@ -1,5 +1,7 @@
 """`grouping`: sensor selection by correlation grouping and successive regression (Hwang, Lee, Yang)."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from thermocomp.core.exceptions import FitError, InputError
@@ -12,6 +14,7 @@ from thermocomp.models.selection.exhaustive import Subset
 from thermocomp.models.selection.grouping import choose, group, interval_of, intervals
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class CorrelationGrouping(StaticRegressor, TermRegressor):
     """Linear model of the temperatures chosen by correlation grouping and successive regression (H-01).
 
@@ -92,18 +95,10 @@ class CorrelationGrouping(StaticRegressor, TermRegressor):
     ((1, 0), (3, 2)) (0, 3) [4.0, -2.0]
     """
 
-    def __init__(
-        self,
-        *,
-        threshold: float = 0.9,
-        absolute: bool = False,
-        reference: str | int | None = None,
-        fit_intercept: bool = True,
-    ) -> None:
-        self.threshold = threshold
-        self.absolute = absolute
-        self.reference = reference
-        self.fit_intercept = fit_intercept
+    threshold: float = 0.9
+    absolute: bool = False
+    reference: str | int | None = None
+    fit_intercept: bool = True
 
     def _fit(self, change: FloatArray, deviation: FloatArray) -> None:
         names = self._names()

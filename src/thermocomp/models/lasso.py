@@ -1,8 +1,8 @@
 """`lasso` and `elastic-net`: regressions with built-in input selection."""
 
 import warnings
-from abc import abstractmethod
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from sklearn.exceptions import ConvergenceWarning
@@ -10,58 +10,27 @@ from sklearn.linear_model import enet_path
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.models.base import FloatArray
-from thermocomp.models.shrinkage import PenalisedRegressor, Rule, sorted_strengths
+from thermocomp.models.shrinkage import PenalisedRegressor, sorted_strengths
 
 #: strengths to choose from, relative to the strength at which the last input is dropped
 SHARES: tuple[float, ...] = tuple(float(10.0 ** (-k / 10)) for k in range(41))
 _TOL, _SWEEPS = 1e-5, 5_000  # dual gap as a share of the sum of squares of y; changing either has no visible effect
 
 
-class _Sparse(PenalisedRegressor):
-    """Linear regression with a penalty on the absolute values of the coefficients."""
-
-    @abstractmethod
-    def _ratios(self) -> tuple[float, ...]:
-        """Return the shares of the absolute-value (L1) term in the penalty."""
-
-    def _paths(self, Z: FloatArray, y: FloatArray) -> FloatArray:
-        shares, ratios = sorted_strengths(self.strengths), self._ratios()
-        steepest = float(np.abs(y @ Z).max()) / len(y)
-        paths = np.zeros((len(ratios), shares.size, Z.shape[1]))
-        if steepest == 0:  # y is uncorrelated with all inputs
-            return paths
-        for path, ratio in zip(paths, ratios, strict=True):
-            with warnings.catch_warnings():
-                # a strength too small for convergence is assessed on the left-out cycles like any other
-                warnings.simplefilter("ignore", ConvergenceWarning)
-                path[:] = enet_path(
-                    Z, y, l1_ratio=ratio, alphas=shares * (steepest / ratio), tol=_TOL, max_iter=_SWEEPS
-                )[1].T
-        return paths
-
-    def _note(self, which: int, setting: int) -> None:
-        super()._note(which, setting)
-        self.l1_ratio_ = self._ratios()[which]
-
-    @property
-    def selected_(self) -> tuple[str, ...]:
-        """Names of the inputs that were not dropped."""
-        return tuple(name for name, c in zip(self.terms_, self.coef_, strict=True) if c != 0)
-
-
-class Lasso(_Sparse):
+@dataclass(kw_only=True, eq=False, repr=False)
+class Lasso(PenalisedRegressor):
     """Lasso (Tibshirani 1996) on standardised inputs: selector and regression in one.
 
     Uses scikit-learn's coordinate descent along the whole path; the strength is chosen by leaving out thermal cycles.
 
     Parameters
     ----------
-    strengths : sequence of float
-        Strengths to choose from, relative to the strength at which the last input is dropped.
     rule : {'one-standard-error', 'minimum'}
         Rule for the choice of the strength.
     fit_intercept : bool
         False: the model returns zero in the reference state.
+    strengths : sequence of float
+        Strengths to choose from, relative to the strength at which the last input is dropped.
 
     Attributes
     ----------
@@ -91,22 +60,39 @@ class Lasso(_Sparse):
     ('x1', 'x4') [4.9, -2.9]
     """
 
-    def __init__(
-        self,
-        *,
-        strengths: Sequence[float] = SHARES,
-        rule: Rule = "one-standard-error",
-        fit_intercept: bool = True,
-    ) -> None:
-        self.strengths = strengths
-        self.rule = rule
-        self.fit_intercept = fit_intercept
+    strengths: Sequence[float] = SHARES
 
     def _ratios(self) -> tuple[float, ...]:
+        """Return the shares of the absolute-value (L1) term in the penalty."""
         return (1.0,)
 
+    def _paths(self, Z: FloatArray, y: FloatArray) -> FloatArray:
+        shares, ratios = sorted_strengths(self.strengths), self._ratios()
+        steepest = float(np.abs(y @ Z).max()) / len(y)
+        paths = np.zeros((len(ratios), shares.size, Z.shape[1]))
+        if steepest == 0:  # y is uncorrelated with all inputs
+            return paths
+        for path, ratio in zip(paths, ratios, strict=True):
+            with warnings.catch_warnings():
+                # a strength too small for convergence is assessed on the left-out cycles like any other
+                warnings.simplefilter("ignore", ConvergenceWarning)
+                path[:] = enet_path(
+                    Z, y, l1_ratio=ratio, alphas=shares * (steepest / ratio), tol=_TOL, max_iter=_SWEEPS
+                )[1].T
+        return paths
 
-class ElasticNet(_Sparse):
+    def _note(self, which: int, setting: int) -> None:
+        super()._note(which, setting)
+        self.l1_ratio_ = self._ratios()[which]
+
+    @property
+    def selected_(self) -> tuple[str, ...]:
+        """Names of the inputs that were not dropped."""
+        return tuple(name for name, c in zip(self.terms_, self.coef_, strict=True) if c != 0)
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
+class ElasticNet(Lasso):
     """Elastic net (Zou and Hastie 2005): a lasso that keeps or drops collinear inputs together.
 
     Uses scikit-learn's coordinate descent along the whole path; strength and L1 share are chosen by leaving out thermal
@@ -114,14 +100,14 @@ class ElasticNet(_Sparse):
 
     Parameters
     ----------
-    l1_ratios : sequence of float
-        L1 shares of the penalty to choose from; the rest of the penalty is quadratic. 1 gives the lasso.
-    strengths : sequence of float
-        Strengths to choose from, relative to the strength at which the last input is dropped.
     rule : {'one-standard-error', 'minimum'}
         Rule for the choice of the strength, within the best share.
     fit_intercept : bool
         False: the model returns zero in the reference state.
+    strengths : sequence of float
+        Strengths to choose from, relative to the strength at which the last input is dropped.
+    l1_ratios : sequence of float
+        L1 shares of the penalty to choose from; the rest of the penalty is quadratic. 1 gives the lasso.
 
     Attributes
     ----------
@@ -153,18 +139,7 @@ class ElasticNet(_Sparse):
     ('x1', 'x2') [2.4, 2.4]
     """
 
-    def __init__(
-        self,
-        *,
-        l1_ratios: Sequence[float] = (0.1, 0.5, 0.9),
-        strengths: Sequence[float] = SHARES,
-        rule: Rule = "one-standard-error",
-        fit_intercept: bool = True,
-    ) -> None:
-        self.l1_ratios = l1_ratios
-        self.strengths = strengths
-        self.rule = rule
-        self.fit_intercept = fit_intercept
+    l1_ratios: Sequence[float] = (0.1, 0.5, 0.9)
 
     def _ratios(self) -> tuple[float, ...]:
         ratios = tuple(float(r) for r in self.l1_ratios)

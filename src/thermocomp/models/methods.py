@@ -57,27 +57,24 @@ METHODS = _registered()
 
 
 def find_method(name: str) -> Method:
-    """Find a method.
+    """Find a method; an estimator that was passed in uses all inputs.
 
     Raises
     ------
     InputError
         There is no method of that name.
     """
+    if isinstance(name, NamedEstimator):
+        kind = type(name.estimator)
+        known: tuple[Literal["dt", "cycle"], ...] = ("dt", "cycle")
+        takes = tuple(p for p in known if p in signature(name.estimator.fit).parameters)
+        return Method(str(name), "", f"{kind.__module__}:{kind.__qualname__}", speed="inputs", takes=takes)
     found = METHODS.get(name)
     if found is None:
         near = get_close_matches(name, METHODS, n=1, cutoff=0.4)
         hint = f"; did you mean {near[0]}?" if near else "."
         raise InputError(f"unknown model {name!r}{hint} Known are {', '.join(METHODS)}")
     return found
-
-
-def make_method(estimator: Any) -> Method:
-    """Return the method for an estimator with custom settings; it uses all inputs."""
-    kind = type(estimator)
-    known: tuple[Literal["dt", "cycle"], ...] = ("dt", "cycle")
-    takes = tuple(p for p in known if p in signature(estimator.fit).parameters)
-    return Method(title(estimator), "", f"{kind.__module__}:{kind.__qualname__}", speed="inputs", takes=takes)
 
 
 def expand(names: Sequence[Any]) -> list[str]:

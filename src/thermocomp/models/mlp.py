@@ -43,6 +43,7 @@ class HiddenCount:
         return float(np.std(self.rms, ddof=1) / np.sqrt(len(self.rms))) if len(self.rms) > 1 else 0.0
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class SigmoidNet(NetRegressor):
     """Chen's artificial neural network: i-h-o with sigmoids in hidden nodes and outputs, trained by backpropagation.
 
@@ -118,36 +119,19 @@ class SigmoidNet(NetRegressor):
     25 0.98
     """
 
-    def __init__(
-        self,
-        *,
-        hidden: int | Sequence[int] = 20,
-        n_epochs: int = 5000,
-        learning_rate: float = 0.5,
-        final_learning_rate: float = 0.01,
-        schedule: Literal["geometric", "harmonic"] = "geometric",
-        update: Literal["pattern", "batch"] = "pattern",
-        order: Literal["shuffled", "fixed"] = "shuffled",
-        momentum: float = 0.0,
-        scaling: Literal["channel", "common"] = "channel",
-        max_patterns: int = 2000,
-        goal: float = 0.0,
-        seed: int = 0,
-        jobs: int = -1,
-    ) -> None:
-        self.hidden = hidden
-        self.n_epochs = n_epochs
-        self.learning_rate = learning_rate
-        self.final_learning_rate = final_learning_rate
-        self.schedule = schedule
-        self.update = update
-        self.order = order
-        self.momentum = momentum
-        self.scaling = scaling
-        self.max_patterns = max_patterns
-        self.goal = goal
-        self.seed = seed
-        self.jobs = jobs
+    hidden: int | Sequence[int] = 20
+    n_epochs: int = 5000
+    learning_rate: float = 0.5
+    final_learning_rate: float = 0.01
+    schedule: Literal["geometric", "harmonic"] = "geometric"
+    update: Literal["pattern", "batch"] = "pattern"
+    order: Literal["shuffled", "fixed"] = "shuffled"
+    momentum: float = 0.0
+    scaling: Literal["channel", "common"] = "channel"
+    max_patterns: int = 2000
+    goal: float = 0.0
+    seed: int = 0
+    jobs: int = -1
 
     def fit(
         self,

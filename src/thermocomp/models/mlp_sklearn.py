@@ -1,6 +1,7 @@
 """`mlp-sklearn`: scikit-learn's net, for comparison."""
 
 import warnings
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -14,6 +15,7 @@ from thermocomp.models.numerics.backprop import constant
 _NAMES: dict[str, Activation] = {"logistic": "sigmoid", "tanh": "tanh"}
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class SklearnNet(StaticRegressor, NetRegressor):
     """`sklearn.neural_network.MLPRegressor` with one hidden layer, inputs and targets standardised.
 
@@ -61,24 +63,13 @@ class SklearnNet(StaticRegressor, NetRegressor):
     25 1.0
     """
 
-    def __init__(
-        self,
-        *,
-        hidden: int = 20,
-        activation: Literal["logistic", "tanh"] = "logistic",
-        solver: Literal["lbfgs", "adam", "sgd"] = "lbfgs",
-        alpha: float = 1e-4,
-        max_iter: int = 1000,
-        max_patterns: int = 2000,
-        seed: int = 0,
-    ) -> None:
-        self.hidden = hidden
-        self.activation = activation
-        self.solver = solver
-        self.alpha = alpha
-        self.max_iter = max_iter
-        self.max_patterns = max_patterns
-        self.seed = seed
+    hidden: int = 20
+    activation: Literal["logistic", "tanh"] = "logistic"
+    solver: Literal["lbfgs", "adam", "sgd"] = "lbfgs"
+    alpha: float = 1e-4
+    max_iter: int = 1000
+    max_patterns: int = 2000
+    seed: int = 0
 
     def _fit(self, change: FloatArray, deviation: FloatArray) -> None:
         from sklearn.neural_network import MLPRegressor  # slow to import, and unused by other methods

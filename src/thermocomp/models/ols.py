@@ -1,9 +1,12 @@
 """`ols`: least squares on all inputs."""
 
+from dataclasses import dataclass
+
 from thermocomp.models.base import FloatArray, StaticRegressor
 from thermocomp.models.linear import TermRegressor
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class LeastSquares(StaticRegressor, TermRegressor):
     """Linear least squares on all inputs: the reference for other methods (T-08).
 
@@ -38,8 +41,7 @@ class LeastSquares(StaticRegressor, TermRegressor):
     2.0 [5.0, 0.0, -3.0]
     """
 
-    def __init__(self, *, fit_intercept: bool = True) -> None:
-        self.fit_intercept = fit_intercept
+    fit_intercept: bool = True
 
     def _fit(self, change: FloatArray, deviation: FloatArray) -> None:
         self._regress(change, deviation, range(self.n_features_in_))

@@ -4,15 +4,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermocomp.core import lagbank
+from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
 from thermocomp.core.bounds import LEAST
+from thermocomp.models.numerics.moments import accumulate
 from thermocomp.models.numerics.structures import LagStructure, Moments
 from thermocomp.recordings.samples import usual_step
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
 
 #: Temperature lags shorter than this many row intervals are omitted: the rows contain no information about them, and a
 #: model that runs at another rate would behave in an untested way.
@@ -52,7 +50,7 @@ class PacedFeatures:
         cls,
         rows: FloatArray,
         step: FloatArray,
-        learned: NDArray[np.bool_],
+        learned: BoolArray,
         speeds: Sequence[int],
         *,
         lags: Sequence[float],
@@ -100,21 +98,26 @@ class PacedFeatures:
     def __len__(self) -> int:
         return self.copies * len(self.temperatures) + len(self.states)
 
-    def tables(self, rows: FloatArray, step: FloatArray) -> Iterator[FloatArray]:
-        """Yield the table of all features, (n_rows, n_features), in chunks of rows."""
+    def tables(self, rows: FloatArray, step: FloatArray) -> Iterator[tuple[slice, FloatArray]]:
+        """Yield the table of all features, (n_rows, n_features), in chunks of rows, with the rows of each."""
         where = [state[0] for state in self.states]
         powers, slow, fast = np.array([state[1:] for state in self.states], dtype=np.float64).reshape(-1, 3).T
         taus = np.repeat(self.lags, len(self.temperatures))
         memory = None
         for start in range(0, len(rows), _CHUNK):
-            chunk, dt = rows[start : start + _CHUNK], step[start : start + _CHUNK]
+            own = slice(start, start + _CHUNK)
+            chunk, dt = rows[own], step[own]
             temperatures = chunk[:, self.temperatures]
             share = np.abs(chunk[:, where]) / self.top_speed
             signals = np.hstack([temperatures] * len(self.lags) + [share**powers])
             paced = 1.0 / (1.0 / slow + share * (1.0 / fast - 1.0 / slow))
             states = lagbank.run(signals, dt, np.hstack([np.tile(taus, (len(chunk), 1)), paced]), memory)
             memory = states[-1].copy() if len(states) else memory
-            yield np.hstack([temperatures, states])
+            yield own, np.hstack([temperatures, states])
+
+    def table(self, rows: FloatArray, step: FloatArray) -> FloatArray:
+        """Return the table of all features, (n_rows, n_features)."""
+        return np.vstack([features for _, features in self.tables(rows, step)])
 
     def moments(
         self, rows: FloatArray, targets: FloatArray, step: FloatArray, parts: IntArray, noise: float
@@ -133,20 +136,12 @@ class PacedFeatures:
         noise : float
             Standard deviation of the temperature noise in use [degC].
         """
-        n_parts, n_features, start = int(parts.max()) + 1, len(self), 0
-        products = np.zeros((n_parts, n_features + targets.shape[1], n_features + targets.shape[1]))
-        for features in self.tables(rows, step):
-            own = slice(start, start + len(features))
-            table = np.hstack([features, targets[own]])
-            for k in range(n_parts):
-                mine = table[parts[own] == k]
-                products[k] += mine.T @ mine
-            start += len(features)
+        n_features, products = len(self), accumulate(self.tables(rows, step), targets, parts)
         return Moments(
             gram=products[:, :n_features, :n_features],
             cross=products[:, :n_features, n_features:],
             power=np.diagonal(products, axis1=1, axis2=2)[:, n_features:],
-            rows=np.bincount(parts[parts >= 0], minlength=n_parts).astype(np.float64),
+            rows=np.bincount(parts[parts >= 0], minlength=len(products)).astype(np.float64),
             noise=noise**2 * self._covariance(rows, step),
         )
 

@@ -1,11 +1,14 @@
 """`partial-f`: temperature points by stepwise regression with fixed thresholds on partial F."""
 
+from dataclasses import dataclass
+
 from thermocomp.models.base import FloatArray
 from thermocomp.models.numerics.leastsquares import join_columns, triangle
 from thermocomp.models.numerics.stepwise import FThresholds, alpha_of_f, r_squared_of_f
 from thermocomp.models.steplog import StepwiseRegressor
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class PartialF(StepwiseRegressor):
     """Linear model of the temperatures that partial F selects (stepwise2017, section 3; T-02 to T-06).
 
@@ -56,10 +59,9 @@ class PartialF(StepwiseRegressor):
     ('x1', 'x4') 1.05 um
     """
 
-    def __init__(self, *, f_enter: float = 100.0, f_delete: float = 50.0, fit_intercept: bool = True) -> None:
-        self.f_enter = f_enter
-        self.f_delete = f_delete
-        self.fit_intercept = fit_intercept
+    f_enter: float = 100.0
+    f_delete: float = 50.0
+    fit_intercept: bool = True
 
     def _fit(self, change: FloatArray, deviation: FloatArray) -> None:
         tri = triangle(join_columns(change, deviation), intercept=self.fit_intercept)

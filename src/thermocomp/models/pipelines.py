@@ -18,7 +18,7 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.provenance import Provenance
 from thermocomp.core.terms import Variable
-from thermocomp.models.base import FloatArray, IntArray, ThermalRegressor
+from thermocomp.models.base import FloatArray, IntArray, ThermalRegressor, plain_inputs
 from thermocomp.models.timed import TimedRegressor
 
 
@@ -98,13 +98,10 @@ def freeze(
     if inputs is None:
         first = _steps(estimator)[0]
         names = getattr(first, "feature_names_in_", [f"x{i}" for i in range(first.n_features_in_)])
-        ranges = zip(last.data_min_ * scale + mean, last.data_max_ * scale + mean, strict=True)
-        mine = [
-            Input(str(names[c]), "dimensionless", "1", reference=0.0, rezero=False, low=float(low), high=float(high))
-            for c, (low, high) in zip(columns.tolist(), ranges, strict=True)
-        ]
+        kept = [str(names[c]) for c in columns.tolist()]
+        mine = plain_inputs(kept, last.data_min_ * scale + mean, last.data_max_ * scale + mean)
     else:
-        mine = [inputs[c - hidden] for c in columns.tolist()]
+        mine = tuple(inputs[c - hidden] for c in columns.tolist())
     model: ErrorModel = last.freeze(inputs=mine, **header)
     if not mean.any() and (scale == 1).all():
         return model

@@ -17,14 +17,14 @@ class PartialLeastSquares(ComponentRegressor):
 
     Parameters
     ----------
-    components : int, optional
-        Fixed number of components, or the largest possible number if smaller. Default: chosen by `rule`.
-    max_components : int, optional
-        Largest number to choose from; default: the number of inputs.
     rule : {'one-standard-error', 'minimum'}
         Rule for the choice of the number of components.
     fit_intercept : bool
         False: the model returns zero in the reference state, and the components are computed about zero.
+    components : int, optional
+        Fixed number of components, or the largest possible number if smaller. Default: chosen by `rule`.
+    max_components : int, optional
+        Largest number to choose from; default: the number of inputs.
 
     Attributes
     ----------

@@ -23,6 +23,7 @@ _SWEEPS = 20  # backfitting sweeps after each new term
 _GAIN = 1e-3  # stop if a step or sweep reduces the residual sum of squares by a smaller share
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class ProjectionPursuit(CycledRegressor):
     """Projection pursuit regression (Friedman and Stuetzle 1981), the comparison method of stepwise2017 (T-08).
 
@@ -83,12 +84,9 @@ class ProjectionPursuit(CycledRegressor):
     [1.0, -1.0, 0.0] 0.999
     """
 
-    def __init__(
-        self, *, max_terms: int = 5, degrees: Sequence[float] = (3.0, 6.0), rule: Rule = "one-standard-error"
-    ) -> None:
-        self.max_terms = max_terms
-        self.degrees = degrees
-        self.rule = rule
+    max_terms: int = 5
+    degrees: Sequence[float] = (3.0, 6.0)
+    rule: Rule = "one-standard-error"
 
     def _fit(self, change: FloatArray, deviation: FloatArray, folds: IntArray) -> None:
         degrees = self._settings()

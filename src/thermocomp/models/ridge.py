@@ -1,15 +1,17 @@
 """`ridge`: ridge regression on all inputs."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from sklearn.linear_model import ridge_regression
 
 from thermocomp.models.base import FloatArray
 from thermocomp.models.dynamic import STRENGTHS
-from thermocomp.models.shrinkage import PenalisedRegressor, Rule, sorted_strengths
+from thermocomp.models.shrinkage import PenalisedRegressor, sorted_strengths
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class Ridge(PenalisedRegressor):
     """Ridge regression (Hoerl and Kennard 1970) on standardised inputs: `dynamic` without memory.
 
@@ -17,12 +19,12 @@ class Ridge(PenalisedRegressor):
 
     Parameters
     ----------
-    strengths : sequence of float
-        Strengths to choose from, per row and relative to each input's variance.
     rule : {'one-standard-error', 'minimum'}
         Rule for the choice of the strength.
     fit_intercept : bool
         False: the model returns zero in the reference state.
+    strengths : sequence of float
+        Strengths to choose from, per row and relative to each input's variance.
 
     Attributes
     ----------
@@ -54,16 +56,7 @@ class Ridge(PenalisedRegressor):
     [2.0, 2.0] 1.0 um
     """
 
-    def __init__(
-        self,
-        *,
-        strengths: Sequence[float] = STRENGTHS,
-        rule: Rule = "one-standard-error",
-        fit_intercept: bool = True,
-    ) -> None:
-        self.strengths = strengths
-        self.rule = rule
-        self.fit_intercept = fit_intercept
+    strengths: Sequence[float] = STRENGTHS
 
     def _paths(self, Z: FloatArray, y: FloatArray) -> FloatArray:
         strengths = sorted_strengths(self.strengths)

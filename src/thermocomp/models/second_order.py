@@ -1,6 +1,7 @@
 """`mra`: second-order regression with stepwise selection of terms (Chen, Yuan, Ni 1996)."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from thermocomp.models.numerics.stepwise import AlphaThresholds
 from thermocomp.models.steplog import StepwiseRegressor
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class SecondOrderRegression(StepwiseRegressor):
     """Chen's multiple regression analysis: linear terms, squares and products, selected by significance.
 
@@ -77,24 +79,13 @@ class SecondOrderRegression(StepwiseRegressor):
     ('x0', 'x0*x2') [2.0, 0.5]
     """
 
-    def __init__(
-        self,
-        *,
-        alpha_enter: float = 0.001,
-        alpha_remove: float = 0.015,
-        fit_intercept: bool = False,
-        differences: Sequence[tuple[str, str]] = (),
-        subset: Sequence[str] | None = None,
-        second_order: bool = True,
-        hierarchy: bool = False,
-    ) -> None:
-        self.alpha_enter = alpha_enter
-        self.alpha_remove = alpha_remove
-        self.fit_intercept = fit_intercept
-        self.differences = differences
-        self.subset = subset
-        self.second_order = second_order
-        self.hierarchy = hierarchy
+    alpha_enter: float = 0.001
+    alpha_remove: float = 0.015
+    fit_intercept: bool = False
+    differences: Sequence[tuple[str, str]] = ()
+    subset: Sequence[str] | None = None
+    second_order: bool = True
+    hierarchy: bool = False
 
     def _fit(self, change: FloatArray, deviation: FloatArray) -> None:
         variables = self._variables()

@@ -1,6 +1,7 @@
 """`SensorSelector`: sensor selection methods as a step of a scikit-learn Pipeline."""
 
 from collections.abc import Sequence
+from dataclasses import KW_ONLY, dataclass
 from inspect import signature
 from typing import Any, Literal
 
@@ -29,6 +30,7 @@ SELECTORS: dict[str, type[ThermalRegressor]] = {
 }
 
 
+@dataclass(eq=False, repr=False)
 class SensorSelector(SelectorMixin, BaseEstimator):
     """Transformer that keeps the sensors chosen by a method.
 
@@ -67,16 +69,10 @@ class SensorSelector(SelectorMixin, BaseEstimator):
     [1, 4] (200, 2)
     """
 
-    def __init__(
-        self,
-        method: str | ThermalRegressor = "subsets",
-        *,
-        keep: Sequence[str | int] = (),
-        time: Literal["column"] | None = None,
-    ) -> None:
-        self.method = method
-        self.keep = keep
-        self.time = time
+    method: str | ThermalRegressor = "subsets"
+    _: KW_ONLY
+    keep: Sequence[str | int] = ()
+    time: Literal["column"] | None = None
 
     def fit(self, X: ArrayLike, y: ArrayLike, *, cycle: ArrayLike | None = None) -> "SensorSelector":
         """Choose the sensors.

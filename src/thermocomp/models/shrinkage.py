@@ -2,6 +2,7 @@
 
 from abc import abstractmethod
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -62,11 +63,19 @@ def choose(rms: FloatArray, rule: Rule) -> tuple[int, int]:
     return i, j
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class ShrunkRegressor(CycledRegressor, TermRegressor):
     """Linear regression on standardised inputs whose complexity is chosen by leaving out thermal cycles.
 
     Each thermal cycle among the training rows is left out in turn; the whole path of models is fitted to the others and
     predicts the left-out cycle. Constant inputs get the coefficient 0.
+
+    Parameters
+    ----------
+    rule : {'one-standard-error', 'minimum'}
+        Rule for the choice of the complexity.
+    fit_intercept : bool
+        False: the model returns zero in the reference state.
 
     Attributes
     ----------
@@ -80,7 +89,8 @@ class ShrunkRegressor(CycledRegressor, TermRegressor):
         Names of the constant inputs.
     """
 
-    rule: Rule
+    rule: Rule = "one-standard-error"
+    fit_intercept: bool = True
 
     def _fit(self, change: FloatArray, deviation: FloatArray, folds: IntArray) -> None:
         errors = []
@@ -149,19 +159,20 @@ class PenalisedRegressor(ShrunkRegressor):
         self.strength_ = float(sorted_strengths(self.strengths)[setting])
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class ComponentRegressor(ShrunkRegressor):
     """Linear regression on the first components of the inputs, whose number is chosen by leaving out thermal cycles.
 
     Parameters
     ----------
-    components : int, optional
-        Fixed number of components, or the largest possible number if smaller. Default: chosen by `rule`.
-    max_components : int, optional
-        Largest number to choose from; default: the number of inputs.
     rule : {'one-standard-error', 'minimum'}
         Rule for the choice of the number of components.
     fit_intercept : bool
         False: the model returns zero in the reference state, and the components are computed about zero.
+    components : int, optional
+        Fixed number of components, or the largest possible number if smaller. Default: chosen by `rule`.
+    max_components : int, optional
+        Largest number to choose from; default: the number of inputs.
 
     Attributes
     ----------
@@ -169,18 +180,8 @@ class ComponentRegressor(ShrunkRegressor):
         Chosen number.
     """
 
-    def __init__(
-        self,
-        *,
-        components: int | None = None,
-        max_components: int | None = None,
-        rule: Rule = "one-standard-error",
-        fit_intercept: bool = True,
-    ) -> None:
-        self.components = components
-        self.max_components = max_components
-        self.rule = rule
-        self.fit_intercept = fit_intercept
+    components: int | None = None
+    max_components: int | None = None
 
     @abstractmethod
     def _path(self, Z: FloatArray, y: FloatArray, most: int) -> FloatArray:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -49,6 +50,7 @@ def scores(found: Subsets) -> dict[str, FloatArray]:
         }
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class BestSubset(TermRegressor):
     """Linear least squares on the best of all possible sets of temperatures (H-05, H-07).
 
@@ -124,28 +126,15 @@ class BestSubset(TermRegressor):
     (1, 6) True [5.0, -3.0]
     """
 
-    def __init__(
-        self,
-        *,
-        criterion: Criterion | None = None,
-        size: int | None = None,
-        max_size: int | None = None,
-        rule: Literal["minimum", "one-standard-error"] = "minimum",
-        fit_intercept: bool = True,
-        jobs: int = 1,
-        nodes: int | None = None,
-        seconds: float | None = None,
-        progress: Callable[[str], None] | None = None,
-    ) -> None:
-        self.criterion = criterion
-        self.size = size
-        self.max_size = max_size
-        self.rule = rule
-        self.fit_intercept = fit_intercept
-        self.jobs = jobs
-        self.nodes = nodes
-        self.seconds = seconds
-        self.progress = progress
+    criterion: Criterion | None = None
+    size: int | None = None
+    max_size: int | None = None
+    rule: Literal["minimum", "one-standard-error"] = "minimum"
+    fit_intercept: bool = True
+    jobs: int = 1
+    nodes: int | None = None
+    seconds: float | None = None
+    progress: Callable[[str], None] | None = None
 
     def fit(self, X: ArrayLike, y: ArrayLike, *, cycle: ArrayLike | None = None) -> "BestSubset":
         """Search, choose the size, and fit.

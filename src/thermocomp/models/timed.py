@@ -19,7 +19,7 @@ from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.model import ErrorModel
 from thermocomp.models.base import FloatArray, IntArray, ThermalRegressor
 from thermocomp.models.numerics.folds import number_folds
-from thermocomp.models.numerics.ticks import check_steps as checked_steps
+from thermocomp.models.numerics.ticks import check_steps
 
 Time = Literal["column", "routed", "none"]
 
@@ -318,7 +318,7 @@ def _routed(dt: ArrayLike | None, n_rows: int, name: str) -> FloatArray:
             ".set_fit_request(dt=True).set_predict_request(dt=True).set_score_request(dt=True); a scorer by name "
             "passes none to predict: score with scoring=None, or use time='column'"
         )
-    step = checked_steps(dt, n_rows)
+    step = check_steps(dt, n_rows)
     if n_rows and not np.isinf(step[0]):
         raise InputError(
             f"dt: the first row comes {step[0]:g} s after another, and its test must start with inf. Its start was "

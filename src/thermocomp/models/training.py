@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, clone
 from sklearn.metrics import r2_score
 
 from thermocomp import __version__
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.band import Band
 from thermocomp.core.exceptions import FitError
 from thermocomp.core.inputs import Support
@@ -23,16 +23,13 @@ from thermocomp.core.zero import STANDS
 from thermocomp.models.bands import find_band
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.covering import find_joint_support
-from thermocomp.models.foreign import adopt_estimator, catch_failures, check_numbers, title
+from thermocomp.models.foreign import catch_failures, check_numbers
 from thermocomp.models.method import Method
-from thermocomp.models.methods import NamedEstimator, find_method, make_method
+from thermocomp.models.methods import expand, find_method
 from thermocomp.models.timed import TimedRegressor
 from thermocomp.models.unfrozen import UnfrozenRegressor
 from thermocomp.recordings.fingerprints import fingerprint
 from thermocomp.recordings.samples import Samples
-
-BoolArray = NDArray[np.bool_]
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -116,14 +113,9 @@ def fit_method(name: str | BaseEstimator, samples: Samples, target: int, learn: 
         There are too few rows, the method cannot be fitted to them, or its predictions are not one finite number per
         row.
     """
-    own = (
-        name.estimator if isinstance(name, NamedEstimator) else None if isinstance(name, str) else adopt_estimator(name)
-    )
-    how = (
-        find_method(str(name))
-        if own is None
-        else replace(make_method(own), name=str(name) if isinstance(name, str) else title(own))
-    )
+    if not isinstance(name, str):
+        (name,) = expand([name])
+    how, own = find_method(name), getattr(name, "estimator", None)
     columns = tuple(j for j, c in enumerate(samples.inputs) if how.speed or c.quantity != "spindle_speed")
     if not columns:
         raise FitError(f"{how.name}: there is no temperature to predict from")

@@ -4,21 +4,16 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
+from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
 from thermocomp.core.bounds import GAP
 from thermocomp.core.watch import FASTER, LASTING, Watch, Watched
-from thermocomp.core.zero import STANDS
-from thermocomp.models.averaged import LAGS, POWERS, RUNNING, STOPPED
-from thermocomp.models.numerics.folds import halve, number_folds
+from thermocomp.models.averaged import AveragedDynamic
+from thermocomp.models.numerics.folds import number_folds
 from thermocomp.models.numerics.structures import fit_each, share_out
 from thermocomp.models.pacedfeatures import PacedFeatures
 from thermocomp.recordings.samples import Samples, usual_step
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.intp]
 
 #: noise assumed for the predicting temperatures, as in `averaged` [degC]
 NOISE = 0.2
@@ -66,18 +61,15 @@ def find_watch(samples: Samples, learn: BoolArray) -> Watch | None:
     count = int(folds.max()) + 1
     if count < 2:
         return None
-    of = PacedFeatures.of(change, step, folds >= 0, speeds, lags=LAGS, powers=POWERS, stopped=STOPPED, running=RUNNING)
-    turning = np.abs(change[:, speeds]).max(axis=1, initial=0.0) > STANDS
-    parts, _ = halve(folds, turning)
+    of, parts, _ = AveragedDynamic().lay_out(change, step, folds, speeds)
     weights = _weights(of, change, step, heat, parts, folds)
     predicted = np.full((len(samples), len(heat)), np.nan)
     known = _covered(np.abs(change[:, speeds]).max(axis=1, initial=0.0), folds, samples.test)
-    start = 0
-    for table in of.tables(change, step):
-        mine = np.where(known, folds, -1)[start : start + len(table)]
+    judged = np.where(known, folds, -1)
+    for own, table in of.tables(change, step):
+        mine = judged[own]
         for k in range(count):
-            predicted[start : start + len(table)][mine == k] = table[mine == k] @ weights[1 + k]
-        start += len(table)
+            predicted[own][mine == k] = table[mine == k] @ weights[1 + k]
     pace = max(PACE, usual_step(step)) if np.isfinite(usual_step(step)) else PACE
     inputs = samples.model_inputs(range(len(samples.inputs)), learn)
     wider = SAFETY * (1.0 + 1.0 / count)

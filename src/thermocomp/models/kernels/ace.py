@@ -4,30 +4,25 @@ from typing import Any
 
 import numpy as np
 
-from thermocomp.models.kernels.ranks import FloatArray, RankArray, compiled, dot, running_sums, smooth
+from thermocomp.core.arrays import FloatArray
+from thermocomp.models.kernels.ranks import RankArray, Smoothing, compiled, dot, running_sums, smooth
+
+Work = tuple[FloatArray, FloatArray, FloatArray]  # residual, running sums, new phi
+
 
 VANISHES = 1e-9  # a function with a smaller norm (theta has norm 1) counts as zero
 MOMENTUM = 0.95  # maximum momentum coefficient of the accelerated sweeps
 
 
 @compiled
-def _begin(
-    order: RankArray,
-    bounds: RankArray,
-    groups: Any,
-    start: FloatArray,
-    half: int,
-    twice: bool,
-    phi: FloatArray,
-    total: FloatArray,
-    sums: FloatArray,
-) -> bool:
+def _begin(how: Smoothing, start: FloatArray, phi: FloatArray, total: FloatArray, sums: FloatArray) -> bool:
     """Initialise phi_j = E[S|T_j] of the first variable with a non-zero result; return False if there is none."""
+    order, groups = how[2], how[4]
     n = len(start)
     for j in range(len(phi)):
         if groups[j] > 1:
             running_sums(start, phi[j], order[j], sums)
-            smooth(sums, half, twice, bounds[j], groups[j], phi[j])
+            smooth(sums, how, j, phi[j])
             if np.sqrt(dot(phi[j], phi[j]) / n) > VANISHES:
                 for i in range(n):
                     total[order[j, i]] = phi[j, i]
@@ -37,24 +32,14 @@ def _begin(
 
 
 @compiled
-def _sweep(
-    order: RankArray,
-    bounds: RankArray,
-    groups: Any,
-    half: int,
-    twice: bool,
-    theta: FloatArray,
-    phi: FloatArray,
-    total: FloatArray,
-    residual: FloatArray,
-    sums: FloatArray,
-    work: FloatArray,
-) -> float:
+def _sweep(how: Smoothing, theta: FloatArray, phi: FloatArray, total: FloatArray, work: Work) -> float:
     """Run one sweep: theta from the sum of phi, then each phi from theta; return E[(theta - sum)^2], or nan."""
+    order = how[2]
+    residual, sums, new = work
     p, n = phi.shape
     residual[:] = 0.0
     running_sums(residual, total, order[p], sums)
-    smooth(sums, half, twice, bounds[p], groups[p], theta)
+    smooth(sums, how, p, theta)
     norm = np.sqrt(dot(theta, theta) / n)
     if not norm > VANISHES:
         return np.nan
@@ -64,10 +49,10 @@ def _sweep(
     for j in range(p):
         mine, index = phi[j], order[j]
         running_sums(residual, mine, index, sums)
-        smooth(sums, half, twice, bounds[j], groups[j], work)
+        smooth(sums, how, j, new)
         for i in range(n):
-            residual[index[i]] += mine[i] - work[i]
-            mine[i] = work[i]
+            residual[index[i]] += mine[i] - new[i]
+            mine[i] = new[i]
     for i in range(n):
         total[i] = theta[i] - residual[i]
     return float(dot(residual, residual) / n)
@@ -80,10 +65,42 @@ def _correlation(x: FloatArray, y: FloatArray) -> float:
 
 
 @compiled
+def _moved(phi: FloatArray, before: FloatArray, work: FloatArray) -> float:
+    """Return the root of the mean square of the change over the rows, summed over all phi."""
+    p, n = phi.shape
+    square = 0.0
+    for j in range(p):
+        for i in range(n):
+            work[i] = phi[j, i] - before[j, i]
+        square += dot(work, work) / n
+    return float(np.sqrt(square))
+
+
+@compiled
 def solve(
-    order: RankArray, bounds: RankArray, groups: Any, start: FloatArray, half: int, tolerance: float, max_sweeps: int
+    order: RankArray,
+    bounds: RankArray,
+    groups: Any,
+    start: FloatArray,
+    half: int,
+    tolerance: float,
+    max_sweeps: int,
+    converged: bool,
 ) -> tuple[FloatArray, FloatArray, float, FloatArray]:
-    """Sweep until the error fails to decrease by more than `tolerance`.
+    """Sweep until the error fails to decrease by more than `tolerance`, or to convergence.
+
+    Parameters
+    ----------
+    order, bounds, groups, start
+        As returned by `rank`.
+    half : int
+        Half width of the boxcar.
+    tolerance : float
+    max_sweeps : int
+    converged : bool
+        True: sweep with `triangle` instead of the boxcar until a sweep changes the functions by at most `tolerance`:
+        the root of the mean square over the rows, summed over all phi; theta has norm 1. Sweeps are accelerated by
+        momentum (Nesterov), which restarts whenever the change increases.
 
     Returns
     -------
@@ -96,52 +113,20 @@ def solve(
         E[(theta - sum phi)^2] after each sweep.
     """
     p, n = len(order) - 1, len(start)
-    theta, phi, total, residual = np.zeros(n), np.zeros((p, n)), np.zeros(n), np.empty(n)
-    sums, work = np.empty(n + 1), np.empty(n)
-    errors = np.empty(max_sweeps)
-    sweeps = 0
-    if _begin(order, bounds, groups, start, half, False, phi, total, sums):
-        while sweeps < max_sweeps:
-            error = _sweep(order, bounds, groups, half, False, theta, phi, total, residual, sums, work)
-            if np.isnan(error):
-                theta[:] = 0.0
-                phi[:] = 0.0
-                return theta, phi, 0.0, errors[:sweeps]
-            errors[sweeps] = error
-            sweeps += 1
-            if sweeps > 1 and not errors[sweeps - 2] - error > tolerance:
-                break
-    return theta, phi, _correlation(theta, total), errors[:sweeps]
-
-
-@compiled
-def converge(
-    order: RankArray, bounds: RankArray, groups: Any, start: FloatArray, half: int, tolerance: float, max_sweeps: int
-) -> tuple[FloatArray, FloatArray, float, FloatArray]:
-    """Sweep, with `triangle` instead of the boxcar, until a sweep changes the functions by at most `tolerance`.
-
-    The change is the root of the mean square over the rows, summed over all phi; theta has norm 1. Sweeps are
-    accelerated by momentum (Nesterov), which restarts whenever the change increases.
-
-    Returns
-    -------
-    theta, phi, psi, errors
-        As in `solve`.
-    """
-    p, n = len(order) - 1, len(start)
-    theta, residual = np.zeros(n), np.empty(n)
-    sums, work = np.empty(n + 1), np.empty(n)
+    how = (half, converged, order, bounds, groups)
+    theta, work = np.zeros(n), (np.empty(n), np.empty(n + 1), np.empty(n))
     state, last = np.zeros((p + 1, n)), np.zeros((p + 1, n))  # all phi, and their sum in rank order of S
     before = np.empty((p, n))
     phi, total = state[:p], state[p]
     errors = np.empty(max_sweeps)
     sweeps = age = 0
     moved = 0.0
-    if not _begin(order, bounds, groups, start, half, True, phi, total, sums):
+    if not _begin(how, start, phi, total, work[1]):
         return theta, phi, 0.0, errors[:0]
     while True:
-        before[:] = phi
-        error = _sweep(order, bounds, groups, half, True, theta, phi, total, residual, sums, work)
+        if converged:
+            before[:] = phi
+        error = _sweep(how, theta, phi, total, work)
         if np.isnan(error):
             theta[:] = 0.0
             state[:] = 0.0
@@ -149,18 +134,18 @@ def converge(
         errors[sweeps] = error
         sweeps += 1
         previous = moved
-        moved = 0.0
-        for j in range(p):
-            for i in range(n):
-                work[i] = phi[j, i] - before[j, i]
-            moved += dot(work, work) / n
-        moved = np.sqrt(moved)
-        if moved <= tolerance or sweeps == max_sweeps:
+        if converged:
+            moved = _moved(phi, before, work[2])
+            ended = moved <= tolerance
+        else:
+            ended = sweeps > 1 and not errors[sweeps - 2] - error > tolerance
+        if ended or sweeps == max_sweeps:
             return theta, phi, _correlation(theta, total), errors[:sweeps]
-        age = 0 if sweeps == 1 or moved > previous else age + 1
-        momentum = min(MOMENTUM, age / (age + 3.0))
-        for j in range(p + 1):
-            for i in range(n):
-                new = state[j, i]
-                state[j, i] = new + momentum * (new - last[j, i])
-                last[j, i] = new
+        if converged:
+            age = 0 if sweeps == 1 or moved > previous else age + 1
+            momentum = min(MOMENTUM, age / (age + 3.0))
+            for j in range(p + 1):
+                for i in range(n):
+                    new = state[j, i]
+                    state[j, i] = new + momentum * (new - last[j, i])
+                    last[j, i] = new

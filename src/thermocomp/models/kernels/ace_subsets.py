@@ -5,9 +5,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.models.kernels.ace import MOMENTUM, VANISHES
 from thermocomp.models.kernels.lanes import LANES, add, load, multiply, splat, store, subtract
-from thermocomp.models.kernels.ranks import FloatArray, RankArray, compiled, dot, running_sums, smooth
+from thermocomp.models.kernels.ranks import RankArray, Smoothing, compiled, dot, running_sums, smooth
+
+State = tuple[FloatArray, FloatArray, FloatArray, FloatArray]  # phi, phi before, sum of phi, lanes that use a variable
+Work = tuple[FloatArray, FloatArray, FloatArray, FloatArray]  # residual, running sums twice, new phi
+
+# rows of `result`: sum of squared changes (before: scale of theta), residual^2, sum^2 and theta * sum; what is kept
+_MOVE, _ERROR, _NORM, _CROSS, _MOMENTUM, _BEFORE = range(6)
 
 
 @compiled
@@ -87,10 +94,10 @@ def _lane_twice(sums: FloatArray, again: FloatArray, half: int, bounds: RankArra
 
 
 @compiled
-def _lane_smooth(
-    sums: FloatArray, again: FloatArray, half: int, twice: bool, bounds: RankArray, groups: Any, out: FloatArray
-) -> Any:
+def _lane_smooth(work: Work, how: Smoothing, j: int, out: FloatArray) -> Any:
     """Apply `smooth` in all lanes without subtracting the mean; return the mean."""
+    _, sums, again, _ = work
+    half, twice, bounds, groups = how[0], how[1], how[3][j], how[4][j]
     if not twice:
         return _lane_boxcar(sums, half, bounds, groups, out)
     h = (half + 1) // 2
@@ -103,24 +110,14 @@ def _lane_smooth(
 
 @compiled
 def _lane_theta(
-    total: FloatArray,
-    last_total: FloatArray,
-    momentum: FloatArray,
-    half: int,
-    twice: bool,
-    bounds: RankArray,
-    groups: Any,
-    theta: FloatArray,
-    residual: FloatArray,
-    sums: FloatArray,
-    again: FloatArray,
-    norm: FloatArray,
+    total: FloatArray, last_total: FloatArray, how: Smoothing, theta: FloatArray, work: Work, result: FloatArray
 ) -> None:
-    """Compute theta, normalised, from the (extrapolated) sum of phi; 0 where theta vanishes. `norm` is a work row."""
+    """Compute theta, normalised, from the (extrapolated) sum of phi; row `_MOVE` of `result` is 0 where theta is."""
+    residual, sums, _, _ = work
     n = len(theta)
     spare = (len(sums) - 1 - n) // 2
     store(sums, spare, splat(0.0))
-    share, running = load(momentum, 0), splat(0.0)
+    share, running = load(result, _MOMENTUM), splat(0.0)
     for i in range(n):
         new = load(total, i)
         ahead = add(new, multiply(share, subtract(new, load(last_total, i))))
@@ -128,16 +125,16 @@ def _lane_theta(
         store(total, i, ahead)
         running = add(running, ahead)
         store(sums, i + 1 + spare, running)
-    mean, square = _lane_smooth(sums, again, half, twice, bounds, groups, theta), splat(0.0)
+    mean, square = _lane_smooth(work, how, len(how[2]) - 1, theta), splat(0.0)
     for i in range(n):
         value = subtract(load(theta, i), mean)
         store(theta, i, value)
         square = add(square, multiply(value, value))
-    store(norm, 0, square)
+    store(result, _MOVE, square)
     for v in range(LANES):
-        root = np.sqrt(norm[0, v] / n)
-        norm[0, v] = 1.0 / root if root > VANISHES else 0.0
-    scale = load(norm, 0)
+        root = np.sqrt(result[_MOVE, v] / n)
+        result[_MOVE, v] = 1.0 / root if root > VANISHES else 0.0
+    scale = load(result, _MOVE)
     for i in range(n):
         value = multiply(load(theta, i), scale)
         store(theta, i, value)
@@ -154,27 +151,15 @@ def _lane_settle(phi: FloatArray, i: int, residual: FloatArray, at: Any, new: An
 
 
 @compiled
-def _lane_phi(
-    phi: FloatArray,
-    last: FloatArray,
-    momentum: FloatArray,
-    on: FloatArray,
-    j: int,
-    index: RankArray,
-    half: int,
-    bounds: RankArray,
-    groups: Any,
-    residual: FloatArray,
-    sums: FloatArray,
-    again: FloatArray,
-    work: FloatArray,
-    accelerate: bool,
-) -> Any:
+def _lane_phi(j: int, how: Smoothing, state: State, work: Work, result: FloatArray) -> Any:
     """Back-fit one phi in the lanes that use it; return the square of its change."""
+    half, accelerate, index, bounds, groups = how[0], how[1], how[2][j], how[3][j], how[4][j]
+    residual, sums, again, smoothed = work
+    phi, last = state[0][j], state[1][j]
     n = len(phi)
     spare = (len(sums) - 1 - n) // 2
     store(sums, spare, splat(0.0))
-    share, running = load(momentum, 0), splat(0.0)
+    share, running = load(result, _MOMENTUM), splat(0.0)
     if accelerate:
         for i in range(n):
             new = load(phi, i)
@@ -187,7 +172,7 @@ def _lane_phi(
         for i in range(n):
             running = add(running, add(load(residual, index[i]), load(phi, i)))
             store(sums, i + 1 + spare, running)
-    mine, square = load(on, j), splat(0.0)
+    mine, square = load(state[3], j), splat(0.0)
     if accelerate and groups == n:  # same as below, in a single pass
         h = (half + 1) // 2
         mean, width = _lane_twice(sums, again, h, bounds, groups), splat(1.0 / (2 * h + 1))
@@ -195,16 +180,16 @@ def _lane_phi(
             value = multiply(subtract(load(again, i + 2 * h + 1), load(again, i)), width)
             square = add(square, _lane_settle(phi, i, residual, index[i], multiply(subtract(value, mean), mine)))
         return square
-    mean = _lane_smooth(sums, again, half, accelerate, bounds, groups, work)
+    mean = _lane_smooth(work, how, j, smoothed)
     for i in range(n):
-        new = multiply(subtract(load(work, i), mean), mine)
+        new = multiply(subtract(load(smoothed, i), mean), mine)
         square = add(square, _lane_settle(phi, i, residual, index[i], new))
     return square
 
 
 @compiled
 def _lane_sums(theta: FloatArray, residual: FloatArray, total: FloatArray, result: FloatArray) -> None:
-    """Update the sum of phi; write the sums of residual^2, sum^2 and theta * sum to rows 1 to 3 of `result`."""
+    """Update the sum of phi; write the sums of residual^2, sum^2 and theta * sum to `result`."""
     error = norm = cross = splat(0.0)
     for i in range(len(theta)):
         left, ours = load(residual, i), load(theta, i)
@@ -213,25 +198,16 @@ def _lane_sums(theta: FloatArray, residual: FloatArray, total: FloatArray, resul
         error = add(error, multiply(left, left))
         norm = add(norm, multiply(fitted, fitted))
         cross = add(cross, multiply(fitted, ours))
-    store(result, 1, error)
-    store(result, 2, norm)
-    store(result, 3, cross)
+    store(result, _ERROR, error)
+    store(result, _NORM, norm)
+    store(result, _CROSS, cross)
 
 
 @compiled
-def _take(
-    v: int,
-    subset: NDArray[np.bool_],
-    first: FloatArray,
-    order: RankArray,
-    groups: Any,
-    phi: FloatArray,
-    last: FloatArray,
-    total: FloatArray,
-    on: FloatArray,
-    accelerate: bool,
-) -> bool:
+def _take(v: int, subset: BoolArray, first: FloatArray, how: Smoothing, state: State) -> bool:
     """Start a subset in lane `v`; return False if E[S|T] vanishes for all its variables."""
+    _, accelerate, order, _, groups = how
+    phi, last, total, on = state
     p, n, _ = phi.shape
     begun = False
     for j in range(p):
@@ -251,22 +227,21 @@ def _take(
 
 
 @compiled
-def _first_phi(
-    order: RankArray, bounds: RankArray, groups: Any, start: FloatArray, half: int, accelerate: bool
-) -> FloatArray:
+def _first_phi(how: Smoothing, start: FloatArray) -> FloatArray:
     """Return E[S|T] of each variable, (p, n); 0 for a constant variable."""
+    order, groups = how[2], how[4]
     p, n = len(order) - 1, len(start)
     first = np.zeros((p, n))
     sums, zero = np.empty(n + 1), np.zeros(n)
     for j in range(p):
         if groups[j] > 1:
             running_sums(start, zero, order[j], sums)
-            smooth(sums, half, accelerate, bounds[j], groups[j], first[j])
+            smooth(sums, how, j, first[j])
     return first
 
 
 @compiled
-def _note_used(on: FloatArray, idle: NDArray[np.bool_], used: NDArray[np.bool_]) -> None:
+def _note_used(on: FloatArray, idle: BoolArray, used: BoolArray) -> None:
     """Set in `used` the variables that any active lane needs."""
     for j in range(len(used)):
         used[j] = False
@@ -276,25 +251,18 @@ def _note_used(on: FloatArray, idle: NDArray[np.bool_], used: NDArray[np.bool_])
 
 @compiled
 def _ended(
-    v: int,
-    n: int,
-    sweep: int,
-    result: FloatArray,
-    previous: FloatArray,
-    age: NDArray[np.int64],
-    momentum: FloatArray,
-    accelerate: bool,
-    tolerance: float,
+    v: int, n: int, sweep: int, result: FloatArray, age: NDArray[np.int64], accelerate: bool, tolerance: float
 ) -> bool:
     """Update the momentum of lane `v` after a sweep; return whether its subset is finished."""
-    now = np.sqrt(result[0, v] / n) if accelerate else result[1, v] / n
+    now = np.sqrt(result[_MOVE, v] / n) if accelerate else result[_ERROR, v] / n
+    before = result[_BEFORE, v]
     if accelerate:
-        age[v] = 0 if sweep == 1 or now > previous[v] else age[v] + 1
-        momentum[0, v] = min(MOMENTUM, age[v] / (age[v] + 3.0))
+        age[v] = 0 if sweep == 1 or now > before else age[v] + 1
+        result[_MOMENTUM, v] = min(MOMENTUM, age[v] / (age[v] + 3.0))
         ended = now <= tolerance
     else:
-        ended = sweep > 1 and not previous[v] - now > tolerance
-    previous[v] = now
+        ended = sweep > 1 and not before - now > tolerance
+    result[_BEFORE, v] = now
     return bool(ended)
 
 
@@ -308,7 +276,7 @@ def correlations(
     tolerance: float,
     max_sweeps: int,
     accelerate: bool,
-    subsets: NDArray[np.bool_],
+    subsets: BoolArray,
 ) -> tuple[FloatArray, NDArray[np.int64]]:
     """Compute psi of many subsets of the variables, eight at a time.
 
@@ -317,7 +285,7 @@ def correlations(
     order, bounds, groups, start
         As returned by `rank`.
     accelerate : bool
-        False: stopping rule of `solve`; True: stopping rule of `converge`.
+        As `converged` of `thermocomp.models.kernels.ace.solve`.
     subsets : ndarray of bool of shape (n_subsets, p)
         Consecutive subsets should share most of their variables.
 
@@ -328,49 +296,43 @@ def correlations(
     """
     p, n, count = len(order) - 1, len(start), len(subsets)
     psi, sweeps = np.zeros(count), np.zeros(count, np.int64)
-    first = _first_phi(order, bounds, groups, start, half, accelerate)
+    how = (half, accelerate, order, bounds, groups)
+    first = _first_phi(how, start)
     theta, total, residual = np.empty((n, LANES)), np.empty((n, LANES)), np.empty((n, LANES))
-    last_total, work = np.zeros((n, LANES)), np.empty((n, LANES))
+    last_total, smoothed = np.zeros((n, LANES)), np.empty((n, LANES))
     spare = (half + 1) // 2 if accelerate else 0
     sums, again = np.empty((n + 1 + 2 * spare, LANES)), np.empty((n + 1 + 2 * spare, LANES))
-    phi, last = np.zeros((p, n, LANES)), np.zeros((p, n, LANES))
     on, used = np.zeros((p, LANES)), np.zeros(p, np.bool_)
-    momentum, result = np.zeros((1, LANES)), np.empty((4, LANES))
-    previous, age, holds = np.empty(LANES), np.empty(LANES, np.int64), np.full(LANES, -1)
-    idle = np.ones(LANES, np.bool_)
+    state = (np.zeros((p, n, LANES)), np.zeros((p, n, LANES)), total, on)
+    work, result = (residual, sums, again, smoothed), np.zeros((6, LANES))
+    age, holds, idle = np.empty(LANES, np.int64), np.full(LANES, -1), np.ones(LANES, np.bool_)
     queue = 0
     while True:
         for v in range(LANES):  # a finished lane starts the next subset
             while idle[v] and queue < count:
                 holds[v] = queue
-                momentum[0, v] = 0.0  # the last sum is multiplied by this, then overwritten
-                idle[v] = not _take(v, subsets[queue], first, order, groups, phi, last, total, on, accelerate)
+                result[_MOMENTUM, v] = 0.0  # the last sum is multiplied by this, then overwritten
+                idle[v] = not _take(v, subsets[queue], first, how, state)
                 queue += 1
         if idle.all():
             return psi, sweeps
         _note_used(on, idle, used)
-        _lane_theta(
-            total, last_total, momentum, half, accelerate, bounds[p], groups[p], theta, residual, sums, again,
-            result[:1],
-        )  # fmt: skip
+        _lane_theta(total, last_total, how, theta, work, result)
         for v in range(LANES):
-            if result[0, v] == 0.0 and not idle[v]:
+            if result[_MOVE, v] == 0.0 and not idle[v]:
                 idle[v] = True
                 psi[holds[v]] = 0.0
         move = splat(0.0)
         for j in range(p):
             if used[j]:
-                square = _lane_phi(
-                    phi[j], last[j], momentum, on, j, order[j], half, bounds[j], groups[j],
-                    residual, sums, again, work, accelerate,
-                )  # fmt: skip
-                move = add(move, square)
-        store(result, 0, move)
+                move = add(move, _lane_phi(j, how, state, work, result))
+        store(result, _MOVE, move)
         _lane_sums(theta, residual, total, result)
         for v in range(LANES):
             if not idle[v]:
                 k = holds[v]
                 sweeps[k] += 1
-                psi[k] = abs(result[3, v]) / np.sqrt(result[2, v] * n) if result[2, v] > 0 else 0.0
-                ended = _ended(v, n, sweeps[k], result, previous, age, momentum, accelerate, tolerance)
+                square = result[_NORM, v]
+                psi[k] = abs(result[_CROSS, v]) / np.sqrt(square * n) if square > 0 else 0.0
+                ended = _ended(v, n, sweeps[k], result, age, accelerate, tolerance)
                 idle[v] = ended or sweeps[k] == max_sweeps

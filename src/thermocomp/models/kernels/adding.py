@@ -5,18 +5,9 @@ method only screens: candidates that may be good enough, or cannot be assessed r
 """
 
 import numpy as np
-from numba import njit
 
-from thermocomp.models.kernels.subsets import (
-    CONTRACT,
-    ByteArray,
-    FloatArray,
-    IntArray,
-    Lists,
-    exact,
-    householder,
-    offer,
-)
+from thermocomp.core.arrays import FloatArray
+from thermocomp.models.kernels.subsets import ByteArray, IntArray, Lists, compiled, exact, householder, offer
 
 State = tuple[FloatArray, FloatArray, FloatArray, FloatArray, IntArray, IntArray]
 
@@ -28,7 +19,7 @@ SCREEN = 1e-6
 DIGITS = 1e-14
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
+@compiled
 def try_exactly(
     columns: FloatArray, least: FloatArray, lists: Lists, inside: ByteArray, chosen: IntArray, n: int
 ) -> None:
@@ -41,7 +32,7 @@ def try_exactly(
         offer(lists, n, value, inside, -1, -1)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
+@compiled
 def left_by(
     columns: FloatArray, least: FloatArray, chosen: IntArray, n: int, G: FloatArray, D: FloatArray, h: FloatArray
 ) -> None:
@@ -66,7 +57,7 @@ def left_by(
             G[i, k] = np.sum(rest[i] * rest[k])
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
+@compiled
 def add(  # noqa: PLR0912, PLR0915 - a single function is four times as fast
     columns: FloatArray, least: FloatArray, state: State, lists: Lists, inside: ByteArray, size: int, budget: int
 ) -> int:

@@ -15,18 +15,9 @@ are nearly dependent, 7 the removed column. ``rss``: residual sum of squares of 
 """
 
 import numpy as np
-from numba import njit
 
-from thermocomp.models.kernels.subsets import (
-    CONTRACT,
-    ByteArray,
-    FloatArray,
-    IntArray,
-    Lists,
-    exact,
-    householder,
-    offer,
-)
+from thermocomp.core.arrays import FloatArray
+from thermocomp.models.kernels.subsets import ByteArray, IntArray, Lists, compiled, exact, householder, offer
 
 State = tuple[FloatArray, FloatArray, FloatArray, IntArray, IntArray, FloatArray]
 
@@ -34,7 +25,7 @@ State = tuple[FloatArray, FloatArray, FloatArray, IntArray, IntArray, FloatArray
 GUARD = 1e-5
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
+@compiled
 def gather(state: State, source: int, inside: ByteArray, free: IntArray, n_free: int) -> tuple[FloatArray, int]:
     """Return the triangular factor of the permanently retained columns, free columns and y, and the number retained."""
     _, _, triangles, orders, numbers, _ = state
@@ -44,10 +35,7 @@ def gather(state: State, source: int, inside: ByteArray, free: IntArray, n_free:
     kept = 0
     for i in range(had):
         k = orders[2, source, i]
-        is_free = False
-        for f in range(n_free):
-            is_free |= free[f] == k
-        if inside[k] and not is_free:
+        if inside[k] and not (free[:n_free] == k).any():
             columns[kept] = triangles[source, i, :had]
             kept += 1
     for f in range(n_free):
@@ -60,7 +48,7 @@ def gather(state: State, source: int, inside: ByteArray, free: IntArray, n_free:
     return columns, kept
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
+@compiled
 def renew(state: State, source: int, level: int, inside: ByteArray, free: IntArray, n_free: int) -> None:
     """Compute W, M and b of the free columns from the triangular factor at level `source`; store them at `level`."""
     work, moments, triangles, orders, numbers, _ = state
@@ -68,14 +56,10 @@ def renew(state: State, source: int, level: int, inside: ByteArray, free: IntArr
     columns, kept = gather(state, source, inside, free, n_free)
     m = n_free
     W = np.zeros((m, m))
-    for i in range(m):
-        orders[2, level, i] = free[i]
+    orders[2, level, :m] = free[:m]
     triangles[level, :, :m] = 0.0
-    for i in range(m):
-        for r in range(m):
-            triangles[level, i, r] = columns[kept + i, kept + r]
-    for r in range(m):
-        triangles[level, p, r] = columns[kept + m, kept + r]
+    triangles[level, :m, :m] = columns[kept : kept + m, kept : kept + m]
+    triangles[level, p, :m] = columns[kept + m, kept : kept + m]
     numbers[4, level] = m
     for i in range(m):  # by rows: each is then exact for a triangle with errors only in the last digits
         W[i, i] = 1.0 / columns[kept + i, kept + i]
@@ -100,21 +84,18 @@ def renew(state: State, source: int, level: int, inside: ByteArray, free: IntArr
                 total += W[i, c] * W[j, c]
             M[k, free[j]] = M[free[j], k] = total
         D[k] = M[k, k]
-    for k in range(len(D)):
-        C[k] = B[k] * B[k] / D[k]
-        limits[k] = GUARD * D[k]
+    C[:] = B * B / D
+    limits[:] = GUARD * D
     numbers[3, level] = level
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
+@compiled
 def begin(triangle: FloatArray, state: State, lists: Lists, inside: ByteArray, residual: float) -> None:
     """Initialise the root node (all columns) with all its children."""
     work, _, triangles, orders, numbers, rss = state
     p = len(inside)
-    for i in range(p):
-        orders[2, 0, i] = i
-        triangles[0, i] = triangle[:, i]
-    triangles[0, p] = triangle[:, p]
+    orders[2, 0, :p] = np.arange(p)
+    triangles[0] = triangle.T
     numbers[4, 0] = p
     inside[:] = 1
     renew(state, 0, 0, inside, np.arange(p), p)
@@ -137,7 +118,7 @@ def begin(triangle: FloatArray, state: State, lists: Lists, inside: ByteArray, r
     numbers[6, 0] = inflated
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
+@compiled
 def drop(  # noqa: PLR0912, PLR0915 - a single function is a tenth faster
     state: State, lists: Lists, inside: ByteArray, budget: int
 ) -> int:
@@ -272,7 +253,7 @@ def drop(  # noqa: PLR0912, PLR0915 - a single function is a tenth faster
     return nodes
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
+@compiled
 def pivot(A: FloatArray, k: int) -> None:
     """Sweep column k in or out: symmetric Gauss-Jordan; columns in the set have a negative diagonal."""
     d = A[k, k]
@@ -286,7 +267,7 @@ def pivot(A: FloatArray, k: int) -> None:
     A[k, k] = -1 / d
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
+@compiled
 def list_good_sets(triangle: FloatArray, least: FloatArray, lists: Lists, inside: ByteArray, largest: int) -> None:  # noqa: PLR0912
     """List good sets of every size: remove the cheapest column, then swap pairs while that improves the set.
 
@@ -296,7 +277,6 @@ def list_good_sets(triangle: FloatArray, least: FloatArray, lists: Lists, inside
     columns = np.ascontiguousarray(triangle.T)
     A = columns @ columns.T
     inside[:] = 1
-    chosen = np.empty(p, np.int64)
     for k in range(p):
         pivot(A, k)
     for size in range(p - 1, 0, -1):
@@ -326,10 +306,4 @@ def list_good_sets(triangle: FloatArray, least: FloatArray, lists: Lists, inside
             pivot(A, enter)
             pivot(A, out)
         if size <= largest:
-            n = 0
-            for i in range(p):
-                if inside[i]:
-                    chosen[n] = i
-                    n += 1
-            lists_value = exact(columns, least, chosen, size)
-            offer(lists, size, lists_value, inside, -1, -1)
+            offer(lists, size, exact(columns, least, np.flatnonzero(inside), size), inside, -1, -1)

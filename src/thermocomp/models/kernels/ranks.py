@@ -13,8 +13,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from thermocomp.core.arrays import FloatArray
+
 RankArray = NDArray[np.uint32]
+#: half width of the boxcar, whether `triangle` replaces it, and `order`, `bounds` and `groups` of all variables
+Smoothing = tuple[int, bool, RankArray, RankArray, NDArray[np.int64]]
 
 compiled: Any = njit(cache=True, nogil=True)
 
@@ -233,12 +236,13 @@ def triangle(sums: FloatArray, half: int, bounds: RankArray, groups: Any, out: F
 
 
 @compiled
-def smooth(sums: FloatArray, half: int, twice: bool, bounds: RankArray, groups: Any, out: FloatArray) -> None:
-    """Estimate E[z|x] in rank order from the running sums of z, which may be overwritten."""
+def smooth(sums: FloatArray, how: Smoothing, j: int, out: FloatArray) -> None:
+    """Estimate E[z|x] of variable `j` in rank order from the running sums of z, which may be overwritten."""
+    half, twice, _, bounds, groups = how
     if twice:
-        triangle(sums, half, bounds, groups, out)
+        triangle(sums, half, bounds[j], groups[j], out)
     else:
-        boxcar(sums, half, bounds, groups, out)
+        boxcar(sums, half, bounds[j], groups[j], out)
 
 
 @compiled

@@ -6,20 +6,23 @@ below which a set is of interest; the greatest limit of this or any larger size;
 the margin of `thermocomp.models.selection.subsetsearch.Problem`.
 """
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from thermocomp.core.arrays import FloatArray
+
 IntArray = NDArray[np.int64]
 ByteArray = NDArray[np.uint8]
 Lists = tuple[FloatArray, ByteArray, FloatArray, FloatArray, FloatArray, IntArray, FloatArray]
 
-#: products and sums may be fused, with one rounding instead of two
-CONTRACT = {"contract"}
+# "contract": products and sums may be fused, with one rounding instead of two
+compiled: Any = njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
+@compiled
 def offer(lists: Lists, size: int, value: float, inside: ByteArray, a: int, b: int) -> None:
     """Add the set `inside` without `a` and `b` to the list of its size; update the limits."""
     values, sets, lost, limit, bound, wanted, margin = lists
@@ -51,7 +54,7 @@ def offer(lists: Lists, size: int, value: float, inside: ByteArray, a: int, b: i
                 bound[s] = most
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
+@compiled
 def householder(columns: FloatArray, n: int) -> None:
     """Triangularise the first `n` columns and transform the other columns alike; columns are stored as rows."""
     width, rows = columns.shape
@@ -77,7 +80,7 @@ def householder(columns: FloatArray, n: int) -> None:
             x[i] = 0.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
+@compiled
 def exact(columns: FloatArray, least: FloatArray, chosen: IntArray, n: int) -> float:
     """Return the residual sum of squares of the first `n` of `chosen` by QR; inf if the columns are dependent."""
     p, rows = columns.shape[0] - 1, columns.shape[1]

@@ -4,12 +4,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.network import Affine, Perceptron
-
-FloatArray = NDArray[np.float64]
 
 #: range to which inputs and targets are scaled (C-28)
 LOW, HIGH = 0.1, 0.9
@@ -51,7 +49,7 @@ def scaling_out(low: FloatArray, high: FloatArray) -> Affine:
     return Affine(tuple(gain.tolist()), tuple(np.where(still, low, low - gain * LOW).tolist()))
 
 
-def constant(low: FloatArray, high: FloatArray) -> NDArray[np.bool_]:
+def constant(low: FloatArray, high: FloatArray) -> BoolArray:
     """Return a mask of the channels that are constant up to rounding."""
     return np.asarray(high - low <= 1e-12 * np.maximum(np.abs(low), np.abs(high)))
 

@@ -1,11 +1,10 @@
 """Folds of thermal cycles, by which a method chooses its settings."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from thermocomp.core.arrays import BoolArray, IntArray
 from thermocomp.core.exceptions import FitError, InputError
-
-IntArray = NDArray[np.intp]
 
 
 def number_folds(cycle: ArrayLike | None, n_rows: int) -> tuple[IntArray, str]:
@@ -51,7 +50,7 @@ _LEAST_PART = 0.1
 _MOST_PARTS = 16
 
 
-def halve(folds: IntArray, turning: NDArray[np.bool_]) -> tuple[IntArray, str]:
+def halve(folds: IntArray, turning: BoolArray) -> tuple[IntArray, str]:
     """Split each fold in two at the last stop of the spindle.
 
     A drift model must predict both warm-up and cool-down: knowledge of one half of a cycle need not cover the other.

@@ -5,13 +5,11 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.autoregressive import companion, find_largest_root
 from thermocomp.models.numerics import ticks
 from thermocomp.models.numerics.ticks import TickedRun
-
-FloatArray = NDArray[np.float64]
 
 #: number of time constants combined in starting values, from the interval to the length of the data
 N_START = 7

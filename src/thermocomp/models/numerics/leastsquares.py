@@ -4,11 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft, linalg
 from scipy.linalg import lapack
 
-FloatArray = NDArray[np.float64]
+from thermocomp.core.arrays import FloatArray, IntArray
 
 _EPS = float(np.finfo(np.float64).eps)
 #: condition number above which a solution is refined
@@ -62,6 +61,16 @@ class Triangle:
         does not exceed this.
         """
         return np.asarray((64 + self.factor.shape[1]) * self.last_place)
+
+    def find_independent(self) -> IntArray:
+        """Return the indices of linearly independent columns before the last, in ascending order."""
+        norms, noise = self.norms[:-1], self.noise[:-1]
+        alive = np.flatnonzero(norms > noise)
+        if alive.size == 0:
+            return alive
+        R, order = linalg.qr(self.factor[:, alive] / norms[alive], mode="r", pivoting=True)
+        order = alive[order[: min(R.shape)]]
+        return np.sort(order[np.abs(np.diag(R)) > noise[order] / norms[order]])
 
 
 def join_columns(X: FloatArray, y: FloatArray) -> FloatArray:
@@ -180,9 +189,8 @@ def solve(X: FloatArray, y: FloatArray, tri: Triangle, *, columns: Sequence[int]
     if columns is not None:
         tri = tri.part(columns)
     places = np.arange(X.shape[1]) if columns is None else np.array(columns, dtype=np.intp)
-    norms, noise = tri.norms[:-1], tri.noise[:-1]
-    kept = _independent(tri.factor[:, :-1], norms, noise)
-    scale = norms[kept]
+    kept = tri.find_independent()
+    scale = tri.norms[kept]
     both = tri.factor[:, [*kept, -1]]
     both[:, :-1] /= scale
     both = np.asarray(np.linalg.qr(both, mode="r"))
@@ -201,16 +209,6 @@ def solve(X: FloatArray, y: FloatArray, tri: Triangle, *, columns: Sequence[int]
         residual=residual,
         rss=float(residual @ residual),
     )
-
-
-def _independent(factor: FloatArray, norms: FloatArray, noise: FloatArray) -> NDArray[np.intp]:
-    """Return the indices of linearly independent columns, in ascending order."""
-    alive = np.flatnonzero(norms > noise)
-    if alive.size == 0:
-        return alive
-    R, order = linalg.qr(factor[:, alive] / norms[alive], mode="r", pivoting=True)
-    order = alive[order[: min(R.shape)]]
-    return np.sort(order[np.abs(np.diag(R)) > noise[order] / norms[order]])
 
 
 def effective_sample_size(residual: FloatArray) -> float:

@@ -1,12 +1,34 @@
 """Ridge regression from moments: only sums of products of [features, 1, y] are required."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
+from thermocomp.core.arrays import FloatArray, IntArray
+
+
+def accumulate(tables: Iterable[tuple[slice, FloatArray]], targets: FloatArray, parts: IntArray) -> FloatArray:
+    """Sum the products of [features, targets] over the rows of each part.
+
+    Parameters
+    ----------
+    tables : iterable of (slice, ndarray)
+        Rows and their features.
+    targets : ndarray of shape (n_rows, n_targets)
+    parts : ndarray of int of shape (n_rows,)
+        Part of each row; -1: unused.
+
+    Returns
+    -------
+    ndarray of shape (n_parts, n_features + n_targets, n_features + n_targets)
+    """
+    sums: Any = 0.0
+    for own, features in tables:
+        table = np.hstack([features, targets[own]])
+        chosen = [table[parts[own] == k] for k in range(int(parts.max()) + 1)]
+        sums = sums + np.array([mine.T @ mine for mine in chosen])
+    return np.asarray(sums)
 
 
 def part(moments: FloatArray, columns: IntArray) -> FloatArray:

@@ -8,36 +8,19 @@ orthogonal to the model by construction after any number of steps.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import blas, lapack
 from scipy.special import fdtrc, stdtrit
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.models.numerics.leastsquares import Triangle
 
-FloatArray = NDArray[np.float64]
-
 #: smallest share of a candidate's norm that the model must leave unexplained for the candidate to enter
 TOLERANCE = 1e-8
 _TINY = float(np.finfo(np.float64).tiny)
 _SAME = 1e-10  # gains closer than this count as equal, and the first candidate is chosen regardless of rounding
-
-
-class Rule(Protocol):
-    """Rule for entry and deletion of terms by partial F."""
-
-    def enter_f(self, df: int) -> float:
-        """Return the smallest F for a term to enter; `df`: residual degrees of freedom with the term included."""
-        ...
-
-    def delete_f(self, df: int) -> float:
-        """Return the F below which a term is deleted; `df`: residual degrees of freedom with the term included."""
-        ...
-
-    def __str__(self) -> str: ...
 
 
 @dataclass(frozen=True)
@@ -121,6 +104,9 @@ class AlphaThresholds:
 
     def __str__(self) -> str:
         return f"ALPHA-TO-ENTER= {_bare(self.enter)} AND ALPHA-TO-REMOVE= {_bare(self.remove)}"
+
+
+Rule = FThresholds | AlphaThresholds
 
 
 def f_of_alpha(alpha: float, df: int) -> float:

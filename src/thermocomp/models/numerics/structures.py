@@ -4,10 +4,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
+from thermocomp.core.arrays import FloatArray, IntArray
 
 #: a structure's share is its RMS error (geometric mean over the left-out parts) raised to minus this power
 TRUST = 3.0

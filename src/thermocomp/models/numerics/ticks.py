@@ -5,13 +5,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
 from thermocomp.core.autoregressive import EARLY
 from thermocomp.core.exceptions import InputError
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
 
 #: a displacement between two rows is interpolated if their distance is at most this many usual steps
 NEAR = 1.5
@@ -49,16 +47,14 @@ class TickedRun:
         return self.since is self.drive
 
 
-def check_steps(dt: ArrayLike | None, n_rows: int) -> FloatArray:
-    """Check time steps [s]; if None, every row is a separate test.
+def check_steps(dt: ArrayLike, n_rows: int) -> FloatArray:
+    """Check time steps [s].
 
     Raises
     ------
     InputError
         The number of steps differs from the number of rows, or a step is negative or nan.
     """
-    if dt is None:
-        return np.full(n_rows, np.inf)
     found = np.asarray(dt, dtype=np.float64)
     if found.shape != (n_rows,) or not (found >= 0).all():
         raise InputError(f"dt: expected {n_rows} time steps that are not negative")
@@ -120,7 +116,7 @@ def _run(inputs: FloatArray, dt: FloatArray, rows: slice, h: float) -> TickedRun
 
 
 def displacements(
-    runs: Sequence[TickedRun], y: FloatArray, dt: FloatArray, known: NDArray[np.bool_], h: float
+    runs: Sequence[TickedRun], y: FloatArray, dt: FloatArray, known: BoolArray, h: float
 ) -> list[FloatArray]:
     """Return the displacement at each tick, interpolated between adjacent rows; nan where unknown.
 

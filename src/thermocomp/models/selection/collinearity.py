@@ -3,12 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.exceptions import FitError
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 #: a channel that varies by no more than this share of its magnitude is constant: rounding may cause such a variation
 ROUNDING = 64 * float(np.finfo(np.float64).eps)

@@ -8,13 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.stats import rankdata
 
+from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
 from thermocomp.core.exceptions import InputError
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 _DECIMALS = 12  # decimals of psi differences that are compared; further digits are rounding errors
 
@@ -186,7 +184,7 @@ def signed_rank_p(differences: FloatArray) -> FloatArray:
     return p
 
 
-def _below(ranks: NDArray[np.intp]) -> FloatArray:
+def _below(ranks: IntArray) -> FloatArray:
     """Return the probability that the sum of the positive ranks is at most 0, 1, 2, ..."""
     chance = np.zeros(int(ranks.sum()) + 1)
     chance[0] = 1.0

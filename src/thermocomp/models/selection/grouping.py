@@ -8,14 +8,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.models.numerics.leastsquares import Triangle
 from thermocomp.models.selection.collinearity import Spectrum, correlation, spectrum
 from thermocomp.models.selection.exhaustive import LIMIT, SAME, Search, search_members, search_subsets
 
-FloatArray = NDArray[np.float64]
 Groups = tuple[tuple[int, ...], ...]
 
 

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 from joblib import Parallel, delayed
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.exceptions import FitError, InputError
 
-FloatArray = NDArray[np.float64]
 #: distributes work: receives a function and a sequence of arguments, yields the result for each
 Share = Callable[[Callable[[Any], FloatArray], Sequence[Any]], Iterable[FloatArray]]
 
@@ -172,7 +172,7 @@ def _checked(test: DataSet, half_window: int) -> tuple[FloatArray, FloatArray]:
     return T, S
 
 
-def _membership(subsets: Sequence[tuple[int, ...]], n_temperatures: int) -> NDArray[np.bool_]:
+def _membership(subsets: Sequence[tuple[int, ...]], n_temperatures: int) -> BoolArray:
     members = np.zeros((len(subsets), n_temperatures), dtype=np.bool_)
     for row, subset in zip(members, subsets, strict=True):
         if not subset or any(not 0 <= j < n_temperatures for j in subset):
@@ -182,7 +182,7 @@ def _membership(subsets: Sequence[tuple[int, ...]], n_temperatures: int) -> NDAr
 
 
 def _psi(
-    piece: tuple[FloatArray, FloatArray, NDArray[np.bool_], int, float, int, bool],
+    piece: tuple[FloatArray, FloatArray, BoolArray, int, float, int, bool],
 ) -> FloatArray:
     from thermocomp.models.kernels import ace_subsets, ranks  # numba is slow to import
 

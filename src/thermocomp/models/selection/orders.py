@@ -6,13 +6,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.autoregressive import find_largest_root
 from thermocomp.models.numerics.leastsquares import Triangle
-
-FloatArray = NDArray[np.float64]
 
 _TINY = float(np.finfo(np.float64).tiny)
 
@@ -97,7 +95,8 @@ def compute_orders(
     floor = float(tri.noise[-1] ** 2)
     found = []
     for m in ms:
-        driven = _independent(tri.part(range(K, K + (m + 1) * n_inputs))) + K
+        # dependent columns would remove directions of dz
+        driven = tri.part(range(K, K + (m + 1) * n_inputs)).find_independent() + K
         small = tri.part([*driven, *range(K)])
         R = np.asarray(np.linalg.qr(small.factor, mode="r"))
         left = np.append(np.cumsum(R[::-1, -1] ** 2)[::-1], np.zeros(len(driven) + K + 1))
@@ -140,22 +139,11 @@ def coefficients(tri: Triangle, columns: Sequence[int]) -> tuple[FloatArray, flo
     intercept : float
     """
     part = tri.part(columns)
-    kept = _independent(part)
+    kept = part.find_independent()
     R = np.asarray(np.linalg.qr(part.factor[:, [*kept, -1]], mode="r"))
     weights = np.zeros(len(columns))
     weights[kept] = linalg.solve_triangular(R[: len(kept), : len(kept)], R[: len(kept), -1]) if len(kept) else 0.0
     return weights, float(part.centre[-1] - part.centre[:-1] @ weights)
-
-
-def _independent(tri: Triangle) -> NDArray[np.intp]:
-    """Return the linearly independent columns; dependent ones would remove directions of dz."""
-    norms, noise = tri.norms[:-1], tri.noise[:-1]
-    alive = np.flatnonzero(norms > noise)
-    if not alive.size:
-        return alive
-    R, order = linalg.qr(tri.factor[:, alive] / norms[alive], mode="r", pivoting=True)
-    order = alive[order[: min(R.shape)]]
-    return np.sort(order[np.abs(np.diag(R)) > noise[order] / norms[order]])
 
 
 def _largest_root(R: FloatArray, head: FloatArray, noise: FloatArray) -> float:

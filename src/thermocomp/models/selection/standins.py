@@ -4,12 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.models.numerics.structures import Moments, average, share_out
 from thermocomp.models.pacedfeatures import PacedFeatures
-
-FloatArray = NDArray[np.float64]
 
 #: structures for the errors of sensor sets on left-out parts; ranking sets requires fewer than a model
 _STRUCTURES = 30

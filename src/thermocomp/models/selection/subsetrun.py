@@ -9,11 +9,9 @@ from typing import Any, Literal
 
 import numpy as np
 from joblib import Parallel, delayed
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.models.selection.subsetsearch import Adding, Dropping, Problem, Search, Swapping
-
-FloatArray = NDArray[np.float64]
 
 Route = Literal["dropping", "adding"]
 Stop = Literal["", "nodes", "seconds", "interrupted"]

@@ -5,14 +5,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.models.numerics.leastsquares import Triangle, join_columns, solve, triangle
 from thermocomp.models.selection.subsetrun import Route, Stop, run
 from thermocomp.models.selection.subsetsearch import Problem
-
-FloatArray = NDArray[np.float64]
 
 _SAME = 1e-12  # relative difference of two sums of squares due to rounding alone, in addition to the noise of y
 
@@ -48,8 +46,6 @@ class Subsets:
     ----------
     ranked : tuple of tuple of Subset
         Sets for each size from 1, the best first; empty if none was found before the search was stopped.
-    n_columns : int
-        Number of columns of X.
     left_out : tuple of int
         Columns not searched: constant columns, and copies of an earlier column (up to a factor and an offset).
     rank : int
@@ -71,7 +67,6 @@ class Subsets:
     """
 
     ranked: tuple[tuple[Subset, ...], ...]
-    n_columns: int
     left_out: tuple[int, ...]
     rank: int
     total: float
@@ -196,7 +191,6 @@ def best_subsets(
         ranked.append(_certified(sorted(fitted), n_best, beyond, complete and same))
     return Subsets(
         ranked=tuple(ranked),
-        n_columns=X.shape[1],
         left_out=tuple(sorted(set(range(X.shape[1])) - set(kept))),
         rank=problem.rank,
         total=tri.total,

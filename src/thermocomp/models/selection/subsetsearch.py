@@ -1,6 +1,5 @@
 """The two searches of `best_subsets`: search problem, margins for rounding, and the part of one thread."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -9,9 +8,8 @@ from numpy.typing import NDArray
 from scipy import linalg
 from scipy.linalg import lapack
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.models.numerics.leastsquares import Triangle
-
-FloatArray = NDArray[np.float64]
 
 _SPARE = 7  # additional sets kept per size: those that rounding could make the best
 _MOST = 0.05  # larger margins, as a share of a sum of squares, are cut and nothing is proven: bounds the work
@@ -82,8 +80,8 @@ class Problem:
         return float(self.margin[0] + self.margin[1] * np.sqrt(max(rss - self.full_rss, 0.0)))
 
 
-class Search(ABC):
-    """One thread's part of a search: its working data, and the best sets it found.
+class Search:
+    """One thread's part of a search: its working data, and the best sets it found; by itself without branches.
 
     Parameters
     ----------
@@ -116,17 +114,16 @@ class Search(ABC):
         self.lists = (self.values, self.contents, self.lost, limit, bound, wanted, problem.margin)
         self.tasks = 0
 
-    @abstractmethod
     def start(self, first: int, last: int) -> None:
         """Set the branches of the root to search, from `first` up to but excluding `last`."""
 
-    @abstractmethod
-    def go_on(self, budget: int) -> int:
+    def go_on(self, budget: int) -> int:  # noqa: ARG002
         """Examine about `budget` sets and return their number; 0 if there are no more."""
+        return 0
 
-    @abstractmethod
     def open_from(self) -> FloatArray:
         """Return a lower bound of the sums of squares of the unexamined sets of each size, shape (p + 1,)."""
+        return np.full(len(self.inside) + 1, np.inf)
 
     def columns(self, flags: NDArray[np.uint8]) -> tuple[int, ...]:
         """Return the columns of a set."""
@@ -142,17 +139,6 @@ class Swapping(Search):
 
         list_good_sets(problem.triangle, problem.least, self.lists, self.inside, sizes)
 
-    def start(self, first: int, last: int) -> None:
-        """Start without branches."""
-
-    def go_on(self, budget: int) -> int:  # noqa: ARG002
-        """Do nothing."""
-        return 0
-
-    def open_from(self) -> FloatArray:
-        """Return a lower bound of the sums of the unexamined sets, per size."""
-        return np.full(len(self.inside) + 1, np.inf)
-
 
 class Dropping(Search):
     """Branch and bound from the full set downwards."""
@@ -165,16 +151,9 @@ class Dropping(Search):
         width = -(-p // _LANES) * _LANES
         self._orders = np.zeros((3, p + 1, width), dtype=np.int64)
         self._numbers = np.zeros((8, p + 1), dtype=np.int64)
-        self._work = np.zeros((6, p + 1, width))
-        self._rss = np.zeros(p + 1)
-        self._state = (
-            self._work,
-            np.empty((p + 1, width, width)),
-            np.empty((p + 1, p + 1, p)),
-            self._orders,
-            self._numbers,
-            self._rss,
-        )
+        self._work, self._rss = np.zeros((6, p + 1, width)), np.zeros(p + 1)
+        moments, triangles = np.empty((p + 1, width, width)), np.empty((p + 1, p + 1, p))
+        self._state = (self._work, moments, triangles, self._orders, self._numbers, self._rss)
         self._drop = dropping.drop
         dropping.begin(problem.triangle[:p], self._state, self.lists, self.inside, problem.full_rss)
         self.tasks = p - 1
