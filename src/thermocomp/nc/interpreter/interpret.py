@@ -8,9 +8,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Final
 
-from thermocomp.core.exceptions import ProgramError
 from thermocomp.nc.interpreter import fanuc, modal, motion, offsetcodes
-from thermocomp.nc.interpreter.block import Block, Setup
+from thermocomp.nc.interpreter.block import Block, Setup, triple
 from thermocomp.nc.interpreter.codes import CYCLES, STOPS, TAKES_AXES
 from thermocomp.nc.interpreter.state import InterpreterState
 from thermocomp.nc.interpreter.words import BlockWords, Reader
@@ -85,14 +84,14 @@ class Follower:
         if line.optional and self._setup.skip_optional:
             return self._idle(line)
         if line.error:
-            raise ProgramError(line.number, line.error)
+            raise line.fault(line.error)
         if line.flow:
             remedy = (
                 "--expand writes them as plain lines"
                 if self.state.fanuc
                 else "--expand lets the interpreter unroll them"
             )
-            raise ProgramError(line.number, f"{line.flow}: loops, branches and subprograms are not followed; {remedy}")
+            raise line.fault(f"{line.flow}: loops, branches and subprograms are not followed; {remedy}")
         if not line.words and not line.assignments:
             return self._idle(line)
         words = self._reader.read(line)
@@ -118,7 +117,7 @@ class Follower:
         """Begin or end the program at ``%``."""
         if self._began:
             if not self._demarcated and not self.state.fanuc:
-                raise ProgramError(line.number, "'%' in a program that does not begin with it; remove it")
+                raise line.fault("'%' in a program that does not begin with it; remove it")
             block = self._idle(line)
             block.ends = self._ended = True
             return block
@@ -145,11 +144,10 @@ class Follower:
                 "skips it; decide with --block-delete"
             )
         if block.moves:
-            x, y, z = (
+            block.known = self.state.known = triple(
                 k and letter not in block.values and a == b
                 for k, letter, a, b in zip(block.known, "XYZ", block.start, block.end, strict=True)
             )
-            block.known = self.state.known = (x, y, z)
         return block
 
     def _check_motion(self, words: BlockWords, otherwise: str) -> None:

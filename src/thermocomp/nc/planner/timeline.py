@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 from thermocomp.core.exceptions import SettingError
 from thermocomp.core.machine import Machine
-from thermocomp.nc.interpreter.block import PLANES, Block, Move, Point
-from thermocomp.nc.interpreter.codes import ADDITIONAL_SYSTEMS
+from thermocomp.nc.interpreter.block import PLANES, Block, Move, Point, triple
+from thermocomp.nc.interpreter.codes import list_names
 from thermocomp.nc.planner.corners import Corners, find_overlap_speeds
 from thermocomp.nc.planner.segment import Segment, Segments, Vector
 
@@ -25,27 +25,9 @@ CHAIN = 100
 STEADY = 0.01
 #: codes before which the axes stop, as in LinuxCNC: pauses, probing, other coordinates, actions at a position
 HALTS = frozenset(
-    {"G4", "G10", "G31", "G38.2", "G38.3", "G38.4", "G38.5", "G43", "G43.1", "G43.2", "G44", "G49", "G52"}
-    | {
-        "G68",
-        "G69",
-        "G54",
-        "G55",
-        "G56",
-        "G57",
-        "G58",
-        "G59",
-        "G59.1",
-        "G59.2",
-        "G59.3",
-        "G92",
-        "G92.1",
-        "G92.2",
-        "G92.3",
-    }
-    | {"M0", "M1", "M2", "M3", "M4", "M5", "M6", "M7", "M8", "M9", "M19", "M30", "M60", "M61", "M64", "M65", "M66"}
-    | {"M98", "M99"}
-    | ADDITIONAL_SYSTEMS
+    {"G4", "G10", "G31", "G38.2", "G38.3", "G38.4", "G38.5", "G52", "G92", "G92.1", "G92.2", "G92.3"}
+    | {"M64", "M65", "M66"}
+    | list_names("tool length", "rotation", "system", "stop", "spindle", "coolant", "tool")
 )
 
 
@@ -116,8 +98,7 @@ class MotionLimits:
         axes = {a.name: a for a in machine.axes}
 
         def told(key: str, otherwise: float) -> Vector:
-            x, y, z = (getattr(axes.get(name), key, None) or otherwise for name in "XYZ")
-            return (x, y, z)
+            return triple(getattr(axes.get(name), key, None) or otherwise for name in "XYZ")
 
         return cls(told("rapid", RAPID), told("acceleration", ACCELERATION), **others)
 

@@ -11,7 +11,7 @@ from typing import Literal
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Machine
 from thermocomp.files.machines import read_machine
-from thermocomp.nc.interpreter.block import Setup
+from thermocomp.nc.interpreter.block import Setup, triple
 from thermocomp.nc.planner.timeline import MotionLimits
 from thermocomp.nc.revision.values import (
     m_code_of,
@@ -92,8 +92,7 @@ class Way:
                 "--method offset writes G52, which cancels a G92 or G52 that is in force when the program starts: make "
                 "sure that none is, and give --no-g92; or use --method coordinates"
             )
-        x, y, z = (name in axes for name in "XYZ")
-        return Offset(digits, step, safe_z=safe, axes=(x, y, z))
+        return Offset(digits, step, safe_z=safe, axes=triple(name in axes for name in "XYZ"))
 
     def folders(self) -> list[Path]:
         """Return the folders of subprograms."""

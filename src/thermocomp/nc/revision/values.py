@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from thermocomp.core.exceptions import InputError, UnitError
 from thermocomp.core.units import read_with_unit as with_unit
 from thermocomp.nc.interpreter import startup
-from thermocomp.nc.interpreter.block import Point
+from thermocomp.nc.interpreter.block import Point, triple
 from thermocomp.nc.interpreter.codes import find_code
 from thermocomp.nc.parser.line import Controller
 
@@ -162,8 +162,7 @@ def point_of(text: str, said: str) -> Point:
     parts = [part.strip() for part in text.split(",")]
     if len(parts) != 3:
         raise InputError(f"{said}: expected X, Y and Z, such as 100 mm, 50 mm, 0 mm")
-    x, y, z = (read_value(part, "position", said, "100 mm") for part in parts)
-    return x, y, z
+    return triple(read_value(part, "position", said, "100 mm") for part in parts)
 
 
 def startup_of(text: str, controller: Controller) -> str:

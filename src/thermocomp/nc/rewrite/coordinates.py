@@ -16,8 +16,7 @@ Treatment of a block, by its kind:
 import math
 from dataclasses import dataclass, field
 
-from thermocomp.core.exceptions import ProgramError
-from thermocomp.nc.interpreter.block import PLANES, Block
+from thermocomp.nc.interpreter.block import PLANES, Block, triple
 from thermocomp.nc.interpreter.codes import CYCLES
 from thermocomp.nc.rewrite.contact import CLEAR, Contact
 from thermocomp.nc.rewrite.frame import Frame, Vector
@@ -146,9 +145,7 @@ class Coordinates(CorrectionMethod):
 
     def _drill(self, block: Block, frame: Frame, old: Vector, demand: Vector) -> str:
         if block.modal.motion == "G87":
-            raise ProgramError(
-                block.line.number, "G87 has levels that cannot be shifted; use --method offset, or --expand"
-            )
+            raise block.error("G87 has levels that cannot be shifted; use --method offset, or --expand")
         axis = PLANES[block.modal.plane][2]
         self._refuse_mixed_levels(block, axis)
         goal = frame.words(demand)
@@ -167,7 +164,7 @@ class Coordinates(CorrectionMethod):
                 new[i] = goal[i]
                 shifts[AXES[i]] = round(new[i] - old[i], frame.digits)
         if block.line.optional and tuple(new) != old:
-            raise ProgramError(block.line.number, "an optional line that drills: give --block-delete off or on")
+            raise block.error("an optional line that drills: give --block-delete off or on")
         if not block.moves:  # K0: the cycle is stored, and drills at later lines
             return self._store(block, axis, frame, old, goal[axis])
         self._take(block, frame, old, new)
@@ -181,8 +178,7 @@ class Coordinates(CorrectionMethod):
             return
         if any(word not in block.words for word in (AXES[axis], "R")):
             if self._cycle:
-                raise ProgramError(
-                    block.line.number,
+                raise block.error(
                     f"G91 while {block.modal.motion} is in force, whose R and {AXES[axis]} are shifted levels: write "
                     "G80 before, and the cycle with all its words; or use --expand",
                 )
@@ -223,8 +219,7 @@ class Coordinates(CorrectionMethod):
         if block.modal.motion in ("G73", "G83"):
             wanted, goal = goal, _same_pecks(block, words[0], goal, frame.digits)
             if held and goal != wanted:
-                raise ProgramError(
-                    block.line.number,
+                raise block.error(
                     f"Q divides the way from R to {words[0]}, so rounding decides whether there is one peck more, and "
                     "the tool is at R, which must not move: write G80 and a rapid above R before, or use --expand",
                 )
@@ -234,11 +229,11 @@ class Coordinates(CorrectionMethod):
         shifts |= {word: goal for word in words if word in block.words}
         within = list(frame.words(self.carried))
         within[axis] = goal
-        self.inner = frame.shift((within[0], within[1], within[2]))
+        self.inner = frame.shift(triple(within))
         back = list(self.carried)
         at_r = abs(block.end[axis] - plane) < CLEAR
         back[axis], other = (self.inner[axis], carried[axis]) if at_r else (carried[axis], self.inner[axis])
-        self.carried = (back[0], back[1], back[2])
+        self.carried = triple(back)
         if at_r or not block.known[axis]:
             self.fixed[axis] = self.doubtful[axis] = False
         if not block.known[axis] and other != back[axis]:
@@ -252,8 +247,7 @@ class Coordinates(CorrectionMethod):
     def _named_anew(self, block: Block) -> str:
         for i in self.named(block):
             if self.doubtful[i]:
-                raise ProgramError(
-                    block.line.number,
+                raise block.error(
                     f"names the position of {AXES[i]}, which is unknown: a tool change or an optional line "
                     "may have moved it; position it before, or give --block-delete off or on",
                 )
@@ -326,7 +320,7 @@ class Coordinates(CorrectionMethod):
                 # if the least increment is greater than the step, it is the smallest possible change
                 least = 10.0**-frame.digits / frame.scale[i]
                 out.append(self.carried[i] + math.copysign(min(abs(gap), max(most, least)) if most else 0.0, gap))
-        return out[0], out[1], out[2]
+        return triple(out)
 
     def _take(self, block: Block, frame: Frame, old: Vector, new: list[float]) -> None:
         """Store the new words; in G90, also those of axes whose word on the line is unchanged."""
@@ -334,9 +328,8 @@ class Coordinates(CorrectionMethod):
         taken = [n != o or letter in words for letter, n, o in zip(AXES, new, old, strict=True)]
         if frame.turned:
             taken[0] = taken[1] = taken[0] or taken[1]
-        moved = frame.shift((new[0], new[1], new[2]))
-        x, y, z = (m if t else c for t, m, c in zip(taken, moved, self.carried, strict=True))
-        self.carried = (x, y, z)
+        moved = frame.shift(triple(new))
+        self.carried = triple(m if t else c for t, m, c in zip(taken, moved, self.carried, strict=True))
 
 
 def _same_pecks(block: Block, depth: str, shift: float, digits: int) -> float:

@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol
 
 from thermocomp.core.correction import Correction, Deviation
 from thermocomp.core.exceptions import InputError
-from thermocomp.nc.interpreter.block import Point
+from thermocomp.nc.interpreter.block import Point, triple
 from thermocomp.nc.rewrite.frame import Vector
 
 #: deviation of the tool point at a point in machine coordinates [um]
@@ -103,8 +103,7 @@ class Demand:
 
 def oppose_deviation(deviation: Vector) -> Vector:
     """Return the corrections that cancel a deviation [um]."""
-    x, y, z = (Correction.opposing(Deviation(d)).offset for d in deviation)
-    return x, y, z
+    return triple(Correction.opposing(Deviation(d)).offset for d in deviation)
 
 
 class CutErrors(NamedTuple):

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, field
 
-from thermocomp.nc.interpreter.block import Point
+from thermocomp.nc.interpreter.block import Point, triple
 from thermocomp.nc.rewrite.demand import DriftSource
 
 #: distance of the compared positions [mm]
@@ -36,6 +36,6 @@ class Elsewhere:
         here = now(point)
         for axis in range(3):
             for away in (-AWAY, AWAY):
-                x, y, z = (p + away * (k == axis) for k, p in enumerate(point))
-                for k, (there, was) in enumerate(zip(now((x, y, z)), here, strict=True)):
+                place = triple(p + away * (k == axis) for k, p in enumerate(point))
+                for k, (there, was) in enumerate(zip(now(place), here, strict=True)):
                     self.most[k] = max(self.most[k], abs(there - was))

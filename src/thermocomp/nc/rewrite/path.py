@@ -3,7 +3,7 @@
 import math
 
 from thermocomp.nc.interpreter import arcs
-from thermocomp.nc.interpreter.block import PLANES, Move, Point
+from thermocomp.nc.interpreter.block import PLANES, Move, Point, triple
 
 
 def length(move: Move) -> float:
@@ -24,4 +24,4 @@ def find_point(move: Move, share: float) -> Point:
         angle = math.atan2(move.start[j] - q, move.start[i] - p) + (-turned if arc.clockwise else turned)
         radius = math.hypot(move.start[i] - p, move.start[j] - q)
         point[i], point[j] = p + radius * math.cos(angle), q + radius * math.sin(angle)
-    return point[0], point[1], point[2]
+    return triple(point)

@@ -16,7 +16,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.nc.interpreter.block import Point
+from thermocomp.nc.interpreter.block import Point, triple
 from thermocomp.nc.thermal.inputs import FloatArray, Inputs, Wiring
 from thermocomp.nc.thermal.jobstate import JobState
 from thermocomp.nc.thermal.start import ThermalStart, hand_over_state
@@ -219,7 +219,7 @@ class Drift:
             past = max(ladder.positions[0] - position, position - ladder.positions[-1])
             if past > self.beyond.get(AXES[ladder.axis], 0.0):
                 self.beyond[AXES[ladder.axis]] = past
-        return (found[0], found[1], found[2])
+        return triple(found)
 
     def field(self) -> Callable[[Point], Point]:
         """Return the present `deviation` as a function of position that is independent of time."""
@@ -259,7 +259,7 @@ class Drift:
         places = [0.0, 0.0, 0.0]
         for station, value in zip(self.stations, values, strict=True):
             places[AXES.index(station.axis)] = value
-        self._everywhere: Point = (places[0], places[1], places[2])
+        self._everywhere: Point = triple(places)
         for ladder in self._ladders:
             ladder.values = values[ladder.stations]
 
@@ -301,7 +301,7 @@ class Drift:
             error = math.nan if honest is None else honest.max_abs * (1 if self._zero_known else 2) + doubt
             if not error <= worst[k]:  # nan stays nan
                 worst[k] = error if not math.isnan(worst[k]) else math.nan
-        return (worst[0], worst[1], worst[2])
+        return triple(worst)
 
     # -- next job ----------------------------------------------------------------------------------------------------
 

@@ -1,6 +1,7 @@
 """Required shift of every line of a revised program, and the original line of each of its lines."""
 
 from array import array
+from operator import sub
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -88,15 +89,13 @@ class Ledger:
         if block is None:
             return
         self._carried.take(line, revised.carried)
-        x, y, z = (i - c for i, c in zip(revised.inner, revised.carried, strict=True))
-        self._inner.take(line, (x, y, z))
+        self._inner.take(line, tuple(map(sub, revised.inner, revised.carried)))
         self._inverse.take(line, (float(block.modal.feed_mode == _INVERSE_TIME),))
         if revised.knots:
             self.knots[line] = revised.knots
         goes = block.kind in ("machine", "home")
         self._loose.take(line, (_MACHINE if goes else float(not revised.placed),))
-        x, y, z = (o - c for o, c in zip(revised.other or revised.carried, revised.carried, strict=True))
-        self._other.take(line, (x, y, z))
+        self._other.take(line, tuple(map(sub, revised.other or revised.carried, revised.carried)))
 
     def of(self, lines: Integers) -> Shifts:
         """Return the required shifts of lines of the original."""

@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import Final
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.nc.interpreter.block import PLANES, Block, Point, Setup, system_name
+from thermocomp.nc.interpreter.block import PLANES, Block, Point, Setup, system_name, triple
 from thermocomp.nc.interpreter.codes import ADDITIONAL_SYSTEMS, CYCLES
 from thermocomp.nc.interpreter.cycles import KEPT
 from thermocomp.nc.interpreter.interpret import Follower
@@ -32,25 +32,10 @@ _OTHER: Final = {"G61": "G61.1"}
 _SAME_M: Final = frozenset({"M0", "M1", "M2", "M3", "M4", "M5", "M6", "M7", "M8", "M9", "M30", "M48", "M49"})
 #: codes without motion, for path smoothing or cancelling inactive modes; G98 and G99 are written with each cycle
 _LEFT_OUT: Final = frozenset(
-    {
-        "G98",
-        "G99",
-        "G5",
-        "G5.1",
-        "G8",
-        "G9",
-        "G13.1",
-        "G15",
-        "G22",
-        "G23",
-        "G50",
-        "G50.1",
-        "G61.1",
-        "G67",
-        "G103",
-        "G187",
-    }
-) | {"M19", "M29"}
+    {"G5", "G5.1", "G8", "G9", "G61.1", "G103", "G187"}
+    | {"G13.1", "G15", "G22", "G23", "G50", "G50.1", "G67"}
+    | {"G98", "G99", "M19", "M29"}
+)
 _MOTION: Final = CYCLES | {"G0", "G1", "G2", "G3", "G80", "G31"}
 _ONCE: Final = ("G4", "G10", "G28", "G30", "G52", "G53", "G92", "G92.1")
 _AXES: Final = "XYZABC"
@@ -235,8 +220,9 @@ class Translator:
             raise _cannot(block, f"G30 P{values['P']:g}: LinuxCNC has two reference points")
         if once == "G52":
             scale = self._follower.state.scale
-            x, y, z = (values[c] * scale if c in values else v for c, v in zip("XYZ", self._local, strict=True))
-            self._local = (x, y, z)
+            self._local = triple(
+                values[c] * scale if c in values else v for c, v in zip("XYZ", self._local, strict=True)
+            )
         if once == "G53":  # always a rapid
             return f"G0 G53 {words}" if block.moves else ""
         return {"G4": f"G4 P{format_number(block.pause)}", "G92.1": once}.get(once, f"{once} {words}")
