@@ -16,7 +16,6 @@ import struct
 from collections.abc import Callable
 from functools import partial
 from importlib import import_module
-from operator import add, sub
 from typing import Any, BinaryIO
 
 # loaded by `_rs274_child.py`
@@ -197,14 +196,16 @@ class Canon:
 
     def shifted(self, name: str, values: tuple[float, ...]) -> None:
         """Apply an offset without moving the machine."""
-        sums = map(add, self.offset["g5x"], self.offset["length"])
-        machine = list(map(add, self.turned(tuple(map(add, self.place, self.offset["g92"])), self.angle), sums))
+        sums = [o + t for o, t in zip(self.offset["g5x"], self.offset["length"], strict=True)]
+        machine = self.turned(tuple(p + g for p, g in zip(self.place, self.offset["g92"], strict=True)), self.angle)
+        machine = [m + f for m, f in zip(machine, sums, strict=True)]
         if name == "rotation":
             self.angle = math.radians(values[0])
         else:
             self.offset[name] = values
-        sums = map(add, self.offset["g5x"], self.offset["length"])
-        self.place = tuple(map(sub, self.turned(tuple(map(sub, machine, sums)), -self.angle), self.offset["g92"]))
+        sums = [o + t for o, t in zip(self.offset["g5x"], self.offset["length"], strict=True)]
+        back = self.turned(tuple(m - f for m, f in zip(machine, sums, strict=True)), -self.angle)
+        self.place = tuple(p - g for p, g in zip(back, self.offset["g92"], strict=True))
 
     def position(self, axis: int) -> float:
         return self.place[axis] * (MM if self.metric and not 3 <= axis < 6 else 1.0)

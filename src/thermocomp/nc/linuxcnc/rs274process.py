@@ -201,6 +201,13 @@ class InterpreterRun:
         return {int(row[0]): float(row[1]) for row in rows if len(row) == 2}
 
 
+def run_through(job: InterpreterJob) -> None:
+    """Run a program and discard its calls; raises the errors of `InterpreterRun.blocks`."""
+    with InterpreterRun(job) as run:
+        for _ in run.blocks():
+            pass
+
+
 def _all(pipe: IO[bytes], size: int) -> bytes:
     found = pipe.read(size)
     if len(found) < size:
