@@ -148,8 +148,7 @@ class _Unroller:
     def _line(self, frame: _Frame, line: Line) -> Generator[tuple[str, int], None, int | None]:
         """Run one line; return None if the program continues after it."""
         if line.flow or line.assignments:
-            self._refuse_optional(line)
-            self._acted = True
+            self._act(line)
             if line.flow:
                 self._steer(frame, line, squeeze(line.flow))
             for assignment in line.assignments:
@@ -163,8 +162,7 @@ class _Unroller:
         call = next((int(n) for n in (98.0, 97.0) if ("M", n) in codes), 0)
         back = ("M", 99.0) in codes
         if call or back:
-            self._refuse_optional(line)
-            self._acted = True
+            self._act(line)
         if back and not frame.called:
             raise line.fault("M99 in the main program repeats it endlessly; write M30")
         head = line.label[:1] in ("O", ":")
@@ -198,8 +196,7 @@ class _Unroller:
 
     def _macro(self, frame: _Frame, line: Line) -> Generator[tuple[str, int], None, int | None]:
         """Run G65."""
-        self._refuse_optional(line)
-        self._acted = True
+        self._act(line)
         number, times = self._count(frame, line, "P", 0), self._count(frame, line, "L", 1)
         if not number:
             raise line.fault("G65 needs P, the number of the macro")
@@ -235,8 +232,10 @@ class _Unroller:
                 return
             if found.group("goto"):
                 self._go(frame, line, found.group("goto"))
+            elif (setting := _SET.fullmatch(found.group("then"))) is None:
+                raise line.fault("IF [..] THEN needs an assignment, such as #1=2")
             else:
-                self._then(frame, line, found.group("then"))
+                frame.variables.assign(line.number, Assignment(setting.group(1).lower(), setting.group(2), 0, 0))
         elif found := _GOTO.fullmatch(flow):
             self._go(frame, line, found.group("goto"))
         elif found := _LOOP.fullmatch(flow):
@@ -261,12 +260,6 @@ class _Unroller:
             frame.loops.append((number, index, end))
         else:
             frame.place = end + 1
-
-    def _then(self, frame: _Frame, line: Line, text: str) -> None:
-        found = _SET.fullmatch(text)
-        if found is None:
-            raise line.fault("IF [..] THEN needs an assignment, such as #1=2")
-        frame.variables.assign(line.number, Assignment(found.group(1).lower(), found.group(2), 0, 0))
 
     def _go(self, frame: _Frame, line: Line, goal: str) -> None:
         value = frame.variables.value(line.number, goal, "GOTO")
@@ -351,7 +344,9 @@ class _Unroller:
                 return int(value)
         return default
 
-    def _refuse_optional(self, line: Line) -> None:
+    def _act(self, line: Line) -> None:
+        """Note a line that calls, jumps or sets a variable."""
+        self._acted = True
         if line.optional:
             raise line.fault("an optional line (/) that calls, jumps or sets a variable: give --block-delete on")
 

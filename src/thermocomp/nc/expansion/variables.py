@@ -67,7 +67,7 @@ class Variables:
                     "others stay in the control, and plain lines would not set them; use one of those, or omit "
                     "--expand if no loop or subprogram needs it"
                 )
-            if squeezed_is_empty(assignment.value):
+            if "".join(assignment.value.split()) == "#0":
                 raise InputError(f"{assignment.target} is set to empty (#0), which is not followed; give it a value")
             same = key in self._parameters and self._parameters[key]
             self._parameters.assign([assignment])
@@ -118,11 +118,6 @@ class Variables:
         raise ProgramError(
             line, f"whether #{key} is empty is uncertain: the program has not set it, and another program may have"
         )
-
-
-def squeezed_is_empty(value: str) -> bool:
-    """Return whether an assignment makes its variable empty."""
-    return "".join(value.split()) == "#0"
 
 
 def arguments(

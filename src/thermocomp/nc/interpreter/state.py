@@ -204,7 +204,6 @@ class InterpreterState:
         feed = pitch * abs(self.speed)
         if not feed:
             raise words.error("a feed per turn while the spindle is stopped; start it with S and M3 before")
-        way = length(arc, start, end) if arc else math.dist(start, end)
-        return Move(
-            rapid=False, start=start, end=end, arc=arc, feed=feed, seconds=(way or rotary) / feed * 60.0, rotary=rotary
-        )
+        move = Move(rapid=False, start=start, end=end, arc=arc, feed=feed, rotary=rotary)
+        move.seconds = (length(move) or rotary) / feed * 60.0
+        return move

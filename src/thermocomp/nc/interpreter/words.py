@@ -96,8 +96,8 @@ class Reader:
                 words[letter] = word
                 values[letter] = number
         found = BlockWords(line=line, codes=codes, groups=groups, words=words, values=values)
-        if len(codes) > _MOST_M:
-            self._count(found)
+        if len(codes) > _MOST_M and self._controller == "linuxcnc" and sum(name[0] == "M" for name in codes) > _MOST_M:
+            raise found.error(f"more than {_MOST_M} M codes on one line; put them on separate lines")
         if line.assignments:
             self._assign(line)
         return found
@@ -174,10 +174,6 @@ class Reader:
             groups[code.group] = other if code.name == "G80" else code.name
             return
         raise line.fault(f"{other} and {code.name} on one line exclude each other; put them on separate lines")
-
-    def _count(self, words: BlockWords) -> None:
-        if self._controller == "linuxcnc" and sum(name[0] == "M" for name in words.codes) > _MOST_M:
-            raise words.error(f"more than {_MOST_M} M codes on one line; put them on separate lines")
 
     def _assign(self, line: Line) -> None:
         try:

@@ -16,8 +16,8 @@ from thermocomp.nc.revision import headers, ncprogram
 from thermocomp.nc.revision.job import ALL_THE_SAME, Job, Paths
 from thermocomp.nc.revision.options import Controller, Timing, Way
 from thermocomp.nc.revision.thermaloptions import Drifting, Starting
+from thermocomp.nc.rewrite.course import Travel
 from thermocomp.nc.rewrite.revise import Revision
-from thermocomp.nc.rewrite.travel import Travel
 from thermocomp.nc.thermal.stations import Station
 
 

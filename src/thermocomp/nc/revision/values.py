@@ -14,7 +14,7 @@ _ANGLE = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+))\s*(?:deg|°)")
 _SYSTEM = re.compile(r"G?5([4-9])(?:\.([1-3]))?(?:\s*P(\d+))?", re.IGNORECASE)
 
 
-def read_value(text: str, quantity: str, option: str, example: str) -> float:
+def read_value(text: str, quantity: str, option: str, example: str, *, positive: bool = False) -> float:
     """Return the value of an option in internal units.
 
     Parameters
@@ -27,38 +27,8 @@ def read_value(text: str, quantity: str, option: str, example: str) -> float:
         Name of the option.
     example : str
         Example of a valid value.
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    InputError
-        The text is not a value with a unit of the quantity.
-    """
-    try:
-        number = with_unit(text, quantity)
-    except UnitError as e:
-        raise InputError(f"{option} {text!r}: {e}") from e
-    if number is None:
-        raise InputError(f'{option} {text!r}: write a value with its unit, such as "{example}"')
-    return number
-
-
-def read_positive(text: str, quantity: str, option: str, example: str) -> float:
-    """Return the value of an option that must be positive.
-
-    Parameters
-    ----------
-    text : str
-        Text of the option.
-    quantity : str
-        Quantity, such as ``time``.
-    option : str
-        Name of the option.
-    example : str
-        Example of a valid value.
+    positive : bool
+        Refuse 0 and less.
 
     Returns
     -------
@@ -69,8 +39,13 @@ def read_positive(text: str, quantity: str, option: str, example: str) -> float:
     InputError
         The text is not a value with a unit of the quantity, or not positive.
     """
-    number = read_value(text, quantity, option, example)
-    if not number > 0:
+    try:
+        number = with_unit(text, quantity)
+    except UnitError as e:
+        raise InputError(f"{option} {text!r}: {e}") from e
+    if number is None:
+        raise InputError(f'{option} {text!r}: write a value with its unit, such as "{example}"')
+    if positive and not number > 0:
         raise InputError(f"{option} {text!r}: must be positive")
     return number
 

@@ -7,9 +7,8 @@ from thermocomp.core.exceptions import ProgramError
 from thermocomp.nc.interpreter.block import PLANES, Block, Move, Setup
 from thermocomp.nc.interpreter.interpret import follow_program
 from thermocomp.nc.parser.tokens import read_lines
-from thermocomp.nc.rewrite.frame import Vector
 from thermocomp.nc.rewrite.method import Change
-from thermocomp.nc.rewrite.text import LONGEST
+from thermocomp.nc.rewrite.text import LONGEST, Vector
 
 #: largest difference regarded as rounding [um]
 ROUNDING = 0.1

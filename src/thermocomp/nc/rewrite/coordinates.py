@@ -16,13 +16,12 @@ Treatment of a block, by its kind:
 import math
 from dataclasses import dataclass, field
 
+from thermocomp.nc.interpreter.arcs import length
 from thermocomp.nc.interpreter.block import PLANES, Block, triple
 from thermocomp.nc.interpreter.codes import CYCLES
 from thermocomp.nc.rewrite.contact import CLEAR, Contact
-from thermocomp.nc.rewrite.frame import Frame, Vector
 from thermocomp.nc.rewrite.method import AXES, STILL, CorrectionMethod
-from thermocomp.nc.rewrite.path import length
-from thermocomp.nc.rewrite.text import format_number, format_shifted, shift_words
+from thermocomp.nc.rewrite.text import Frame, Vector, format_number, format_shifted, shift_words
 
 #: motion codes of lines that can get additional words
 PLAIN = ("G0", "G1")

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from thermocomp.nc.interpreter.block import Block, Setup, system_name
-from thermocomp.nc.rewrite.frame import Vector
+from thermocomp.nc.rewrite.text import Vector
 
 
 @dataclass

@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 from thermocomp.nc.interpreter.block import Block, Known, Modal, system_name, triple
 from thermocomp.nc.interpreter.codes import ROTARY
-from thermocomp.nc.rewrite.frame import Frame, Vector
-from thermocomp.nc.rewrite.text import LONGEST, Digits, part_comments
+from thermocomp.nc.rewrite.text import LONGEST, Digits, Frame, Vector, part_comments
 
 AXES = "XYZ"
 ALL: Known = (True, True, True)

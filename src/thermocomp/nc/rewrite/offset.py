@@ -10,9 +10,8 @@ from dataclasses import dataclass, field
 from thermocomp.nc.interpreter.block import PLANES, Block, triple
 from thermocomp.nc.interpreter.codes import CYCLES
 from thermocomp.nc.rewrite.contact import CLEAR
-from thermocomp.nc.rewrite.frame import Frame, Vector
 from thermocomp.nc.rewrite.method import AXES, STILL, CorrectionMethod
-from thermocomp.nc.rewrite.text import format_number
+from thermocomp.nc.rewrite.text import Frame, Vector, format_number
 
 #: codes that use the same stored offset as G52
 SAME_STORE = ("G52", "G92", "G92.1", "G92.2", "G92.3")

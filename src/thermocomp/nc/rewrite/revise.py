@@ -12,6 +12,7 @@ from operator import add, sub
 from typing import NamedTuple
 
 from thermocomp.core.exceptions import InputError, ProgramError
+from thermocomp.nc.interpreter.arcs import find_point, length
 from thermocomp.nc.interpreter.block import Block, Point, Setup
 from thermocomp.nc.interpreter.codes import ROTARY
 from thermocomp.nc.interpreter.interpret import follow_program
@@ -21,17 +22,12 @@ from thermocomp.nc.parser.tokens import read_lines
 from thermocomp.nc.planner.timeline import MotionLimits, time_blocks
 from thermocomp.nc.rewrite import header, known
 from thermocomp.nc.rewrite.check import Check
-from thermocomp.nc.rewrite.demand import CutErrors, Demand, DriftSource, Left
-from thermocomp.nc.rewrite.elsewhere import Elsewhere
-from thermocomp.nc.rewrite.frame import Vector
+from thermocomp.nc.rewrite.demand import DENSE, OFTEN, CutErrors, Demand, DriftSource, Elsewhere, Left
 from thermocomp.nc.rewrite.method import Change, CorrectionMethod
 from thermocomp.nc.rewrite.offset import ending
-from thermocomp.nc.rewrite.path import find_point, length
 from thermocomp.nc.rewrite.split import Sample, axes_to_split, beside, may_split, pieces, shares
+from thermocomp.nc.rewrite.text import Vector
 
-#: sampling intervals in a cut: in time [s], and along the path if the drift depends on the position [mm]
-OFTEN = 20.0
-DENSE = 20.0
 MOST_PIECES = 1000
 #: the drift continues within a line: a residual up to this multiple of the tolerance is not reported as held
 TELLING = 1.1

@@ -5,16 +5,14 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import Final, NamedTuple
 
-from thermocomp.nc.interpreter.arcs import CENTRE
+from thermocomp.nc.interpreter.arcs import CENTRE, find_point
 from thermocomp.nc.interpreter.block import PLANES, Block, Known, Move, Point, triple
 from thermocomp.nc.interpreter.codes import ROTARY
 from thermocomp.nc.parser.line import Controller
 from thermocomp.nc.parser.tokens import read_line
-from thermocomp.nc.rewrite.frame import Vector
 from thermocomp.nc.rewrite.method import AXES
 from thermocomp.nc.rewrite.offset import ending
-from thermocomp.nc.rewrite.path import find_point
-from thermocomp.nc.rewrite.text import format_number
+from thermocomp.nc.rewrite.text import Vector, format_number
 
 #: decimals of positions inside a cut: their rounding is a thousandth of that of a correction
 DIGITS: Final = 6

@@ -11,10 +11,9 @@ from typing import Any
 
 from thermocomp.core.exceptions import InputError, ProgramError
 from thermocomp.files.draft import draft
-from thermocomp.nc.linuxcnc.expansion.origins import DEPENDS, G10, SYSTEMS
+from thermocomp.nc.linuxcnc.expansion.origins import DEPENDS, G10, SYSTEMS, Side
 from thermocomp.nc.linuxcnc.expansion.plain import Writer
 from thermocomp.nc.linuxcnc.expansion.proof import compare, compare_parameters
-from thermocomp.nc.linuxcnc.expansion.words import Side
 from thermocomp.nc.linuxcnc.rs274 import Canonical, read
 from thermocomp.nc.linuxcnc.rs274process import InterpreterJob, run_through
 from thermocomp.nc.linuxcnc.stored import Stored, draw_controller

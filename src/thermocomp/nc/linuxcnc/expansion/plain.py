@@ -7,8 +7,7 @@ G30. Anything else depends on data stored in the controller, and is refused.
 
 from collections.abc import Callable, Iterator
 
-from thermocomp.nc.linuxcnc.expansion.origins import DEPENDS, G10, OriginWriter
-from thermocomp.nc.linuxcnc.expansion.words import STILL, agree, format_number
+from thermocomp.nc.linuxcnc.expansion.origins import DEPENDS, G10, STILL, OriginWriter, agree, format_number
 from thermocomp.nc.linuxcnc.rs274 import AXES, PLANE_AXES, Canonical, Stored
 
 CENTRES = {17: "IJ", 18: "KI", 19: "JK"}

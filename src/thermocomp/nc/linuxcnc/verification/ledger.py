@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from thermocomp.nc.rewrite.frame import Vector
 from thermocomp.nc.rewrite.revise import Revised
+from thermocomp.nc.rewrite.text import Vector
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 Booleans = np.ndarray[Any, np.dtype[np.bool_]]
@@ -16,17 +16,6 @@ Integers = np.ndarray[Any, np.dtype[np.int64]]
 _INVERSE_TIME = 93
 #: flags of lines: unknown previous position of an axis in the line; move to machine coordinates
 _UNPLACED, _MACHINE = 1.0, 2.0
-
-
-class LineShift(NamedTuple):
-    """Allowed shifts of the moves of a line [um, machine axes]."""
-
-    before: Vector  #: shift in effect before the line
-    after: Vector  #: shift in effect after the line, required for its last move
-    inner: Vector  #: shift of intermediate moves of a cycle
-    inverse: bool  #: G93: a change in path length changes the feed
-    knots: tuple[Vector, ...] = ()  #: shifts at the inner ends of the pieces of a divided move
-    other: Vector | None = None  #: alternative shift, if the program does not determine which
 
 
 class Shifts(NamedTuple):
@@ -114,31 +103,15 @@ class Ledger:
             others=others,
         )
 
-    def at(self, line: int) -> LineShift:
-        """Return the required shift of a line of the original."""
-        found = self.of(np.array([line]))
-        before, after, inner, inverse = (row[0].tolist() for row in found[:4])
-        other = tuple(found.others[1][0].tolist()) if found.others else tuple(after)
-        return LineShift(
-            before=tuple(before),
-            after=tuple(after),
-            inner=tuple(inner),
-            inverse=inverse,
-            knots=self.knots.get(line, ()),
-            other=None if other == tuple(after) else other,
-        )
-
     def originals(self, lines: Integers) -> Integers:
         """Return the lines of the original for lines of the revised program."""
         if not self._first:
             return lines
-        first, count, original = (np.frombuffer(a, np.intc).astype(int) for a in self._tables())
+        tables = self._first, self._count, self._original
+        first, count, original = (np.frombuffer(a, np.intc).astype(int) for a in tables)
         k = np.searchsorted(first, lines, side="right") - 1
         beyond = lines - first[k] - count[k]
         return np.where(k < 0, lines, np.where(beyond < 0, original[k], original[k] + 1 + beyond))
-
-    def _tables(self) -> "tuple[array[int], array[int], array[int]]":
-        return self._first, self._count, self._original
 
     @property
     def lines(self) -> int:

@@ -57,33 +57,6 @@ class UntranslatableError(InputError):
         self.reason = reason
 
 
-def translate(lines: Iterable[str], setup: Setup) -> Iterator[tuple[str, int]]:
-    """Translate a Fanuc program into LinuxCNC code.
-
-    Parameters
-    ----------
-    lines : iterable of str
-        Plain lines, see `thermocomp.nc.expansion.unroll`.
-    setup : Setup
-        Setup of the program.
-
-    Yields
-    ------
-    str
-        Line of the translation, with its ending.
-    int
-        Number of its line in the program (1-based).
-
-    Raises
-    ------
-    UntranslatableError
-        LinuxCNC does this differently, or not at all.
-    ProgramError
-        The program cannot be interpreted.
-    """
-    return Translator(setup).translate(lines)
-
-
 class Translator:
     """Translator of one program.
 
@@ -109,7 +82,27 @@ class Translator:
         self._length: int | None = None
 
     def translate(self, lines: Iterable[str]) -> Iterator[tuple[str, int]]:
-        """Yield the lines of the translation; see `translate`."""
+        """Translate a program.
+
+        Parameters
+        ----------
+        lines : iterable of str
+            Plain lines, see `thermocomp.nc.expansion.unroll`.
+
+        Yields
+        ------
+        str
+            Line of the translation, with its ending.
+        int
+            Number of its line in the program (1-based).
+
+        Raises
+        ------
+        UntranslatableError
+            LinuxCNC does this differently, or not at all.
+        ProgramError
+            The program cannot be interpreted.
+        """
         for line in read_lines(lines, "fanuc"):
             block = self._follower.step(line)
             if line.optional and self._setup.skip_optional:
@@ -193,12 +186,15 @@ class Translator:
     def _system(self, block: Block, codes: set[str]) -> list[str]:
         if not ADDITIONAL_SYSTEMS & codes:
             return []
-        system = block.modal.system
+        return [system_name(self._spare(block, block.modal.system))]
+
+    def _spare(self, block: Block, system: int) -> int:
+        """Return the LinuxCNC system that stands for a system of G54.1."""
         if system not in self.systems:
             if len(self.systems) == len(_SPARE):
                 raise _cannot(block, f"LinuxCNC can hold up to {len(_SPARE)} work coordinate systems of G54.1")
             self.systems[system] = _SPARE[len(self.systems)]
-        return [system_name(self.systems[system])]
+        return self.systems[system]
 
     def _speeds(self, block: Block, codes: set[str]) -> list[str]:
         """Return F, S, T words; F is repeated after G94, because LinuxCNC, unlike a Fanuc, resets it."""
@@ -242,11 +238,7 @@ class Translator:
         if not block.modal.absolute:
             raise _cannot(block, "G10 in G91 moves the origin by its words, which LinuxCNC does not do")
         if kind == 20:
-            if 100 + target not in self.systems:
-                if len(self.systems) == len(_SPARE):
-                    raise _cannot(block, f"LinuxCNC can hold up to {len(_SPARE)} work coordinate systems of G54.1")
-                self.systems[100 + target] = _SPARE[len(self.systems)]
-            target = self.systems[100 + target]
+            target = self._spare(block, 100 + target)
         elif not target:
             raise _cannot(block, "G10 L2 P0 sets the external offset, which LinuxCNC does not have")
         return f"G10 L2 P{target} {_words(values, _AXES)}"

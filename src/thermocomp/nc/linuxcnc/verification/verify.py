@@ -17,11 +17,11 @@ from thermocomp.nc.linuxcnc import rs274
 from thermocomp.nc.linuxcnc.rs274process import InterpreterJob, InterpreterRun, run_through
 from thermocomp.nc.linuxcnc.verification import states
 from thermocomp.nc.linuxcnc.verification.comparison import Found, LineOrigins, RefusedError, compare
-from thermocomp.nc.linuxcnc.verification.ledger import Integers, Ledger, LineShift
+from thermocomp.nc.linuxcnc.verification.ledger import Integers, Ledger
 from thermocomp.nc.linuxcnc.verification.translation import Translator, UntranslatableError
 from thermocomp.nc.parser.tokens import program_lines
 
-__all__ = ["Ledger", "LineShift", "Proof", "prove"]
+__all__ = ["Ledger", "Proof", "prove"]
 
 #: settings that a state may omit if the original does not run with them
 _SPARED = ("rotation", "tool diameters")
