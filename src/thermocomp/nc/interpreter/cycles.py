@@ -27,16 +27,10 @@ class CycleMove(NamedTuple):
 
 #: words that are required in the first line of a cycle and stay in force
 KEPT: Final = {
-    "G73": "RQ",
-    "G74": "R",
-    "G81": "R",
-    "G82": "RP",
-    "G83": "RQ",
-    "G84": "R",
-    "G85": "R",
-    "G86": "RP",
+    **dict.fromkeys(("G74", "G81", "G84", "G85"), "R"),
+    **dict.fromkeys(("G82", "G86", "G89"), "RP"),
+    **dict.fromkeys(("G73", "G83"), "RQ"),
     "G87": "RIJK",
-    "G89": "RP",
 }
 #: tapping: P is an optional dwell
 _TAPS: Final = ("G74", "G84")

@@ -86,12 +86,8 @@ class Follower:
         if line.error:
             raise line.fault(line.error)
         if line.flow:
-            remedy = (
-                "--expand writes them as plain lines"
-                if self.state.fanuc
-                else "--expand lets the interpreter unroll them"
-            )
-            raise line.fault(f"{line.flow}: loops, branches and subprograms are not followed; {remedy}")
+            remedy = "writes them as plain lines" if self.state.fanuc else "lets the interpreter unroll them"
+            raise line.fault(f"{line.flow}: loops, branches and subprograms are not followed; --expand {remedy}")
         if not line.words and not line.assignments:
             return self._idle(line)
         words = self._reader.read(line)
@@ -102,16 +98,9 @@ class Follower:
         return self._run(words)
 
     def _idle(self, line: Line) -> Block:
-        state = self.state
-        return Block(
-            line,
-            state.modal,
-            start=state.place,
-            end=state.place,
-            known=state.known,
-            feed=state.feed,
-            speed=0.0 if self._ended else state.speed,
-        )
+        state, place = self.state, self.state.place
+        speed = 0.0 if self._ended else state.speed
+        return Block(line, state.modal, start=place, end=place, known=state.known, feed=state.feed, speed=speed)
 
     def _percent(self, line: Line) -> Block:
         """Begin or end the program at ``%``."""
@@ -183,15 +172,7 @@ class Follower:
             fanuc.check_codes(state, words, code)
         if values.keys() - _PLAIN_LETTERS:
             self._reader.check_letters(words, code)
-        block = Block(
-            line=words.line,
-            modal=before,
-            kind="none",
-            codes=words.codes,
-            words=words.words,
-            values=values,
-            start=state.place,
-        )
+        block = Block(words.line, before, codes=words.codes, words=words.words, values=values, start=state.place)
         if groups and not (len(groups) == 1 and "motion" in groups):
             modal.apply_modal_codes(state, words, block)
         else:
@@ -250,7 +231,7 @@ class Follower:
             )
         if once is None and not smoothed and not turns and "tool length" not in groups:
             if told == "G80":
-                return "" if _AXIS_LETTERS.isdisjoint(values) else self._beside_g80(words)
+                return "" if _AXIS_LETTERS.isdisjoint(values) else fanuc.motion_beside_g80(self.state, words)
             if told is not None:
                 return told
         takes = smoothed or turns or once in TAKES_AXES or groups.get("tool length") == "G43.1"
@@ -267,11 +248,6 @@ class Follower:
         if not force or told == "G80":
             raise words.error("axis words, but no motion code is in force; write G0, G1 ... before them")
         return force
-
-    def _beside_g80(self, words: BlockWords) -> str:
-        if not self.state.fanuc:
-            raise words.error("axis words with G80; write the motion code they are for")
-        return fanuc.motion_beside_g80(self.state, words)
 
     def _beside(self, words: BlockWords, told: str | None, other: str) -> None:
         """Process a motion code together with another code that uses the axis words."""

@@ -1,6 +1,6 @@
 """Parameters that belong to the machine and not to the program (LinuxCNC and Fanuc)."""
 
-from typing import Literal
+from thermocomp.nc.parser.line import Controller
 
 # first and last number, meaning
 _LINUXCNC = (
@@ -47,7 +47,7 @@ _NAMED = {
 }
 
 
-def machine_meaning(key: int | str, controller: Literal["linuxcnc", "fanuc"] = "linuxcnc") -> str:
+def machine_meaning(key: int | str, controller: Controller = "linuxcnc") -> str:
     """Return the meaning of a parameter of the machine; empty if it belongs to the program.
 
     Parameters
@@ -68,7 +68,7 @@ def machine_meaning(key: int | str, controller: Literal["linuxcnc", "fanuc"] = "
     return "" if key < 1000 else "system variable of the control"
 
 
-def explain_unset(key: int | str, controller: Literal["linuxcnc", "fanuc"] = "linuxcnc") -> str:
+def explain_unset(key: int | str, controller: Controller = "linuxcnc") -> str:
     """Return the reason why an unset parameter is unknown, such as 'present position, which only the machine knows'."""
     if meaning := machine_meaning(key, controller):
         return f"{meaning}, which only the machine knows"

@@ -176,7 +176,8 @@ class _Plan:
         if codes or not serial:
             halts = halts or not HALTS.isdisjoint(codes)
             if not serial or "G61.1" in codes or "G61" in codes or "G64" in codes:
-                self._path_mode(block)
+                self._unchain()
+                self.exact, self.straight = block.modal.exact_stop, block.modal.naive
         if block.tool_change is not None:
             before += kinematics.tool_change
         if block.speed != self.turning:
@@ -193,7 +194,7 @@ class _Plan:
                     self._chain(serial, move, block)
                 else:
                     self._unchain()
-                    self._join(self.segments.of(serial, move, block), block)
+                    self._join(serial, move, block)
         if after or block.ends or block.kind == "probe" or (self.last is None and self.chained is None):
             self.halt(after)
 
@@ -208,11 +209,6 @@ class _Plan:
         self.now += pause
         while self.waiting:
             self._finish()
-
-    def _path_mode(self, block: Block) -> None:
-        """Set the path accuracy from this block on."""
-        self._unchain()
-        self.exact, self.straight = block.modal.exact_stop, block.modal.naive
 
     def _chain(self, serial: int, move: Move, block: Block) -> None:
         """Replace feed lines by a single line while it passes close enough to their ends."""
@@ -246,20 +242,16 @@ class _Plan:
         if self.chained is not None:
             serial, move, block = self.chained
             self.chained = None
-            self._join(
-                self.segments.of(
-                    serial, Move(rapid=False, start=self.chain[0], end=move.end, arc=None, feed=move.feed), block
-                ),
-                block,
-            )
+            self._join(serial, Move(rapid=False, start=self.chain[0], end=move.end, feed=move.feed), block)
 
     def _finish(self) -> None:
         """Complete the first waiting block."""
         self.done.append(Timed(self.waiting.popleft()[1], self.since, self.now))
         self.since = self.now
 
-    def _join(self, segment: Segment | None, block: Block) -> None:
-        """Append a segment, joined to the last one."""
+    def _join(self, serial: int, move: Move, block: Block) -> None:
+        """Append the segment of a move, joined to the last one."""
+        segment = self.segments.of(serial, move, block)
         if segment is None:
             return
         last = self.last

@@ -30,6 +30,15 @@ SLOWER, LATER = 0.015, 0.004
 
 
 @dataclass
+class _Edit:
+    """Amounts of the correction in the words of X, Y and Z after a line, and what changes on the line for that."""
+
+    new: list[float]
+    shifts: dict[str, float] = field(default_factory=dict)  #: of words on the line
+    added: dict[str, float] = field(default_factory=dict)  #: words to be added
+
+
+@dataclass
 class Coordinates(CorrectionMethod):
     """Correction method that adds the correction to the words.
 
@@ -102,7 +111,8 @@ class Coordinates(CorrectionMethod):
         holds = self._holds(block, frame)
         if len(holds) < 3 and goal != old and self._hurries(block, frame, goal, holds):
             holds = (0, 1, 2)
-        new, shifts, added = list(old), dict[str, float](), dict[str, float]()
+        edit = _Edit(list(old))
+        new, shifts = edit.new, edit.shifts
         for i in named:
             letter = AXES[i]
             if modal.absolute:
@@ -114,30 +124,24 @@ class Coordinates(CorrectionMethod):
                 new[i] = goal[i]
                 shifts[letter] = round(new[i] - old[i], frame.digits)
         if len(holds) < 3 and self._takes_words(block, named):
-            self._add(block, frame, goal, holds, new, added)
+            self._add(block, frame, goal, holds, edit)
         if modal.arc_absolute and block.kind == "arc":
             for i, letter in enumerate("IJK"):
                 if letter in block.words:
                     shifts[letter] = old[i] / 2 if modal.diameter and i == 0 else old[i]
         self._take(block, frame, old, new)
-        return shift_words(block, shifts, added, frame.digits)
+        return shift_words(block, shifts, edit.added, frame.digits)
 
-    def _add(
-        self,
-        block: Block,
-        frame: Frame,
-        goal: Vector,
-        holds: tuple[int, ...],
-        new: list[float],
-        added: dict[str, float],
-    ) -> None:
+    def _add(self, block: Block, frame: Frame, goal: Vector, holds: tuple[int, ...], edit: _Edit) -> None:
+        """Add words for axes that have none, but whose correction has changed."""
+        new = edit.new
         for i, letter in enumerate(AXES):
             if letter in block.words or i in holds or goal[i] == new[i] or self.fixed[i] or self.doubtful[i]:
                 continue
             if not block.modal.absolute:
-                added[letter] = goal[i] - new[i]
+                edit.added[letter] = goal[i] - new[i]
             elif self.before[i] and block.known[i]:
-                added[letter] = block.end[i] * (frame.scale[i] * 1e3) + goal[i]
+                edit.added[letter] = block.end[i] * (frame.scale[i] * 1e3) + goal[i]
             else:
                 continue
             new[i] = goal[i]
@@ -148,7 +152,8 @@ class Coordinates(CorrectionMethod):
         axis = PLANES[block.modal.plane][2]
         self._refuse_mixed_levels(block, axis)
         goal = frame.words(demand)
-        new, shifts, added = list(old), dict[str, float](), dict[str, float]()
+        edit = _Edit(list(old))
+        new, shifts = edit.new, edit.shifts
         repeats = block.values.get("L", block.values.get("K", 1.0))
         for i in self.named(block):
             if i == axis:
@@ -168,8 +173,8 @@ class Coordinates(CorrectionMethod):
             return self._store(block, axis, frame, old, goal[axis])
         self._take(block, frame, old, new)
         if block.modal.absolute:
-            self._levels(block, axis, frame, goal[axis], shifts, added)
-        return shift_words(block, shifts, added, frame.digits)
+            self._levels(block, axis, frame, goal[axis], edit)
+        return shift_words(block, shifts, edit.added, frame.digits)
 
     def _refuse_mixed_levels(self, block: Block, axis: int) -> None:
         """Raise `ProgramError` if corrected absolute levels would be reused as distances in G91."""
@@ -186,18 +191,16 @@ class Coordinates(CorrectionMethod):
 
     def _store(self, block: Block, axis: int, frame: Frame, old: Vector, goal: float) -> str:
         carried, before = self.carried, (self.fixed[axis], self.doubtful[axis])
-        shifts, added = dict[str, float](), dict[str, float]()
+        edit = _Edit(list(old))
         if block.modal.absolute:
-            self._levels(block, axis, frame, goal, shifts, added)
+            self._levels(block, axis, frame, goal, edit)
             # the axes do not move, but may have words for their present position
-            shifts |= {AXES[i]: old[i] for i in self.named(block) if i != axis}
+            edit.shifts |= {AXES[i]: old[i] for i in self.named(block) if i != axis}
             self.carried, self.inner = carried, None
             self.fixed[axis], self.doubtful[axis] = before
-        return shift_words(block, shifts, added, frame.digits)
+        return shift_words(block, edit.shifts, edit.added, frame.digits)
 
-    def _levels(
-        self, block: Block, axis: int, frame: Frame, goal: float, shifts: dict[str, float], added: dict[str, float]
-    ) -> None:
+    def _levels(self, block: Block, axis: int, frame: Frame, goal: float, edit: _Edit) -> None:
         """Shift depth and retract plane of a cycle, both or neither."""
         words = (AXES[axis], "R")
         if self._series is None:
@@ -223,9 +226,9 @@ class Coordinates(CorrectionMethod):
                     "the tool is at R, which must not move: write G80 and a rapid above R before, or use --expand",
                 )
         if goal != self._cycle or all(word in block.words for word in words):
-            added |= {word: block.sticky[word] + goal for word in words if word not in block.words}
+            edit.added |= {word: block.sticky[word] + goal for word in words if word not in block.words}
             self._cycle = goal
-        shifts |= {word: goal for word in words if word in block.words}
+        edit.shifts |= {word: goal for word in words if word in block.words}
         within = list(frame.words(self.carried))
         within[axis] = goal
         self.inner = frame.shift(triple(within))

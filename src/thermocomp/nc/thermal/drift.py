@@ -8,8 +8,8 @@ division of time into steps.
 
 import copy
 import math
-from bisect import bisect_right
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import groupby
 from typing import Literal, NamedTuple
 
@@ -17,7 +17,7 @@ import numpy as np
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.nc.interpreter.block import Point, triple
-from thermocomp.nc.thermal.inputs import FloatArray, Inputs, Wiring
+from thermocomp.nc.thermal.inputs import FloatArray, Inputs, Wiring, interpolate
 from thermocomp.nc.thermal.jobstate import JobState
 from thermocomp.nc.thermal.start import ThermalStart, hand_over_state
 from thermocomp.nc.thermal.stations import AXES, Station, check_stations
@@ -215,7 +215,7 @@ class Drift:
         found = list(self._everywhere)
         for ladder in self._ladders:
             position = point[ladder.along]
-            found[ladder.axis] = ladder.at(position)
+            found[ladder.axis] = interpolate(ladder.positions, ladder.values, position)
             past = max(ladder.positions[0] - position, position - ladder.positions[-1])
             if past > self.beyond.get(AXES[ladder.axis], 0.0):
                 self.beyond[AXES[ladder.axis]] = past
@@ -312,25 +312,15 @@ class Drift:
         return hand_over_state(self.stations, self._states, self._zeros, self._doubts, zero_known=self._zero_known)
 
 
+@dataclass(slots=True)
 class _Ladder:
     """Stations of one axis along another axis."""
 
-    __slots__ = ("along", "axis", "positions", "stations", "values")
-
-    def __init__(self, axis: int, along: int, positions: tuple[float, ...], stations: slice) -> None:
-        self.axis, self.along, self.positions, self.stations = axis, along, positions, stations
-        self.values: tuple[float, ...] = ()
-
-    def at(self, position: float) -> float:
-        """Return the deviation at a position, linear between stations, constant beyond the outermost ones [um]."""
-        positions, values = self.positions, self.values
-        k = bisect_right(positions, position)
-        if k == 0:
-            return values[0]
-        if k == len(positions):
-            return values[-1]
-        share = (position - positions[k - 1]) / (positions[k] - positions[k - 1])
-        return (1.0 - share) * values[k - 1] + share * values[k]
+    axis: int
+    along: int
+    positions: tuple[float, ...]
+    stations: slice
+    values: tuple[float, ...] = ()
 
 
 def _ladders(stations: Sequence[Station]) -> tuple[_Ladder, ...]:

@@ -5,6 +5,7 @@ from array import array
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -183,7 +184,7 @@ def _lines(path: Path, around: _Around) -> Iterator[tuple[str, int]]:
     if radii:
         yield "G8", 0
     one, two = (around.controller(seed) for seed in _WRITTEN)
-    writer = Writer(one, two, _Source(path), around.inch, around.user_codes)
+    writer = Writer(one, two, partial(_line_of, path), around.inch, around.user_codes)
     opened: set[Path] = set()
     with closing(around.run(path, one, opened=opened)) as run1, closing(around.run(path, two, task=True)) as run2:
         for first, second in zip_longest(_told(run1, writer.sides[0]), _told(run2, writer.sides[1])):
@@ -258,12 +259,7 @@ def _told(calls: Iterator[Canonical], side: Side) -> Iterator[Canonical]:
             yield call
 
 
-class _Source:
-    """Text of a line by its number; the file is reread at each rare call."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-
-    def __call__(self, number: int) -> str:
-        with self.path.open(encoding="latin-1") as file:
-            return next((text for i, text in enumerate(file, 1) if i == number), "")
+def _line_of(path: Path, number: int) -> str:
+    """Return the text of a line by its number; the file is reread at each rare call."""
+    with path.open(encoding="latin-1") as file:
+        return next((text for i, text in enumerate(file, 1) if i == number), "")

@@ -89,15 +89,13 @@ class Ledger:
     def of(self, lines: Integers) -> Shifts:
         """Return the required shifts of lines of the original."""
         after = self._carried.at(lines)
-        inverse = self._inverse.at(lines)[:, 0] > 0
         before, loose = self._carried.at(lines - 1), self._loose.at(lines)[:, 0]
         others = (before + self._other.at(lines - 1), after + self._other.at(lines)) if self._other.lines else ()
-        inner = after + self._inner.at(lines)
         return Shifts(
             before=before,
             after=after,
-            inner=inner,
-            inverse=inverse,
+            inner=after + self._inner.at(lines),
+            inverse=self._inverse.at(lines)[:, 0] > 0,
             placed=loose != _UNPLACED,
             machine=loose == _MACHINE,
             others=others,
