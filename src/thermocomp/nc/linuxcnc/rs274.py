@@ -16,8 +16,7 @@ import numpy as np
 from thermocomp.core.exceptions import ThermocompError
 from thermocomp.files.scratch import scratch
 from thermocomp.nc.linuxcnc import rs274process
-from thermocomp.nc.linuxcnc.rs274process import AXES, InterpreterJob, InterpreterRun
-from thermocomp.nc.linuxcnc.stored import HIGHEST_TOOL, Stored
+from thermocomp.nc.linuxcnc.rs274process import AXES, HIGHEST_TOOL, InterpreterJob, InterpreterRun, Stored
 
 __all__ = [
     "AXES", "HIGHEST_TOOL", "ORIGIN", "PACKAGE", "PLANE_AXES", "ArcPath", "Canonical", "Place", "ProgramFrame",

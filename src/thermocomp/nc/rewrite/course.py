@@ -111,13 +111,9 @@ class Course:
         """Merge adjacent intervals; an unpaired last one remains open."""
         n = len(self._times) // 2 * 2
         odd = len(self._times) > n
-        self._times = self._times[1:n:2] + self._times[n:]
-        self._low = [
-            tuple(map(_least, a, b)) for a, b in zip(self._low[0:n:2], self._low[1:n:2], strict=True)
-        ] + self._low[n:]
-        self._high = [
-            tuple(map(_most, a, b)) for a, b in zip(self._high[0:n:2], self._high[1:n:2], strict=True)
-        ] + self._high[n:]
+        self._times[:n] = self._times[1:n:2]
+        for rows, outer in ((self._low, _least), (self._high, _most)):
+            rows[:n] = [tuple(map(outer, a, b)) for a, b in zip(rows[0:n:2], rows[1:n:2], strict=True)]
         self._rows = self._rows if odd else 2 * self._stride
         self._stride *= 2
 

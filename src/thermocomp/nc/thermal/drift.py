@@ -309,7 +309,8 @@ class Drift:
         """Return the state from which the next job can start, after stepping the models to the present time."""
         if self._pending:
             self._flush()
-        return hand_over_state(self.stations, self._states, self._zeros, self._doubts, zero_known=self._zero_known)
+        stations = map(hand_over_state, self.stations, self._states, self._zeros, self._doubts)
+        return JobState(tuple(stations), self._zero_known)
 
 
 @dataclass(slots=True)

@@ -16,8 +16,7 @@ from thermocomp.nc.linuxcnc.expansion.origins import DEPENDS, G10, SYSTEMS, Side
 from thermocomp.nc.linuxcnc.expansion.plain import Writer
 from thermocomp.nc.linuxcnc.expansion.proof import compare, compare_parameters
 from thermocomp.nc.linuxcnc.rs274 import Canonical, read
-from thermocomp.nc.linuxcnc.rs274process import InterpreterJob, run_through
-from thermocomp.nc.linuxcnc.stored import Stored, draw_controller
+from thermocomp.nc.linuxcnc.rs274process import InterpreterJob, Stored, draw_controller, run_through
 from thermocomp.nc.rewrite.header import clean_comment
 
 _NO_CODE = re.compile(r"\([^)]*\)|<[^>]*>|;.*|\s")

@@ -8,8 +8,7 @@ from typing import Final
 
 from thermocomp.nc.interpreter import startup
 from thermocomp.nc.interpreter.block import Setup, system_name
-from thermocomp.nc.linuxcnc.rs274process import InterpreterJob
-from thermocomp.nc.linuxcnc.stored import SYSTEMS, Stored, draw_controller
+from thermocomp.nc.linuxcnc.rs274process import SYSTEMS, InterpreterJob, Stored, draw_controller
 
 #: number of states in which a revised program is verified
 STATES = 8
