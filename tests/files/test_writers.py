@@ -29,8 +29,7 @@ GIVEN = {
     "nc/linuxcnc/_rs274_child.py": {"run": 1},  # a process of its own, in the folder of its run
     "nc/linuxcnc/rs274process.py": {"__init__": 2, "_lay_out": 5},
     "nc/linuxcnc/verification/verify.py": {"of": 1},
-    "nc/revision/expanded.py": {"write_expanded": 1},
-    "nc/revision/job.py": {"_write": 3},
+    "nc/revision/job.py": {"_expand": 1, "_write": 3},
     "live/journal/journal.py": {"_set_aside": 1},  # a journal that is damaged is moved aside, not lost
     "nc/revision/ncprogram.py": {"open_to_write": 1, "replace_lines": 1},
     "live/keeper.py": {"put_aside": 1},  # a state that is refused is moved aside, not lost

@@ -9,11 +9,10 @@ from thermocomp.nc.linuxcnc.verification.verify import Ledger, Proof, prove
 from thermocomp.nc.planner.timeline import MotionLimits
 from thermocomp.nc.rewrite.coordinates import Coordinates
 from thermocomp.nc.rewrite.demand import Demand, Field
-from thermocomp.nc.rewrite.frame import Vector
 from thermocomp.nc.rewrite.method import CorrectionMethod
 from thermocomp.nc.rewrite.offset import Offset
 from thermocomp.nc.rewrite.revise import Revised, Revision
-from thermocomp.nc.rewrite.text import DIGITS
+from thermocomp.nc.rewrite.text import DIGITS, Vector
 
 #: what the programs do not say: that the controller starts in mm, without rotation and G92, and the spindle turns
 STATED = Setup(inch=False, speed=3000.0, rotations=dict.fromkeys(range(1, 10), 0.0), no_shift=True)

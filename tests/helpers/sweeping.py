@@ -19,7 +19,7 @@ from nc_law import Steady, revise
 from thermocomp.core.exceptions import InputError, ProgramError, ThermocompError
 from thermocomp.nc.interpreter.block import Point, Setup
 from thermocomp.nc.rewrite.demand import Field
-from thermocomp.nc.rewrite.frame import Vector
+from thermocomp.nc.rewrite.text import Vector
 
 WAYS = ("coordinates", "offset")
 #: programs that a process takes at a time

@@ -3,7 +3,7 @@
 import pytest
 
 from thermocomp.core.exceptions import ProgramError
-from thermocomp.nc.interpreter.block import Block, Setup
+from thermocomp.nc.interpreter.block import Block, Modal, Setup
 from thermocomp.nc.interpreter.cycles import CannedCycle, CycleError
 from thermocomp.nc.interpreter.interpret import follow_program
 from thermocomp.nc.parser.tokens import read_lines, split_lines
@@ -116,8 +116,8 @@ def test_what_is_known_after_a_cycle() -> None:
 @pytest.mark.parametrize("shift", [0.0, 0.0123456, -1 / 3])
 def test_the_number_of_moves_does_not_depend_on_a_shift(shift: float) -> None:
     made = [
-        len(list(CannedCycle("G81", 17, True, to_r, False, (0.0, 0.0, start), {"X": 1.0}, sticky, start, 2).steps()))
-        for to_r in (True, False)
+        len(list(CannedCycle(Modal("G81", retract=retract), (0.0, 0.0, start), {"X": 1.0}, sticky, start, 2).steps()))
+        for retract in (98, 99)
         for start in (2.0 + shift, 5.0)
         for sticky in ({"R": 2.0 + shift, "Z": -1.0 + shift},)
     ]
@@ -126,11 +126,9 @@ def test_the_number_of_moves_does_not_depend_on_a_shift(shift: float) -> None:
 
 def test_impossible_cycles() -> None:
     with pytest.raises(CycleError, match="below the bottom"):
-        list(CannedCycle("G81", 17, True, True, False, (0.0, 0.0, 5.0), {}, {"R": 1.0, "Z": 2.0}, 5.0).steps())
+        list(CannedCycle(Modal("G81", retract=99), (0.0, 0.0, 5.0), {}, {"R": 1.0, "Z": 2.0}, 5.0).steps())
     with pytest.raises(CycleError, match="pecks"):
-        list(
-            CannedCycle("G83", 17, True, True, False, (0.0, 0.0, 5.0), {}, {"R": 1.0, "Z": 0.0, "Q": 1e-9}, 5.0).steps()
-        )
+        list(CannedCycle(Modal("G83", retract=99), (0.0, 0.0, 5.0), {}, {"R": 1.0, "Z": 0.0, "Q": 1e-9}, 5.0).steps())
 
 
 @pytest.mark.parametrize("text", ["G81 X1 Z-1 R1 L999999999", "G83 X1 Z-10 R1 Q0.01 L9999"])

@@ -7,9 +7,8 @@ from thermocomp.nc.interpreter.block import Setup
 from thermocomp.nc.interpreter.interpret import follow_program
 from thermocomp.nc.parser.tokens import read_lines
 from thermocomp.nc.rewrite.check import Check
-from thermocomp.nc.rewrite.frame import Vector
 from thermocomp.nc.rewrite.method import Change
-from thermocomp.nc.rewrite.text import LONGEST
+from thermocomp.nc.rewrite.text import LONGEST, Vector
 
 BEGIN = ["G21 G90 G17 S500 M3\n", "G0 X0 Y0 Z5 F100\n"]
 NONE: Vector = (0.0, 0.0, 0.0)

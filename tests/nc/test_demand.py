@@ -8,7 +8,7 @@ from nc_law import Growing, Steady
 from thermocomp.core.exceptions import InputError
 from thermocomp.nc.interpreter.block import Point
 from thermocomp.nc.rewrite.demand import Demand, oppose_deviation
-from thermocomp.nc.rewrite.frame import Vector
+from thermocomp.nc.rewrite.text import Vector
 
 HERE = (0.0, 0.0, 0.0)
 

@@ -4,9 +4,8 @@ import pytest
 from nc_law import Growing
 
 from thermocomp.nc.interpreter.block import Point
-from thermocomp.nc.rewrite.demand import Field
-from thermocomp.nc.rewrite.elsewhere import Elsewhere
-from thermocomp.nc.rewrite.frame import Vector
+from thermocomp.nc.rewrite.demand import Elsewhere, Field
+from thermocomp.nc.rewrite.text import Vector
 
 
 class Kinked(Growing):

@@ -16,7 +16,7 @@ from thermocomp.nc.linuxcnc.expansion.expand import expand
 from thermocomp.nc.linuxcnc.expansion.origins import SYSTEMS
 from thermocomp.nc.linuxcnc.expansion.proof import compare, compare_parameters
 from thermocomp.nc.linuxcnc.rs274 import HIGHEST_TOOL, Stored, read
-from thermocomp.nc.linuxcnc.stored import draw_controller
+from thermocomp.nc.linuxcnc.rs274process import draw_controller
 
 pytestmark = pytest.mark.usefixtures("interpreter")
 

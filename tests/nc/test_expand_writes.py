@@ -14,7 +14,7 @@ from thermocomp.nc.linuxcnc.expansion import expand as expanding
 def test_a_name_stays_in_its_comment(name: str, tmp_path: Path) -> None:
     program = tmp_path / f"{name}.ngc"
     program.write_text("G21\n", encoding="ascii")
-    around = expanding._Around(None, None, {}, False, (), False, 1, {})
+    around = expanding._Around(None, None, {}, False, (), False, {})
     comment, line = next(expanding._lines(program, around))
     assert line == 0
     assert re.fullmatch(r"\(expanded from [ !-$&'*-:<-~]{1,48} by thermocomp\)", comment)

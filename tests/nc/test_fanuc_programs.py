@@ -18,11 +18,10 @@ from thermocomp.nc.parser.tokens import split_lines
 from thermocomp.nc.planner.timeline import MotionLimits
 from thermocomp.nc.rewrite.coordinates import Coordinates
 from thermocomp.nc.rewrite.demand import Demand
-from thermocomp.nc.rewrite.frame import Vector
 from thermocomp.nc.rewrite.method import CorrectionMethod
 from thermocomp.nc.rewrite.offset import Offset
 from thermocomp.nc.rewrite.revise import Revised, Revision
-from thermocomp.nc.rewrite.text import DIGITS
+from thermocomp.nc.rewrite.text import DIGITS, Vector
 
 PROGRAMS = sorted((Path(__file__).parents[1] / "nc" / "fanuc").glob("*.nc"))
 KINDS = ("drilling", "pocket", "subprogram", "macro", "g68", "home")

@@ -9,14 +9,13 @@ import pytest
 from nc_law import STATED, Growing, Trial, revise
 
 from thermocomp.core.exceptions import ProgramError
+from thermocomp.nc.interpreter.arcs import find_point, length
 from thermocomp.nc.interpreter.block import Move, Point, Setup
 from thermocomp.nc.planner.timeline import MotionLimits
 from thermocomp.nc.rewrite.coordinates import Coordinates
 from thermocomp.nc.rewrite.demand import Demand
-from thermocomp.nc.rewrite.frame import Vector
-from thermocomp.nc.rewrite.path import find_point, length
 from thermocomp.nc.rewrite.revise import Revision
-from thermocomp.nc.rewrite.text import DIGITS
+from thermocomp.nc.rewrite.text import DIGITS, Vector
 
 BEGIN = "G21 G90 G17 G94\nS3000 M3 F300\nG0 X0 Y0 Z10\n"
 

@@ -11,7 +11,7 @@ from thermocomp.core.exceptions import InputError, ProgramError
 from thermocomp.nc.interpreter.block import Block, Modal, Setup
 from thermocomp.nc.linuxcnc import rs274
 from thermocomp.nc.linuxcnc.verification.states import build_stored
-from thermocomp.nc.linuxcnc.verification.verify import Ledger, LineShift, prove
+from thermocomp.nc.linuxcnc.verification.verify import Ledger, prove
 from thermocomp.nc.parser.line import Line
 from thermocomp.nc.rewrite.revise import Revised
 
@@ -52,16 +52,22 @@ def ledger(
     return made
 
 
+def allowed(made: Ledger, line: int) -> tuple[Vector, Vector, Vector, bool]:
+    """Return what a line carries before, at its end and inside, and whether F is its time."""
+    before, after, inner, inverse = (row[0].tolist() for row in made.of(np.array([line]))[:4])
+    return tuple(before), tuple(after), tuple(inner), inverse
+
+
 def test_a_ledger_is_kept_short() -> None:
     made = ledger(
         [(NONE, NONE)] * 5 + [((1.0, 0.0, 0.0), NONE)] * 2 + [((1.0, 0.0, 2.0), (0.0, 0.0, 3.0))], inverse=[8]
     )
-    assert made.at(0) == LineShift(NONE, NONE, NONE, inverse=False)
-    assert made.at(1) == made.at(5) == LineShift(NONE, NONE, NONE, inverse=False)
-    assert made.at(6) == LineShift(NONE, (1.0, 0.0, 0.0), NONE, inverse=False)
-    assert made.at(7) == LineShift((1.0, 0.0, 0.0), (1.0, 0.0, 0.0), NONE, inverse=False)
-    assert made.at(8) == LineShift((1.0, 0.0, 0.0), (1.0, 0.0, 2.0), (0.0, 0.0, 3.0), inverse=True)
-    assert made.at(9) == LineShift((1.0, 0.0, 2.0), (1.0, 0.0, 2.0), (0.0, 0.0, 3.0), inverse=True)
+    assert allowed(made, 0) == (NONE, NONE, NONE, False)
+    assert allowed(made, 1) == allowed(made, 5) == (NONE, NONE, NONE, False)
+    assert allowed(made, 6) == (NONE, (1.0, 0.0, 0.0), NONE, False)
+    assert allowed(made, 7) == ((1.0, 0.0, 0.0), (1.0, 0.0, 0.0), NONE, False)
+    assert allowed(made, 8) == ((1.0, 0.0, 0.0), (1.0, 0.0, 2.0), (0.0, 0.0, 3.0), True)
+    assert allowed(made, 9) == ((1.0, 0.0, 2.0), (1.0, 0.0, 2.0), (0.0, 0.0, 3.0), True)
     assert len(made._carried.lines) == 2
     assert made.originals(np.arange(1, 9)).tolist() == list(range(1, 9))
 

@@ -230,7 +230,8 @@ def test_the_sentence(tmp_path: Path) -> None:
 
 def test_the_states_are_extreme_and_hold_what_is_stated() -> None:
     setup = Setup(tools={7: 99.0}, offsets={2: (1.0, 2.0, 3.0)}, rotations={3: 4.0}, home=(5.0, 6.0, 7.0))
-    drawn = [states.state(setup, number, set(states.list_unstated(setup))) for number in range(states.STATES)]
+    program = Path("part.ngc")
+    drawn = [states.state(setup, number, set(states.list_unstated(setup)), program) for number in range(states.STATES)]
     told = {(s.stored.startup[-3:], len(s.stored.rotations) > 1, any(s.stored.shift)) for s in drawn}
     assert len(told) == 8
     assert sum(s.block_delete for s in drawn) == sum(s.inch for s in drawn) == 4
@@ -254,7 +255,7 @@ def test_the_states_are_extreme_and_hold_what_is_stated() -> None:
         assert one.stored.system != other.stored.system
     held = replace(setup, inch=True, skip_optional=True, no_shift=True, startup="G98", rotations=PLAIN.rotations)
     for number in range(states.STATES):
-        s = states.state(held, number, set(states.list_unstated(held)))
+        s = states.state(held, number, set(states.list_unstated(held)), program)
         assert s.inch
         assert s.block_delete
         assert not any(s.stored.shift)

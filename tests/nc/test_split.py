@@ -9,7 +9,7 @@ from nc_law import STATED, Growing, Trial, revise
 
 from thermocomp.nc.interpreter.block import Point
 from thermocomp.nc.rewrite.demand import Field
-from thermocomp.nc.rewrite.frame import Vector
+from thermocomp.nc.rewrite.text import Vector
 
 BEGIN = "G21 G90 G17 G94 G54\nS3000 M3\nG0 X0 Y0 Z5\nG1 Z-1 F3000\n"
 PLACED = replace(STATED, offsets={1: (0.0, 0.0, 0.0)})

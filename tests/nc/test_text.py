@@ -12,8 +12,7 @@ from thermocomp.nc.interpreter.block import Block, Modal
 from thermocomp.nc.parser.line import Line, Word
 from thermocomp.nc.rewrite import header
 from thermocomp.nc.rewrite.diff import CONTEXT, unified
-from thermocomp.nc.rewrite.frame import Frame
-from thermocomp.nc.rewrite.text import DIGITS, LONGEST, format_number, part_comments, shift_words
+from thermocomp.nc.rewrite.text import DIGITS, LONGEST, Frame, format_number, part_comments, shift_words
 
 
 def block(text: str, *words: tuple[str, str, float | None, float]) -> Block:

@@ -13,7 +13,7 @@ from thermocomp.nc.expansion.unroll import unroll
 from thermocomp.nc.interpreter.block import PLANES, Block, Setup
 from thermocomp.nc.interpreter.interpret import follow_program
 from thermocomp.nc.linuxcnc import rs274
-from thermocomp.nc.linuxcnc.verification.translation import Translator, UntranslatableError, translate
+from thermocomp.nc.linuxcnc.verification.translation import Translator, UntranslatableError
 from thermocomp.nc.parser.tokens import read_lines, split_lines
 
 pytestmark = pytest.mark.usefixtures("interpreter")
@@ -193,7 +193,7 @@ def test_lengths_without_a_point(tmp_path: Path) -> None:
 def test_under_cutter_compensation_the_tool_is_beside_the_contour_by_almost_nothing(tmp_path: Path) -> None:
     text = f"{BEGIN}G1 G41 D5 X10. Y10.\nY30.\nX30.\nG40 X40. Y0.\nM30\n"
     path = tmp_path / "a.ngc"
-    path.write_text("".join(line for line, _ in translate(split_lines(text), SETUP)), "ascii")
+    path.write_text("".join(line for line, _ in Translator(SETUP).translate(split_lines(text))), "ascii")
     ends = [call.machine[:2] for call in rs274.read(path) if call.kind == "feed"]
     assert len(ends) >= 4
     assert all(min(math.dist(end, goal) for goal in ((10, 10), (10, 30), (30, 30), (40, 0))) < 0.02 for end in ends)
@@ -201,13 +201,13 @@ def test_under_cutter_compensation_the_tool_is_beside_the_contour_by_almost_noth
 
 def test_dwells_of_cycles_count_seconds() -> None:
     text = "G21 G90 G17 S100 M3 F100\nG0 X0. Y0. Z9.\nG99 G82 X1. Z-3. R2. P500\nM30\n"
-    told = [line for line, _ in translate(split_lines(text), SETUP)]
+    told = [line for line, _ in Translator(SETUP).translate(split_lines(text))]
     assert told[-2] == "G99 G82 X1 Z-3 R2 P0.5\n"
 
 
 def test_every_line_tells_where_it_comes_from() -> None:
     text = "%\nO1 (A)\nG20\n\nG0 G91 G28 Z0.\nG90 G80\n(X)\nG68 X0. Y0. R90.\nG69\nM30\n%\nX1.\n"
-    assert list(translate(split_lines(text), SETUP)) == [
+    assert list(Translator(SETUP).translate(split_lines(text))) == [
         ("G20\n", 3),
         ("G91 G28 Z0\n", 5),
         ("G90 G80\n", 6),
@@ -219,8 +219,8 @@ def test_every_line_tells_where_it_comes_from() -> None:
         ("G52 X0 Y0\n", 9),
         ("M30\n", 10),
     ]
-    assert list(translate(["G0 X1.\n", "%\n"], SETUP)) == [("G0 X1\n", 1), ("M2\n", 2)]
-    assert list(translate(["/G0 X1.\n", "M30\n"], replace(SETUP, skip_optional=True))) == [("M30\n", 2)]
+    assert list(Translator(SETUP).translate(["G0 X1.\n", "%\n"])) == [("G0 X1\n", 1), ("M2\n", 2)]
+    assert list(Translator(replace(SETUP, skip_optional=True)).translate(["/G0 X1.\n", "M30\n"])) == [("M30\n", 2)]
 
 
 def test_what_stands_at_the_other_control() -> None:
@@ -250,5 +250,5 @@ def test_what_stands_at_the_other_control() -> None:
 )
 def test_what_is_not_the_same_is_not_translated(text: str, reason: str) -> None:
     with pytest.raises(UntranslatableError, match=reason) as caught:
-        list(translate(split_lines(f"G21 G90 S1000 M3\n{text}\nM30\n"), SETUP))
+        list(Translator(SETUP).translate(split_lines(f"G21 G90 S1000 M3\n{text}\nM30\n")))
     assert caught.value.line == 1 + len(text.splitlines())

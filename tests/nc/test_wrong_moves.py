@@ -12,7 +12,7 @@ from nc_law import STATED, Growing, Steady, Trial, revise
 from thermocomp.core.exceptions import ProgramError
 from thermocomp.nc.interpreter.block import Point, Setup
 from thermocomp.nc.linuxcnc import rs274
-from thermocomp.nc.rewrite.frame import Vector
+from thermocomp.nc.rewrite.text import Vector
 
 pytestmark = pytest.mark.usefixtures("interpreter")
 

@@ -1,15 +1,14 @@
 """Python function for the command `thermocomp revise`."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import MISSING, dataclass, fields
+from collections.abc import Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass, fields
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.nc.revision import outcome
-from thermocomp.nc.revision.job import Tell
 from thermocomp.nc.revision.job import revise as revise_program
 from thermocomp.nc.revision.options import Controller, Timing, Way
 from thermocomp.nc.revision.prepare import prepare_job
@@ -113,31 +112,8 @@ def revise(
     for name in given.keys() - known:
         near = get_close_matches(name, known, n=3, cutoff=0.5)
         raise InputError(f"revise: there is no option {name!r}; the nearest are {', '.join(near) or ', '.join(known)}")
-    groups: list[Any] = []
-    for group in GROUPS:
-        mine = {f.name: given[f.name] for f in fields(group) if f.name in given}
-        missing = [
-            f.name
-            for f in fields(group)
-            if f.default is MISSING and f.default_factory is MISSING and f.name not in given
-        ]
-        if missing:
-            raise InputError(f"revise: give {', '.join(missing)}")
-        groups.append(group(**mine))
-    drifting, starting, way, controller, timing = groups
-    job, notes = prepare_job(
-        Path(program), drifting, Path(output), starting, way, controller, timing, date, overwrite=overwrite
-    )
-    done = revise_program(job, _untold)
-    return RevisedProgram(
-        Path(output),
-        done.written,
-        tuple(job.paths.all()) if done.written else (),
-        outcome.content(job, done, notes),
-    )
-
-
-@contextmanager
-def _untold(_: str) -> Iterator[Tell]:
-    """Report no progress."""
-    yield lambda *_: None
+    groups: list[Any] = [group(**{f.name: given[f.name] for f in fields(group) if f.name in given}) for group in GROUPS]
+    job, notes = prepare_job(Path(program), Path(output), *groups, when=date, overwrite=overwrite)
+    done = revise_program(job, lambda _: nullcontext(lambda *_: None))
+    files = tuple(job.paths.all()) if done.written else ()
+    return RevisedProgram(Path(output), done.written, files, outcome.content(job, done, notes))

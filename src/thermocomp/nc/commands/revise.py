@@ -87,7 +87,8 @@ def revise(
     int
         0 done, 1 no correction was needed and nothing was written, 2 the program or another input is invalid.
     """
-    job, notes = prepare_job(program, drifting, output, starting, way, controller, timing, date, overwrite=overwrite)
+    groups = drifting, starting, way, controller, timing
+    job, notes = prepare_job(program, output, *groups, when=date, overwrite=overwrite)
     loudness.tell(f"read {job.program}")
     # piped output: progress goes to stderr, whatever stdout is used for
     done = revise_program(job, partial(show_share, hidden=json and sys.stderr.isatty()))

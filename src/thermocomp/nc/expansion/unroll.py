@@ -148,14 +148,13 @@ class _Unroller:
     def _line(self, frame: _Frame, line: Line) -> Generator[tuple[str, int], None, int | None]:
         """Run one line; return None if the program continues after it."""
         if line.flow or line.assignments:
-            self._refuse_optional(line)
-            self._acted = True
+            self._act(line)
             if line.flow:
                 self._steer(frame, line, squeeze(line.flow))
             for assignment in line.assignments:
                 frame.variables.assign(line.number, assignment)
             if line.words:
-                raise ProgramError(line.number, "words on a line that sets a variable; put them on a separate line")
+                raise line.fault("words on a line that sets a variable; put them on a separate line")
             return None
         codes = {(w.letter, w.number) for w in line.words if w.letter in "GM"}
         if ("G", 65.0) in codes:
@@ -163,10 +162,9 @@ class _Unroller:
         call = next((int(n) for n in (98.0, 97.0) if ("M", n) in codes), 0)
         back = ("M", 99.0) in codes
         if call or back:
-            self._refuse_optional(line)
-            self._acted = True
+            self._act(line)
         if back and not frame.called:
-            raise ProgramError(line.number, "M99 in the main program repeats it endlessly; write M30")
+            raise line.fault("M99 in the main program repeats it endlessly; write M30")
         head = line.label[:1] in ("O", ":")
         if not (head and frame.called and not line.words):
             text = self._plain(frame, line, "MPLK" if call else "MP" if back else "")
@@ -185,8 +183,7 @@ class _Unroller:
         number = self._count(frame, line, "P", 0)
         told = [letter for letter in "LK" if any(w.letter == letter for w in line.words)]
         if not number or len(told) > 1:
-            raise ProgramError(
-                line.number,
+            raise line.fault(
                 f"M{code} needs P, the target of the call, and at most one of L and K, the number of calls",
             )
         times = self._count(frame, line, told[0], 1) if told else 1
@@ -199,11 +196,10 @@ class _Unroller:
 
     def _macro(self, frame: _Frame, line: Line) -> Generator[tuple[str, int], None, int | None]:
         """Run G65."""
-        self._refuse_optional(line)
-        self._acted = True
+        self._act(line)
         number, times = self._count(frame, line, "P", 0), self._count(frame, line, "L", 1)
         if not number:
-            raise ProgramError(line.number, "G65 needs P, the number of the macro")
+            raise line.fault("G65 needs P, the number of the macro")
         program = self._file.find(number, line.number, f"G65 P{number}")
         least = self._setup.least / (10.0 if self._inch else 1.0)
         given = arguments(line, frame.variables, self._setup.integers, least)
@@ -213,9 +209,9 @@ class _Unroller:
         self, frame: _Frame, line: Line, program: Program, place: int, times: int, given: dict[Key, float] | None
     ) -> Generator[tuple[str, int], None, int | None]:
         if frame.depth >= DEEPEST:
-            raise ProgramError(line.number, f"more than {DEEPEST} nested calls, which controls refuse")
+            raise line.fault(f"more than {DEEPEST} nested calls, which controls refuse")
         if times < 1:
-            raise ProgramError(line.number, "a call that is made 0 times; remove it")
+            raise line.fault("a call that is made 0 times; remove it")
         for _ in range(times):
             own = frame.variables if given is None else frame.variables.called(given)
             done = yield from self._run(_Frame(program, own, frame.depth + 1, place, called=True))
@@ -236,8 +232,10 @@ class _Unroller:
                 return
             if found.group("goto"):
                 self._go(frame, line, found.group("goto"))
+            elif (setting := _SET.fullmatch(found.group("then"))) is None:
+                raise line.fault("IF [..] THEN needs an assignment, such as #1=2")
             else:
-                self._then(frame, line, found.group("then"))
+                frame.variables.assign(line.number, Assignment(setting.group(1).lower(), setting.group(2), 0, 0))
         elif found := _GOTO.fullmatch(flow):
             self._go(frame, line, found.group("goto"))
         elif found := _LOOP.fullmatch(flow):
@@ -245,35 +243,28 @@ class _Unroller:
         elif found := _END.fullmatch(flow):
             number, index = int(found.group("loop")), line.number - 1
             if not frame.loops or (frame.loops[-1][0], frame.loops[-1][2]) != (number, index):
-                raise ProgramError(line.number, f"END{number} without its DO{number}, or overlapping loops")
+                raise line.fault(f"END{number} without its DO{number}, or overlapping loops")
             frame.place = frame.loops.pop()[1]
             self._go_back(frame)
         else:
-            raise ProgramError(
-                line.number,
+            raise line.fault(
                 f"{line.flow}: not supported; IF [..] GOTO, IF [..] THEN #i=.., GOTO, WHILE [..] DO, END are",
             )
 
     def _begin(self, frame: _Frame, line: Line, condition: str | None, number: int) -> None:
         index = line.number - 1
         if any(loop == number for loop, _, _ in frame.loops):
-            raise ProgramError(line.number, f"DO{number} inside DO{number}; give the inner loop another number")
+            raise line.fault(f"DO{number} inside DO{number}; give the inner loop another number")
         end = frame.program.closing(index, number)
         if condition is None or frame.variables.holds(line.number, condition):
             frame.loops.append((number, index, end))
         else:
             frame.place = end + 1
 
-    def _then(self, frame: _Frame, line: Line, text: str) -> None:
-        found = _SET.fullmatch(text)
-        if found is None:
-            raise ProgramError(line.number, "IF [..] THEN needs an assignment, such as #1=2")
-        frame.variables.assign(line.number, Assignment(found.group(1).lower(), found.group(2), 0, 0))
-
     def _go(self, frame: _Frame, line: Line, goal: str) -> None:
         value = frame.variables.value(line.number, goal, "GOTO")
         if value != int(value):
-            raise ProgramError(line.number, f"GOTO {value:g}, which is no line number")
+            raise line.fault(f"GOTO {value:g}, which is no line number")
         self._jump(frame, int(value), line.number, f"GOTO {value:g}")
 
     def _jump(self, frame: _Frame, number: int, line: int, who: str) -> None:
@@ -334,7 +325,7 @@ class _Unroller:
             if word.letter == "G" and abs(value * 10 - round(value * 10)) < 1e-6:  # G54.1
                 return f"{word.letter}{round(value, 1):g}"
             if abs(value - round(value)) > 1e-6:
-                raise ProgramError(line.number, f"{word.letter} must be a whole number; found {value:g}")
+                raise line.fault(f"{word.letter} must be a whole number; found {value:g}")
             return f"{word.letter}{round(value)}"
         # the control rounds the value of a variable in a word to the least increment
         decimals = max(0, round(-math.log10(self._setup.least))) + self._inch
@@ -349,15 +340,15 @@ class _Unroller:
                 if value is None:
                     value = frame.variables.value(line.number, word.value, letter)
                 if value != int(value) or value < 0:
-                    raise ProgramError(line.number, f"{letter} must be a whole number; found {value:g}")
+                    raise line.fault(f"{letter} must be a whole number; found {value:g}")
                 return int(value)
         return default
 
-    def _refuse_optional(self, line: Line) -> None:
+    def _act(self, line: Line) -> None:
+        """Note a line that calls, jumps or sets a variable."""
+        self._acted = True
         if line.optional:
-            raise ProgramError(
-                line.number, "an optional line (/) that calls, jumps or sets a variable: give --block-delete on"
-            )
+            raise line.fault("an optional line (/) that calls, jumps or sets a variable: give --block-delete on")
 
     def _step(self, line: int) -> None:
         self._steps += 1

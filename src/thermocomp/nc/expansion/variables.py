@@ -67,7 +67,7 @@ class Variables:
                     "others stay in the control, and plain lines would not set them; use one of those, or omit "
                     "--expand if no loop or subprogram needs it"
                 )
-            if squeezed_is_empty(assignment.value):
+            if "".join(assignment.value.split()) == "#0":
                 raise InputError(f"{assignment.target} is set to empty (#0), which is not followed; give it a value")
             same = key in self._parameters and self._parameters[key]
             self._parameters.assign([assignment])
@@ -120,11 +120,6 @@ class Variables:
         )
 
 
-def squeezed_is_empty(value: str) -> bool:
-    """Return whether an assignment makes its variable empty."""
-    return "".join(value.split()) == "#0"
-
-
 def arguments(
     line: Line, variables: Variables, integers: Literal["whole", "least", "refuse"], least: float
 ) -> dict[Key, float]:
@@ -148,15 +143,13 @@ def arguments(
     found: dict[Key, float] = {}
     order = [word.letter for word in line.words if word.letter in "IJK"]
     if order != sorted(order):
-        raise ProgramError(line.number, "I J K of G65 must be in this order: otherwise they set other variables")
+        raise line.fault("I J K of G65 must be in this order: otherwise they set other variables")
     for word in line.words:
         letter = word.letter
         if letter in "PL" or (letter == "G" and word.number == 65.0):
             continue
         if letter not in ARGUMENTS:
-            raise ProgramError(
-                line.number, f"{letter} on the line of G65 is not an argument; put it on a separate line"
-            )
+            raise line.fault(f"{letter} on the line of G65 is not an argument; put it on a separate line")
         if variables.leaves_out(line.number, word):
             continue
         value = word.number
@@ -164,8 +157,7 @@ def arguments(
             value = variables.value(line.number, word.value, letter)
         elif "." not in word.value and value and letter not in _WHOLE:
             if integers == "refuse":
-                raise ProgramError(
-                    line.number,
+                raise line.fault(
                     f"{letter}{word.value} has no decimal point: whether it is in units or least increments depends "
                     "on the control; state which with --integers",
                 )

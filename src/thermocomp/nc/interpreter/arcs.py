@@ -1,9 +1,9 @@
-"""Centres and lengths of arcs, with the tolerances of LinuxCNC."""
+"""Centres of arcs, with the tolerances of LinuxCNC; lengths of moves, and positions along them."""
 
 import math
 from typing import Final
 
-from thermocomp.nc.interpreter.block import PLANES, Arc, Point
+from thermocomp.nc.interpreter.block import PLANES, Arc, Move, Point, triple
 
 #: letters of the centre coordinates, by plane; the third is the axis perpendicular to the plane
 CENTRE: Final = {17: ("I", "J", "K"), 18: ("K", "I", "J"), 19: ("J", "K", "I")}
@@ -87,8 +87,25 @@ def sweep(arc: Arc, start: Point, end: Point) -> float:
     return angle + (arc.turns - 1) * math.tau
 
 
-def length(arc: Arc, start: Point, end: Point) -> float:
-    """Return the length of an arc or helix [mm]; start and end in machine coordinates."""
+def length(move: Move) -> float:
+    """Return the length of a move [mm]."""
+    start, end, arc = move.start, move.end, move.arc
+    if arc is None:
+        return math.dist(start, end)
     first, second, across = PLANES[arc.plane]
     radius = math.dist((start[first], start[second]), arc.centre)
     return math.hypot(radius * sweep(arc, start, end), end[across] - start[across])
+
+
+def find_point(move: Move, share: float) -> Point:
+    """Return the position of the tool after a fraction of a move [mm, machine coordinates]."""
+    point = [a + share * (b - a) for a, b in zip(move.start, move.end, strict=True)]
+    arc = move.arc
+    if arc is not None:
+        i, j, _ = PLANES[arc.plane]
+        p, q = arc.centre
+        turned = share * sweep(arc, move.start, move.end)
+        angle = math.atan2(move.start[j] - q, move.start[i] - p) + (-turned if arc.clockwise else turned)
+        radius = math.hypot(move.start[i] - p, move.start[j] - q)
+        point[i], point[j] = p + radius * math.cos(angle), q + radius * math.sin(angle)
+    return triple(point)

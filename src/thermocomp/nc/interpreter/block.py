@@ -1,12 +1,15 @@
 """Effect of a line of an NC program on the machine: modal state and moves."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Final, Literal, NamedTuple
+from typing import Final, Literal, NamedTuple, TypeVar
 
+from thermocomp.core.exceptions import ProgramError
 from thermocomp.nc.parser.line import Line, Word
 
 Point = tuple[float, float, float]
 Known = tuple[bool, bool, bool]
+_Value = TypeVar("_Value")
 
 #: effect of a block on the position: ``none``; ``line`` G0, G1, G33; ``arc`` G2, G3; ``cycle`` G73, G81 ...;
 #: ``machine`` a move in machine coordinates (G53); ``home`` G28, G30; ``set`` redefines the coordinates of the
@@ -183,6 +186,10 @@ class Block:
     ends: bool = False
     sticky: dict[str, float] = field(default_factory=dict)
 
+    def error(self, reason: str) -> ProgramError:
+        """Return an error for this line."""
+        return self.line.fault(reason)
+
 
 @dataclass(frozen=True)
 class Setup:
@@ -237,6 +244,12 @@ class Setup:
     least: float = 0.001
     skip_optional: bool = False
     harmless: frozenset[int] = frozenset()
+
+
+def triple(values: Iterable[_Value]) -> tuple[_Value, _Value, _Value]:
+    """Return three values, of X, Y and Z, as a tuple of this length."""
+    x, y, z = values
+    return x, y, z
 
 
 def system_name(system: int) -> str:

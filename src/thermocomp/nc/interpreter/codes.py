@@ -33,6 +33,7 @@ class Code(NamedTuple):
 
 _EXPAND = "--expand lets the interpreter unroll it"
 _LATHE = "a turning cycle; replace it with its moves"
+_SURFACE = "the spindle's speed follows the diameter (constant surface speed), which is not supported; use G97"
 
 _COMMON_G: Final = (
     Code("G0", "motion", "rapid move"),
@@ -74,37 +75,24 @@ _COMMON_G: Final = (
     Code("G92", "once", "shifts the coordinate system to the words"),
     Code("G94", "feed mode", "feed per minute"),
     Code("G95", "feed mode", "feed per turn"),
-    Code(
-        "G96",
-        "spindle mode",
-        "constant surface speed",
-        "the spindle's speed follows the diameter (constant surface speed), which is not supported; use G97",
-    ),
+    Code("G96", "spindle mode", "constant surface speed", _SURFACE),
     Code("G97", "spindle mode", "constant spindle speed"),
     Code("G98", "retract", "cycles return to the initial level"),
     Code("G99", "retract", "cycles return to R"),
     Code("G93", "feed mode", "inverse time"),
 )
 
+_NURBS = "NURBS are not supported; write them as G1, G2, G3 or G5"
+_STORES = "it changes the reference point of {}, which is not followed; remove it"
+
 _LINUXCNC_G: Final = (
     Code("G5", "motion", "cubic spline"),
     Code("G5.1", "motion", "quadratic spline"),
-    Code("G5.2", "motion", "NURBS", "NURBS are not supported; write them as G1, G2, G3 or G5"),
-    Code("G5.3", "once", "end of a NURBS", "NURBS are not supported; write them as G1, G2, G3 or G5"),
+    Code("G5.2", "motion", "NURBS", _NURBS),
+    Code("G5.3", "once", "end of a NURBS", _NURBS),
     Code("G7", "diameter", "X is a diameter"),
     Code("G8", "diameter", "X is a radius"),
-    Code(
-        "G28.1",
-        "once",
-        "stores the reference point",
-        "it changes the reference point of G28, which is not followed; remove it",
-    ),
-    Code(
-        "G30.1",
-        "once",
-        "stores the reference point",
-        "it changes the reference point of G30, which is not followed; remove it",
-    ),
+    *(Code(f"{code}.1", "once", "stores the reference point", _STORES.format(code)) for code in ("G28", "G30")),
     Code("G33", "motion", "move synchronised with the spindle"),
     Code("G33.1", "motion", "rigid tapping"),
     *(Code(f"G38.{n}", "motion", "probing") for n in range(2, 6)),
@@ -133,6 +121,8 @@ HAAS_SYSTEMS: Final = {f"G{109 + n}": n for n in range(1, 21)}
 ADDITIONAL_SYSTEMS: Final = frozenset({"G54.1", "G154", *HAAS_SYSTEMS})
 _NO_POCKET = "milling cycles and hole patterns of the control are not followed; output single moves from the CAM system"
 _WRITTEN = "--expand writes it as plain lines"
+_NO_MODAL_CALL = "modal macro calls are not supported; write G65 on every line that calls the macro"
+_NO_FINE_BORING = "it shifts the tool by a parameter of the control; use G85 or single moves"
 _NO_TCP = "tool centre point control moves the axes by more than their words; not supported"
 
 _FANUC_G: Final = (
@@ -158,35 +148,26 @@ _FANUC_G: Final = (
     Code("G54.1", "system", "one of the additional work coordinate systems"),
     Code("G61.1", "path", "high accuracy"),
     Code("G65", "once", "macro call", f"macros are not followed; {_WRITTEN}"),
-    Code(
-        "G66",
-        "call",
-        "modal macro call",
-        "modal macro calls are not supported; write G65 on every line that calls the macro",
-    ),
+    Code("G66", "call", "modal macro call", _NO_MODAL_CALL),
     Code("G67", "call", "modal macro call off"),
     Code("G68", "rotation", "rotation"),
     Code("G68.2", "rotation", "tilted plane", "tilted planes are not supported; write X Y Z"),
     Code("G69", "rotation", "rotation off"),
-    Code(
-        "G76",
-        "motion",
-        "fine boring",
-        "it shifts the tool by a parameter of the control; use G85 or single moves",
-    ),
+    Code("G76", "motion", "fine boring", _NO_FINE_BORING),
     Code("G87", "motion", "back boring", "it shifts the tool by a parameter of the control; not supported"),
     Code("G92.1", "once", "G92 off"),
     Code("G103", "look ahead", "limits the look-ahead of the control"),
     Code("G107", "once", "cylindrical interpolation", "cylindrical interpolation is not supported; write X Y Z"),
     *(
-        Code(code, "system", "one of the additional work coordinate systems of a Haas")
-        for code in ("G154", *HAAS_SYSTEMS)
+        Code(name, "system", "one of the additional work coordinate systems of a Haas")
+        for name in ("G154", *HAAS_SYSTEMS)
     ),
     Code("G187", "high speed", "smoothness"),
     *(Code(f"G{n}", "motion", "pocket or bolt hole cycle of a Haas", _NO_POCKET) for n in (12, 13, 70, 71, 72, 150)),
 )
 
 _CALL = "subprograms are not followed; write their moves in the program"
+_NO_STORING = f"stored modal states are not followed; {_EXPAND}"
 
 _COMMON_M: Final = (
     Code("M0", "stop", "stop"),
@@ -212,10 +193,7 @@ _LINUXCNC_M: Final = (
     Code("M60", "stop", "stop, change pallets"),
     Code("M61", "tool", "sets the number of the current tool"),
     *(Code(f"M{n}", "io", "inputs and outputs") for n in range(62, 69)),
-    *(
-        Code(f"M{n}", "state", "stores or restores modal codes", f"stored modal states are not followed; {_EXPAND}")
-        for n in range(70, 74)
-    ),
+    *(Code(f"M{n}", "state", "stores or restores modal codes", _NO_STORING) for n in range(70, 74)),
 )
 
 _FANUC_M: Final = (
@@ -239,6 +217,13 @@ M_CODES: Final[dict[Controller, dict[float, Code]]] = {
     "linuxcnc": _by_number(_COMMON_M + _LINUXCNC_M),
     "fanuc": _by_number(_COMMON_M + _FANUC_M),
 }
+
+
+def list_names(*groups: str) -> set[str]:
+    """Return the codes of modal groups, of all controllers."""
+    tables = (*G_CODES.values(), *M_CODES.values())
+    return {code.name for table in tables for code in table.values() if code.group in groups}
+
 
 _ARCS: Final = frozenset({"G2", "G3"})
 

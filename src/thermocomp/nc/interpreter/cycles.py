@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
-from thermocomp.nc.interpreter.block import PLANES, Point
+from thermocomp.nc.interpreter.block import PLANES, Modal, Point
 
 #: clearance above the previous depth in chip breaking and peck drilling [inch]
 BACK_OFF: Final = 0.01
@@ -27,16 +27,10 @@ class CycleMove(NamedTuple):
 
 #: words that are required in the first line of a cycle and stay in force
 KEPT: Final = {
-    "G73": "RQ",
-    "G74": "R",
-    "G81": "R",
-    "G82": "RP",
-    "G83": "RQ",
-    "G84": "R",
-    "G85": "R",
-    "G86": "RP",
+    **dict.fromkeys(("G74", "G81", "G84", "G85"), "R"),
+    **dict.fromkeys(("G82", "G86", "G89"), "RP"),
+    **dict.fromkeys(("G73", "G83"), "RQ"),
     "G87": "RIJK",
-    "G89": "RP",
 }
 #: tapping: P is an optional dwell
 _TAPS: Final = ("G74", "G84")
@@ -48,13 +42,8 @@ class CannedCycle:
 
     Parameters
     ----------
-    code : str
-    plane : {17, 18, 19}
-        Plane perpendicular to the drilling direction.
-    absolute : bool
-    to_r : bool
-        G99: retract to R only.
-    inch : bool
+    modal : Modal
+        State in force, with the code of the cycle.
     start : tuple of float
         Position of the tool, in program coordinates and units, like all other values.
     named : dict of str to float
@@ -68,11 +57,7 @@ class CannedCycle:
         The tool moves from R to the next hole at level R, also in G98 (Fanuc).
     """
 
-    code: str
-    plane: int
-    absolute: bool
-    to_r: bool
-    inch: bool
+    modal: Modal
     start: Point
     named: dict[str, float]
     sticky: dict[str, float]
@@ -87,14 +72,15 @@ class CannedCycle:
         ------
         CycleError
         """
-        first, second, across = PLANES[self.plane]
+        modal = self.modal
+        first, second, across = PLANES[modal.plane]
         r, bottom = self.sticky["R"], self.sticky["XYZ"[across]]
-        if not self.absolute:
+        if not modal.absolute:
             r += self.level
             bottom += r
         if r < bottom:
             raise CycleError(f"R is at {r:g}, below the bottom of the hole at {bottom:g}; check R and {'XYZ'[across]}")
-        pecks = (r - bottom) / self.sticky["Q"] if self.code in ("G73", "G83") else 1.0
+        pecks = (r - bottom) / self.sticky["Q"] if modal.motion in ("G73", "G83") else 1.0
         if pecks > MOST:
             raise CycleError(f"Q{self.sticky['Q']:g} makes more than {MOST} pecks; check Q")
         if self.repeats * max(pecks, 1.0) > MOST:
@@ -105,11 +91,11 @@ class CannedCycle:
         if level < r:
             level = now = r
         yield CycleMove(True, self._at(a, b, now))
-        back = r if self.to_r else level
+        back = r if modal.retract == 99 else level
         height = now if now > r + ROUNDING or self.direct else back
         da, db = self.named.get("XYZ"[first]), self.named.get("XYZ"[second])
         for _ in range(self.repeats):
-            if self.absolute:
+            if modal.absolute:
                 a, b = a if da is None else da, b if db is None else db
             else:
                 a, b = a + (da or 0.0), b + (db or 0.0)
@@ -120,16 +106,14 @@ class CannedCycle:
 
     def _at(self, a: float, b: float, c: float) -> Point:
         """Return a point from its coordinates in the plane and perpendicular to it."""
-        if self.plane == 17:
-            return (a, b, c)
-        return (b, c, a) if self.plane == 18 else (c, a, b)
+        return {17: (a, b, c), 18: (b, c, a), 19: (c, a, b)}[self.modal.plane]
 
     def _hole(self, a: float, b: float, r: float, bottom: float, back: float) -> Iterator[CycleMove]:
         """Yield the moves from R to the bottom and back."""
-        code, sticky, at = self.code, self.sticky, self._at
+        code, sticky, at = self.modal.motion, self.sticky, self._at
         if code == "G87":
             beside = a + sticky["I"], b + sticky["J"]
-            top = sticky["K"] + (0.0 if self.absolute else bottom)
+            top = sticky["K"] + (0.0 if self.modal.absolute else bottom)
             yield CycleMove(True, at(*beside, r))
             yield CycleMove(True, at(*beside, bottom))
             yield CycleMove(True, at(a, b, bottom))
@@ -140,7 +124,7 @@ class CannedCycle:
             yield CycleMove(True, at(a, b, back))
             return
         if code in ("G73", "G83"):
-            off = BACK_OFF if self.inch else BACK_OFF * 25.4
+            off = BACK_OFF if self.modal.inch else BACK_OFF * 25.4
             depth = r - sticky["Q"]
             while depth > bottom:
                 yield CycleMove(False, at(a, b, depth))

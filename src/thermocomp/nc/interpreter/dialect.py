@@ -156,12 +156,7 @@ def check_dialect(lines: Iterable[str], *, whole: bool = False, startup: str = "
 def judge_dialect(lines: Iterable[str], *, whole: bool = False, startup: str = "") -> Judgement:
     """Return the evidence of the dialect in a whole program; see `check_dialect`."""
     scan = _Scan(InForce(whole))
-    words = _WORD.findall(_squeeze(startup.upper()))
-    scan.force.take(
-        LineWords(
-            code="", g=[read_number(value) for letter, value in words if letter == "G"], m=[], computed="", values={}
-        )
-    )
+    scan.force.take(_line_words("", [word for word in _WORD.findall(_squeeze(startup.upper())) if word[0] == "G"]))
     for number, text in enumerate(lines, 1):
         if not scan.pass_plain(text):
             scan.take(number, text)
@@ -278,15 +273,7 @@ class _Scan:
             self._sign("fanuc", "an expression without brackets, which only a Fanuc or Haas accepts")
 
     def _words(self, words: list[tuple[str, str]], *, runs: bool) -> None:
-        values = {letter: value for letter, value in words if letter not in "GM"}
-        line = LineWords(
-            code=self._code,
-            g=[read_number(value) for letter, value in words if letter == "G"],
-            m=[read_number(value) for letter, value in words if letter == "M"],
-            computed=next((letter + value for letter, value in words if letter in "GM" and not _is_plain(value)), ""),
-            values=values,
-            p_of=find_owner_of_p((letter, read_number(value)) for letter, value in words) if "P" in values else "",
-        )
+        line = _line_words(self._code, words)
         self.force.take(line)
         self._signs(line)
         if not self._ended:
@@ -322,8 +309,13 @@ class _Scan:
             self._sign("linuxcnc", f"LinuxCNC's ({own[0]})")
 
 
-def _is_plain(value: str) -> bool:
-    return "#" not in value and "{" not in value
+def _line_words(code: str, words: list[tuple[str, str]]) -> LineWords:
+    """Return the words of a line by kind, with their numbers."""
+    g, m = ([read_number(value) for letter, value in words if letter == kind] for kind in "GM")
+    computed = (letter + value for letter, value in words if letter in "GM" and ("#" in value or "{" in value))
+    values = {letter: value for letter, value in words if letter not in "GM"}
+    p_of = find_owner_of_p((letter, read_number(value)) for letter, value in words) if "P" in values else ""
+    return LineWords(code, g, m, next(computed, ""), values, p_of)
 
 
 def _squeeze(text: str) -> str:

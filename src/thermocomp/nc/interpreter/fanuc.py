@@ -22,8 +22,10 @@ def motion_beside_g80(state: InterpreterState, words: BlockWords) -> str:
     Raises
     ------
     ProgramError
-        That motion is not linear.
+        That motion is not linear, or the controller is LinuxCNC.
     """
+    if not state.fanuc:
+        raise words.error("axis words with G80; write the motion code they are for")
     modal = state.modal.motion
     before = state.under if modal in CYCLES else modal
     if before not in _STRAIGHT:

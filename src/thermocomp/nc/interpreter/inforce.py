@@ -37,7 +37,7 @@ class LineWords:
     m: list[float]
     computed: str
     values: dict[str, str]
-    p_of: str = ""
+    p_of: str
 
     def linuxcncs_user_of_p(self) -> str:
         """Return the first code that P may belong to in LinuxCNC; empty if there is none."""

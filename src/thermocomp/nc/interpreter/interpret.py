@@ -8,9 +8,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Final
 
-from thermocomp.core.exceptions import ProgramError
 from thermocomp.nc.interpreter import fanuc, modal, motion, offsetcodes
-from thermocomp.nc.interpreter.block import Block, Setup
+from thermocomp.nc.interpreter.block import Block, Setup, triple
 from thermocomp.nc.interpreter.codes import CYCLES, STOPS, TAKES_AXES
 from thermocomp.nc.interpreter.state import InterpreterState
 from thermocomp.nc.interpreter.words import BlockWords, Reader
@@ -85,14 +84,10 @@ class Follower:
         if line.optional and self._setup.skip_optional:
             return self._idle(line)
         if line.error:
-            raise ProgramError(line.number, line.error)
+            raise line.fault(line.error)
         if line.flow:
-            remedy = (
-                "--expand writes them as plain lines"
-                if self.state.fanuc
-                else "--expand lets the interpreter unroll them"
-            )
-            raise ProgramError(line.number, f"{line.flow}: loops, branches and subprograms are not followed; {remedy}")
+            remedy = "writes them as plain lines" if self.state.fanuc else "lets the interpreter unroll them"
+            raise line.fault(f"{line.flow}: loops, branches and subprograms are not followed; --expand {remedy}")
         if not line.words and not line.assignments:
             return self._idle(line)
         words = self._reader.read(line)
@@ -103,22 +98,15 @@ class Follower:
         return self._run(words)
 
     def _idle(self, line: Line) -> Block:
-        state = self.state
-        return Block(
-            line,
-            state.modal,
-            start=state.place,
-            end=state.place,
-            known=state.known,
-            feed=state.feed,
-            speed=0.0 if self._ended else state.speed,
-        )
+        state, place = self.state, self.state.place
+        speed = 0.0 if self._ended else state.speed
+        return Block(line, state.modal, start=place, end=place, known=state.known, feed=state.feed, speed=speed)
 
     def _percent(self, line: Line) -> Block:
         """Begin or end the program at ``%``."""
         if self._began:
             if not self._demarcated and not self.state.fanuc:
-                raise ProgramError(line.number, "'%' in a program that does not begin with it; remove it")
+                raise line.fault("'%' in a program that does not begin with it; remove it")
             block = self._idle(line)
             block.ends = self._ended = True
             return block
@@ -145,11 +133,10 @@ class Follower:
                 "skips it; decide with --block-delete"
             )
         if block.moves:
-            x, y, z = (
+            block.known = self.state.known = triple(
                 k and letter not in block.values and a == b
                 for k, letter, a, b in zip(block.known, "XYZ", block.start, block.end, strict=True)
             )
-            block.known = self.state.known = (x, y, z)
         return block
 
     def _check_motion(self, words: BlockWords, otherwise: str) -> None:
@@ -185,15 +172,7 @@ class Follower:
             fanuc.check_codes(state, words, code)
         if values.keys() - _PLAIN_LETTERS:
             self._reader.check_letters(words, code)
-        block = Block(
-            line=words.line,
-            modal=before,
-            kind="none",
-            codes=words.codes,
-            words=words.words,
-            values=values,
-            start=state.place,
-        )
+        block = Block(words.line, before, codes=words.codes, words=words.words, values=values, start=state.place)
         if groups and not (len(groups) == 1 and "motion" in groups):
             modal.apply_modal_codes(state, words, block)
         else:
@@ -252,7 +231,7 @@ class Follower:
             )
         if once is None and not smoothed and not turns and "tool length" not in groups:
             if told == "G80":
-                return "" if _AXIS_LETTERS.isdisjoint(values) else self._beside_g80(words)
+                return "" if _AXIS_LETTERS.isdisjoint(values) else fanuc.motion_beside_g80(self.state, words)
             if told is not None:
                 return told
         takes = smoothed or turns or once in TAKES_AXES or groups.get("tool length") == "G43.1"
@@ -269,11 +248,6 @@ class Follower:
         if not force or told == "G80":
             raise words.error("axis words, but no motion code is in force; write G0, G1 ... before them")
         return force
-
-    def _beside_g80(self, words: BlockWords) -> str:
-        if not self.state.fanuc:
-            raise words.error("axis words with G80; write the motion code they are for")
-        return fanuc.motion_beside_g80(self.state, words)
 
     def _beside(self, words: BlockWords, told: str | None, other: str) -> None:
         """Process a motion code together with another code that uses the axis words."""

@@ -1,5 +1,6 @@
 """Settings that precede any motion of a line, in LinuxCNC's order: units, feed, spindle, tool, modal codes."""
 
+from collections.abc import Callable
 from typing import Final
 
 from thermocomp.core.exceptions import ProgramError
@@ -10,9 +11,16 @@ from thermocomp.nc.interpreter.offsets import mark_axes
 from thermocomp.nc.interpreter.state import MM, InterpreterState
 from thermocomp.nc.interpreter.words import BlockWords
 
-_MODAL_GROUPS: Final = frozenset(
-    {"plane", "units", "cutter", "distance", "arc distance", "diameter", "retract", "path", "feed mode"}
-)
+#: by modal group: field of the modal state, and its value for a code
+_FIELDS: Final[dict[str, tuple[str, Callable[[str], object]]]] = {
+    "plane": ("plane", lambda code: int(code[1:])),
+    "units": ("inch", lambda code: code == "G20"),
+    "diameter": ("diameter", lambda code: code == "G7"),
+    "cutter": ("cutter", lambda code: code != "G40"),
+    "distance": ("absolute", lambda code: code == "G90"),
+    "arc distance": ("arc_absolute", lambda code: code == "G90.1"),
+    "retract": ("retract", lambda code: int(code[1:])),
+}
 #: groups that LinuxCNC refuses during cutter compensation
 _NOT_UNDER_CUTTER: Final = frozenset({"tool length", "system", "path", "retract", "tool", "io", "override"})
 
@@ -111,8 +119,7 @@ def apply_modal_codes(state: InterpreterState, words: BlockWords, block: Block) 
         check_units(state, words)
     speeds(state, words, inch)
     _machine_codes(state, words, block)
-    if not _MODAL_GROUPS.isdisjoint(groups):
-        _modal_codes(state, words)
+    _modal_codes(state, words)
     if "units" in groups and state.setup.integers != "whole":
         lengths(state, words)
     if "tool length" in groups:
@@ -178,32 +185,18 @@ def _machine_codes(state: InterpreterState, words: BlockWords, block: Block) -> 
 
 def _modal_codes(state: InterpreterState, words: BlockWords) -> None:
     groups = words.groups
-    fields: dict[str, object] = {}
-    if "plane" in groups:
-        fields["plane"] = int(groups["plane"][1:])
+    fields: dict[str, object] = {name: say(groups[group]) for group, (name, say) in _FIELDS.items() if group in groups}
     if "units" in groups:
-        fields["inch"] = inch = groups["units"] == "G20"
-        state.scale = MM if inch else 1.0
-    if "diameter" in groups:
-        fields["diameter"] = groups["diameter"] == "G7"
-    if "cutter" in groups:
-        fields["cutter"] = on = groups["cutter"] != "G40"
-        if state.modal.cutter and not on:  # the tool remains offset from the programmed path
-            state.known = mark_axes(state.known, dict.fromkeys(PLANES[state.modal.plane][:2]), to=False)
+        state.scale = MM if fields["inch"] else 1.0
+    if state.modal.cutter and not fields.get("cutter", True):  # the tool remains offset from the programmed path
+        state.known = mark_axes(state.known, dict.fromkeys(PLANES[state.modal.plane][:2]), to=False)
     if "path" in groups:
         # Fanuc-type controls smooth the path in G61.1 and stop in G61
         exact = groups["path"] == "G61" or (groups["path"] == "G61.1" and not state.fanuc)
         blend = 0.0 if exact else words.values.get("P", 0.0) * state.scale
         naive = words.values.get("Q", 0.0) * state.scale if blend and "Q" in words.values else blend
-        fields |= {
-            "blend": None if exact else blend,
-            "naive": naive,
-            "exact_stop": exact and (groups["path"] == "G61.1" or state.fanuc),
-        }
-    if "distance" in groups:
-        fields["absolute"] = groups["distance"] == "G90"
-    if "arc distance" in groups:
-        fields["arc_absolute"] = groups["arc distance"] == "G90.1"
+        stops = exact and (groups["path"] == "G61.1" or state.fanuc)
+        fields |= {"blend": None if exact else blend, "naive": naive, "exact_stop": stops}
     if "retract" in groups:
-        fields |= {"retract": int(groups["retract"][1:]), "retract_stated": True}
+        fields["retract_stated"] = True
     state.changed(**fields)

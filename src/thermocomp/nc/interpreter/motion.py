@@ -2,15 +2,12 @@
 
 from thermocomp.nc.interpreter import fanuc
 from thermocomp.nc.interpreter.arcs import CENTRE, ArcError, Flat, centre_of_radius, check_centre
-from thermocomp.nc.interpreter.block import PLANES, Arc, Block, Known, Move
+from thermocomp.nc.interpreter.block import PLANES, Arc, Block, Known, Move, triple
 from thermocomp.nc.interpreter.codes import ROTARY
 from thermocomp.nc.interpreter.cycles import KEPT, ROUNDING, CannedCycle, CycleError, pause
 from thermocomp.nc.interpreter.offsets import mark_axes, replace_coordinates
 from thermocomp.nc.interpreter.state import InterpreterState
 from thermocomp.nc.interpreter.words import BlockWords
-
-#: reason for refusal by LinuxCNC during cutter compensation, which is not computed here
-_NOT_COMPENSATED = "is not allowed during cutter compensation; write G40 before"
 
 #: levels closer than this are equal [mm]
 _SAME_LEVEL = 1e-4
@@ -41,8 +38,7 @@ def in_machine(state: InterpreterState, words: BlockWords, block: Block) -> None
     """Run G53: the words are machine coordinates."""
     if not state.modal.absolute:
         raise words.error("G53 is not allowed in G91; write G90 before")
-    if state.modal.cutter:
-        raise words.error(f"G53 {_NOT_COMPENSATED}")
+    _refuse_compensated(state, words, "G53")
     if state.modal.motion not in ("G0", "G1"):
         raise words.error("G53 needs G0 or G1 on its line or in force")
     rotary = state.turn(words)
@@ -52,14 +48,16 @@ def in_machine(state: InterpreterState, words: BlockWords, block: Block) -> None
     start, end = state.machine, replace_coordinates(state.machine, values)
     block.kind = "machine"
     rapid = state.fanuc or state.modal.motion == "G0"
-    block.moves.append(
-        Move(rapid=True, start=start, end=end, arc=None, feed=0.0, seconds=None, rotary=rotary)
-        if rapid
-        else state.cut(words, start, end)
-    )
+    block.moves.append(Move(True, start, end, rotary=rotary) if rapid else state.cut(words, start, end))
     state.machine = end
     state.place = state.offsets.program(end)
     state.known = _doubt(state, values)
+
+
+def _refuse_compensated(state: InterpreterState, words: BlockWords, code: str) -> None:
+    """Refuse a code as LinuxCNC does during cutter compensation, which is not computed here."""
+    if state.modal.cutter:
+        raise words.error(f"{code} is not allowed during cutter compensation; write G40 before")
 
 
 def _doubt(state: InterpreterState, axes: dict[int, float]) -> Known:
@@ -72,8 +70,7 @@ def _doubt(state: InterpreterState, axes: dict[int, float]) -> Known:
 def home(state: InterpreterState, words: BlockWords, block: Block) -> None:
     """Run G28 or G30: via the point in the words; only the axes in the words move home, all if there are none."""
     code = words.groups["once"]
-    if state.modal.cutter:
-        raise words.error(f"{code} {_NOT_COMPENSATED}")
+    _refuse_compensated(state, words, code)
     turns = not ROTARY.isdisjoint(words.values)  # whether already there or not
     rotary = state.turn(words)
     named = state.axis_values(words)
@@ -147,8 +144,7 @@ def in_step(state: InterpreterState, words: BlockWords, block: Block) -> None:
         raise words.error(f"{code} needs K, the distance per turn")
     if "F" in words.values:
         raise words.error(f"{code} takes its feed from K, found F; remove F")
-    if state.modal.cutter:
-        raise words.error(f"{code} {_NOT_COMPENSATED}")
+    _refuse_compensated(state, words, code)
     rotary = state.turn(words)
     start, before, was_known = state.machine, state.place, state.known
     state.reach(*state.goal(words))
@@ -166,8 +162,7 @@ def in_step(state: InterpreterState, words: BlockWords, block: Block) -> None:
 def probe(state: InterpreterState, words: BlockWords, block: Block) -> None:
     """Run G38 or G31: the end of the move is unknown; the target is used as the end."""
     code = state.modal.motion
-    if state.modal.cutter:
-        raise words.error(f"{code} {_NOT_COMPENSATED}")
+    _refuse_compensated(state, words, code)
     if state.modal.feed_mode == 95:
         raise words.error(f"{code} needs a feed per minute; write G94 and F before")
     rotary = state.turn(words)
@@ -188,8 +183,7 @@ def curve(state: InterpreterState, words: BlockWords, block: Block) -> None:
         raise words.error(f"{code} is known but not implemented; please report this")
     if state.modal.plane != 17 or {"Z", "A", "B", "C"} & values.keys():
         raise words.error(f"{code} is for X and Y in G17 only")
-    if state.modal.cutter:
-        raise words.error(f"{code} {_NOT_COMPENSATED}")
+    _refuse_compensated(state, words, code)
     if state.modal.feed_mode == 93:
         raise words.error(f"{code} in G93 is not supported; write G94 and F before")
     needed = ("P", "Q") if code == "G5" else ("I", "J")
@@ -237,20 +231,8 @@ def cycle(state: InterpreterState, words: BlockWords, block: Block, again: bool)
     if state.fanuc and not fanuc.drills(state, words):
         return
     repeats = words.whole("K" if "K" in values and state.fanuc else "L", least=1) or 1
-    x, y, z = (v / scale for v in start)
-    run = CannedCycle(
-        code=code,
-        plane=modal.plane,
-        absolute=modal.absolute,
-        to_r=modal.retract == 99,
-        inch=modal.inch,
-        start=(x, y, z),
-        named=named,
-        sticky=state.sticky,
-        level=state.level / scale,
-        repeats=repeats,
-        direct=state.fanuc,
-    )
+    begin = triple(v / scale for v in start)
+    run = CannedCycle(modal, begin, named, state.sticky, state.level / scale, repeats, direct=state.fanuc)
     _turn_for_a_tap(state, words, block)
     block.pause += repeats * dwell_seconds(state, pause(code, state.sticky))
     at = state.machine
@@ -317,8 +299,7 @@ def _may_drill(state: InterpreterState, words: BlockWords) -> None:
         raise words.error(f"{code} with a rotary axis; turn it on a separate line before")
     if modal.feed_mode == 93:
         raise words.error(f"{code} is not allowed in G93; write G94 and F before")
-    if modal.cutter:
-        raise words.error(f"{code} {_NOT_COMPENSATED}")
+    _refuse_compensated(state, words, code)
     if state.fanuc:
         return
     turning = state.turning

@@ -1,6 +1,6 @@
 """Codes that change offsets without moving the tool: work coordinate systems, G10, G52, G92, tool lengths."""
 
-from thermocomp.nc.interpreter.block import Block, Known, Point
+from thermocomp.nc.interpreter.block import Block, Known, triple
 from thermocomp.nc.interpreter.codes import HAAS_SYSTEMS, ROTARY
 from thermocomp.nc.interpreter.offsets import EXTERNAL, LAST, mark_axes
 from thermocomp.nc.interpreter.state import InterpreterState
@@ -35,7 +35,9 @@ def tool_length(state: InterpreterState, words: BlockWords) -> None:
         )
     state.length_inch = None if code == "G49" else state.modal.inch
     if code == "G43.1":
-        offset, certain = _put_words(state, words), _LENGTH_CERTAIN
+        # axes without a word keep their offset
+        offset = triple(state.axis_values(words).get(i, old) for i, old in enumerate(offsets.tool))
+        certain = _LENGTH_CERTAIN
         untold = None if "Z" in words.values else state.untold_tool
     elif code == "G49":
         offset, certain, untold = (0.0, 0.0, 0.0), _LENGTH_CERTAIN, None
@@ -54,12 +56,6 @@ def tool_length(state: InterpreterState, words: BlockWords) -> None:
     state.renamed(offsets.set_tool(offset, certain))
     state.untold_tool = untold
     state.placed()
-
-
-def _put_words(state: InterpreterState, words: BlockWords) -> Point:
-    """Return the offset of G43.1: its words; axes without a word keep their offset."""
-    x, y, z = (state.axis_values(words).get(i, old) for i, old in enumerate(state.offsets.tool))
-    return (x, y, z)
 
 
 def _length_number(state: InterpreterState, words: BlockWords, code: str) -> int:

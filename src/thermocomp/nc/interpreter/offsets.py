@@ -7,7 +7,7 @@ in LinuxCNC, where G92 and G52 use the same stored offset.
 import math
 from collections.abc import Mapping
 
-from thermocomp.nc.interpreter.block import Known, Point, Setup
+from thermocomp.nc.interpreter.block import Known, Point, Setup, triple
 
 _ZERO: Point = (0.0, 0.0, 0.0)
 _NEVER: Known = (False, False, False)
@@ -26,14 +26,12 @@ def combine_known(a: Known, b: Known) -> Known:
 
 def replace_coordinates(point: Point, values: Mapping[int, float]) -> Point:
     """Return a point with some of its coordinates replaced."""
-    x, y, z = (values.get(i, point[i]) for i in range(3))
-    return (x, y, z)
+    return triple(values.get(i, old) for i, old in enumerate(point))
 
 
 def mark_axes(known: Known, axes: Mapping[int, object], to: bool) -> Known:
     """Return `known` with the value of some axes replaced."""
-    x, y, z = (to if i in axes else known[i] for i in range(3))
-    return (x, y, z)
+    return triple(to if i in axes else was for i, was in enumerate(known))
 
 
 class Offsets:
@@ -186,13 +184,10 @@ class Offsets:
         wanted = replace_coordinates(self.program(point), values)
         old = self.origins.get(system, _ZERO)
         reached = self.machine(wanted)
-        x, y, z = (old[i] + point[i] - reached[i] for i in range(3))
-        self.origins[system] = (x, y, z)
+        self.origins[system] = triple(old[i] + point[i] - reached[i] for i in range(3))
         stays = mark_axes(self._certain_origins.get(system, _NEVER), values, to=False)
         told = mark_axes(_NEVER, values, to=True)
-        self._certain_origins[system] = tuple(  # type: ignore[assignment]
-            s or (t and c) for s, t, c in zip(stays, told, certain, strict=True)
-        )
+        self._certain_origins[system] = triple(s or (t and c) for s, t, c in zip(stays, told, certain, strict=True))
         self.system = own
         self._update()
 
@@ -204,10 +199,10 @@ class Offsets:
 
     def set_shift(self, values: Mapping[int, float]) -> Known:
         """Run G52; return, per axis, whether a known program coordinate remains known."""
-        still = tuple(c or i not in values for i, c in enumerate(self._certain_shift))
+        still = triple(c or i not in values for i, c in enumerate(self._certain_shift))
         self._certain_shift = mark_axes(self._certain_shift, values, to=True)
         self._set_shift(replace_coordinates(self.shift, values))
-        return still  # type: ignore[return-value]
+        return still
 
     def drop_shift(self, keep: bool) -> Known:
         """Run G92.1, or G92.2, which keeps the values for G92.3; return whether program coordinates remain known."""

@@ -198,9 +198,9 @@ def _open_lathe(codes: set[float], values: dict[str, str], force: InForce) -> It
         code = "G99" if 99.0 in codes else "G98"
         what = "without cycles is feed per turn (G99) or minute (G98) on a Fanuc's lathe: write G95 or G94 instead"
         yield OpenWord("feed mode", code, what)
-    if _picks_offset(values.get("T", "")):
+    if (tool := values.get("T", "")).isdigit() and len(tool) in (3, 4):  # a tool and its offset
         what = "without M6 changes the tool on a Fanuc's lathe, and only selects it in LinuxCNC: write M6"
-        yield OpenWord("tool", f"T{values['T']}", what)
+        yield OpenWord("tool", f"T{tool}", what)
     cycle = next((f"G{n:g}" for n in (90.0, 94.0) if n in codes), None)
     if cycle and codes.isdisjoint((*MOTIONS, *TAKES_AXES)) and {"X", "Z"} <= values.keys() and "Y" not in values:
         what = "with X and Z is a turning cycle on a Fanuc's lathe: write it on a separate line"
@@ -209,11 +209,6 @@ def _open_lathe(codes: set[float], values: dict[str, str], force: InForce) -> It
 
 #: kinds of words that are not ambiguous if the whole program has this property
 DOUBTS: Final = {"feed mode": "drilled", "tool": "changed", "turning": "mill"}
-
-
-def _picks_offset(value: str) -> bool:
-    """Return whether a T may specify a tool and its offset, as on a Fanuc lathe."""
-    return value.isdigit() and len(value) in (3, 4)
 
 
 def _is_bare(value: str) -> bool:

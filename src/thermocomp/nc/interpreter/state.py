@@ -8,7 +8,7 @@ from thermocomp.nc.interpreter import startup
 from thermocomp.nc.interpreter.arcs import length
 from thermocomp.nc.interpreter.block import Arc, Known, Modal, Move, Point, Setup
 from thermocomp.nc.interpreter.codes import CYCLES, ROTARY
-from thermocomp.nc.interpreter.offsets import Offsets
+from thermocomp.nc.interpreter.offsets import Offsets, combine_known
 from thermocomp.nc.interpreter.words import BlockWords
 
 MM: Final = 25.4  # per inch
@@ -153,8 +153,7 @@ class InterpreterState:
     def renamed(self, still: Known) -> None:
         """Keep the tool position under new offsets; known coordinates remain so where `still` is True."""
         self.place = self.offsets.program(self.machine)
-        a, b, c = self.known
-        self.known = (a and still[0], b and still[1], c and still[2])
+        self.known = combine_known(self.known, still)
 
     def cut(self, words: BlockWords, start: Point, end: Point, arc: Arc | None = None, rotary: float = 0.0) -> Move:
         """Return a move at feed rate.
@@ -205,7 +204,6 @@ class InterpreterState:
         feed = pitch * abs(self.speed)
         if not feed:
             raise words.error("a feed per turn while the spindle is stopped; start it with S and M3 before")
-        way = length(arc, start, end) if arc else math.dist(start, end)
-        return Move(
-            rapid=False, start=start, end=end, arc=arc, feed=feed, seconds=(way or rotary) / feed * 60.0, rotary=rotary
-        )
+        move = Move(rapid=False, start=start, end=end, arc=arc, feed=feed, rotary=rotary)
+        move.seconds = (length(move) or rotary) / feed * 60.0
+        return move

@@ -36,7 +36,7 @@ class BlockWords:
 
     def error(self, reason: str) -> ProgramError:
         """Return an error for this line."""
-        return ProgramError(self.line.number, reason)
+        return self.line.fault(reason)
 
     def whole(self, letter: str, least: int = 0) -> int | None:
         """Return the value of a whole-number word; None if the line has no such word."""
@@ -91,13 +91,13 @@ class Reader:
                     groups[code.group] = code.name
                 codes += (code.name,)
             elif letter in values:
-                raise ProgramError(line.number, f"{letter} appears twice on the line; remove one")
+                raise line.fault(f"{letter} appears twice on the line; remove one")
             else:
                 words[letter] = word
                 values[letter] = number
         found = BlockWords(line=line, codes=codes, groups=groups, words=words, values=values)
-        if len(codes) > _MOST_M:
-            self._count(found)
+        if len(codes) > _MOST_M and self._controller == "linuxcnc" and sum(name[0] == "M" for name in codes) > _MOST_M:
+            raise found.error(f"more than {_MOST_M} M codes on one line; put them on separate lines")
         if line.assignments:
             self._assign(line)
         return found
@@ -148,7 +148,7 @@ class Reader:
         try:
             return evaluate(word.value, self.parameters)
         except InputError as error:
-            raise ProgramError(line.number, f"the value of {word.letter}: {error}") from None
+            raise line.fault(f"the value of {word.letter}: {error}") from None
 
     def _find(self, line: Line, letter: str, number: float) -> Code:
         code = find_code(letter, number, self._controller)
@@ -158,13 +158,12 @@ class Reader:
         if code is None:
             user = letter == "M" and 100 <= number < 200 and self._controller == "linuxcnc"
             remedy = f"if it does not affect axes and spindle: --harmless {name}; otherwise " if letter == "M" else ""
-            raise ProgramError(
-                line.number,
+            raise line.fault(
                 f"{name} is not a known code ({'user-defined' if user else self._controller}), so its effect is "
                 f"unknown; {remedy}replace it with supported codes (docs/precompensation.rst)",
             )
         if code.refused:
-            raise ProgramError(line.number, f"{code.name} ({code.does}): {code.refused}")
+            raise line.fault(f"{code.name} ({code.does}): {code.refused}")
         self._codes[letter, number] = code
         return code
 
@@ -174,13 +173,7 @@ class Reader:
         if "G80" in (other, code.name) and other != code.name:
             groups[code.group] = other if code.name == "G80" else code.name
             return
-        raise ProgramError(
-            line.number, f"{other} and {code.name} on one line exclude each other; put them on separate lines"
-        )
-
-    def _count(self, words: BlockWords) -> None:
-        if self._controller == "linuxcnc" and sum(name[0] == "M" for name in words.codes) > _MOST_M:
-            raise words.error(f"more than {_MOST_M} M codes on one line; put them on separate lines")
+        raise line.fault(f"{other} and {code.name} on one line exclude each other; put them on separate lines")
 
     def _assign(self, line: Line) -> None:
         try:
@@ -189,4 +182,4 @@ class Reader:
                 for assignment in line.assignments:
                     self.parameters.forget(assignment.target, "an optional line sets it; give --block-delete off or on")
         except InputError as error:
-            raise ProgramError(line.number, f"a parameter: {error}") from None
+            raise line.fault(f"a parameter: {error}") from None

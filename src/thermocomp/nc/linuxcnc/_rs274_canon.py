@@ -27,8 +27,21 @@ BLOCK = 2048
 
 INT, D, B, P, TEXT = kinds.INT, kinds.D, kinds.B, kinds.P, kinds.TEXT
 RECORD, CODES, TOLD, REDIRECTED, PYTHON = kinds.RECORD, kinds.CODES, kinds.TOLD, kinds.REDIRECTED, kinds.PYTHON
-RAPID, FEED, PROBE, ARC, CENTRE = (CODES[kind] for kind in ("rapid", "feed", "probe", "arc", "centre"))
+ARC, CENTRE = CODES["arc"], CODES["centre"]
 RefusedError = reading.RefusedError
+
+
+def straight(code: int) -> Callable[..., None]:
+    """Return the method that records the linear moves of a kind."""
+
+    def move(self: "Canon", *place: float) -> None:
+        self.act(moved=place != self.place)
+        self.place = place
+        self.records.append(RECORD.pack(code, 9, self.line, *place, 0.0))
+        if len(self.records) >= BLOCK:
+            self.flush()
+
+    return move
 
 
 class Canon:
@@ -62,7 +75,7 @@ class Canon:
 
     def begin(self, job: dict[str, Any]) -> None:
         """Set the context in which the program runs."""
-        self.parameter_file = job["parameters"]
+        self.parameter_file = job["parameters"]  # read by the module
         self.delete = bool(job["block_delete"])
         self.tools: list[tuple[int, float, float]] = job["tools"]  # number, length, diameter
         self.spindle: int = job["spindle"]
@@ -171,7 +184,7 @@ class Canon:
         self.more.clear()
 
     def length(self, value: float) -> float:
-        return value if self.metric else value * MM
+        return value * self.unit()
 
     def unit(self) -> float:
         return 1.0 if self.metric else MM
@@ -280,26 +293,7 @@ class Canon:
         elif self.interpreter:
             self.move_to(state.sequence_number)
 
-    def straight_traverse(self, *place: float) -> None:
-        self.act(moved=place != self.place)
-        self.place = place
-        self.records.append(RECORD.pack(RAPID, 9, self.line, *place, 0.0))
-        if len(self.records) >= BLOCK:
-            self.flush()
-
-    def straight_feed(self, *place: float) -> None:
-        self.act(moved=place != self.place)
-        self.place = place
-        self.records.append(RECORD.pack(FEED, 9, self.line, *place, 0.0))
-        if len(self.records) >= BLOCK:
-            self.flush()
-
-    def straight_probe(self, *place: float) -> None:
-        self.act(moved=place != self.place)
-        self.place = place
-        self.records.append(RECORD.pack(PROBE, 9, self.line, *place, 0.0))
-        if len(self.records) >= BLOCK:
-            self.flush()
+    straight_traverse, straight_feed, straight_probe = (straight(CODES[kind]) for kind in ("rapid", "feed", "probe"))
 
     def arc_feed(
         self, end1: float, end2: float, centre1: float, centre2: float, turns: int, end3: float, *more: float

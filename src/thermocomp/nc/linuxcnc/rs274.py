@@ -16,8 +16,7 @@ import numpy as np
 from thermocomp.core.exceptions import ThermocompError
 from thermocomp.files.scratch import scratch
 from thermocomp.nc.linuxcnc import rs274process
-from thermocomp.nc.linuxcnc.rs274process import AXES, InterpreterJob, InterpreterRun
-from thermocomp.nc.linuxcnc.stored import HIGHEST_TOOL, Stored
+from thermocomp.nc.linuxcnc.rs274process import AXES, HIGHEST_TOOL, InterpreterJob, InterpreterRun, Stored
 
 __all__ = [
     "AXES", "HIGHEST_TOOL", "ORIGIN", "PACKAGE", "PLANE_AXES", "ArcPath", "Canonical", "Place", "ProgramFrame",
@@ -165,13 +164,9 @@ def read(
     path: Path,
     stored: Stored | None = None,
     *,
-    inch: bool = False,
-    block_delete: bool = False,
-    subroutines: Sequence[Path] = (),
-    task: bool = False,
-    seconds: int = 600,
     left: dict[int, float] | None = None,
     opened: set[Path] | None = None,
+    **settings: Any,
 ) -> Generator[Canonical]:
     """Run a program through LinuxCNC's interpreter and yield its canonical calls one by one.
 
@@ -180,20 +175,12 @@ def read(
     path : Path
     stored : Stored, optional
         Values stored in the controller. Default: none.
-    inch : bool
-        G20 is in force when the program starts.
-    block_delete : bool
-        Lines that begin with ``/`` are not run.
-    subroutines : sequence of Path
-        Folders of subprograms, at most 8; the folder of the program is always searched first.
-    task : bool
-        Value of ``#<_task>``: the program is run, not previewed.
-    seconds : int
-        Maximum processor time of the interpreter [s], in case of an endless loop.
     left : dict, optional
         Filled at the end with the parameters that the controller would store after the program.
     opened : set, optional
         Filled at the end with the files opened by the interpreter: the program and its subprograms.
+    **settings
+        Other fields of `InterpreterJob`, such as ``inch=True``.
 
     Yields
     ------
@@ -208,16 +195,7 @@ def read(
     InputError
         The file does not exist, or the interpreter crashed.
     """
-    job = InterpreterJob(
-        path=path,
-        stored=stored or Stored(),
-        inch=inch,
-        block_delete=block_delete,
-        subroutines=subroutines,
-        task=task,
-        seconds=seconds,
-    )
-    with InterpreterRun(job) as run:
+    with InterpreterRun(InterpreterJob(path, stored or Stored(), **settings)) as run:
         yield from calls(run)
         if opened is not None:
             opened.update(run.opened())

@@ -7,11 +7,13 @@ report other comments.
 
 import json
 import os
+import random
 import re
 import subprocess
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import IO, Any, NamedTuple, NoReturn
 
@@ -19,7 +21,6 @@ import numpy as np
 
 from thermocomp.core.exceptions import InputError, ProgramError
 from thermocomp.files.scratch import scratch
-from thermocomp.nc.linuxcnc.stored import HIGHEST_TOOL, Stored
 
 #: Python of the Debian system, for which the module `gcode` is installed.
 PYTHON = Path("/usr/bin/python3")
@@ -28,6 +29,9 @@ ISOLATED = "-I"
 CHILD = Path(__file__).with_name("_rs274_child.py")
 AXES = "XYZABCUVW"
 MOST_FOLDERS = 8
+HIGHEST_TOOL = 1000
+#: work coordinate systems, G54 to G59.3
+SYSTEMS = range(1, 10)
 MM = 25.4
 #: a canonical call: code of its kind, count of numbers, line, numbers
 RECORD = np.dtype([("kind", "<u2"), ("count", "<u2"), ("line", "<i4"), ("values", "<f8", (10,))])
@@ -40,6 +44,104 @@ _NOT_THERE = re.compile(r"(?:EOF in file|Unable to open file).*?(o<[^>]*>)(?: fr
 _TOO_DEEP = "Too many subroutine levels"
 _RECURSION = "more than 10 nested calls: a subprogram that calls itself does not end; write a loop instead"
 _MISSING = r"\1 was not found: for a subprogram, name its folder (--subroutines); for a loop or a branch, write its end"
+
+
+@dataclass(frozen=True)
+class Stored:
+    """State stored in the controller and not in the program.
+
+    Parameters
+    ----------
+    origins : dict of int to sequence of float
+        Origins of the work coordinate systems, 1 (G54) to 9 (G59.3), X to W [mm, deg]; the others are 0.
+    rotations : dict of int to float
+        Rotations of the work coordinate systems about Z [deg].
+    shift : sequence of float
+        G92 offset in force, X to W [mm, deg].
+    lengths, diameters : dict of int to float
+        Dimensions of the tools [mm]; all tools up to 1000 are included, those not listed with 0.
+    active_length : float
+        Tool length offset in force at the start [mm].
+    spindle : int
+        Number of the tool in the spindle at the start; 0: none.
+    home28, home30 : sequence of float
+        Positions approached by G28 and G30, X to W [mm, deg].
+    startup : str
+        Codes in force at the start that the end of a program does not reset, such as ``G64 P0.01 G98`` (mm).
+    start : sequence of float or None
+        Machine coordinates at the start, X to W [mm, deg]; None: the origin of the first work coordinate system.
+    parameters : dict of int to float
+        Other parameters, such as ``#100``.
+    system : int
+        Work coordinate system in force at the start: 1, G54, after the end of a program; any after an MDI command.
+    """
+
+    origins: Mapping[int, Sequence[float]] = field(default_factory=dict)
+    rotations: Mapping[int, float] = field(default_factory=dict)
+    shift: Sequence[float] = ()
+    lengths: Mapping[int, float] = field(default_factory=dict)
+    diameters: Mapping[int, float] = field(default_factory=dict)
+    active_length: float = 0.0
+    spindle: int = 0
+    home28: Sequence[float] = ()
+    home30: Sequence[float] = ()
+    startup: str = "G64 G98"
+    start: Sequence[float] | None = None
+    parameters: Mapping[int, float] = field(default_factory=dict)
+    system: int = 1
+
+    def numbers(self) -> dict[int, float]:
+        """Return all parameters as stored in the controller."""
+        result = dict(self.parameters)
+        result |= {5161 + i: value for i, value in enumerate(self.home28)}
+        result |= {5181 + i: value for i, value in enumerate(self.home30)}
+        result |= {5211 + i: value for i, value in enumerate(self.shift)}
+        result[5210] = float(any(self.shift))
+        result[5220] = float(self.system)
+        for system, origin in self.origins.items():
+            result |= {5201 + 20 * system + i: value for i, value in enumerate(origin)}
+        result |= {5210 + 20 * system: angle for system, angle in self.rotations.items()}
+        return result
+
+
+@lru_cache(64)
+def draw_controller(seed: int, startup: str = "") -> Stored:
+    """Return a random controller; different seeds share only the codes in `startup`.
+
+    Parameters
+    ----------
+    seed : int
+        Random seed; selects G98 (even) or G99 (odd) unless `startup` specifies it.
+    startup : str
+        Specified codes in force at the start.
+
+    Returns
+    -------
+    Stored
+        Origins and homes within 300 mm, rotations within 20 degrees, a G92 shift within 10 mm, tools of 20 to 200 mm.
+    """
+    chance = random.Random(seed)
+
+    def some(count: int, most: float = 300.0) -> tuple[float, ...]:
+        return tuple(round(chance.uniform(-most, most), 6) for _ in range(count))
+
+    codes = [startup]
+    codes += [f"G64 P0.{seed}"] * ("G6" not in startup) + [f"G9{8 + seed % 2}"] * ("G9" not in startup)
+    tools = range(1, HIGHEST_TOOL)
+    return Stored(
+        origins={system: some(9) for system in SYSTEMS},
+        rotations={system: some(1, 20.0)[0] for system in SYSTEMS},
+        shift=some(9, 10.0),
+        lengths={tool: round(chance.uniform(20.0, 200.0), 6) for tool in tools},
+        diameters={tool: round(chance.uniform(0.001, 0.1), 6) for tool in tools},
+        active_length=round(chance.uniform(20.0, 200.0), 6),
+        spindle=HIGHEST_TOOL - seed,
+        home28=some(9),
+        home30=some(9),
+        startup=" ".join(codes),
+        start=some(9),
+        parameters=dict(zip(range(31, 5001), some(4970, 1000.0), strict=True)),
+    )
 
 
 class CallBlock(NamedTuple):
@@ -70,7 +172,7 @@ class InterpreterJob:
     """
 
     path: Path
-    stored: Stored = Stored()  # noqa: RUF009 - immutable
+    stored: Stored = Stored()
     inch: bool = False
     block_delete: bool = False
     subroutines: Sequence[Path] = ()
@@ -199,6 +301,13 @@ class InterpreterRun:
         text = (self.folder / str(self._number) / "parameters").read_text(encoding="ascii")
         rows = (row.split() for row in text.splitlines())
         return {int(row[0]): float(row[1]) for row in rows if len(row) == 2}
+
+
+def run_through(job: InterpreterJob) -> None:
+    """Run a program and discard its calls; raises the errors of `InterpreterRun.blocks`."""
+    with InterpreterRun(job) as run:
+        for _ in run.blocks():
+            pass
 
 
 def _all(pipe: IO[bytes], size: int) -> bytes:

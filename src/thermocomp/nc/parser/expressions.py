@@ -9,10 +9,9 @@ import operator
 import re
 from collections.abc import Iterable, Mapping
 from functools import lru_cache
-from typing import Literal
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.nc.parser.line import Assignment
+from thermocomp.nc.parser.line import Assignment, Controller
 from thermocomp.nc.parser.operators import FANUC_FUNCTIONS, FUNCTIONS, OPERATORS, REFUSED_BY_FANUC, Binary
 from thermocomp.nc.parser.systemparameters import explain_unset, machine_meaning
 
@@ -44,9 +43,7 @@ class Parameters:
         Values known before the program starts; names without ``#<`` and ``>``.
     """
 
-    def __init__(
-        self, controller: Literal["linuxcnc", "fanuc"] = "linuxcnc", values: Mapping[Key, float] | None = None
-    ) -> None:
+    def __init__(self, controller: Controller = "linuxcnc", values: Mapping[Key, float] | None = None) -> None:
         self.controller = controller
         self._values = {_key(key): float(value) for key, value in (values or {}).items()}
         self._lost: dict[Key, str] = {}
@@ -130,9 +127,7 @@ def evaluate(text: str, parameters: Parameters, *, word: bool = True) -> float:
 
 
 @lru_cache(maxsize=4096)
-def _read_simple(
-    text: str, controller: Literal["linuxcnc", "fanuc"]
-) -> tuple[float | int, Binary | None, float | int] | None:
+def _read_simple(text: str, controller: Controller) -> tuple[float | int, Binary | None, float | int] | None:
     """Return operands and operator of a simple expression, with parameter numbers as int; None for any other one."""
     found = _SIMPLE.fullmatch(_BLANKS.sub("", text).lower())
     if found is None or bool(found[1]) != bool(found[7]) or not (found[1] or controller == "fanuc" or not found[4]):

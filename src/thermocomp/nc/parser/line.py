@@ -3,6 +3,8 @@
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
+from thermocomp.core.exceptions import ProgramError
+
 Controller = Literal["linuxcnc", "fanuc"]
 
 
@@ -63,3 +65,7 @@ class Line:
     comment: str = ""
     label: str = ""
     error: str = ""
+
+    def fault(self, reason: str) -> ProgramError:
+        """Return an error for this line."""
+        return ProgramError(self.number, reason)

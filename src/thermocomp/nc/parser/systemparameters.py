@@ -1,6 +1,6 @@
 """Parameters that belong to the machine and not to the program (LinuxCNC and Fanuc)."""
 
-from typing import Literal
+from thermocomp.nc.parser.line import Controller
 
 # first and last number, meaning
 _LINUXCNC = (
@@ -31,35 +31,11 @@ _NAMED = {
     **{f"_{frame}{axis}": "present position" for frame in ("", "abs_") for axis in "xyzabcuvw"},
     **dict.fromkeys(
         (
-            "_motion_mode",
-            "_plane",
-            "_ccomp",
-            "_metric",
-            "_imperial",
-            "_absolute",
-            "_incremental",
-            "_inverse_time",
-            "_units_per_minute",
-            "_units_per_rev",
-            "_coord_system",
-            "_tool_offset",
-            "_retract_r_plane",
-            "_retract_old_z",
-            "_spindle_rpm_mode",
-            "_spindle_css_mode",
-            "_ijk_absolute_mode",
-            "_lathe_diameter_mode",
-            "_lathe_radius_mode",
-            "_spindle_on",
-            "_spindle_cw",
-            "_mist",
-            "_flood",
-            "_speed_override",
-            "_feed_override",
-            "_adaptive_feed",
-            "_feed_hold",
-            "_feed",
-            "_rpm",
+            *("_motion_mode", "_plane", "_ccomp", "_metric", "_imperial", "_absolute", "_incremental"),
+            *("_inverse_time", "_units_per_minute", "_units_per_rev", "_coord_system", "_tool_offset"),
+            *("_retract_r_plane", "_retract_old_z", "_spindle_rpm_mode", "_spindle_css_mode", "_ijk_absolute_mode"),
+            *("_lathe_diameter_mode", "_lathe_radius_mode", "_spindle_on", "_spindle_cw", "_mist", "_flood"),
+            *("_speed_override", "_feed_override", "_adaptive_feed", "_feed_hold", "_feed", "_rpm"),
         ),
         "modal state",
     ),
@@ -71,7 +47,7 @@ _NAMED = {
 }
 
 
-def machine_meaning(key: int | str, controller: Literal["linuxcnc", "fanuc"] = "linuxcnc") -> str:
+def machine_meaning(key: int | str, controller: Controller = "linuxcnc") -> str:
     """Return the meaning of a parameter of the machine; empty if it belongs to the program.
 
     Parameters
@@ -92,7 +68,7 @@ def machine_meaning(key: int | str, controller: Literal["linuxcnc", "fanuc"] = "
     return "" if key < 1000 else "system variable of the control"
 
 
-def explain_unset(key: int | str, controller: Literal["linuxcnc", "fanuc"] = "linuxcnc") -> str:
+def explain_unset(key: int | str, controller: Controller = "linuxcnc") -> str:
     """Return the reason why an unset parameter is unknown, such as 'present position, which only the machine knows'."""
     if meaning := machine_meaning(key, controller):
         return f"{meaning}, which only the machine knows"

@@ -103,17 +103,7 @@ def read_line(text: str, number: int, controller: Controller = "linuxcnc") -> Li
     """
     found = _WORDS(text)
     if found is not None and len(text) < _ORDINARY and (few := _few_words(found)) is not None:
-        return Line(
-            number=number,
-            text=text,
-            words=few,
-            assignments=[],
-            optional=False,
-            flow="",
-            demarcation=False,
-            comment="",
-            label="",
-        )
+        return Line(number, text, few)
     item = _ITEM[controller]
     found = _HEAD(text)
     if found is None or len(text) >= _ORDINARY:  # every part of the head is optional, so it always matches
@@ -137,17 +127,7 @@ def read_line(text: str, number: int, controller: Controller = "linuxcnc") -> Li
             plain = float(value) if kind == _NUMBER else None
             words.append(_new_word(Word, (letter, found.start(1), place, value, plain)))
         elif kind == _END:
-            return Line(
-                number=number,
-                text=text,
-                words=words,
-                assignments=[],
-                optional=slash != "",
-                flow="",
-                demarcation=False,
-                comment=comment,
-                label=label or "",
-            )
+            return Line(number, text, words, optional=slash != "", comment=comment, label=label or "")
         else:
             remark = found.group(kind) if kind == _COMMENT else found.group(kind).rstrip(BLANK)
             if controller == "linuxcnc" and runs_python(remark):

@@ -1,10 +1,10 @@
 """Segments of a controller's path planner: pieces of the path, with limits along them."""
 
 import math
+from dataclasses import dataclass, field
 
-from thermocomp.core.exceptions import ProgramError
 from thermocomp.nc.interpreter.arcs import sweep
-from thermocomp.nc.interpreter.block import PLANES, Block, Move
+from thermocomp.nc.interpreter.block import PLANES, Block, Move, triple
 
 Vector = tuple[float, float, float]
 
@@ -14,6 +14,7 @@ ACROSS, ALONG = math.sqrt(0.75), 0.5
 LEAST = 1.02
 
 
+@dataclass(slots=True)
 class Segment:
     """Piece of the path with constant speed, except at its ends.
 
@@ -40,53 +41,30 @@ class Segment:
         Rotation axis of an arc, in the right-hand sense.
     """
 
-    __slots__ = (
-        "acceleration",
-        "axis",
-        "bend",
-        "entry",
-        "gives",
-        "halved",
-        "leave",
-        "length",
-        "nominal",
-        "overlap",
-        "owner",
-        "radius",
-        "rapid",
-        "rotary",
-        "speed",
-        "sweep",
-        "through",
-        "top",
-    )
+    owner: int
+    length: float
+    entry: Vector
+    leave: Vector
+    top: float
+    speed: float
+    acceleration: float
+    rapid: bool = False
+    rotary: bool = False
+    radius: float = 0.0
+    bend: float = 0.0
+    sweep: float = 0.0
+    axis: Vector = (0.0, 0.0, 1.0)
+    nominal: float = field(init=False)  #: length as programmed
+    gives: float = field(default=0.0, init=False)  #: fraction of the acceleration reserved for kinks at its ends
+    #: half of its acceleration is reserved for an overlapping neighbour
+    halved: bool = field(default=False, init=False)
+    through: float = field(default=0.0, init=False)  #: maximum speed at its end [mm/s]
+    #: if the next segment begins before the end of this one: tolerance [mm], cosine of half the angle between them
+    overlap: tuple[float, float] | None = field(default=None, init=False)
 
-    def __init__(
-        self,
-        owner: int,
-        length: float,
-        entry: Vector,
-        leave: Vector,
-        top: float,
-        speed: float,
-        acceleration: float,
-        rapid: bool = False,
-        rotary: bool = False,
-        radius: float = 0.0,
-        bend: float = 0.0,
-        sweep: float = 0.0,
-        axis: Vector = (0.0, 0.0, 1.0),
-    ) -> None:
-        self.owner, self.length, self.nominal = owner, length, length
-        self.entry, self.leave, self.top, self.acceleration = entry, leave, top, acceleration
-        self.speed = min(speed, top)
-        self.rapid, self.rotary, self.radius, self.sweep, self.axis = rapid, rotary, radius, sweep, axis
-        self.bend = bend
-        self.gives = 0.0  #: fraction of the acceleration reserved for kinks at its ends
-        self.halved = False  #: half of its acceleration is reserved for an overlapping neighbour
-        self.through = 0.0  #: maximum speed at its end [mm/s]
-        #: if the next segment begins before the end of this one: tolerance [mm], cosine of half the angle between them
-        self.overlap: tuple[float, float] | None = None
+    def __post_init__(self) -> None:
+        self.nominal = self.length
+        self.speed = min(self.speed, self.top)
 
     def finish(self, cycle: float, last: bool = False) -> float:
         """Set the speed, when length and neighbours are final, and return the acceleration [mm/s2].
@@ -167,7 +145,7 @@ class Segments:
         """Return the programmed speed [mm/s]."""
         speed = length / move.seconds if move.seconds else move.feed / 60.0
         if not speed > 0.0:
-            raise ProgramError(block.line.number, "a feed move, but no feed is in force: write F before it")
+            raise block.error("a feed move, but no feed is in force: write F before it")
         return min(speed, self.feed)
 
     def _arc(self, serial: int, move: Move, block: Block) -> Segment:
@@ -180,7 +158,7 @@ class Segments:
         qi, qj = move.end[i] - ci, move.end[j] - cj
         first, second = math.hypot(pi, pj), math.hypot(qi, qj)
         if not first or not second:
-            raise ProgramError(block.line.number, "the centre of the arc is at its start or end: check the centre")
+            raise block.error("the centre of the arc is at its start or end: check the centre")
         sense = -1.0 if arc.clockwise else 1.0
         turned = sweep(arc, move.start, move.end)
         climb = move.end[k] - move.start[k]
@@ -191,7 +169,7 @@ class Segments:
             along = [0.0, 0.0, 0.0]
             s = sense * flat / length / r
             along[i], along[j], along[k] = -s * b, s * a, climb / length
-            return (along[0], along[1], along[2])
+            return triple(along)
 
         ai, aj, ak = (self.accelerations[axis] for axis in (i, j, k))
         vi, vj, vk = (self.speeds[axis] for axis in (i, j, k))
@@ -208,5 +186,5 @@ class Segments:
             radius=first,
             bend=first + climb * climb / first,
             sweep=turned,
-            axis=(axis[0], axis[1], axis[2]),
+            axis=triple(axis),
         )

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 from thermocomp.core.exceptions import SettingError
 from thermocomp.core.machine import Machine
-from thermocomp.nc.interpreter.block import PLANES, Block, Move, Point
-from thermocomp.nc.interpreter.codes import ADDITIONAL_SYSTEMS
+from thermocomp.nc.interpreter.block import PLANES, Block, Move, Point, triple
+from thermocomp.nc.interpreter.codes import list_names
 from thermocomp.nc.planner.corners import Corners, find_overlap_speeds
 from thermocomp.nc.planner.segment import Segment, Segments, Vector
 
@@ -25,27 +25,9 @@ CHAIN = 100
 STEADY = 0.01
 #: codes before which the axes stop, as in LinuxCNC: pauses, probing, other coordinates, actions at a position
 HALTS = frozenset(
-    {"G4", "G10", "G31", "G38.2", "G38.3", "G38.4", "G38.5", "G43", "G43.1", "G43.2", "G44", "G49", "G52"}
-    | {
-        "G68",
-        "G69",
-        "G54",
-        "G55",
-        "G56",
-        "G57",
-        "G58",
-        "G59",
-        "G59.1",
-        "G59.2",
-        "G59.3",
-        "G92",
-        "G92.1",
-        "G92.2",
-        "G92.3",
-    }
-    | {"M0", "M1", "M2", "M3", "M4", "M5", "M6", "M7", "M8", "M9", "M19", "M30", "M60", "M61", "M64", "M65", "M66"}
-    | {"M98", "M99"}
-    | ADDITIONAL_SYSTEMS
+    {"G4", "G10", "G31", "G38.2", "G38.3", "G38.4", "G38.5", "G52", "G92", "G92.1", "G92.2", "G92.3"}
+    | {"M64", "M65", "M66"}
+    | list_names("tool length", "rotation", "system", "stop", "spindle", "coolant", "tool")
 )
 
 
@@ -116,8 +98,7 @@ class MotionLimits:
         axes = {a.name: a for a in machine.axes}
 
         def told(key: str, otherwise: float) -> Vector:
-            x, y, z = (getattr(axes.get(name), key, None) or otherwise for name in "XYZ")
-            return (x, y, z)
+            return triple(getattr(axes.get(name), key, None) or otherwise for name in "XYZ")
 
         return cls(told("rapid", RAPID), told("acceleration", ACCELERATION), **others)
 
@@ -195,7 +176,8 @@ class _Plan:
         if codes or not serial:
             halts = halts or not HALTS.isdisjoint(codes)
             if not serial or "G61.1" in codes or "G61" in codes or "G64" in codes:
-                self._path_mode(block)
+                self._unchain()
+                self.exact, self.straight = block.modal.exact_stop, block.modal.naive
         if block.tool_change is not None:
             before += kinematics.tool_change
         if block.speed != self.turning:
@@ -212,7 +194,7 @@ class _Plan:
                     self._chain(serial, move, block)
                 else:
                     self._unchain()
-                    self._join(self.segments.of(serial, move, block), block)
+                    self._join(serial, move, block)
         if after or block.ends or block.kind == "probe" or (self.last is None and self.chained is None):
             self.halt(after)
 
@@ -227,11 +209,6 @@ class _Plan:
         self.now += pause
         while self.waiting:
             self._finish()
-
-    def _path_mode(self, block: Block) -> None:
-        """Set the path accuracy from this block on."""
-        self._unchain()
-        self.exact, self.straight = block.modal.exact_stop, block.modal.naive
 
     def _chain(self, serial: int, move: Move, block: Block) -> None:
         """Replace feed lines by a single line while it passes close enough to their ends."""
@@ -265,20 +242,16 @@ class _Plan:
         if self.chained is not None:
             serial, move, block = self.chained
             self.chained = None
-            self._join(
-                self.segments.of(
-                    serial, Move(rapid=False, start=self.chain[0], end=move.end, arc=None, feed=move.feed), block
-                ),
-                block,
-            )
+            self._join(serial, Move(rapid=False, start=self.chain[0], end=move.end, feed=move.feed), block)
 
     def _finish(self) -> None:
         """Complete the first waiting block."""
         self.done.append(Timed(self.waiting.popleft()[1], self.since, self.now))
         self.since = self.now
 
-    def _join(self, segment: Segment | None, block: Block) -> None:
-        """Append a segment, joined to the last one."""
+    def _join(self, serial: int, move: Move, block: Block) -> None:
+        """Append the segment of a move, joined to the last one."""
+        segment = self.segments.of(serial, move, block)
         if segment is None:
             return
         last = self.last

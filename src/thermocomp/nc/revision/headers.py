@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from thermocomp.nc.interpreter.block import system_name
 from thermocomp.nc.linuxcnc.verification.verify import Proof
 from thermocomp.nc.rewrite.course import Bound
-from thermocomp.nc.rewrite.elsewhere import AWAY, Elsewhere
+from thermocomp.nc.rewrite.demand import AWAY, Elsewhere
 from thermocomp.nc.rewrite.header import wrap_text
 from thermocomp.nc.rewrite.revise import Revision
 

@@ -13,15 +13,15 @@ from typing import NamedTuple, TextIO
 from thermocomp import __version__
 from thermocomp.core.exceptions import InputError, ProgramError
 from thermocomp.files.draft import drafts
+from thermocomp.nc.expansion.unroll import unroll
+from thermocomp.nc.linuxcnc.expansion.expand import expand
 from thermocomp.nc.linuxcnc.verification.verify import Ledger, Proof, prove
 from thermocomp.nc.parser.tokens import program_lines
 from thermocomp.nc.revision import headers, jobstate, ncprogram
-from thermocomp.nc.revision.expanded import write_expanded
 from thermocomp.nc.rewrite import diff, header
-from thermocomp.nc.rewrite.course import Bound, Course, Run
+from thermocomp.nc.rewrite.course import Bound, Course, Run, Travel
 from thermocomp.nc.rewrite.offset import ending
 from thermocomp.nc.rewrite.revise import Revised, Revision
-from thermocomp.nc.rewrite.travel import Travel
 from thermocomp.nc.thermal.drift import Drift
 
 #: remedy in the error for a program that cannot be proved
@@ -203,16 +203,29 @@ def _revise(job: Job, phase: Phase) -> Done:
         return Done(run, bounds, written=True, proof=proof, seconds=took, proving=time.perf_counter() - begin)
 
 
-def _expand(job: Job, source: Path, phase: Phase) -> "array[int]":
+def _expand(job: Job, out: Path, phase: Phase) -> "array[int]":
+    """Write the program as plain lines, and return for each the number of its line in the program; 0 if it has none.
+
+    A program for LinuxCNC is expanded by its interpreter, one for a Fanuc by a built-in unroller.
+    """
+    setup, sources = job.revision.setup, array("I")
     with phase("expanding") as tell:
-        return write_expanded(
-            job.program,
-            source,
-            job.revision.setup,
-            job.diameters,
-            job.subroutines,
-            lambda lines: tell(0.0, f"{lines:,} lines"),
-        )
+        if setup.controller == "linuxcnc":
+            return expand(
+                job.program,
+                out,
+                inch=setup.inch,
+                startup=setup.startup or None,
+                diameters=job.diameters,
+                block_delete=setup.skip_optional,
+                subroutines=job.subroutines,
+                progress=lambda lines: tell(0.0, f"{lines:,} lines"),
+            ).sources
+        with ncprogram.open_to_read(job.program) as texts, ncprogram.open_to_write(out) as file:
+            for text, line in unroll(program_lines(texts), setup):
+                file.write(text)
+                sources.append(line)
+    return sources
 
 
 def _rehearse(job: Job, source: Path, phase: Phase) -> None:
@@ -239,18 +252,15 @@ def _write(
         for revised in job.revision.revise(texts):
             program.writelines(revised.texts)
             number += len(revised.texts)
+            for listener in listeners:  # all but the ledger, which counts all lines written, ignore the header
+                listener.take(revised)
             if revised.number:
                 rows.write(_row(revised, number, axes))
-                for listener in listeners:
-                    listener.take(revised)
                 read += len(revised.text)
                 if revised.number % TOLD == 0:
                     tell(read / size, f"line {revised.number}")
             else:
                 blank = revised.texts
-                for listener in listeners:
-                    if isinstance(listener, Ledger):  # the ledger counts all lines written
-                        listener.take(revised)
             yield revised.text, revised.texts
 
     with (

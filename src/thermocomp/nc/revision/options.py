@@ -11,13 +11,12 @@ from typing import Literal
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Machine
 from thermocomp.files.machines import read_machine
-from thermocomp.nc.interpreter.block import Setup
+from thermocomp.nc.interpreter.block import Setup, triple
 from thermocomp.nc.planner.timeline import MotionLimits
 from thermocomp.nc.revision.values import (
     m_code_of,
     origin_of,
     point_of,
-    read_positive,
     read_value,
     rotations_of,
     startup_of,
@@ -76,13 +75,13 @@ class Way:
 
     def demand(self) -> Demand:
         """Return the conditions for updating the correction."""
-        every = None if self.every is None else read_positive(self.every, "time", "--every", "10 min")
-        tolerance = read_positive(self.tolerance, "displacement", "--tolerance", "1 um")
-        return Demand(tolerance, every, read_positive(self.largest, "displacement", "--largest", "400 um"))
+        every = None if self.every is None else read_value(self.every, "time", "--every", "10 min", positive=True)
+        tolerance = read_value(self.tolerance, "displacement", "--tolerance", "1 um", positive=True)
+        return Demand(tolerance, every, read_value(self.largest, "displacement", "--largest", "400 um", positive=True))
 
     def made(self, setup: Setup, axes: Sequence[str]) -> CorrectionMethod:
         """Return the method of correction."""
-        digits, step = DIGITS[setup.controller], read_positive(self.step, "displacement", "--step", "1 um")
+        digits, step = DIGITS[setup.controller], read_value(self.step, "displacement", "--step", "1 um", positive=True)
         safe = None if self.safe_z is None else read_value(self.safe_z, "position", "--safe-z", "5 mm")
         if self.method == "coordinates":
             # a helix is an option of older Fanucs
@@ -92,8 +91,7 @@ class Way:
                 "--method offset writes G52, which cancels a G92 or G52 that is in force when the program starts: make "
                 "sure that none is, and give --no-g92; or use --method coordinates"
             )
-        x, y, z = (name in axes for name in "XYZ")
-        return Offset(digits, step, safe_z=safe, axes=(x, y, z))
+        return Offset(digits, step, safe_z=safe, axes=triple(name in axes for name in "XYZ"))
 
     def folders(self) -> list[Path]:
         """Return the folders of subprograms."""
@@ -183,7 +181,9 @@ class Controller:
             controller=self.whose,
             inch=None if self.units is None else self.units == "inch",
             startup="" if self.startup is None else startup_of(self.startup, self.whose),
-            speed=0.0 if self.speed is None else read_positive(self.speed, "spindle_speed", "--speed", "6000 1/min"),
+            speed=0.0
+            if self.speed is None
+            else read_value(self.speed, "spindle_speed", "--speed", "6000 1/min", positive=True),
             offsets=dict(origin_of(text) for text in self.origin or ()),
             tools=dict(tool_of(text, "--tool", "120 mm") for text in self.tool or ()),
             home=None if self.home is None else point_of(self.home, f"--home {self.home!r}"),
@@ -191,7 +191,7 @@ class Controller:
             no_shift=self.no_g92,
             rotary={} if machine is None else dict(machine.structure.rotary),
             integers=self.integers or ("whole" if self.whose == "linuxcnc" else "refuse"),
-            least=read_positive(self.least, "position", "--least", "1 um"),
+            least=read_value(self.least, "position", "--least", "1 um", positive=True),
             skip_optional=self.block_delete == "on",
             harmless=frozenset(m_code_of(text, self.whose) for text in self.harmless or ()),
         )

@@ -48,15 +48,12 @@ def warnings(job: Job, done: Done) -> list[str]:
         found.append(f"{revision.idle} lines after the end of the program are unchanged: they do not run")
     if done.written and revision.method.leaves_mark:
         found.append("G52 may stay in force if the run is aborted: send G52 X0 Y0 Z0 then")
+    judged = [(s.axis, honest) for s in drift.stations if (honest := s.model.honest_error) is not None]
+    found += [f"the model of {axis} is unproven: {honest.why}" for axis, honest in judged if honest.taken]
     found += [
-        f"the model of {s.axis} is unproven: {honest.why}"
-        for s in drift.stations
-        if (honest := s.model.honest_error) is not None and honest.taken
-    ]
-    found += [
-        f"the model of {s.axis} was judged with a stated harm margin of {honest.harm_margin:g} um"
-        for s in drift.stations
-        if (honest := s.model.honest_error) is not None and honest.harm_margin is not None
+        f"the model of {axis} was judged with a stated harm margin of {honest.harm_margin:g} um"
+        for axis, honest in judged
+        if honest.harm_margin is not None
     ]
     if all(i.quantity == SPEED for s in drift.stations for i in s.model.inputs):
         found.append(

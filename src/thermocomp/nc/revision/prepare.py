@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from datetime import date, datetime
-from itertools import chain, islice
 from pathlib import Path
 
 from thermocomp.core.exceptions import InputError
@@ -11,36 +10,35 @@ from thermocomp.nc.interpreter.block import Setup
 from thermocomp.nc.interpreter.dialect import check_dialect
 from thermocomp.nc.linuxcnc import rs274
 from thermocomp.nc.linuxcnc.verification.verify import foresee_sentence
-from thermocomp.nc.parser.recognise import FIRST, recognise
+from thermocomp.nc.parser.recognise import recognised
 from thermocomp.nc.parser.tokens import program_lines, read_lines
 from thermocomp.nc.revision import headers, ncprogram
 from thermocomp.nc.revision.job import ALL_THE_SAME, Job, Paths
 from thermocomp.nc.revision.options import Controller, Timing, Way
 from thermocomp.nc.revision.thermaloptions import Drifting, Starting
+from thermocomp.nc.rewrite.course import Travel
 from thermocomp.nc.rewrite.revise import Revision
-from thermocomp.nc.rewrite.travel import Travel
 from thermocomp.nc.thermal.stations import Station
 
 
 def prepare_job(
     program: Path,
-    drifting: Drifting,
     output: Path,
+    drifting: Drifting,
     starting: Starting,
     way: Way,
     controller: Controller,
     timing: Timing,
-    when: str | None,
     *,
+    when: str | None,
     overwrite: bool,
 ) -> tuple[Job, list[str]]:
     """Return the job of revising a program, and notes.
 
     Parameters
     ----------
-    program : Path
+    program, output : Path
     drifting : Drifting
-    output : Path
     starting : Starting
     way : Way
     controller : Controller
@@ -125,10 +123,9 @@ def _check_dialect(program: Path, controller: Controller) -> None:
     """Raise `InputError` if the dialect of a program is not specified and may be other than LinuxCNC."""
     startup = f"{controller.startup or ''} {'G20' if controller.units == 'inch' else ''}"
     with ncprogram.open_to_read(program) as texts:
-        lines = program_lines(texts)
         try:
-            recognise(first := list(islice(lines, FIRST)))
-            check_dialect(chain(first, lines), whole=controller.integers is not None, startup=startup)
+            lines = recognised(program_lines(texts))
+            check_dialect(lines, whole=controller.integers is not None, startup=startup)
         except InputError as e:
             raise InputError(f"{program}: {e}") from e
 

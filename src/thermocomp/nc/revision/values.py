@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from thermocomp.core.exceptions import InputError, UnitError
 from thermocomp.core.units import read_with_unit as with_unit
 from thermocomp.nc.interpreter import startup
-from thermocomp.nc.interpreter.block import Point
+from thermocomp.nc.interpreter.block import Point, triple
 from thermocomp.nc.interpreter.codes import find_code
 from thermocomp.nc.parser.line import Controller
 
@@ -14,7 +14,7 @@ _ANGLE = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+))\s*(?:deg|°)")
 _SYSTEM = re.compile(r"G?5([4-9])(?:\.([1-3]))?(?:\s*P(\d+))?", re.IGNORECASE)
 
 
-def read_value(text: str, quantity: str, option: str, example: str) -> float:
+def read_value(text: str, quantity: str, option: str, example: str, *, positive: bool = False) -> float:
     """Return the value of an option in internal units.
 
     Parameters
@@ -27,38 +27,8 @@ def read_value(text: str, quantity: str, option: str, example: str) -> float:
         Name of the option.
     example : str
         Example of a valid value.
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    InputError
-        The text is not a value with a unit of the quantity.
-    """
-    try:
-        number = with_unit(text, quantity)
-    except UnitError as e:
-        raise InputError(f"{option} {text!r}: {e}") from e
-    if number is None:
-        raise InputError(f'{option} {text!r}: write a value with its unit, such as "{example}"')
-    return number
-
-
-def read_positive(text: str, quantity: str, option: str, example: str) -> float:
-    """Return the value of an option that must be positive.
-
-    Parameters
-    ----------
-    text : str
-        Text of the option.
-    quantity : str
-        Quantity, such as ``time``.
-    option : str
-        Name of the option.
-    example : str
-        Example of a valid value.
+    positive : bool
+        Refuse 0 and less.
 
     Returns
     -------
@@ -69,8 +39,13 @@ def read_positive(text: str, quantity: str, option: str, example: str) -> float:
     InputError
         The text is not a value with a unit of the quantity, or not positive.
     """
-    number = read_value(text, quantity, option, example)
-    if not number > 0:
+    try:
+        number = with_unit(text, quantity)
+    except UnitError as e:
+        raise InputError(f"{option} {text!r}: {e}") from e
+    if number is None:
+        raise InputError(f'{option} {text!r}: write a value with its unit, such as "{example}"')
+    if positive and not number > 0:
         raise InputError(f"{option} {text!r}: must be positive")
     return number
 
@@ -162,8 +137,7 @@ def point_of(text: str, said: str) -> Point:
     parts = [part.strip() for part in text.split(",")]
     if len(parts) != 3:
         raise InputError(f"{said}: expected X, Y and Z, such as 100 mm, 50 mm, 0 mm")
-    x, y, z = (read_value(part, "position", said, "100 mm") for part in parts)
-    return x, y, z
+    return triple(read_value(part, "position", said, "100 mm") for part in parts)
 
 
 def startup_of(text: str, controller: Controller) -> str:

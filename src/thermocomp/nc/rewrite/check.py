@@ -7,9 +7,8 @@ from thermocomp.core.exceptions import ProgramError
 from thermocomp.nc.interpreter.block import PLANES, Block, Move, Setup
 from thermocomp.nc.interpreter.interpret import follow_program
 from thermocomp.nc.parser.tokens import read_lines
-from thermocomp.nc.rewrite.frame import Vector
 from thermocomp.nc.rewrite.method import Change
-from thermocomp.nc.rewrite.text import LONGEST
+from thermocomp.nc.rewrite.text import LONGEST, Vector
 
 #: largest difference regarded as rounding [um]
 ROUNDING = 0.1
@@ -47,13 +46,13 @@ class Check:
         """
         longest = max(map(len, change.texts))
         if longest > max(LONGEST, len(block.line.text)):
-            raise ProgramError(block.line.number, f"would become a line of {longest} characters; divide it")
+            raise block.error(f"would become a line of {longest} characters; divide it")
         self._texts.extend(change.texts)
         try:
             moves = [m for _ in change.texts for m in next(self._blocks).moves]
         except ProgramError as e:
             text = change.texts[-1].strip()
-            raise ProgramError(block.line.number, f"would become {text!r}, which cannot be read: {e.reason}") from e
+            raise block.error(f"would become {text!r}, which cannot be read: {e.reason}") from e
         if len(moves) != len(block.moves):
             raise _fault(block, change, f"makes {len(moves)} moves instead of {len(block.moves)}")
         for k, (was, now) in enumerate(zip(block.moves, moves, strict=True)):
@@ -82,8 +81,7 @@ def _same_arc(was: Move, now: Move, shift: Vector) -> bool:
 
 
 def _fault(block: Block, change: Change, what: str) -> ProgramError:
-    return ProgramError(
-        block.line.number,
+    return block.error(
         f"{block.line.text.strip()!r} would become {change.texts[-1].strip()!r}, which {what}: "
         "please report this; nothing was written",
     )

@@ -3,8 +3,8 @@
 import math
 from dataclasses import dataclass, field
 
+from thermocomp.nc.interpreter.arcs import length
 from thermocomp.nc.interpreter.block import Block
-from thermocomp.nc.rewrite.path import length
 
 #: path length in a cut over which the correction changes by at most one step [mm]
 SPREAD = 10.0

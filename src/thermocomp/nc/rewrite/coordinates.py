@@ -16,19 +16,26 @@ Treatment of a block, by its kind:
 import math
 from dataclasses import dataclass, field
 
-from thermocomp.core.exceptions import ProgramError
-from thermocomp.nc.interpreter.block import PLANES, Block
+from thermocomp.nc.interpreter.arcs import length
+from thermocomp.nc.interpreter.block import PLANES, Block, triple
 from thermocomp.nc.interpreter.codes import CYCLES
 from thermocomp.nc.rewrite.contact import CLEAR, Contact
-from thermocomp.nc.rewrite.frame import Frame, Vector
 from thermocomp.nc.rewrite.method import AXES, STILL, CorrectionMethod
-from thermocomp.nc.rewrite.path import length
-from thermocomp.nc.rewrite.text import format_number, format_shifted, shift_words
+from thermocomp.nc.rewrite.text import Frame, Vector, format_number, format_shifted, shift_words
 
 #: motion codes of lines that can get additional words
 PLAIN = ("G0", "G1")
 #: allowed change in the duration of a cut: relative, and absolute [s]
 SLOWER, LATER = 0.015, 0.004
+
+
+@dataclass
+class _Edit:
+    """Amounts of the correction in the words of X, Y and Z after a line, and what changes on the line for that."""
+
+    new: list[float]
+    shifts: dict[str, float] = field(default_factory=dict)  #: of words on the line
+    added: dict[str, float] = field(default_factory=dict)  #: words to be added
 
 
 @dataclass
@@ -104,7 +111,8 @@ class Coordinates(CorrectionMethod):
         holds = self._holds(block, frame)
         if len(holds) < 3 and goal != old and self._hurries(block, frame, goal, holds):
             holds = (0, 1, 2)
-        new, shifts, added = list(old), dict[str, float](), dict[str, float]()
+        edit = _Edit(list(old))
+        new, shifts = edit.new, edit.shifts
         for i in named:
             letter = AXES[i]
             if modal.absolute:
@@ -116,43 +124,36 @@ class Coordinates(CorrectionMethod):
                 new[i] = goal[i]
                 shifts[letter] = round(new[i] - old[i], frame.digits)
         if len(holds) < 3 and self._takes_words(block, named):
-            self._add(block, frame, goal, holds, new, added)
+            self._add(block, frame, goal, holds, edit)
         if modal.arc_absolute and block.kind == "arc":
             for i, letter in enumerate("IJK"):
                 if letter in block.words:
                     shifts[letter] = old[i] / 2 if modal.diameter and i == 0 else old[i]
         self._take(block, frame, old, new)
-        return shift_words(block, shifts, added, frame.digits)
+        return shift_words(block, shifts, edit.added, frame.digits)
 
-    def _add(
-        self,
-        block: Block,
-        frame: Frame,
-        goal: Vector,
-        holds: tuple[int, ...],
-        new: list[float],
-        added: dict[str, float],
-    ) -> None:
+    def _add(self, block: Block, frame: Frame, goal: Vector, holds: tuple[int, ...], edit: _Edit) -> None:
+        """Add words for axes that have none, but whose correction has changed."""
+        new = edit.new
         for i, letter in enumerate(AXES):
             if letter in block.words or i in holds or goal[i] == new[i] or self.fixed[i] or self.doubtful[i]:
                 continue
             if not block.modal.absolute:
-                added[letter] = goal[i] - new[i]
+                edit.added[letter] = goal[i] - new[i]
             elif self.before[i] and block.known[i]:
-                added[letter] = block.end[i] * (frame.scale[i] * 1e3) + goal[i]
+                edit.added[letter] = block.end[i] * (frame.scale[i] * 1e3) + goal[i]
             else:
                 continue
             new[i] = goal[i]
 
     def _drill(self, block: Block, frame: Frame, old: Vector, demand: Vector) -> str:
         if block.modal.motion == "G87":
-            raise ProgramError(
-                block.line.number, "G87 has levels that cannot be shifted; use --method offset, or --expand"
-            )
+            raise block.error("G87 has levels that cannot be shifted; use --method offset, or --expand")
         axis = PLANES[block.modal.plane][2]
         self._refuse_mixed_levels(block, axis)
         goal = frame.words(demand)
-        new, shifts, added = list(old), dict[str, float](), dict[str, float]()
+        edit = _Edit(list(old))
+        new, shifts = edit.new, edit.shifts
         repeats = block.values.get("L", block.values.get("K", 1.0))
         for i in self.named(block):
             if i == axis:
@@ -167,13 +168,13 @@ class Coordinates(CorrectionMethod):
                 new[i] = goal[i]
                 shifts[AXES[i]] = round(new[i] - old[i], frame.digits)
         if block.line.optional and tuple(new) != old:
-            raise ProgramError(block.line.number, "an optional line that drills: give --block-delete off or on")
+            raise block.error("an optional line that drills: give --block-delete off or on")
         if not block.moves:  # K0: the cycle is stored, and drills at later lines
             return self._store(block, axis, frame, old, goal[axis])
         self._take(block, frame, old, new)
         if block.modal.absolute:
-            self._levels(block, axis, frame, goal[axis], shifts, added)
-        return shift_words(block, shifts, added, frame.digits)
+            self._levels(block, axis, frame, goal[axis], edit)
+        return shift_words(block, shifts, edit.added, frame.digits)
 
     def _refuse_mixed_levels(self, block: Block, axis: int) -> None:
         """Raise `ProgramError` if corrected absolute levels would be reused as distances in G91."""
@@ -181,8 +182,7 @@ class Coordinates(CorrectionMethod):
             return
         if any(word not in block.words for word in (AXES[axis], "R")):
             if self._cycle:
-                raise ProgramError(
-                    block.line.number,
+                raise block.error(
                     f"G91 while {block.modal.motion} is in force, whose R and {AXES[axis]} are shifted levels: write "
                     "G80 before, and the cycle with all its words; or use --expand",
                 )
@@ -191,18 +191,16 @@ class Coordinates(CorrectionMethod):
 
     def _store(self, block: Block, axis: int, frame: Frame, old: Vector, goal: float) -> str:
         carried, before = self.carried, (self.fixed[axis], self.doubtful[axis])
-        shifts, added = dict[str, float](), dict[str, float]()
+        edit = _Edit(list(old))
         if block.modal.absolute:
-            self._levels(block, axis, frame, goal, shifts, added)
+            self._levels(block, axis, frame, goal, edit)
             # the axes do not move, but may have words for their present position
-            shifts |= {AXES[i]: old[i] for i in self.named(block) if i != axis}
+            edit.shifts |= {AXES[i]: old[i] for i in self.named(block) if i != axis}
             self.carried, self.inner = carried, None
             self.fixed[axis], self.doubtful[axis] = before
-        return shift_words(block, shifts, added, frame.digits)
+        return shift_words(block, edit.shifts, edit.added, frame.digits)
 
-    def _levels(
-        self, block: Block, axis: int, frame: Frame, goal: float, shifts: dict[str, float], added: dict[str, float]
-    ) -> None:
+    def _levels(self, block: Block, axis: int, frame: Frame, goal: float, edit: _Edit) -> None:
         """Shift depth and retract plane of a cycle, both or neither."""
         words = (AXES[axis], "R")
         if self._series is None:
@@ -223,22 +221,21 @@ class Coordinates(CorrectionMethod):
         if block.modal.motion in ("G73", "G83"):
             wanted, goal = goal, _same_pecks(block, words[0], goal, frame.digits)
             if held and goal != wanted:
-                raise ProgramError(
-                    block.line.number,
+                raise block.error(
                     f"Q divides the way from R to {words[0]}, so rounding decides whether there is one peck more, and "
                     "the tool is at R, which must not move: write G80 and a rapid above R before, or use --expand",
                 )
         if goal != self._cycle or all(word in block.words for word in words):
-            added |= {word: block.sticky[word] + goal for word in words if word not in block.words}
+            edit.added |= {word: block.sticky[word] + goal for word in words if word not in block.words}
             self._cycle = goal
-        shifts |= {word: goal for word in words if word in block.words}
+        edit.shifts |= {word: goal for word in words if word in block.words}
         within = list(frame.words(self.carried))
         within[axis] = goal
-        self.inner = frame.shift((within[0], within[1], within[2]))
+        self.inner = frame.shift(triple(within))
         back = list(self.carried)
         at_r = abs(block.end[axis] - plane) < CLEAR
         back[axis], other = (self.inner[axis], carried[axis]) if at_r else (carried[axis], self.inner[axis])
-        self.carried = (back[0], back[1], back[2])
+        self.carried = triple(back)
         if at_r or not block.known[axis]:
             self.fixed[axis] = self.doubtful[axis] = False
         if not block.known[axis] and other != back[axis]:
@@ -252,8 +249,7 @@ class Coordinates(CorrectionMethod):
     def _named_anew(self, block: Block) -> str:
         for i in self.named(block):
             if self.doubtful[i]:
-                raise ProgramError(
-                    block.line.number,
+                raise block.error(
                     f"names the position of {AXES[i]}, which is unknown: a tool change or an optional line "
                     "may have moved it; position it before, or give --block-delete off or on",
                 )
@@ -326,7 +322,7 @@ class Coordinates(CorrectionMethod):
                 # if the least increment is greater than the step, it is the smallest possible change
                 least = 10.0**-frame.digits / frame.scale[i]
                 out.append(self.carried[i] + math.copysign(min(abs(gap), max(most, least)) if most else 0.0, gap))
-        return out[0], out[1], out[2]
+        return triple(out)
 
     def _take(self, block: Block, frame: Frame, old: Vector, new: list[float]) -> None:
         """Store the new words; in G90, also those of axes whose word on the line is unchanged."""
@@ -334,9 +330,8 @@ class Coordinates(CorrectionMethod):
         taken = [n != o or letter in words for letter, n, o in zip(AXES, new, old, strict=True)]
         if frame.turned:
             taken[0] = taken[1] = taken[0] or taken[1]
-        moved = frame.shift((new[0], new[1], new[2]))
-        x, y, z = (m if t else c for t, m, c in zip(taken, moved, self.carried, strict=True))
-        self.carried = (x, y, z)
+        moved = frame.shift(triple(new))
+        self.carried = triple(m if t else c for t, m, c in zip(taken, moved, self.carried, strict=True))
 
 
 def _same_pecks(block: Block, depth: str, shift: float, digits: int) -> float:

@@ -1,6 +1,10 @@
-"""Course of a revised program over time, reduced to a number of points suitable for a figure."""
+"""What is recorded while a program is revised: its course, for a figure, and whether it stays within the travel.
+
+A program beyond the travel of the machine is wrong, or the given origins are.
+"""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -8,11 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.nc.rewrite.demand import CutErrors
-from thermocomp.nc.rewrite.frame import Vector
 from thermocomp.nc.rewrite.revise import Revised
+from thermocomp.nc.rewrite.text import Vector
 
 FloatArray = NDArray[np.float64]
 
+#: minimum distance beyond the travel that is reported [mm]
+BEYOND = 1.0
 _NOT_CUTTING = (math.nan,) * 3
 
 
@@ -105,13 +111,9 @@ class Course:
         """Merge adjacent intervals; an unpaired last one remains open."""
         n = len(self._times) // 2 * 2
         odd = len(self._times) > n
-        self._times = self._times[1:n:2] + self._times[n:]
-        self._low = [
-            tuple(map(_least, a, b)) for a, b in zip(self._low[0:n:2], self._low[1:n:2], strict=True)
-        ] + self._low[n:]
-        self._high = [
-            tuple(map(_most, a, b)) for a, b in zip(self._high[0:n:2], self._high[1:n:2], strict=True)
-        ] + self._high[n:]
+        self._times[:n] = self._times[1:n:2]
+        for rows, outer in ((self._low, _least), (self._high, _most)):
+            rows[:n] = [tuple(map(outer, a, b)) for a, b in zip(rows[0:n:2], rows[1:n:2], strict=True)]
         self._rows = self._rows if odd else 2 * self._stride
         self._stride *= 2
 
@@ -122,3 +124,43 @@ def _least(a: float, b: float) -> float:
 
 def _most(a: float, b: float) -> float:
     return b if a != a or b > a else a  # noqa: PLR0124 - nan gives way
+
+
+@dataclass
+class Travel:
+    """Check of the cuts of a program in machine coordinates, if program or setup define origin and tool length.
+
+    Parameters
+    ----------
+    limits : mapping of str to tuple of float
+        Lowest and highest position by axis [mm].
+    """
+
+    limits: Mapping[str, tuple[float, float]]
+    _farthest: dict[str, tuple[float, float, int]] = field(default_factory=dict, init=False)  # beyond, position, line
+
+    def take(self, revised: Revised) -> None:
+        """Add a line, in order."""
+        block = revised.block
+        if block is None:
+            return
+        modal = block.modal
+        if not modal.origin_told or all(m.rapid for m in block.moves):
+            return
+        for k, axis in enumerate("XYZ"):
+            if axis not in self.limits or not block.known[k] or (axis == "Z" and modal.untold_tool is not None):
+                continue
+            low, high = self.limits[axis]
+            for move in block.moves:
+                position = move.end[k]
+                beyond = max(low - position, position - high)
+                if not move.rapid and beyond > max(BEYOND, self._farthest.get(axis, (0.0,))[0]):
+                    self._farthest[axis] = beyond, position, block.line.number
+
+    def warnings(self) -> list[str]:
+        """Return warnings for the axes that exceed their travel, with the positions farthest beyond it."""
+        return [
+            f"{axis} goes to {position:.6g} mm at line {line}, in machine coordinates: outside its travel, "
+            f"{self.limits[axis][0]:g} to {self.limits[axis][1]:g} mm; check the program and the origins"
+            for axis, (_, position, line) in sorted(self._farthest.items())
+        ]

@@ -1,4 +1,4 @@
-"""Update of the correction in a program, and the remaining drift."""
+"""Update of the correction in a program, and the drift that remains, at the given work offsets or others."""
 
 import math
 from collections.abc import Callable, Iterable, Sequence
@@ -8,8 +8,14 @@ from typing import NamedTuple, Protocol
 
 from thermocomp.core.correction import Correction, Deviation
 from thermocomp.core.exceptions import InputError
-from thermocomp.nc.interpreter.block import Point
-from thermocomp.nc.rewrite.frame import Vector
+from thermocomp.nc.interpreter.block import Point, triple
+from thermocomp.nc.rewrite.text import Vector
+
+#: sampling intervals in a cut: in time [s], and along the path if the drift depends on the position [mm]
+OFTEN = 20.0
+DENSE = 20.0
+#: distance of the positions compared by `Elsewhere` [mm]
+AWAY = 100.0
 
 #: deviation of the tool point at a point in machine coordinates [um]
 Field = Callable[[Point], Vector]
@@ -103,8 +109,7 @@ class Demand:
 
 def oppose_deviation(deviation: Vector) -> Vector:
     """Return the corrections that cancel a deviation [um]."""
-    x, y, z = (Correction.opposing(Deviation(d)).offset for d in deviation)
-    return x, y, z
+    return triple(Correction.opposing(Deviation(d)).offset for d in deviation)
 
 
 class CutErrors(NamedTuple):
@@ -164,3 +169,31 @@ def _range(vectors: Sequence[tuple[float, ...]]) -> tuple[Vector, Vector]:
     a, b, c = map(min, *vectors)
     x, y, z = map(max, *vectors)
     return (a, b, c), (x, y, z)
+
+
+@dataclass
+class Elsewhere:
+    """Error with other work offsets: the drift in the cuts, compared with that 100 mm away, both ways along each axis.
+
+    Parameters
+    ----------
+    most : list of float
+        Largest change of the drift, per axis [um].
+    """
+
+    most: list[float] = field(default_factory=lambda: [0.0] * 3)
+    _time: float = field(default=-math.inf, init=False)
+    _place: Point = field(default=(math.inf,) * 3, init=False)
+
+    def take(self, time: float, point: Point, drift: DriftSource) -> None:
+        """Process the position of a cut [mm, machine coordinates] at a time [s], if far enough from the last sample."""
+        if time - self._time < OFTEN and math.dist(point, self._place) < DENSE:
+            return
+        self._time, self._place = time, point
+        now = drift.field()
+        here = now(point)
+        for axis in range(3):
+            for away in (-AWAY, AWAY):
+                place = triple(p + away * (k == axis) for k, p in enumerate(point))
+                for k, (there, was) in enumerate(zip(now(place), here, strict=True)):
+                    self.most[k] = max(self.most[k], abs(there - was))

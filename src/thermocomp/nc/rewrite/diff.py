@@ -9,7 +9,7 @@ CONTEXT = 3
 LONGEST = 4000
 
 
-def unified(pairs: Iterable[tuple[str, tuple[str, ...]]], name: str, revised: str, before: int = 0) -> Iterator[str]:
+def unified(pairs: Iterable[tuple[str, tuple[str, ...]]], name: str, revised: str) -> Iterator[str]:
     """Yield the lines of a unified diff.
 
     Parameters
@@ -18,8 +18,6 @@ def unified(pairs: Iterable[tuple[str, tuple[str, ...]]], name: str, revised: st
         Lines of the original in order, each with its revised lines; an empty text denotes no line.
     name, revised : str
         Names of the two programs.
-    before : int
-        Number of lines at the beginning of the revised program that are not in the pairs.
 
     Yields
     ------
@@ -46,28 +44,28 @@ def unified(pairs: Iterable[tuple[str, tuple[str, ...]]], name: str, revised: st
                 # without trailing context, omit the leading context: patch would search for it at the end of the file
                 before_change = next(k for k, (mark, _) in enumerate(hunk) if mark != " ")
                 first = (first[0] + before_change, first[1] + before_change)
-                yield from _hunk(head, hunk[before_change:], first, before)
+                yield from _hunk(head, hunk[before_change:], first)
                 hunk = []
             continue
         if hunk:
             hunk.append((" ", text))
             quiet += 1
             if quiet > 2 * CONTEXT:
-                yield from _hunk(head, hunk[: len(hunk) - CONTEXT - 1], first, before)
+                yield from _hunk(head, hunk[: len(hunk) - CONTEXT - 1], first)
                 waiting.extend(hunk[-CONTEXT:])
                 hunk = []
         else:
             waiting.append((" ", text))
     if hunk:
-        yield from _hunk(head, hunk[: len(hunk) - max(0, quiet - CONTEXT)], first, before)
+        yield from _hunk(head, hunk[: len(hunk) - max(0, quiet - CONTEXT)], first)
 
 
-def _hunk(head: list[str], lines: list[tuple[str, str]], first: tuple[int, int], before: int) -> Iterator[str]:
+def _hunk(head: list[str], lines: list[tuple[str, str]], first: tuple[int, int]) -> Iterator[str]:
     yield from head
     head.clear()
     old = sum(mark != "+" for mark, _ in lines)
     new = sum(mark != "-" for mark, _ in lines)
-    yield f"@@ -{_range(first[0], old)} +{_range(first[1] + before, new)} @@\n"
+    yield f"@@ -{_range(first[0], old)} +{_range(first[1], new)} @@\n"
     for mark, text in lines:
         body = text.rstrip("\r\n")
         yield mark + (text if body != text else f"{text}\n\\ No newline at end of file\n")

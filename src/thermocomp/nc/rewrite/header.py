@@ -4,7 +4,6 @@ import re
 import textwrap
 from collections.abc import Sequence
 
-from thermocomp.core.exceptions import ProgramError
 from thermocomp.nc.parser.line import Line
 
 #: beginning of every header line; a program with such a line has been revised
@@ -63,8 +62,7 @@ def wrap_text(text: str, lines: int | None = None) -> list[str]:
 def refuse_revised(line: Line) -> None:
     """Raise `ProgramError` if a comment shows that the program has been revised."""
     if f"{MARK} REVISED" in line.comment:
-        raise ProgramError(
-            line.number,
+        raise line.fault(
             "has been revised by thermocomp already: its drift would be corrected twice; revise the original",
         )
 

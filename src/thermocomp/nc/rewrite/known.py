@@ -3,9 +3,8 @@
 import math
 from dataclasses import dataclass
 
-from thermocomp.core.exceptions import ProgramError
 from thermocomp.nc.interpreter.block import Block, Setup, system_name
-from thermocomp.nc.rewrite.frame import Vector
+from thermocomp.nc.rewrite.text import Vector
 
 
 @dataclass
@@ -28,8 +27,7 @@ class SpindleState:
             if not self._told and self.setup.speed:
                 return self.setup.speed
             if not self._told and any(not m.rapid for m in block.moves):
-                raise ProgramError(
-                    block.line.number,
+                raise block.error(
                     "the program cuts, but has not set the spindle speed (S, M3): its drift is unknown; "
                     "state the speed at its start with --speed",
                 )
@@ -69,7 +67,7 @@ def _refuse_unknown_place(block: Block) -> None:
         what = "the length of the tool in the spindle is unknown: write its number (T, M6, or H)"
     else:
         what = f"the length of tool {tool} is unknown: --tool '{tool}=120 mm'"
-    raise ProgramError(block.line.number, f"the drift depends on the position, but {what}")
+    raise block.error(f"the drift depends on the position, but {what}")
 
 
 def _refuse_turned(block: Block, setup: Setup) -> None:
@@ -85,7 +83,7 @@ def _refuse_turned(block: Block, setup: Setup) -> None:
             else "state whether it turns the spindle or the workpiece, with --machine, whose structure names it: "
             f'"w {letter}\' X\' b Y Z (C1) t" in the table, "w X\' b Y Z {letter} (C1) t" in the head'
         )
-        raise ProgramError(block.line.number, f"{letter} {where}: {what}")
+        raise block.error(f"{letter} {where}: {what}")
 
 
 def refuse_untold_rotation(block: Block, carried: Vector) -> None:
@@ -94,8 +92,7 @@ def refuse_untold_rotation(block: Block, carried: Vector) -> None:
         return
     name, told = system_name(block.modal.system), block.modal.system_told
     which = f"write {name} before the first move, and which (--rotation '{name}=12 deg')"
-    raise ProgramError(
-        block.line.number,
+    raise block.error(
         f"X or Y is corrected, and a rotation of {name if told else 'the work coordinate system in force'} that is "
         "stored in the controller (G10 L2 R) would turn that: state that there is none (--rotation none) or "
         + (f"which (--rotation '{name}=12 deg')" if told else which),

@@ -4,11 +4,9 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from thermocomp.core.exceptions import ProgramError
-from thermocomp.nc.interpreter.block import Block, Known, Modal, system_name
+from thermocomp.nc.interpreter.block import Block, Known, Modal, system_name, triple
 from thermocomp.nc.interpreter.codes import ROTARY
-from thermocomp.nc.rewrite.frame import Frame, Vector
-from thermocomp.nc.rewrite.text import LONGEST, Digits, part_comments
+from thermocomp.nc.rewrite.text import LONGEST, Digits, Frame, Vector, part_comments
 
 AXES = "XYZ"
 ALL: Known = (True, True, True)
@@ -88,13 +86,9 @@ class CorrectionMethod(ABC):
             texts = (*texts[:-1], *part_comments(texts[-1]))
         placed = self.before == ALL or all(self.before[i] for i in self.named(block))
         self.before = block.known
-        other = None
-        if any(self.doubtful):
-            x, y, z = (o if d else c for o, d, c in zip(self.other, self.doubtful, self.carried, strict=True))
-            other = None if (x, y, z) == self.carried else (x, y, z)
-        return Change(
-            texts=texts, before=before, after=self.carried, inner=self.inner or self.carried, other=other, placed=placed
-        )
+        after = self.carried
+        other = triple(o if d else c for o, d, c in zip(self.other, self.doubtful, after, strict=True))
+        return Change(texts, before, after, self.inner or after, None if other == after else other, placed)
 
     @property
     def splits(self) -> bool:
@@ -148,8 +142,7 @@ class CorrectionMethod(ABC):
             return False
         unknown = [AXES[i] for i in self.named(block) if block.modal.absolute and not self.before[i]]
         if unknown and not ROTARY.isdisjoint(block.words) and not block.moves[-1].rapid:
-            raise ProgramError(
-                block.line.number,
+            raise block.error(
                 f"turns a rotary axis at feed rate; whether {unknown[0]} moves is unknown, which decides whether F "
                 f"counts degrees: position {' '.join(unknown)} by a rapid before",
             )
@@ -178,14 +171,12 @@ class CorrectionMethod(ABC):
         if "G10" not in block.codes or block.values.get("L") not in (10.0, 11.0, 20.0):
             return False
         if block.values["L"] != 20:
-            raise ProgramError(
-                block.line.number,
+            raise block.error(
                 "G10 L10 and L11 set the tool length from the current position, which already includes the thermal "
                 "drift; measure tools outside the program",
             )
         if (number := int(block.values.get("P", 0))) and not (block.modal.system_told and number == block.modal.system):
-            raise ProgramError(
-                block.line.number,
+            raise block.error(
                 "G10 L20 for a system that may not be in force is not supported; write "
                 f"{system_name(number)} before it, or P0",
             )
@@ -198,27 +189,23 @@ class CorrectionMethod(ABC):
         if axes and self.frame(block).turned and {0, 1} & set(axes):
             axes = sorted({0, 1, *axes})
             if any(self.carried[i] for i in axes if i not in self.named(block) and i != 2):
-                raise ProgramError(
-                    block.line.number, "a move in machine coordinates of X or Y alone while the coordinates are rotated"
-                )
+                raise block.error("a move in machine coordinates of X or Y alone while the coordinates are rotated")
         fed = any(not m.rapid for m in block.moves)
         if fed and not ROTARY.isdisjoint(block.words) and any(self.carried[i] or self.doubtful[i] for i in axes):
-            raise ProgramError(
-                block.line.number,
+            raise block.error(
                 "turns a rotary axis at feed rate on the way to machine coordinates, where X, Y and Z remove the "
                 "correction: if they stop, F would no longer count degrees; write G53 G0, or a line for each",
             )
         after = list(self.carried)
         for i in axes:
             after[i], self.fixed[i], self.doubtful[i] = 0.0, True, False
-        self.carried = (after[0], after[1], after[2])
+        self.carried = triple(after)
 
 
 def refuse_probing(block: Block) -> None:
     """Raise `ProgramError` if a block probes: its result would contain an unknown correction."""
     if block.kind == "probe":
-        raise ProgramError(
-            block.line.number,
+        raise block.error(
             f"{block.modal.motion} probes: the program continues with the result, which already contains the drift; "
             "revise the part of the program that cuts",
         )

@@ -7,13 +7,11 @@ of the program are unchanged.
 
 from dataclasses import dataclass, field
 
-from thermocomp.core.exceptions import ProgramError
-from thermocomp.nc.interpreter.block import PLANES, Block
+from thermocomp.nc.interpreter.block import PLANES, Block, triple
 from thermocomp.nc.interpreter.codes import CYCLES
 from thermocomp.nc.rewrite.contact import CLEAR
-from thermocomp.nc.rewrite.frame import Frame, Vector
 from thermocomp.nc.rewrite.method import AXES, STILL, CorrectionMethod
-from thermocomp.nc.rewrite.text import format_number
+from thermocomp.nc.rewrite.text import Frame, Vector, format_number
 
 #: codes that use the same stored offset as G52
 SAME_STORE = ("G52", "G92", "G92.1", "G92.2", "G92.3")
@@ -58,15 +56,13 @@ class Offset(CorrectionMethod):
         if self._safe(block):
             # other axes of the plane would only move later, in a cut; perpendicular to it, the tool first comes down
             named = {*self.named(block), PLANES[block.modal.plane][2]}
-            x, y, z = (demand[i] if i in named else self._shift[i] for i in range(3))
-            before = self._update(block, frame, (x, y, z))
+            shift = triple(demand[i] if i in named else self._shift[i] for i in range(3))
+            before = self._update(block, frame, shift)
         elif self._begun and self.stands(block):
             before = self._stay(block, frame)
         elif block.ends and self._begun:
             if block.modal.cutter:
-                raise ProgramError(
-                    block.line.number, "the program ends during cutter radius compensation; write G40 before"
-                )
+                raise block.error("the program ends during cutter radius compensation; write G40 before")
             before = self._update(block, frame, (0.0, 0.0, 0.0))
         self._carry(block, frame)
         self._look_up(block)
@@ -114,18 +110,16 @@ class Offset(CorrectionMethod):
     def _stay(self, block: Block, frame: Frame) -> tuple[str, ...]:
         """Reset the offset of axes that a block names at their present position, so that they do not move."""
         named = self.named(block) if block.modal.absolute else []
-        x, y, z = (self.carried[i] if i in named else self._shift[i] for i in range(3))
-        if (x, y, z) == self._shift or block.modal.cutter or block.modal.turned or block.line.optional:
+        shift = triple(self.carried[i] if i in named else self._shift[i] for i in range(3))
+        if shift == self._shift or block.modal.cutter or block.modal.turned or block.line.optional:
             return ()
-        return self._update(block, frame, (x, y, z))
+        return self._update(block, frame, shift)
 
     # -- changes -----------------------------------------------------------------------------------------------------
 
     def _update(self, block: Block, frame: Frame, demand: Vector) -> tuple[str, ...]:
         if frame.turned and any(demand[:2]):
-            raise ProgramError(
-                block.line.number, "the coordinates are rotated: to shift X and Y, use --method coordinates"
-            )
+            raise block.error("the coordinates are rotated: to shift X and Y, use --method coordinates")
         words = frame.words(demand)
         if not any(self.axes) or (self._begun and frame.shift(words) == self._shift):
             return ()
@@ -144,8 +138,7 @@ class Offset(CorrectionMethod):
         if kind in ("machine", "home"):
             if kind == "home" and block.modal.absolute:  # via a position in work coordinates
                 named = self.named(block)
-                x, y, z = (self._shift[i] if i in named else self.carried[i] for i in range(3))
-                self.inner = x, y, z
+                self.inner = triple(self._shift[i] if i in named else self.carried[i] for i in range(3))
             self.leave(block)
             return
         if self.names_place(block):
@@ -159,9 +152,7 @@ class Offset(CorrectionMethod):
         after = list(self.carried)
         for i in self.named(block):
             if block.line.optional and self.carried[i] != self._shift[i]:
-                raise ProgramError(
-                    block.line.number, "an optional line after an update of the offset: give --block-delete off or on"
-                )
+                raise block.error("an optional line after an update of the offset: give --block-delete off or on")
             after[i], self.fixed[i], self.doubtful[i] = self._shift[i], False, False
         if kind in ("arc", "curve", "cycle"):
             plane = PLANES[block.modal.plane]
@@ -170,7 +161,7 @@ class Offset(CorrectionMethod):
                 drill = plane[2]
                 self.inner = self._shift
                 after[drill] = self._drilled(block, frame, drill)
-        self.carried = (after[0], after[1], after[2])
+        self.carried = triple(after)
 
     def _drilled(self, block: Block, frame: Frame, drill: int) -> float:
         if self._level is None:
@@ -190,16 +181,13 @@ class Offset(CorrectionMethod):
     def _refuse_rivals(self, block: Block) -> None:
         for code in block.codes:
             if code in SAME_STORE:
-                raise ProgramError(
-                    block.line.number, f"{code} uses the offset that holds the correction: use --method coordinates"
-                )
+                raise block.error(f"{code} uses the offset that holds the correction: use --method coordinates")
 
     def _refuse_mixed(self, block: Block, axes: list[int], what: str) -> None:
         """Raise `ProgramError` if an axis has not moved since a change of the offset, and its position matters."""
         for i in axes:
             if self.carried[i] != self._shift[i]:
-                raise ProgramError(
-                    block.line.number,
+                raise block.error(
                     f"{what}, but {AXES[i]} has not been positioned since the offset was updated: "
                     "use --method coordinates, or position all axes after the tool change",
                 )

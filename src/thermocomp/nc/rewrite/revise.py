@@ -12,6 +12,7 @@ from operator import add, sub
 from typing import NamedTuple
 
 from thermocomp.core.exceptions import InputError, ProgramError
+from thermocomp.nc.interpreter.arcs import find_point, length
 from thermocomp.nc.interpreter.block import Block, Point, Setup
 from thermocomp.nc.interpreter.codes import ROTARY
 from thermocomp.nc.interpreter.interpret import follow_program
@@ -21,17 +22,12 @@ from thermocomp.nc.parser.tokens import read_lines
 from thermocomp.nc.planner.timeline import MotionLimits, time_blocks
 from thermocomp.nc.rewrite import header, known
 from thermocomp.nc.rewrite.check import Check
-from thermocomp.nc.rewrite.demand import CutErrors, Demand, DriftSource, Left
-from thermocomp.nc.rewrite.elsewhere import Elsewhere
-from thermocomp.nc.rewrite.frame import Vector
+from thermocomp.nc.rewrite.demand import DENSE, OFTEN, CutErrors, Demand, DriftSource, Elsewhere, Left
 from thermocomp.nc.rewrite.method import Change, CorrectionMethod
 from thermocomp.nc.rewrite.offset import ending
-from thermocomp.nc.rewrite.path import find_point, length
 from thermocomp.nc.rewrite.split import Sample, axes_to_split, beside, may_split, pieces, shares
+from thermocomp.nc.rewrite.text import Vector
 
-#: sampling intervals in a cut: in time [s], and along the path if the drift depends on the position [mm]
-OFTEN = 20.0
-DENSE = 20.0
 MOST_PIECES = 1000
 #: the drift continues within a line: a residual up to this multiple of the tolerance is not reported as held
 TELLING = 1.1
@@ -143,7 +139,7 @@ class Revision:
         method, steered = copy.deepcopy(self.method), known.SpindleState(self.setup)
         nothing: Vector = (0.0, 0.0, 0.0)
         modal, seen = None, set[tuple[str, ...]]()
-        for block in follow_program(self._guarded(read_lines(recognised(texts), self.setup.controller)), self.setup):
+        for block in follow_program(self._read(texts), self.setup):
             steered.speed(block)
             known.refuse_unknown(block, self.setup, by_position=self.drift.by_position)
             # lines with the same words and modal state as an earlier one do not change a method without corrections
@@ -180,14 +176,13 @@ class Revision:
         InputError
             The program is not an ISO program.
         """
-        lines = self._guarded(read_lines(recognised(texts), self.setup.controller))
         check = Check(self.setup)
         steered = known.SpindleState(self.setup)
         point: Point = (0.0, 0.0, 0.0)
         deviation = self.drift.deviation(point)
         headed = ended = False
         carried = self.method.carried
-        for block, start, end in time_blocks(follow_program(lines, self.setup), self.kinematics):
+        for block, start, end in time_blocks(follow_program(self._read(texts), self.setup), self.kinematics):
             line = block.line
             if not headed and not header.comes_first(line):
                 yield self._header(line.text, deviation, carried)
@@ -210,7 +205,8 @@ class Revision:
             if cutting:
                 if block.kind == "cycle":
                     knots = [(0.0, change.inner), (1.0, change.inner)]
-                cut = self._cut(block, samples, knots, demand)
+                cut = self.left.take(line.number, beside(samples, knots))
+                self._note_held(block, demand, samples[0].deviation, (knots[0][1], knots[-1][1]), cut)
                 self.taken_system |= not block.modal.system_told
                 if self.drift.by_position:
                     self.elsewhere.take(end, point, self.drift)
@@ -218,35 +214,32 @@ class Revision:
                 self._why = ""
             self.idle += ended and bool(line.words)
             ended |= block.ends
-            yield self._told(
-                Revised(
-                    number=line.number,
-                    text=line.text,
-                    texts=change.texts,
-                    block=block,
-                    start=start,
-                    end=end,
-                    deviation=deviation,
-                    carried=carried,
-                    inner=change.inner,
-                    cut=cut,
-                    other=change.other,
-                    placed=change.placed,
-                    knots=tuple(carried for _, carried in knots[1:-1]),
-                )
+            revised = Revised(
+                number=line.number,
+                text=line.text,
+                texts=change.texts,
+                block=block,
+                start=start,
+                end=end,
+                deviation=deviation,
+                carried=carried,
+                inner=change.inner,
+                cut=cut,
+                other=change.other,
+                placed=change.placed,
+                knots=tuple(carried for _, carried in knots[1:-1]),
             )
+            self.lines += 1
+            self.changed += revised.texts != (revised.text,)
+            self.corrected = self.corrected or any(carried) or any(change.inner)
+            yield revised
         if not headed:
             raise ProgramError(max(self.lines, 1), "the program is empty")
         self._refuse_open(ended, carried)
 
-    def _cut(self, block: Block, samples: list[Sample], knots: list[tuple[float, Vector]], demand: Vector) -> CutErrors:
-        """Return the error of the tool in a cut, and record the reason that held the correction."""
-        cut = self.left.take(block.line.number, beside(samples, knots))
-        self._note_held(block, demand, samples[0].deviation, (knots[0][1], knots[-1][1]), cut)
-        return cut
-
-    def _guarded(self, lines: Iterable[Line]) -> Iterator[Line]:
-        for line in lines:
+    def _read(self, texts: Iterable[str]) -> Iterator[Line]:
+        """Yield the lines of a program that has not been revised before."""
+        for line in read_lines(recognised(texts), self.setup.controller):
             if line.comment:
                 header.refuse_revised(line)
             yield line
@@ -263,12 +256,6 @@ class Revision:
             carried=carried,
             inner=carried,
         )
-
-    def _told(self, revised: Revised) -> Revised:
-        self.lines += 1
-        self.changed += revised.texts != (revised.text,)
-        self.corrected = self.corrected or any(revised.carried) or any(revised.inner)
-        return revised
 
     def _changed(self, block: Block, samples: list[Sample], check: Check) -> tuple[Change, list[tuple[float, Vector]]]:
         """Return the change of a block, and the corrections along its path."""
@@ -292,14 +279,7 @@ class Revision:
             changes.append(change)
         knots = [(0.0, begun), *((share, c.after) for share, c in zip(parts, changes, strict=True))]
         texts = tuple(text for c in changes for text in c.texts)
-        return Change(
-            texts=texts,
-            before=begun,
-            after=changes[-1].after,
-            inner=changes[-1].inner,
-            other=changes[-1].other,
-            placed=changes[0].placed,
-        ), knots
+        return changes[-1]._replace(texts=texts, before=begun, placed=changes[0].placed), knots
 
     def _worth(self, block: Block, samples: list[Sample], parts: list[float]) -> bool:
         """Return whether splitting a cut reduces its residual, with an increase at the end of at most one step."""

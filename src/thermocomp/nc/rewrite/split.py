@@ -5,16 +5,14 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import Final, NamedTuple
 
-from thermocomp.nc.interpreter.arcs import CENTRE
-from thermocomp.nc.interpreter.block import PLANES, Block, Known, Move, Point
+from thermocomp.nc.interpreter.arcs import CENTRE, find_point
+from thermocomp.nc.interpreter.block import PLANES, Block, Known, Move, Point, triple
 from thermocomp.nc.interpreter.codes import ROTARY
 from thermocomp.nc.parser.line import Controller
 from thermocomp.nc.parser.tokens import read_line
-from thermocomp.nc.rewrite.frame import Vector
 from thermocomp.nc.rewrite.method import AXES
 from thermocomp.nc.rewrite.offset import ending
-from thermocomp.nc.rewrite.path import find_point
-from thermocomp.nc.rewrite.text import format_number
+from thermocomp.nc.rewrite.text import Vector, format_number
 
 #: decimals of positions inside a cut: their rounding is a thousandth of that of a correction
 DIGITS: Final = 6
@@ -24,26 +22,8 @@ SHORTEST: Final = 2.0
 MOST: Final = 64
 #: codes allowed next to the motion code: they take effect before the first piece and stay in force
 _BESIDE: Final = frozenset(
-    {
-        "G1",
-        "G2",
-        "G3",
-        "G17",
-        "G18",
-        "G19",
-        "G90",
-        "G90.1",
-        "G91.1",
-        "G94",
-        "M3",
-        "M4",
-        "M5",
-        "M7",
-        "M8",
-        "M9",
-        "M48",
-        "M49",
-    }
+    {"G1", "G2", "G3", "G17", "G18", "G19", "G90", "G90.1", "G91.1", "G94"}
+    | {"M3", "M4", "M5", "M7", "M8", "M9", "M48", "M49"}
 )
 
 
@@ -129,8 +109,7 @@ def beside(samples: Sequence[Sample], knots: Sequence[tuple[float, Vector]]) -> 
             yield sample.deviation, after
             continue
         part = (sample.share - first) / (last - first)
-        x, y, z = (b + part * (a - b) for b, a in zip(before, after, strict=True))
-        yield sample.deviation, (x, y, z)
+        yield sample.deviation, triple(b + part * (a - b) for b, a in zip(before, after, strict=True))
 
 
 def axes_to_split(block: Block, before: Known) -> list[int]:
@@ -157,7 +136,7 @@ def pieces(block: Block, parts: Sequence[float], before: Known, controller: Cont
     unit = 25.4 if modal.inch else 1.0
     shift = [p - m for p, m in zip(block.start, move.start, strict=True)]
     place, start = block.start, move.start
-    x, y, z = (b or letter in block.words for letter, b in zip(AXES, before, strict=True))
+    known = triple(b or letter in block.words for letter, b in zip(AXES, before, strict=True))
     words, drop = _words(block), "R" if move.arc else ""
     for k, share in enumerate(parts):
         last = k == len(parts) - 1
@@ -176,7 +155,7 @@ def pieces(block: Block, parts: Sequence[float], before: Known, controller: Cont
             values={w.letter: w.number for w in line.words if w.letter not in "GM" and w.number is not None},
             start=place,
             end=goal,
-            known=block.known if last else (x, y, z),
+            known=block.known if last else known,
             moves=[replace(move, start=start, end=end)],
         )
         place, start = goal, end
@@ -196,8 +175,7 @@ def _place(block: Block, end: Point, share: float, shift: Sequence[float]) -> Po
     else:
         exact = [m + s for m, s in zip(end, shift, strict=True)]
     unit = 25.4 if block.modal.inch else 1.0
-    x, y, z = (round(v / unit, DIGITS) * unit for v in exact)
-    return x, y, z
+    return triple(round(v / unit, DIGITS) * unit for v in exact)
 
 
 def _centre(move: Move, place: Point, shift: Sequence[float], absolute: bool, unit: float) -> dict[str, float]:

@@ -1,17 +1,20 @@
-"""Writing of shifts into the words of a line; everything else is preserved byte for byte."""
+"""Corrections as words of a program: conversion from machine axes, and writing; all else is preserved byte for byte."""
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from thermocomp.nc.interpreter.block import Block
-from thermocomp.nc.parser.line import Line, Word
+from thermocomp.nc.interpreter.block import Block, Modal
+from thermocomp.nc.parser.line import Word
 
 #: maximum line length for all controls: LinuxCNC reads characters after the 252nd as the next line
 LONGEST = 240
 
+_MM = 1e-3  # mm per um
 _COMMENTS = re.compile(r"\([^()]*\)|;.*")
 
+Vector = tuple[float, float, float]
 #: letter -> amount added to its value, in the program's units
 Shifts = Mapping[str, float]
 
@@ -36,6 +39,55 @@ class Digits:
 
 #: LinuxCNC reads any number of decimals; a Fanuc with a least increment of 1 um (IS-B) at most these
 DIGITS = {"linuxcnc": Digits(), "fanuc": Digits(3, 4)}
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Conversion of a tool shift [um, machine axes] into words of X, Y and Z, under one modal state.
+
+    Parameters
+    ----------
+    scale : tuple of float
+        Program units per um, of X, Y and Z.
+    cosine, sine : float
+        Cosine and sine of the rotation of the work coordinate system about Z.
+    digits : int
+        Number of decimals.
+    """
+
+    scale: Vector
+    cosine: float
+    sine: float
+    digits: int
+
+    @classmethod
+    def of(cls, modal: Modal, digits: Digits) -> "Frame":
+        """Return the frame of a modal state."""
+        unit = _MM / 25.4 if modal.inch else _MM
+        turned = math.radians(modal.rotation)
+        scale = (2 * unit if modal.diameter else unit, unit, unit)
+        return cls(scale, math.cos(turned), math.sin(turned), digits.of(modal.inch))
+
+    @property
+    def turned(self) -> bool:
+        """Whether X and Y of the program differ in direction from those of the machine."""
+        return self.sine != 0 or self.cosine != 1
+
+    def words(self, shift: Vector) -> Vector:
+        """Return the amounts that a shift [um, machine axes] adds to absolute words, rounded to the decimals."""
+        x, y, z = shift
+        if self.turned:
+            x, y = self.cosine * x + self.sine * y, self.cosine * y - self.sine * x
+        digits = self.digits
+        a, b, c = self.scale
+        return round(a * x, digits) + 0.0, round(b * y, digits) + 0.0, round(c * z, digits) + 0.0
+
+    def shift(self, words: Vector) -> Vector:
+        """Return the shift [um, machine axes] for given amounts added to words."""
+        x, y, z = (w / s for w, s in zip(words, self.scale, strict=True))
+        if self.turned:
+            x, y = self.cosine * x - self.sine * y, self.cosine * y + self.sine * x
+        return x, y, z
 
 
 def format_number(value: float, digits: int) -> str:
@@ -63,18 +115,16 @@ def shift_words(block: Block, shifts: Shifts, added: Mapping[str, float], digits
     -------
     str
     """
-    line = block.line
-    text = line.text
+    text = block.line.text
     if added:
         insert = "".join(f" {letter}{format_number(value, digits)}" for letter, value in added.items())
-        behind = _end(line)
+        behind = max(word.end for word in block.line.words)
         text = text[:behind] + insert + text[behind:]
     changed = [(block.words[letter], shift) for letter, shift in shifts.items() if shift]
-    changed.sort(key=_start, reverse=True)
+    changed.sort(key=lambda change: change[0].start, reverse=True)
     for word, shift in changed:
-        text = (
-            text[: word.start + 1] + format_shifted(word, block.values[word.letter], shift, digits) + text[word.end :]
-        )
+        value = format_shifted(word, block.values[word.letter], shift, digits)
+        text = text[: word.start + 1] + value + text[word.end :]
     return text
 
 
@@ -86,15 +136,6 @@ def part_comments(text: str) -> tuple[str, ...]:
     code = _COMMENTS.sub("", text)
     ending = code[len(code.rstrip()) :].lstrip(" \t")
     return " ".join(c.rstrip() for c in comments) + ending, code.rstrip() + ending
-
-
-def _start(change: tuple[Word, float]) -> int:
-    return change[0].start
-
-
-def _end(line: Line) -> int:
-    """Return the column after the last word of a line."""
-    return max(word.end for word in line.words)
 
 
 def format_shifted(word: Word, value: float, shift: float, digits: int) -> str:

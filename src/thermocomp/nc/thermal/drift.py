@@ -8,16 +8,16 @@ division of time into steps.
 
 import copy
 import math
-from bisect import bisect_right
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import groupby
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.nc.interpreter.block import Point
-from thermocomp.nc.thermal.inputs import FloatArray, Inputs, Wiring
+from thermocomp.nc.interpreter.block import Point, triple
+from thermocomp.nc.thermal.inputs import FloatArray, Inputs, Wiring, interpolate
 from thermocomp.nc.thermal.jobstate import JobState
 from thermocomp.nc.thermal.start import ThermalStart, hand_over_state
 from thermocomp.nc.thermal.stations import AXES, Station, check_stations
@@ -215,11 +215,11 @@ class Drift:
         found = list(self._everywhere)
         for ladder in self._ladders:
             position = point[ladder.along]
-            found[ladder.axis] = ladder.at(position)
+            found[ladder.axis] = interpolate(ladder.positions, ladder.values, position)
             past = max(ladder.positions[0] - position, position - ladder.positions[-1])
             if past > self.beyond.get(AXES[ladder.axis], 0.0):
                 self.beyond[AXES[ladder.axis]] = past
-        return (found[0], found[1], found[2])
+        return triple(found)
 
     def field(self) -> Callable[[Point], Point]:
         """Return the present `deviation` as a function of position that is independent of time."""
@@ -259,7 +259,7 @@ class Drift:
         places = [0.0, 0.0, 0.0]
         for station, value in zip(self.stations, values, strict=True):
             places[AXES.index(station.axis)] = value
-        self._everywhere: Point = (places[0], places[1], places[2])
+        self._everywhere: Point = triple(places)
         for ladder in self._ladders:
             ladder.values = values[ladder.stations]
 
@@ -301,7 +301,7 @@ class Drift:
             error = math.nan if honest is None else honest.max_abs * (1 if self._zero_known else 2) + doubt
             if not error <= worst[k]:  # nan stays nan
                 worst[k] = error if not math.isnan(worst[k]) else math.nan
-        return (worst[0], worst[1], worst[2])
+        return triple(worst)
 
     # -- next job ----------------------------------------------------------------------------------------------------
 
@@ -309,28 +309,19 @@ class Drift:
         """Return the state from which the next job can start, after stepping the models to the present time."""
         if self._pending:
             self._flush()
-        return hand_over_state(self.stations, self._states, self._zeros, self._doubts, zero_known=self._zero_known)
+        stations = map(hand_over_state, self.stations, self._states, self._zeros, self._doubts)
+        return JobState(tuple(stations), self._zero_known)
 
 
+@dataclass(slots=True)
 class _Ladder:
     """Stations of one axis along another axis."""
 
-    __slots__ = ("along", "axis", "positions", "stations", "values")
-
-    def __init__(self, axis: int, along: int, positions: tuple[float, ...], stations: slice) -> None:
-        self.axis, self.along, self.positions, self.stations = axis, along, positions, stations
-        self.values: tuple[float, ...] = ()
-
-    def at(self, position: float) -> float:
-        """Return the deviation at a position, linear between stations, constant beyond the outermost ones [um]."""
-        positions, values = self.positions, self.values
-        k = bisect_right(positions, position)
-        if k == 0:
-            return values[0]
-        if k == len(positions):
-            return values[-1]
-        share = (position - positions[k - 1]) / (positions[k] - positions[k - 1])
-        return (1.0 - share) * values[k - 1] + share * values[k]
+    axis: int
+    along: int
+    positions: tuple[float, ...]
+    stations: slice
+    values: tuple[float, ...] = ()
 
 
 def _ladders(stations: Sequence[Station]) -> tuple[_Ladder, ...]:

@@ -27,6 +27,15 @@ _EXAMPLES = {
 }
 
 
+def interpolate(places: Sequence[float], values: Sequence[float], place: float) -> float:
+    """Return the value at a place: linear between the given places, constant beyond the outermost ones."""
+    k = bisect_right(places, place)
+    if k in (0, len(places)):
+        return values[0 if k == 0 else -1]
+    share = (place - places[k - 1]) / (places[k] - places[k - 1])
+    return (1.0 - share) * values[k - 1] + share * values[k]
+
+
 @dataclass(frozen=True)
 class InputSignal:
     """Value over the time of the program: linear between its points, constant before the first and after the last.
@@ -69,13 +78,7 @@ class InputSignal:
 
     def at(self, time: float) -> float:
         """Return the value at a time [s]."""
-        k = bisect_right(self.time, time)
-        if k == 0:
-            return self.values[0]
-        if k == len(self.time):
-            return self.values[-1]
-        share = (time - self.time[k - 1]) / (self.time[k] - self.time[k - 1])
-        return (1.0 - share) * self.values[k - 1] + share * self.values[k]
+        return interpolate(self.time, self.values, time)
 
     def held(self, time: float) -> float:
         """Return the duration, up to a time of the program, for which the value was held beyond its points [s]."""

@@ -189,46 +189,32 @@ def deviations(texts: Sequence[str]) -> dict[str, float]:
     return found
 
 
-def hand_over_state(
-    stations: Sequence[Station],
-    states: Sequence[State],
-    zeros: Sequence[float],
-    doubts: Sequence[float],
-    *,
-    zero_known: bool,
-) -> JobState:
-    """Return the state from which the next job can start.
+def hand_over_state(station: Station, state: State, zero: float, doubt: float) -> StationState:
+    """Return the state of a station from which the next job can start.
 
     Parameters
     ----------
-    stations : sequence of Station
-    states : sequence of State
-        Present states of the models.
-    zeros, doubts : sequence of float
-        Per station, see `StationState` [um].
-    zero_known : bool
-        The zeros are not predictions.
+    station : Station
+    state : State
+        Present state of its model.
+    zero, doubt : float
+        See `StationState` [um].
 
     Returns
     -------
-    JobState
+    StationState
     """
-    kept = []
-    for station, state, zero, doubt in zip(stations, states, zeros, doubts, strict=True):
-        memory = np.empty(0) if state.memory is None else state.memory
-        kept.append(
-            StationState(
-                station=str(station),
-                target=station.model.target,
-                model=identity(station.model),
-                reference=tuple(state.reference.tolist()),
-                memory=tuple(memory.tolist()),
-                deviation=float(state.deviation),
-                zero=zero,
-                doubt=doubt,
-            )
-        )
-    return JobState(tuple(kept), zero_known)
+    memory = np.empty(0) if state.memory is None else state.memory
+    return StationState(
+        station=str(station),
+        target=station.model.target,
+        model=identity(station.model),
+        reference=tuple(state.reference.tolist()),
+        memory=tuple(memory.tolist()),
+        deviation=float(state.deviation),
+        zero=zero,
+        doubt=doubt,
+    )
 
 
 def identity(model: ErrorModel) -> str:

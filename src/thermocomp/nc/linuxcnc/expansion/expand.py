@@ -5,18 +5,18 @@ from array import array
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import zip_longest
 from pathlib import Path
+from typing import Any
 
 from thermocomp.core.exceptions import InputError, ProgramError
 from thermocomp.files.draft import draft
-from thermocomp.nc.linuxcnc.expansion.origins import DEPENDS, G10, SYSTEMS
+from thermocomp.nc.linuxcnc.expansion.origins import DEPENDS, G10, SYSTEMS, Side
 from thermocomp.nc.linuxcnc.expansion.plain import Writer
 from thermocomp.nc.linuxcnc.expansion.proof import compare, compare_parameters
-from thermocomp.nc.linuxcnc.expansion.words import Side
 from thermocomp.nc.linuxcnc.rs274 import Canonical, read
-from thermocomp.nc.linuxcnc.rs274process import InterpreterJob, InterpreterRun
-from thermocomp.nc.linuxcnc.stored import Stored, draw_controller
+from thermocomp.nc.linuxcnc.rs274process import InterpreterJob, Stored, draw_controller, run_through
 from thermocomp.nc.rewrite.header import clean_comment
 
 _NO_CODE = re.compile(r"\([^)]*\)|<[^>]*>|;.*|\s")
@@ -63,45 +63,16 @@ class _Around:
     block_delete: bool
     subroutines: Sequence[Path]
     user_codes: bool
-    seconds: int
     systems: Mapping[int, int]  #: work coordinate system in force at the start, by seed
 
-    def run(
-        self,
-        path: Path,
-        stored: Stored,
-        *,
-        task: bool = False,
-        left: dict[int, float] | None = None,
-        opened: set[Path] | None = None,
-    ) -> Generator[Canonical]:
-        """Run a program in this environment."""
-        return read(
-            path,
-            stored,
-            inch=bool(self.inch),
-            block_delete=self.block_delete,
-            subroutines=self.subroutines,
-            task=task,
-            seconds=self.seconds,
-            left=left,
-            opened=opened,
-        )
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Fields of `InterpreterJob` that are the same in every run."""
+        return {"inch": bool(self.inch), "block_delete": self.block_delete, "subroutines": self.subroutines}
 
-    def try_whether_it_ends(self, path: Path, stored: Stored) -> None:
-        """Run a program and discard its calls: endless loops are refused before its moves are used."""
-        job = InterpreterJob(
-            path=path,
-            stored=stored,
-            inch=bool(self.inch),
-            block_delete=self.block_delete,
-            subroutines=self.subroutines,
-            task=False,
-            seconds=self.seconds,
-        )
-        with InterpreterRun(job) as run:
-            for _ in run.blocks():
-                pass
+    def run(self, path: Path, stored: Stored, **more: Any) -> Generator[Canonical]:
+        """Run a program in this environment."""
+        return read(path, stored, **self.settings, **more)
 
     def controller(self, seed: int) -> Stored:
         """Return a simulated controller; different seeds share only the specified settings."""
@@ -119,7 +90,6 @@ def expand(
     block_delete: bool = False,
     subroutines: Sequence[Path] = (),
     user_codes: bool = False,
-    seconds: int = 600,
     progress: Callable[[int], object] = lambda _: None,
 ) -> Expansion:
     """Write a program as plain lines that do the same on every machine, whatever its origins and tool lengths.
@@ -147,8 +117,6 @@ def expand(
         Folders of subprograms, at most 8; the folder of the program is always searched first.
     user_codes : bool
         Keep M100 to M199; otherwise they are refused, because their effect is unknown.
-    seconds : int
-        Maximum processor time of each run [s].
     progress : callable, optional
         Called with the number of lines written.
 
@@ -167,18 +135,10 @@ def expand(
     if not path.is_file():
         raise InputError(f"{path} is not a file")
     systems = _start_systems(path, block_delete)
-    around = _Around(
-        inch=inch,
-        startup=startup,
-        diameters=diameters or {},
-        block_delete=block_delete,
-        subroutines=subroutines,
-        user_codes=user_codes,
-        seconds=seconds,
-        systems=systems,
-    )
+    around = _Around(inch, startup, diameters or {}, block_delete, subroutines, user_codes, systems)
     acts = 0
-    around.try_whether_it_ends(path, around.controller(_WRITTEN[0]))
+    # endless loops are refused before the moves are used
+    run_through(InterpreterJob(path, around.controller(_WRITTEN[0]), **around.settings))
     with draft(out, overwrite=False) as part:
         sources: array[int] = array("I")
         with part.open("w", encoding="ascii", newline="\n") as file:
@@ -223,7 +183,7 @@ def _lines(path: Path, around: _Around) -> Iterator[tuple[str, int]]:
     if radii:
         yield "G8", 0
     one, two = (around.controller(seed) for seed in _WRITTEN)
-    writer = Writer(one, two, _Source(path), around.inch, around.user_codes)
+    writer = Writer(one, two, partial(_line_of, path), around.inch, around.user_codes)
     opened: set[Path] = set()
     with closing(around.run(path, one, opened=opened)) as run1, closing(around.run(path, two, task=True)) as run2:
         for first, second in zip_longest(_told(run1, writer.sides[0]), _told(run2, writer.sides[1])):
@@ -298,12 +258,7 @@ def _told(calls: Iterator[Canonical], side: Side) -> Iterator[Canonical]:
             yield call
 
 
-class _Source:
-    """Text of a line by its number; the file is reread at each rare call."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-
-    def __call__(self, number: int) -> str:
-        with self.path.open(encoding="latin-1") as file:
-            return next((text for i, text in enumerate(file, 1) if i == number), "")
+def _line_of(path: Path, number: int) -> str:
+    """Return the text of a line by its number; the file is reread at each rare call."""
+    with path.open(encoding="latin-1") as file:
+        return next((text for i, text in enumerate(file, 1) if i == number), "")

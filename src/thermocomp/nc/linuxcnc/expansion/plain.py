@@ -7,9 +7,7 @@ G30. Anything else depends on data stored in the controller, and is refused.
 
 from collections.abc import Callable, Iterator
 
-from thermocomp.core.exceptions import ProgramError
-from thermocomp.nc.linuxcnc.expansion.origins import DEPENDS, G10, chosen_system, plain_g10, shift, tool_length
-from thermocomp.nc.linuxcnc.expansion.words import STILL, Side, Words, agree, format_number
+from thermocomp.nc.linuxcnc.expansion.origins import DEPENDS, G10, STILL, OriginWriter, agree, format_number
 from thermocomp.nc.linuxcnc.rs274 import AXES, PLANE_AXES, Canonical, Stored
 
 CENTRES = {17: "IJ", 18: "KI", 19: "JK"}
@@ -35,7 +33,7 @@ REFUSED = {
 }
 
 
-class Writer:
+class Writer(OriginWriter):
     """Converter from pairs of canonical calls to lines of a plain program.
 
     Parameters
@@ -51,8 +49,6 @@ class Writer:
 
     Attributes
     ----------
-    line : int
-        Last line of the program with any effect.
     ended : bool
         M2 or M30 was written.
     """
@@ -60,12 +56,10 @@ class Writer:
     def __init__(
         self, first: Stored, second: Stored, source: Callable[[int], str], inch: bool | None, user_codes: bool
     ) -> None:
-        self.sides = Side(first), Side(second)
+        super().__init__(first, second, 25.4 if inch else 1.0)
         self.source = source
         self.stated = inch is not None
         self.user_codes = user_codes
-        self.words = Words(25.4 if inch else 1.0)
-        self.line = 0
         self.feed: float | None = 0.0
         self.written_feed: float | None = None
         self.pitch = 0.0  # pitch of a thread [mm]
@@ -73,10 +67,6 @@ class Writer:
         self.arcs = self.ended = False
         self.held: tuple[Canonical, Canonical] | None = None  # pair held back until the next pair is known
         self.waiting: list[tuple[str, str, int]] = []  # (kind, text, line) held back in case the program ends
-
-    def refuse(self, reason: str, file: str = "") -> ProgramError:
-        """Return an error for the line being run; within a subprogram in another file, for the last line before it."""
-        return ProgramError(max(self.line, 1), f"it cannot be expanded: {reason}" + (f" (in {file})" if file else ""))
 
     def write(self, first: Canonical, second: Canonical) -> Iterator[tuple[str, int]]:
         """Yield the lines for a pair of calls, each with the number of its line in the program."""
@@ -139,7 +129,7 @@ class Writer:
             merged = a.kind == "rotation" and close
             angles = (a.values[0], b.values[0]) if merged else None
             source = "" if held.file else self.source(held.line)
-            return chosen_system(self.sides, self.words, self.refuse, held, other, angles, source), merged
+            return self.chosen_system(held, other, angles, source), merged
         if kind == "path":
             merged = a.kind == "naive" and close
             if held.values != other.values or (merged and a.values != b.values):
@@ -155,9 +145,7 @@ class Writer:
             return [(a.kind if merged else kind, "M30" if a.kind == "end" else "M60")], merged
         if a.kind == "g5x" and close:
             return [], False
-        return [
-            ("g10", plain_g10(self.sides, self.words, self.refuse, "" if held.file else self.source(held.line)))
-        ], False
+        return [("g10", self.plain_g10("" if held.file else self.source(held.line)))], False
 
     def unshifted(self, a: Canonical, b: Canonical) -> bool:
         """Return whether G92 is unchanged."""
@@ -179,9 +167,9 @@ class Writer:
             for side, call in zip(self.sides, (a, b), strict=True):
                 side.take(kind, call.values)
             if kind == "length":
-                yield kind, tool_length(self.sides, self.words, self.refuse)
+                yield kind, self.tool_length()
             else:
-                yield kind, shift(self.sides, self.words, self.refuse, old, "" if a.file else self.source(a.line))
+                yield kind, self.shift(old, "" if a.file else self.source(a.line))
         elif kind in {"comment", "message"}:
             if a.text != b.text:
                 raise self.refuse(f"this message {DEPENDS}", a.file)

@@ -1,7 +1,7 @@
 """Verification that two programs have the same effect on a machine."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from itertools import zip_longest
 from typing import NamedTuple
 
@@ -112,27 +112,17 @@ def trace_acts(calls: Iterator[Canonical]) -> Iterator[Act]:
 
 def _way(call: Canonical, frame: ProgramFrame, here: Place) -> tuple[Place, tuple[float, ...]]:
     """Return the end of a move and all data of its path, in machine coordinates."""
-    if call.arc is not None:
-        arc = call.arc
-        return call.machine, (
-            *call.machine,
-            arc.plane,
-            arc.turns,
-            *arc.machine_centre,
-            _sweep(call, frame.program(here)),
-        )
+    if (arc := call.arc) is not None:
+        numbers = (*call.machine, arc.plane, arc.turns, *arc.machine_centre, _sweep(call, frame.program(here)))
+        return call.machine, numbers
     if call.kind in {"rapid", "feed", "probe"}:
         return call.machine, call.machine
     from_here = frame.program(here)
     if call.kind == "tap":
         x, y, z = call.values[:3]
         return here, (*frame.machine((x, y, z, *from_here[3:])), call.values[3])
-    ways = [frame.machine((x, y, *from_here[2:])) for x, y in _pairs(call.values[1:])]
+    ways = [frame.machine((x, y, *from_here[2:])) for x, y in zip(call.values[1::3], call.values[2::3], strict=True)]
     return ways[-1], tuple(v for way in ways for v in way)
-
-
-def _pairs(values: Sequence[float]) -> list[tuple[float, float]]:
-    return [(values[k], values[k + 1]) for k in range(0, len(values), 3)]
 
 
 def _sweep(call: Canonical, start: Place) -> float:

@@ -1,12 +1,13 @@
 """Required shift of every line of a revised program, and the original line of each of its lines."""
 
 from array import array
+from operator import sub
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from thermocomp.nc.rewrite.frame import Vector
 from thermocomp.nc.rewrite.revise import Revised
+from thermocomp.nc.rewrite.text import Vector
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 Booleans = np.ndarray[Any, np.dtype[np.bool_]]
@@ -15,17 +16,6 @@ Integers = np.ndarray[Any, np.dtype[np.int64]]
 _INVERSE_TIME = 93
 #: flags of lines: unknown previous position of an axis in the line; move to machine coordinates
 _UNPLACED, _MACHINE = 1.0, 2.0
-
-
-class LineShift(NamedTuple):
-    """Allowed shifts of the moves of a line [um, machine axes]."""
-
-    before: Vector  #: shift in effect before the line
-    after: Vector  #: shift in effect after the line, required for its last move
-    inner: Vector  #: shift of intermediate moves of a cycle
-    inverse: bool  #: G93: a change in path length changes the feed
-    knots: tuple[Vector, ...] = ()  #: shifts at the inner ends of the pieces of a divided move
-    other: Vector | None = None  #: alternative shift, if the program does not determine which
 
 
 class Shifts(NamedTuple):
@@ -88,58 +78,38 @@ class Ledger:
         if block is None:
             return
         self._carried.take(line, revised.carried)
-        x, y, z = (i - c for i, c in zip(revised.inner, revised.carried, strict=True))
-        self._inner.take(line, (x, y, z))
+        self._inner.take(line, tuple(map(sub, revised.inner, revised.carried)))
         self._inverse.take(line, (float(block.modal.feed_mode == _INVERSE_TIME),))
         if revised.knots:
             self.knots[line] = revised.knots
         goes = block.kind in ("machine", "home")
         self._loose.take(line, (_MACHINE if goes else float(not revised.placed),))
-        x, y, z = (o - c for o, c in zip(revised.other or revised.carried, revised.carried, strict=True))
-        self._other.take(line, (x, y, z))
+        self._other.take(line, tuple(map(sub, revised.other or revised.carried, revised.carried)))
 
     def of(self, lines: Integers) -> Shifts:
         """Return the required shifts of lines of the original."""
         after = self._carried.at(lines)
-        inverse = self._inverse.at(lines)[:, 0] > 0
         before, loose = self._carried.at(lines - 1), self._loose.at(lines)[:, 0]
         others = (before + self._other.at(lines - 1), after + self._other.at(lines)) if self._other.lines else ()
-        inner = after + self._inner.at(lines)
         return Shifts(
             before=before,
             after=after,
-            inner=inner,
-            inverse=inverse,
+            inner=after + self._inner.at(lines),
+            inverse=self._inverse.at(lines)[:, 0] > 0,
             placed=loose != _UNPLACED,
             machine=loose == _MACHINE,
             others=others,
-        )
-
-    def at(self, line: int) -> LineShift:
-        """Return the required shift of a line of the original."""
-        found = self.of(np.array([line]))
-        before, after, inner, inverse = (row[0].tolist() for row in found[:4])
-        other = tuple(found.others[1][0].tolist()) if found.others else tuple(after)
-        return LineShift(
-            before=tuple(before),
-            after=tuple(after),
-            inner=tuple(inner),
-            inverse=inverse,
-            knots=self.knots.get(line, ()),
-            other=None if other == tuple(after) else other,
         )
 
     def originals(self, lines: Integers) -> Integers:
         """Return the lines of the original for lines of the revised program."""
         if not self._first:
             return lines
-        first, count, original = (np.frombuffer(a, np.intc).astype(int) for a in self._tables())
+        tables = self._first, self._count, self._original
+        first, count, original = (np.frombuffer(a, np.intc).astype(int) for a in tables)
         k = np.searchsorted(first, lines, side="right") - 1
         beyond = lines - first[k] - count[k]
         return np.where(k < 0, lines, np.where(beyond < 0, original[k], original[k] + 1 + beyond))
-
-    def _tables(self) -> "tuple[array[int], array[int], array[int]]":
-        return self._first, self._count, self._original
 
     @property
     def lines(self) -> int:

@@ -2,13 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from types import MappingProxyType
-from typing import Final, NamedTuple
+from typing import Final
 
 from thermocomp.nc.interpreter import startup
 from thermocomp.nc.interpreter.block import Setup, system_name
-from thermocomp.nc.linuxcnc.rs274process import InterpreterJob
-from thermocomp.nc.linuxcnc.stored import SYSTEMS, Stored, draw_controller
+from thermocomp.nc.linuxcnc.rs274process import SYSTEMS, InterpreterJob, Stored, draw_controller
 
 #: number of states in which a revised program is verified
 STATES = 8
@@ -35,18 +35,6 @@ REMEDIES: Final[Mapping[str, str]] = MappingProxyType(
 )
 
 
-class ControllerState(NamedTuple):
-    """Controller state before the program starts."""
-
-    stored: Stored
-    inch: bool
-    block_delete: bool
-
-    def job(self, program: InterpreterJob) -> InterpreterJob:
-        """Return the job of running a program in this state."""
-        return replace(program, stored=self.stored, inch=self.inch, block_delete=self.block_delete)
-
-
 def build_stored(setup: Setup) -> Stored:
     """Return the state of the controller with the given settings; all others are 0."""
     return Stored(
@@ -71,8 +59,8 @@ def list_unstated(setup: Setup) -> tuple[str, ...]:
     return tuple(name for name in REMEDIES if not held.get(name, False))
 
 
-def state(setup: Setup, number: int, what: frozenset[str] | set[str]) -> ControllerState:
-    """Return a controller state.
+def state(setup: Setup, number: int, what: frozenset[str] | set[str], program: Path) -> InterpreterJob:
+    """Return the job of running a program in a state of the controller.
 
     Parameters
     ----------
@@ -83,6 +71,7 @@ def state(setup: Setup, number: int, what: frozenset[str] | set[str]) -> Control
     what : set of str
         Random settings in this state, see `REMEDIES`; all others are 0, but the machine never starts at a position
         that the program could contain.
+    program : Path
     """
     base = replace(build_stored(setup), start=draw_controller(ELSEWHERE).start)
     one, two, four = number & 1, number >> 1 & 1, number >> 2 & 1
@@ -119,7 +108,7 @@ def state(setup: Setup, number: int, what: frozenset[str] | set[str]) -> Control
         }
     inch = bool(setup.inch) or ("unit" in what and bool(one ^ two))
     skips = setup.skip_optional or ("optional lines" in what and bool(one ^ two ^ four))
-    return ControllerState(replace(base, **changes), inch, skips)  # type: ignore[arg-type]
+    return InterpreterJob(program, replace(base, **changes), inch, skips)  # type: ignore[arg-type]
 
 
 def describe_setup(setup: Setup) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import Final
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.nc.interpreter.block import PLANES, Block, Point, Setup, system_name
+from thermocomp.nc.interpreter.block import PLANES, Block, Point, Setup, system_name, triple
 from thermocomp.nc.interpreter.codes import ADDITIONAL_SYSTEMS, CYCLES
 from thermocomp.nc.interpreter.cycles import KEPT
 from thermocomp.nc.interpreter.interpret import Follower
@@ -32,25 +32,10 @@ _OTHER: Final = {"G61": "G61.1"}
 _SAME_M: Final = frozenset({"M0", "M1", "M2", "M3", "M4", "M5", "M6", "M7", "M8", "M9", "M30", "M48", "M49"})
 #: codes without motion, for path smoothing or cancelling inactive modes; G98 and G99 are written with each cycle
 _LEFT_OUT: Final = frozenset(
-    {
-        "G98",
-        "G99",
-        "G5",
-        "G5.1",
-        "G8",
-        "G9",
-        "G13.1",
-        "G15",
-        "G22",
-        "G23",
-        "G50",
-        "G50.1",
-        "G61.1",
-        "G67",
-        "G103",
-        "G187",
-    }
-) | {"M19", "M29"}
+    {"G5", "G5.1", "G8", "G9", "G61.1", "G103", "G187"}
+    | {"G13.1", "G15", "G22", "G23", "G50", "G50.1", "G67"}
+    | {"G98", "G99", "M19", "M29"}
+)
 _MOTION: Final = CYCLES | {"G0", "G1", "G2", "G3", "G80", "G31"}
 _ONCE: Final = ("G4", "G10", "G28", "G30", "G52", "G53", "G92", "G92.1")
 _AXES: Final = "XYZABC"
@@ -70,33 +55,6 @@ class UntranslatableError(InputError):
         super().__init__(f"line {line}: {reason}")
         self.line = line
         self.reason = reason
-
-
-def translate(lines: Iterable[str], setup: Setup) -> Iterator[tuple[str, int]]:
-    """Translate a Fanuc program into LinuxCNC code.
-
-    Parameters
-    ----------
-    lines : iterable of str
-        Plain lines, see `thermocomp.nc.expansion.unroll`.
-    setup : Setup
-        Setup of the program.
-
-    Yields
-    ------
-    str
-        Line of the translation, with its ending.
-    int
-        Number of its line in the program (1-based).
-
-    Raises
-    ------
-    UntranslatableError
-        LinuxCNC does this differently, or not at all.
-    ProgramError
-        The program cannot be interpreted.
-    """
-    return Translator(setup).translate(lines)
 
 
 class Translator:
@@ -124,7 +82,27 @@ class Translator:
         self._length: int | None = None
 
     def translate(self, lines: Iterable[str]) -> Iterator[tuple[str, int]]:
-        """Yield the lines of the translation; see `translate`."""
+        """Translate a program.
+
+        Parameters
+        ----------
+        lines : iterable of str
+            Plain lines, see `thermocomp.nc.expansion.unroll`.
+
+        Yields
+        ------
+        str
+            Line of the translation, with its ending.
+        int
+            Number of its line in the program (1-based).
+
+        Raises
+        ------
+        UntranslatableError
+            LinuxCNC does this differently, or not at all.
+        ProgramError
+            The program cannot be interpreted.
+        """
         for line in read_lines(lines, "fanuc"):
             block = self._follower.step(line)
             if line.optional and self._setup.skip_optional:
@@ -208,12 +186,15 @@ class Translator:
     def _system(self, block: Block, codes: set[str]) -> list[str]:
         if not ADDITIONAL_SYSTEMS & codes:
             return []
-        system = block.modal.system
+        return [system_name(self._spare(block, block.modal.system))]
+
+    def _spare(self, block: Block, system: int) -> int:
+        """Return the LinuxCNC system that stands for a system of G54.1."""
         if system not in self.systems:
             if len(self.systems) == len(_SPARE):
                 raise _cannot(block, f"LinuxCNC can hold up to {len(_SPARE)} work coordinate systems of G54.1")
             self.systems[system] = _SPARE[len(self.systems)]
-        return [system_name(self.systems[system])]
+        return self.systems[system]
 
     def _speeds(self, block: Block, codes: set[str]) -> list[str]:
         """Return F, S, T words; F is repeated after G94, because LinuxCNC, unlike a Fanuc, resets it."""
@@ -235,8 +216,9 @@ class Translator:
             raise _cannot(block, f"G30 P{values['P']:g}: LinuxCNC has two reference points")
         if once == "G52":
             scale = self._follower.state.scale
-            x, y, z = (values[c] * scale if c in values else v for c, v in zip("XYZ", self._local, strict=True))
-            self._local = (x, y, z)
+            self._local = triple(
+                values[c] * scale if c in values else v for c, v in zip("XYZ", self._local, strict=True)
+            )
         if once == "G53":  # always a rapid
             return f"G0 G53 {words}" if block.moves else ""
         return {"G4": f"G4 P{format_number(block.pause)}", "G92.1": once}.get(once, f"{once} {words}")
@@ -256,11 +238,7 @@ class Translator:
         if not block.modal.absolute:
             raise _cannot(block, "G10 in G91 moves the origin by its words, which LinuxCNC does not do")
         if kind == 20:
-            if 100 + target not in self.systems:
-                if len(self.systems) == len(_SPARE):
-                    raise _cannot(block, f"LinuxCNC can hold up to {len(_SPARE)} work coordinate systems of G54.1")
-                self.systems[100 + target] = _SPARE[len(self.systems)]
-            target = self.systems[100 + target]
+            target = self._spare(block, 100 + target)
         elif not target:
             raise _cannot(block, "G10 L2 P0 sets the external offset, which LinuxCNC does not have")
         return f"G10 L2 P{target} {_words(values, _AXES)}"

@@ -14,14 +14,14 @@ from thermocomp.core.exceptions import ProgramError, Unprovable
 from thermocomp.files.scratch import scratch
 from thermocomp.nc.interpreter.block import Setup
 from thermocomp.nc.linuxcnc import rs274
-from thermocomp.nc.linuxcnc.rs274process import InterpreterJob, InterpreterRun
+from thermocomp.nc.linuxcnc.rs274process import InterpreterJob, InterpreterRun, run_through
 from thermocomp.nc.linuxcnc.verification import states
 from thermocomp.nc.linuxcnc.verification.comparison import Found, LineOrigins, RefusedError, compare
-from thermocomp.nc.linuxcnc.verification.ledger import Integers, Ledger, LineShift
+from thermocomp.nc.linuxcnc.verification.ledger import Integers, Ledger
 from thermocomp.nc.linuxcnc.verification.translation import Translator, UntranslatableError
 from thermocomp.nc.parser.tokens import program_lines
 
-__all__ = ["Ledger", "LineShift", "Proof", "prove"]
+__all__ = ["Ledger", "Proof", "prove"]
 
 #: settings that a state may omit if the original does not run with them
 _SPARED = ("rotation", "tool diameters")
@@ -56,11 +56,11 @@ class _Proving(NamedTuple):
         self, wanted: Sequence[tuple[int, set[str]]], progress: Callable[[int], object] = lambda _: None
     ) -> Iterator[Found]:
         """Compare the programs in several states, one after the other."""
-        jobs = [states.state(self.setup, number, drawn) for number, drawn in wanted]
-        with (
-            InterpreterRun(*[state.job(InterpreterJob(self.original)) for state in jobs]) as first,
-            InterpreterRun(*[state.job(InterpreterJob(self.revised)) for state in jobs]) as second,
-        ):
+        first_jobs, second_jobs = (
+            [states.state(self.setup, number, drawn, program) for number, drawn in wanted]
+            for program in (self.original, self.revised)
+        )
+        with InterpreterRun(*first_jobs) as first, InterpreterRun(*second_jobs) as second:
             for number, _ in wanted:
 
                 def told(line: int, number: int = number) -> None:
@@ -126,30 +126,19 @@ def prove(
     """
     if (reason := rs274.find_obstacle()) is not None:
         raise Unprovable(reason)
-    if setup.controller == "linuxcnc":
-        proof = _prove(
-            _Proving(
-                original=original,
-                revised=revised,
-                ledger=ledger,
-                setup=setup,
-                origin=LineOrigins(_same, ledger.originals),
-            ),
-            progress,
-        )
-        return proof._replace(held=_assumed(setup, proof.held))
     with scratch() as folder:
-        try:
-            first = _Translated.of(original, folder / "original.ngc", setup)
-            second = _Translated.of(revised, folder / "revised.ngc", setup)
-        except UntranslatableError as e:
-            raise Unprovable(f"line {e.line} cannot be translated for LinuxCNC: {e.reason}") from e
-        origin = LineOrigins(first.lines, lambda lines: ledger.originals(second.lines(lines)), divided=False)
-        proof = _prove(
-            _Proving(original=first.path, revised=second.path, ledger=ledger, setup=first.setup, origin=origin),
-            progress,
-        )
-        return proof._replace(held=_assumed(setup, proof.held))
+        if setup.controller == "linuxcnc":
+            proving = _Proving(original, revised, ledger, setup, LineOrigins(lambda lines: lines, ledger.originals))
+        else:
+            try:
+                first = _Translated.of(original, folder / "original.ngc", setup)
+                second = _Translated.of(revised, folder / "revised.ngc", setup)
+            except UntranslatableError as e:
+                raise Unprovable(f"line {e.line} cannot be translated for LinuxCNC: {e.reason}") from e
+            origin = LineOrigins(first.lines, lambda lines: ledger.originals(second.lines(lines)), divided=False)
+            proving = _Proving(first.path, second.path, ledger, first.setup, origin)
+        proof = _prove(proving, progress)
+    return proof._replace(held=_assumed(setup, proof.held))
 
 
 def _assumed(setup: Setup, held: Sequence[str]) -> tuple[str, ...]:
@@ -176,10 +165,6 @@ def _say_states(count: int, held: Sequence[str], drawn: Sequence[str]) -> str:
         f"in {count} controller states; the same in all: {', '.join(('what the program says', *held))}; "
         f"not the same: {', '.join(named)}"
     )
-
-
-def _same(lines: Integers) -> Integers:
-    return lines
 
 
 class _Translated(NamedTuple):
@@ -246,12 +231,12 @@ def _fault(proving: _Proving, number: int, drawn: set[str], error: ProgramError)
     causes = proving.causes(number, drawn)
     if not causes:
         return ProgramError(error.line, f"{what}; please report this: nothing was written")
-    remedies = "; ".join(states.REMEDIES[cause] for cause in causes)
+    names, remedies = " and ".join(causes), "; ".join(states.REMEDIES[cause] for cause in causes)
     if "rotation" in causes:
         remedies = f"a correction of X or Y turns with the rotation of its work coordinate system; {remedies}"
     return ProgramError(
         error.line,
-        f"{what}, in a controller where {_listed(causes)} {'is' if len(causes) == 1 else 'are'} another: that is not "
+        f"{what}, in a controller where {names} {'is' if len(causes) == 1 else 'are'} another: that is not "
         f"stated, so it cannot be proved; {remedies}",
     )
 
@@ -263,9 +248,7 @@ def _spared(proving: _Proving, number: int, drawn: set[str], error: RefusedError
         proving.original, states.build_stored(proving.setup), bool(proving.setup.inch), proving.setup.skip_optional
     )
     try:
-        with InterpreterRun(neutral) as run:
-            for _ in run.blocks():
-                pass
+        run_through(neutral)
     except ProgramError as e:
         raise Unprovable(f"LinuxCNC's interpreter does not run the original: {e}") from e
     causes = proving.causes(number, drawn)
@@ -274,10 +257,6 @@ def _spared(proving: _Proving, number: int, drawn: set[str], error: RefusedError
     causes = causes or ["start"]  # the only setting that is always random
     raise Unprovable(
         f"line {line}: the tool position depends on what is stored in the controller "
-        f"({_listed(causes)}), and the original does not run in all states of it: {reason}; "
+        f"({' and '.join(causes)}), and the original does not run in all states of it: {reason}; "
         + "; ".join(states.REMEDIES[cause] for cause in causes)
     ) from error
-
-
-def _listed(causes: list[str]) -> str:
-    return " and ".join(causes)
