@@ -11,9 +11,10 @@ from thermocomp.judging.replay import replay
 from thermocomp.judging.results import Assessment
 from thermocomp.judging.splits import Judging, Split, leave_one_cycle_out
 from thermocomp.models.methods import expand
+from thermocomp.papers.claims import Claims, Facts
 from thermocomp.papers.common import rms, stacked
 from thermocomp.papers.pictures import curves, single
-from thermocomp.papers.study import Claim, Figure, Progress, Study, StudyTable, tell_nobody
+from thermocomp.papers.study import Figure, Progress, Study, StudyTable, tell_nobody
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
 from thermocomp.virtual.datasets import record
@@ -248,7 +249,12 @@ def run(
     return Study(
         name="cross",
         title="The methods on all experiments",
-        claims=tuple(c for k, mine in enumerate(rows) for c in _claims(mine, real=k >= len(experiments))),
+        claims=tuple(
+            claim
+            for k, mine in enumerate(rows)
+            if any(not r.failure for r in mine[1:])
+            for claim in (simulated if k < len(experiments) else measured)(mine)
+        ),
         tables=(_overview(rows), *map(_table, rows)) if rows else (),
         figures=(_figure(rows),),
         numbers={f"{r.task}, {r.method}: rms_um": r.rms for mine in rows for r in mine if not r.failure},
@@ -305,36 +311,34 @@ def _fit_rms(task: Task, blocks: Sequence[Assessment]) -> float:
     return rms(np.concatenate(residuals))
 
 
-def _claims(rows: Sequence[Row], *, real: bool) -> tuple[Claim, ...]:
-    """Return the claims implied by every paper: its method is useful in an unseen test."""
+simulated = Claims[Sequence[Row]](__name__, section="simulated")
+measured = Claims[Sequence[Row]](__name__, section="measured")
+
+
+@simulated.facts
+@measured.facts
+def _useful(rows: Sequence[Row]) -> Facts:
+    """Return the facts of the claim implied by every paper: its method is useful in an unseen test."""
     none, *judged = rows
     fitted = [r for r in judged if not r.failure]
-    if not fitted:
-        return ()
-    best = min(fitted, key=lambda r: r.rms)
-    closest = min(fitted, key=lambda r: r.fit_rms)
-    harmful = [r for r in fitted if not r.rms < none.rms]
-    ratio = float(np.median([r.rms / r.fit_rms for r in fitted if r.fit_rms > 0]))
-    told = f"Unseen RMS over fit RMS: {ratio:.1f} in the median. "
-    if len(fitted) > 2:
-        rank = float(spearmanr([r.fit_rms for r in fitted], [r.rms for r in fitted]).statistic)
-        told += f"Rank correlation of the two: {rank:.2f}. "
-    told += f"The closest fit is that of {closest.method}: {closest.fit_rms:.2f} um, unseen {closest.rms:.2f} um."
-    if harmful:
-        told += " Worse than none: " + ", ".join(f"{r.method} {r.rms:.1f} um" for r in harmful) + "."
     failed = [r.method for r in judged if r.failure]
-    if failed:
-        told += f" Not fitted: {', '.join(failed)}."
-    return (
-        Claim(
-            ids=("X-02", "X-03") if real else ("X-03",),
-            text=f"{none.task}: every method is better than no compensation where it was not trained",
-            paper="",
-            ours=f"best {best.method} {best.rms:.2f} um of {none.rms:.2f} um; {len(harmful)} of {len(fitted)} do harm",
-            holds=not harmful,
-            finding=told,
-        ),
-    )
+    harmful = [(r.method, r.rms) for r in fitted if not r.rms < none.rms]
+    several = len(fitted) > 2
+    return {
+        "none": none,
+        "best": min(fitted, key=lambda r: r.rms),
+        "fitted": len(fitted),
+        "harmful": harmful,
+        "holds": not harmful,
+        "compared": True,
+        "ratio": np.median([r.rms / r.fit_rms for r in fitted if r.fit_rms > 0]),
+        "ranked": several,
+        "rank": spearmanr([r.fit_rms for r in fitted], [r.rms for r in fitted]).statistic if several else np.nan,
+        "closest": min(fitted, key=lambda r: r.fit_rms),
+        "worse": bool(harmful),
+        "unfitted": bool(failed),
+        "failed": failed,
+    }
 
 
 def _overview(rows: Sequence[Sequence[Row]]) -> StudyTable:

@@ -14,9 +14,10 @@ import numpy as np
 from thermocomp.core.components import BY_CODE, COMPONENTS
 from thermocomp.papers.chen1996.setup import TENFOLD
 from thermocomp.papers.chen1996.volume import LearnedVolume
+from thermocomp.papers.claims import Claims, Facts
 from thermocomp.papers.common import Errors, rms
 from thermocomp.papers.pictures import single
-from thermocomp.papers.study import Claims, Figure, FloatArray, Ours, PlotCurve, StudyTable
+from thermocomp.papers.study import Figure, FloatArray, PlotCurve, StudyTable
 from thermocomp.runtime.geometry.kinematics import INDEX, Kinematics
 from thermocomp.runtime.geometry.straight import straight_lines
 from thermocomp.runtime.geometry.volumetric import VolumetricModel
@@ -224,67 +225,41 @@ def as_measured(truth: VolumetricTruth, now: FloatArray, start: FloatArray, poin
 # -- claims ------------------------------------------------------------------------------------------------------------
 
 
-claims = Claims[Volume]()
+claims = Claims[Volume](__name__)
 
 
-@claims.add(
-    "C-01 C-08",
-    "The error anywhere is synthesised from components of the machine's elements (here from the true ones, to "
-    f"first order; the true error, composed exactly, is met within {CLOSED} um)",
-)
-def _closes(found: Volume) -> Ours:
-    return Ours(f"{found.closure:.3f} um at most", found.closure <= CLOSED, "angles are too large for first order")
+@claims.facts
+def _first_order(found: Volume) -> Facts:
+    enough = {code: fit.enough for code, fit in found.learned.fits.items()}
+    more = {code: m for code, m in enough.items() if m > 1}
+    straight = sum(m == 1 for m in enough.values())
+    return {
+        "straight": straight,
+        "fits": len(enough),
+        "bent": bool(more),
+        "more": more,
+        "holds": 2 * straight > len(enough),
+    }
 
 
-@claims.add(
-    "C-05",
-    "In most cases first order describes the thermal part of a position-dependent component well enough",
-    "m = 1",
-)
-def _first_order(found: Volume) -> Ours:
-    fits = found.learned.fits
-    more = [f"{code} (m = {fit.enough})" for code, fit in fits.items() if fit.enough > 1]
-    straight = sum(fit.enough == 1 for fit in fits.values())
-    return Ours(
-        f"{straight} of {len(fits)} components" + (f"; all but {', '.join(more)}" if more else ""),
-        2 * straight > len(fits),
-        "the bent parts of bed and column make parabolas",
-    )
+@claims.facts
+def _bed(found: Volume) -> Facts:
+    return {"flat": _off(found.learned.flat), "full": _off(found.learned.fits["EYX"])}
 
 
-@claims.add(
-    "C-06",
-    "The cold profile of a slide may depend on the other coordinates too (here EYX on Z: the bed gives way "
-    "under the column): with them the profile is nearer to the true one, RMS over the travels of both",
-)
-def _bed(found: Volume) -> Ours:
-    flat, full = (_off(f) for f in (found.learned.flat, found.learned.fits["EYX"]))
-    return Ours(f"{flat:.2f} -> {full:.2f} um", full < flat, "the dependence is smaller than the noise")
-
-
-@claims.add(
-    "C-35",
-    f"Compensation of all components makes the volumetric error ten times smaller, here at {POINTS} random "
-    "points, tools and thermal states of tests that were not learned from (RMS)",
-    "ten times",
-)
-def _tenfold(found: Volume) -> Ours:
-    told = ", ".join(f"{c} {e:.1f}" for c, e in found.by_component.items() if e >= 1.0)
+@claims.facts
+def _tenfold(found: Volume) -> Facts:
     spindle, axes, start = (rms(np.linalg.norm(found.causes[c], axis=1)) for c in (SPINDLE, AXES_SHARE, START))
     ratio = found.sizes[WITHOUT] / found.sizes[WITH]
-    return Ours(
-        f"{rms(found.sizes[WITHOUT]):.1f} -> {rms(found.sizes[WITH]):.2f} um, {found.gain():.1f} times, at the median "
-        f"point {np.median(ratio):.0f} times, at {np.mean(ratio >= TENFOLD):.0%} ten times or more; what is left is "
-        f"the {SPINDLE} ({spindle:.2f} um) and the {AXES_SHARE} ({axes:.2f} um); {start:.2f} um are there already at "
-        f"the {START}; by component: {told}",
-        found.gain() >= TENFOLD,
-        "temperatures do not tell all that the screws and the spindle's shaft do",
-    )
+    facts: Facts = {"without": rms(found.sizes[WITHOUT]), "with": rms(found.sizes[WITH]), "gain_all": found.gain()}
+    facts |= {"median": np.median(ratio), "often": np.mean(ratio >= TENFOLD)}
+    facts |= {"spindle": spindle, "axes": axes, "start": start}
+    return facts | {"components": {c: e for c, e in found.by_component.items() if e >= 1.0}}
 
 
-@claims.add("C-35", "What a controller reaches that takes one straight line per axis, K0 + tan b (P - P0) (ours)")
-def _lines(found: Volume) -> str:
-    return f"{rms(found.sizes[LINES]):.1f} um, {found.gain(LINES):.1f} times"
+@claims.facts
+def _lines(found: Volume) -> Facts:
+    return {"lines": rms(found.sizes[LINES]), "gain_lines": found.gain(LINES)}
 
 
 def numbers(found: Volume) -> dict[str, float]:

@@ -38,7 +38,7 @@ def run(seed: int, progress: Progress) -> Study:
         "chen1996",
         TITLE,
         Part(drift.claims(learned), show.tables(learned), show.figures(learned), drift.numbers(learned)),
-        Part(slope.claims(slopes), slope.tables(slopes), slope.figures(slopes), slope.numbers(slopes)),
+        Part(slope.judge(slopes), slope.tables(slopes), slope.figures(slopes), slope.numbers(slopes)),
         Part(unseen.claims(observed), unseen.tables(observed), unseen.figures(observed), unseen.numbers(observed)),
         Part(anywhere.claims(volumes), anywhere.tables(volumes), anywhere.figures(volumes), anywhere.numbers(volumes)),
     )

@@ -29,8 +29,8 @@ from thermocomp.virtual.datasets import record
 TARGET = "x1_um"
 #: F to enter and F to delete (T-03)
 F_ENTER, F_DELETE = 100.0, 50.0
-#: numbers of the temperatures kept in the paper's model, out of 24 (T-07); its bound on the residual [um] (T-08)
-PAPERS_CHOICE = (3, 9, 11, 18, 23)
+#: number of temperatures kept in the paper's model, out of 24 (T-07); its bound on the residual [um] (T-08)
+PAPERS_COUNT = 5
 PAPERS_RESIDUAL = 5.0
 #: methods by name in the study: the paper's and those compared (T-08), related methods (T-10), and ours
 METHODS = {
@@ -115,6 +115,11 @@ class Computed:
     def errors(self) -> dict[str, Errors]:
         """Error figures of each model in the on-line test."""
         return {name: Errors.of(e) for name, e in self.left.items()}
+
+    @property
+    def fitted(self) -> Errors:
+        """Error figures of the stepwise model in the training test."""
+        return Errors.of(self.left_in_fit[STEPWISE])
 
     @property
     def chosen(self) -> tuple[str, ...]:
