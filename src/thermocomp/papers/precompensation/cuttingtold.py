@@ -3,14 +3,15 @@
 import numpy as np
 
 from thermocomp.papers.claims import Claims, Facts
+from thermocomp.papers.exhibits import Exhibits
 from thermocomp.papers.pictures import curves
 from thermocomp.papers.precompensation import cutting, program, setup
 from thermocomp.papers.precompensation.cutting import CARRIED, COOLS, FALSE, RIGHT, UNKNOWN, WARMS, Milled, Surfaces
 from thermocomp.papers.precompensation.program import EVERY, NEEDED, SAFE, WAYS
 from thermocomp.papers.precompensation.setup import LEAST, NET, NONE
-from thermocomp.papers.study import Figure, FloatArray, Panel, PlotCurve, StudyTable, Style
+from thermocomp.papers.study import Figure, FloatArray, PlotCurve, StudyTable, Style
 
-claims = Claims[Milled](__name__, setup, cutting, program)
+claims, exhibits = Claims[Milled](__name__, setup, cutting, program), Exhibits(__name__)
 
 
 @claims.facts
@@ -56,32 +57,16 @@ def _room(m: Milled) -> Facts:
 
 def tables(m: Milled) -> tuple[StudyTable, ...]:
     """Return depth differences by model and revision method, by test, and by true state."""
-    shown = [(NONE, ""), *((NET, way) for way in WAYS), (LEAST, EVERY)]
+    shown = [m.without(RIGHT), *(m.surfaces[RIGHT, NET, way] for way in WAYS), m.paper(RIGHT, LEAST)]
+    by_method = [(name, [_cell(m, name, way) for way in WAYS]) for name in _models(m)]
+    by_state = [
+        (case, _told(m.without(case)), *(_told(m.paper(case, name)) for name in cutting.TRIED))
+        for case in cutting.CASES
+    ]
     return (
-        StudyTable(
-            f"Depth difference with NC programs, {_over(m)}; in brackets the greatest [um]",
-            ("model", *WAYS),
-            [
-                [NONE, _told(m.without(RIGHT)), "", ""],
-                *([name, *(_cell(m, name, way) for way in WAYS)] for name in _models(m)),
-            ],
-        ),
-        StudyTable(
-            "Depth difference with NC programs, mean over the positions [um]",
-            ("", *(f"{name.partition(',')[0]}{way and f', {way}'}" for name, way in shown)),
-            [
-                [f"test {n + 1}", *(f"{m.surfaces[RIGHT, name, way].by_test[n]:.1f}" for name, way in shown)]
-                for n in range(len(m.without(RIGHT).depth))
-            ],
-        ),
-        StudyTable(
-            f"Depth difference with NC programs revised {EVERY}, {_over(m)}; in brackets the greatest [um]",
-            ("machine and room", NONE, *cutting.TRIED),
-            [
-                [case, _told(m.without(case)), *(_told(m.paper(case, name)) for name in cutting.TRIED)]
-                for case in cutting.CASES
-            ],
-        ),
+        exhibits.table("by_method", [(NONE, [_told(m.without(RIGHT)), "", ""]), *by_method], over=_over(m)),
+        exhibits.table("by_test", enumerate(zip(*(s.by_test for s in shown), strict=True), start=1)),
+        exhibits.table("by_state", by_state, over=_over(m)),
     )
 
 
@@ -90,46 +75,23 @@ def figures(m: Milled) -> tuple[Figure, ...]:
     tests = np.arange(1.0, len(m.without(RIGHT).depth) + 1)
     # extended to the right, where the legend hides nothing
     zero = PlotCurve("", np.array([1.0, 1.5 * len(tests)]), np.zeros(2), "dashed")
-    ways: tuple[tuple[str, str, Style], ...] = (
-        ("", "not revised", "line"),
-        (EVERY, EVERY, "dashed"),
-        (NEEDED, NEEDED, "line"),
+    ways: dict[str, tuple[str, Style]] = {
+        "": ("not revised", "line"),
+        EVERY: (EVERY, "dashed"),
+        NEEDED: (NEEDED, "line"),
+    }
+    cold, later = (
+        [PlotCurve(label, *_surfaces(m, way, number), style) for way, (label, style) in ways.items()]
+        for number in (1, 2)
     )
+    room, state = (
+        {"not revised": m.without(RIGHT).signed} | {case: m.paper(case).signed for case in cases}
+        for cases in ((RIGHT, WARMS, COOLS), (RIGHT, UNKNOWN, CARRIED, FALSE))
+    )
+    compared = ([*curves(tests, values, "points"), zero] for values in (room, state))
     return (
-        Figure(
-            "precompensation-surfaces",
-            "Test 1: where the surfaces lie that its NC program mills, at one position of Z after the other, cold and "
-            "after the hour; revised with the net. Not in the paper.",
-            [
-                Panel(
-                    title,
-                    "time [min]",
-                    "actual minus drawing [um]",
-                    [PlotCurve(label, *_surfaces(m, way, number), style) for way, label, style in ways],
-                )
-                for number, title in ((1, "milled cold"), (2, "milled after the hour"))
-            ],
-            columns=2,
-        ),
-        Figure(
-            "precompensation-programs",
-            "Second surface minus first, mean over the positions, of NC programs revised every 10 min with the net "
-            "(P-07); and where room (E-P6) or start state (E-P5) are not what the revision takes them for. Warm: the "
-            f"spindle had run for {cutting.BEFORE / 60:g} min before.",
-            [
-                Panel(title, "cutting test", "depth difference [um]", [*curves(tests, values, "points"), zero])
-                for title, values in (
-                    (
-                        f"revised: {what}",
-                        {"not revised": m.without(RIGHT).signed} | {case: m.paper(case).signed for case in cases},
-                    )
-                    for what, cases in (
-                        ("the room", (RIGHT, WARMS, COOLS)),
-                        ("the start state", (RIGHT, UNKNOWN, CARRIED, FALSE)),
-                    )
-                )
-            ],
-        ),
+        exhibits.figure("precompensation-surfaces", cold, later),
+        exhibits.figure("precompensation-programs", *compared, minutes=cutting.BEFORE / 60),
     )
 
 

@@ -11,10 +11,10 @@ import numpy as np
 from thermocomp.models.selection.orders import Order
 from thermocomp.papers.claims import Claims, Facts
 from thermocomp.papers.common import Errors, errors_table, rms
-from thermocomp.papers.pictures import curves, single
+from thermocomp.papers.exhibits import Exhibits
 from thermocomp.papers.precompensation import cutting, cuttingtold, setup
 from thermocomp.papers.precompensation.setup import CHOSEN, CUTS, LEAST, NET, POSITIONS, Computed
-from thermocomp.papers.study import Figure, Panel, Part, Progress, Study, StudyTable
+from thermocomp.papers.study import Figure, Part, Progress, Study, StudyTable
 
 TITLE = "Pre-compensation of thermal errors by revising the NC program"
 #: criterion for "describes thermal errors well": minimum explained share of the variance at every position
@@ -45,7 +45,7 @@ def run(seed: int, progress: Progress) -> Study:
     return Study.of("precompensation", TITLE, recorded, milled)
 
 
-claims = Claims[Computed](__name__, setup)
+claims, exhibits = Claims[Computed](__name__, setup), Exhibits(__name__)
 
 
 @claims.facts
@@ -121,30 +121,12 @@ def _room(c: Computed) -> Facts:
 def _tables(c: Computed) -> tuple[StudyTable, ...]:
     order = range(setup.GREATEST + 1)
     table = {(o.k, o.m): o for o in c.orders[0]}
-    fpe = [[f"k = {k}", *(_fpe(table.get((k, m))) for m in order)] for k in order]
     left = {(f"z at {p} mm", name): e[:, j] for j, p in enumerate(POSITIONS) for name, e in c.left.items()}
-    clocks = [
-        [f"{h / 60:g}", f"{k}, {m}", f"{chosen:.2f}", f"{paper:.2f}"] for h, ((k, m), chosen, paper) in c.clocks.items()
-    ]
-    cuts = [[f"test {n}", *(f"{v:+.1f}" for v in (*k.without, *k.scheduled))] for n, k in enumerate(c.cuts, start=1)]
-    first = f"at z = {POSITIONS[0]} mm"
     return (
-        StudyTable(
-            f"Final prediction error [um2] {first}, steps of 10 min; in brackets: the free run does not decay",
-            ("", *(f"m = {m}" for m in order)),
-            fpe,
-        ),
+        exhibits.table("orders", [(k, [_fpe(table.get((k, m))) for m in order]) for k in order]),
         errors_table("Free run in the verification: what is left", left),
-        StudyTable(
-            f"Orders by the step of time, {first}",
-            ("step [min]", "k, m by FPE", "free-run RMS [um]", "with k = 1, m = 0 [um]"),
-            clocks,
-        ),
-        StudyTable(
-            "Depth difference of the second surface to the first [um]",
-            ("", *(f"{p} mm{what}" for what in ("", ", corrected") for p in POSITIONS)),
-            cuts,
-        ),
+        exhibits.table("clocks", [(h / 60, *clock) for h, clock in c.clocks.items()]),
+        exhibits.table("cuts", [(n, k.without, k.scheduled) for n, k in enumerate(c.cuts, start=1)]),
     )
 
 
@@ -156,43 +138,17 @@ def _fpe(order: Order | None) -> str:
 
 def _figures(c: Computed) -> tuple[Figure, ...]:
     hours, z, left = c.judge.time / 3600, c.judge.deviations, c.left[NET]
-    predicted = {
-        k: {"measured": z[:, k], "net": c.free_run[NET][:, k], "residual": left[:, k]} for k in (0, len(POSITIONS) - 1)
-    }
+    first, last = (
+        {"measured": z[:, k], "net": c.free_run[NET][:, k], "residual": left[:, k]} for k in (0, len(POSITIONS) - 1)
+    )
     added = {"drift": z[:, 0], "added to the program": c.schedule[:, 0], "left": z[:, 0] + c.schedule[:, 0]}
     without, with_ = np.array([k.means for k in c.cuts]).T
     warm = {"drift": c.warm.drift, "left, begun cold": c.warm.cold, "left, carried over": c.warm.carried}
     return (
-        Figure(
-            "precompensation-fig4",
-            "Fig. 4: drift of Z under new conditions, and its prediction from the spindle speed alone.",
-            [
-                Panel(f"z at {POSITIONS[k]} mm", "time [h]", "z [um]", curves(hours, values, dashed=["net"]))
-                for k, values in predicted.items()
-            ],
-            columns=2,
-        ),
-        single(
-            "precompensation-schedule",
-            "The correction that stands in the program, a new one every 10 min, and what is left of the drift (P-06).",
-            ("time [h]", "[um]"),
-            curves(hours, added, dashed=["added to the program"]),
-            title=f"z at {POSITIONS[0]} mm",
-        ),
-        single(
-            "precompensation-cut",
-            "The effectiveness of pre-compensation: depth difference in each cutting test (P-07).",
-            ("cutting test", "depth difference [um]"),
-            curves(np.arange(1.0, CUTS + 1), {"without": without, "with": with_}, "points"),
-            columns=2,
-        ),
-        single(
-            "precompensation-warm",
-            "Not in the paper: a job begins on a warm machine. What is left if the model begins cold, and if it "
-            "carries its state over (E-P5).",
-            ("time since the job began [h]", "z [um]"),
-            curves(c.warm.hours, warm, dashed=["left, carried over"]),
-        ),
+        exhibits.figure("precompensation-fig4", (hours, first), (hours, last)),
+        exhibits.figure("precompensation-schedule", (hours, added)),
+        exhibits.figure("precompensation-cut", (np.arange(1.0, CUTS + 1), {"without": without, "with": with_})),
+        exhibits.figure("precompensation-warm", (c.warm.hours, warm)),
     )
 
 

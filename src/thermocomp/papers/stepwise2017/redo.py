@@ -4,17 +4,14 @@ Temperatures are relative to the start of the test, as in Fig. 2 of the paper. I
 so methods are judged by their RMS residual in a test on another day with other speeds.
 """
 
-from collections.abc import Callable
-
 import numpy as np
 
-from thermocomp.models.numerics.stepwise import StepwiseStep
 from thermocomp.papers.claims import Claims, Facts
-from thermocomp.papers.common import errors_table, rms, table
-from thermocomp.papers.pictures import curves, single
+from thermocomp.papers.common import errors_table, rms
+from thermocomp.papers.exhibits import Exhibits
 from thermocomp.papers.stepwise2017 import setup
-from thermocomp.papers.stepwise2017.setup import F_ENTER, LEAST, PAPERS_RESIDUAL, PURSUIT, STEPWISE, Computed, Thinned
-from thermocomp.papers.study import Figure, Panel, Part, Progress, Study, StudyTable
+from thermocomp.papers.stepwise2017.setup import F_ENTER, LEAST, PAPERS_RESIDUAL, PURSUIT, STEPWISE, Computed
+from thermocomp.papers.study import Figure, Part, Progress, Study, StudyTable
 
 TITLE = "Open Mech. Eng. J. 11 (2017): Temperature measurement point optimization by stepwise regression"
 #: numbers of the temperatures in Fig. 2 of the paper
@@ -41,7 +38,7 @@ def _place(name: str) -> str:
     return name.removeprefix("t_").removesuffix("_C")
 
 
-claims = Claims[Computed](__name__, setup)
+claims, exhibits = Claims[Computed](__name__, setup), Exhibits(__name__)
 
 
 @claims.facts
@@ -109,27 +106,12 @@ def _thinned(c: Computed) -> Facts:
 
 
 def _tables(c: Computed) -> tuple[StudyTable, ...]:
-    steps: dict[str, Callable[[StepwiseStep], str]] = {
-        "step": lambda s: str(s.number),
-        "temperature": lambda s: f"{'+' if s.action == 'enter' else '-'} {_place(s.term)}",
-        "partial F": lambda s: f"{s.f:.1f}",
-        "alpha if rows were independent": lambda s: f"{s.alpha:.1e}",
-        "R2": lambda s: f"{s.r_squared:.4f}",
-        "change of R2": lambda s: f"{s.r_squared_step:+.1e}",
-    }
-    thinned: dict[str, Callable[[Thinned], str]] = {
-        "rows": lambda t: str(t.rows),
-        "independent": lambda t: f"{t.effective:.0f}",
-        "R2 a first one needs": lambda t: f"{t.first:.2f}",
-        "chosen": lambda t: str(len(t.names)),
-        "which": lambda t: ", ".join(map(_place, t.names)),
-        "on-line RMS [um]": lambda t: f"{t.rms:.2f}",
-    }
+    steps = [(s, "+" if s.action == "enter" else "-", _place(s.term)) for s in c.selection.log_]
     tests = (("fit", c.left_in_fit), ("on-line", c.left))
     return (
-        table("Steps of the selection", c.selection.log_, steps),
+        exhibits.table("steps", steps),
         errors_table("What the methods leave", {(what, m): e for what, left in tests for m, e in left.items()}),
-        table("What a fixed F owes to the number of rows (E-T3)", c.thinned, thinned),
+        exhibits.table("thinned", [(t, list(map(_place, t.names))) for t in c.thinned]),
     )
 
 
@@ -140,30 +122,9 @@ def _figures(c: Computed) -> tuple[Figure, ...]:
     estimated = {m: now - e for m, e in left.items()} | {"measured": now}
     rows, kept = np.array([(float(t.rows), float(len(t.names))) for t in c.thinned]).T
     return (
-        Figure(
-            "stepwise2017-fig2",
-            "Fig. 2 and 4: temperatures No. 3, 11 and 14 of our sensors, and the drift of X.",
-            [
-                Panel("temperatures", "time [h]", "[degC]", curves(hours, warm)),
-                Panel("drift", "time [h]", "x [um]", curves(hours, {"": c.fit.deviations[:, 0]})),
-            ],
-            columns=2,
-        ),
-        Figure(
-            "stepwise2017-fig6",
-            "Fig. 6: on another day with other speeds, the drift and its predictions, and what each of them leaves.",
-            [
-                Panel("predicted", "time [h]", "x [um]", curves(clock, estimated, dashed=["measured"])),
-                Panel("residual", "time [h]", "[um]", curves(clock, left)),
-            ],
-        ),
-        single(
-            "stepwise2017-rows",
-            "Not in the paper: the same test, every row to every 16th, and how many temperatures F_E = 100 keeps.",
-            ("rows", "temperatures"),
-            curves(rows, {"": kept}),
-            columns=2,
-        ),
+        exhibits.figure("stepwise2017-fig2", (hours, warm), (hours, {"": c.fit.deviations[:, 0]})),
+        exhibits.figure("stepwise2017-fig6", (clock, estimated), (clock, left)),
+        exhibits.figure("stepwise2017-rows", (rows, {"": kept})),
     )
 
 

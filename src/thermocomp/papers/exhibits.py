@@ -1,0 +1,63 @@
+"""Tables and figures of a paper's study as data: entries of ``exhibits.toml`` beside it, filled with numbers.
+
+``tables``
+    ``caption``, and ``columns`` with a template of the cell by heading. A row is a tuple, whose items are ``{0}``,
+    ``{1}``, or an object, whose attributes have their names.
+``figures``
+    ``caption``; ``columns``: number of panels next to each other (default: 1); ``panels``: title and labels of x and y
+    of each; ``style``, and the labels of curves that are ``dashed`` or ``points``.
+
+Captions and labels are templates; see `thermocomp.papers.sentences.Sentences`.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from types import ModuleType
+from typing import Any
+
+from thermocomp.papers.pictures import curves
+from thermocomp.papers.sentences import TextFile
+from thermocomp.papers.study import Figure, FloatArray, Panel, PlotCurve, StudyTable
+
+#: curves of a panel; or their x, and y by label
+Drawn = Sequence[PlotCurve] | tuple[FloatArray, Mapping[str, FloatArray]]
+
+
+class Exhibits:
+    """Tables and figures of a study.
+
+    Parameters
+    ----------
+    module, *others
+        See `thermocomp.papers.sentences.TextFile`.
+    """
+
+    def __init__(self, module: str, *others: ModuleType) -> None:
+        self._file = TextFile("exhibits.toml", module, *others)
+
+    def table(self, key: str, items: Iterable[Any], **names: Any) -> StudyTable:
+        """Return a table with a row per item; names are for the caption and the cells."""
+        entry = self._file.content["tables"][key]
+        caption = self._file.sentences(names, None).fill(entry["caption"])
+        rows = []
+        for item in items:
+            cells = self._file.sentences(names, item, entry.get("parts"))
+            rows.append(
+                [cells.fill(cell, *(item if isinstance(item, tuple) else ())) for cell in entry["columns"].values()]
+            )
+        return StudyTable(caption, tuple(entry["columns"]), rows)
+
+    def figure(self, key: str, *drawn: Drawn | Panel, **names: Any) -> Figure:
+        """Return a figure: its panels, or the curves of the panels that the entry describes."""
+        entry = self._file.content["figures"][key]
+        said = self._file.sentences(names, None)
+        styles = {name: entry[name] for name in ("style", "dashed", "points") if name in entry}
+        panels = []
+        described = iter(entry.get("panels", ()))
+        for each in drawn:
+            if isinstance(each, Panel):
+                panels.append(each)
+                continue
+            title, xlabel, ylabel = map(said.fill, next(described))
+            shown = curves(*each, **styles) if isinstance(each, tuple) else each
+            panels.append(Panel(title, xlabel, ylabel, shown))
+        return Figure(key, said.fill(entry["caption"]), panels, entry.get("columns", 1))
