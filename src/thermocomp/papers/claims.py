@@ -13,7 +13,8 @@ order of presentation:
 ``note``, ``otherwise``
     Limitation, and the reason shown only if the claim does not hold.
 ``parts``
-    Parts of the sentences, by name; see `thermocomp.papers.sentences.Sentences`. Those of a section ``parts`` are for all entries.
+    Parts of the sentences, by name; see `thermocomp.papers.sentences.Sentences`. Those of a section ``parts`` are for
+    all entries.
 ``each``
     Repeats the entry for each of several values, which its sentences call ``{each}``.
 

@@ -1,8 +1,8 @@
 """Tables and figures of a paper's study as data: entries of ``exhibits.toml`` beside it, filled with numbers.
 
 ``tables``
-    ``caption``, and ``columns`` with a template of the cell by heading. A row is a tuple, whose items are ``{0}``,
-    ``{1}``, or an object, whose attributes have their names.
+    ``caption``, and ``columns``: heading, and template of the cells, of each. A row is a tuple, whose items are
+    ``{0}``, ``{1}``, or an object, whose attributes have their names.
 ``figures``
     ``caption``; ``columns``: number of panels next to each other (default: 1); ``panels``: title and labels of x and y
     of each; ``style``, and the labels of curves that are ``dashed`` or ``points``.
@@ -40,11 +40,10 @@ class Exhibits:
         caption = self._file.sentences(names, None).fill(entry["caption"])
         rows = []
         for item in items:
-            cells = self._file.sentences(names, item, entry.get("parts"))
-            rows.append(
-                [cells.fill(cell, *(item if isinstance(item, tuple) else ())) for cell in entry["columns"].values()]
-            )
-        return StudyTable(caption, tuple(entry["columns"]), rows)
+            values = item if isinstance(item, tuple) else ()
+            said = self._file.sentences(names, item)
+            rows.append([said.fill(cell, *values) for _, cell in entry["columns"]])
+        return StudyTable(caption, [heading for heading, _ in entry["columns"]], rows)
 
     def figure(self, key: str, *drawn: Drawn | Panel, **names: Any) -> Figure:
         """Return a figure: its panels, or the curves of the panels that the entry describes."""

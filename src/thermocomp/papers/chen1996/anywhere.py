@@ -12,11 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from thermocomp.core.components import BY_CODE, COMPONENTS
-from thermocomp.papers.chen1996.setup import TENFOLD
+from thermocomp.papers.chen1996.setup import TENFOLD, exhibits
 from thermocomp.papers.chen1996.volume import LearnedVolume
 from thermocomp.papers.claims import Claims, Facts
 from thermocomp.papers.common import Errors, rms
-from thermocomp.papers.pictures import single
 from thermocomp.papers.study import Figure, FloatArray, PlotCurve, StudyTable
 from thermocomp.runtime.geometry.kinematics import INDEX, Kinematics
 from thermocomp.runtime.geometry.straight import straight_lines
@@ -274,12 +273,10 @@ def numbers(found: Volume) -> dict[str, float]:
 
 def tables(found: Volume) -> list[StudyTable]:
     """Return the errors before and after compensation, and source and residual of each component."""
-    rows = []
-    for name, size in found.sizes.items():
-        along = [f"{rms(found.errors[name][:, k]):.2f}" for k in range(3)]
-        e = Errors.of(size)
-        rows.append([name, f"{e.rms:.2f}", f"{np.percentile(size, MOST):.2f}", f"{e.max_abs:.2f}", *along])
-    header = ("", "RMS", f"{MOST} %", "max", "X RMS", "Y RMS", "Z RMS")
+    sizes = [
+        (name, Errors.of(size), np.percentile(size, MOST), [rms(e) for e in found.errors[name].T])
+        for name, size in found.sizes.items()
+    ]
     parts = []
     for c in COMPONENTS:
         fit = found.learned.fits.get(c.code)
@@ -287,26 +284,16 @@ def tables(found: Volume) -> list[StudyTable]:
         how = "no model: in the spindle's drifts" if source is None else "constant" if fit is None else ""
         if c.group == "spindle":
             how = "drift"
-        made = ["", "", ""] if fit is None else [f"{fit.profile.order[0]}", f"{fit.enough}", f"{fit.thermal_rms:.2f}"]
-        parts.append([c.code, c.description, how, *made, f"{found.by_component[c.code]:.2f}"])
-    return [
-        StudyTable(f"Length of the error at {POINTS} random points and thermal states [um]", header, rows),
-        StudyTable(
-            "The 32 components: degree of the cold profile, m, thermal part [um, urad RMS], and what its own error "
-            "does to the tool point [um RMS]",
-            ("", "", "", "degree", "m", "thermal", "left"),
-            parts,
-        ),
-    ]
+        made = ("", "", "") if fit is None else (fit.profile.order[0], fit.enough, f"{fit.thermal_rms:.2f}")
+        parts.append((c, how, *made, found.by_component[c.code]))
+    return [exhibits.table("errors", sizes, points=POINTS), exhibits.table("components", parts)]
 
 
 def figures(found: Volume) -> list[Figure]:
     """Return the cumulative distribution of the error over the points, before and after."""
     share = 100.0 * np.arange(1, POINTS + 1) / POINTS
     lines = [PlotCurve(name, np.sort(size), share) for name, size in found.sizes.items()]
-    text = f"The volumetric error at {POINTS} random points and thermal states, before and after."
-    axes = "length of the error vector [um]", "points with a smaller one [%]"
-    return [single("chen1996-volume", text, axes, lines)]
+    return [exhibits.figure("chen1996-volume", lines, points=POINTS)]
 
 
 def _off(fit: PositionFit) -> float:

@@ -17,7 +17,15 @@ from thermocomp.core.polynomial import Polynomial
 from thermocomp.models.mlp import SigmoidNet
 from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.papers.chen1996 import setup
-from thermocomp.papers.chen1996.setup import EQ6, EQ8, SLOPE_VARIABLES, TEMPERATURES, recordings, with_differences
+from thermocomp.papers.chen1996.setup import (
+    EQ6,
+    EQ8,
+    SLOPE_VARIABLES,
+    TEMPERATURES,
+    exhibits,
+    recordings,
+    with_differences,
+)
 from thermocomp.papers.claims import Claims, Facts
 from thermocomp.papers.common import rms
 from thermocomp.papers.study import FloatArray, StudyTable
@@ -346,26 +354,11 @@ def numbers(found: Law) -> dict[str, float]:
 
 def tables(found: Law) -> list[StudyTable]:
     """Return the frequency of recovery of the law, and its coefficients."""
-    rates = [
-        [d.name, f"{d.laser:g}", f"{d.sensor:g}", *(f"{v:.1%}" for v in (r.whole, r.missing, r.wrong))]
-        for d, r in found.recoveries.items()
-    ]
     got, errors = found.fit.model.slopes[0], found.fit.coefficient_errors[0]
     first = got.coefficients_by_name() if isinstance(got, Polynomial) else {}
     drawn = found.recoveries[OURS].coefficients
     coefficients = [
-        [t, f"{true:.3f}", *(f"{v[t]:.3f}" if t in v else "" for v in (first, errors)), f"{mean:.3f}", f"{spread:.3f}"]
+        (t, true, *(f"{v[t]:.3f}" if t in v else "" for v in (first, errors)), mean, spread)
         for (t, true), mean, spread in zip(EQ8.items(), drawn.mean(axis=0), drawn.std(axis=0), strict=True)
     ]
-    return [
-        StudyTable(
-            "A planted law sought: share of the draws",
-            ("51 profiles", "laser [um]", "sensor [degC]", "whole", "a term missing", "a wrong one"),
-            rates,
-        ),
-        StudyTable(
-            "Coefficients of the planted law [um/m per degC]",
-            ("term", "planted", "found, first draw", "standard error", "mean of draws", "spread of draws"),
-            coefficients,
-        ),
-    ]
+    return [exhibits.table("rates", found.recoveries.items()), exhibits.table("law", coefficients)]

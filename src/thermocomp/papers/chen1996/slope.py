@@ -13,11 +13,10 @@ from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.papers import common
 from thermocomp.papers.chen1996 import law, setup
 from thermocomp.papers.chen1996.law import HIDDEN, Law, r2_about_zero
-from thermocomp.papers.chen1996.setup import CLOSELY, EQ6, EQ8, SLOPE_VARIABLES, recordings, with_differences
-from thermocomp.papers.chen1996.show import beside, figure
+from thermocomp.papers.chen1996.setup import CLOSELY, EQ6, EQ8, SLOPE_VARIABLES, exhibits, recordings, with_differences
+from thermocomp.papers.chen1996.show import beside
 from thermocomp.papers.claims import Claims, Facts
 from thermocomp.papers.common import PAPERS_SUPPORT, Errors, rms
-from thermocomp.papers.pictures import curves
 from thermocomp.papers.study import Claim, Figure, FloatArray, PlotCurve, StudyTable
 from thermocomp.recordings.profiles import Profiles
 from thermocomp.recordings.readers.profiles import from_recording
@@ -243,17 +242,15 @@ def tables(found: LearnedPositioning) -> list[StudyTable]:
     ours = dict(zip(found.regression.terms_, found.regression.coef_.tolist(), strict=True))
     # in powers of mm, as in the paper
     cold = np.polynomial.polynomial.polyfit(learned.position, found.geometric(learned), EQ6.degree())
-    eq6 = [
-        [f"y^{k}", f"{1e-3 * c:.3e}", f"{1e-3 * p:.3e}"]
-        for k, (c, p) in enumerate(zip(cold, EQ6.coef.tolist(), strict=True))
-    ]
     errors = {}
     for day, what in ((learned, "learned"), (found.other, "another day")):
         errors[what, NONE] = day.values
         errors |= {(what, "cold profile alone" if m == NONE else m): e for m, e in residuals(found, day).items()}
     return [
-        StudyTable("Cold profile [mm, y in mm] here and in Eq. 6", ("term", "here", "Eq. 6"), eq6),
-        beside("Slope of Y: coefficients [um/m per degC, degC2]", "Eq. 8", ours, EQ8),
+        exhibits.table(
+            "cold", [(k, 1e-3 * c, 1e-3 * p) for k, (c, p) in enumerate(zip(cold, EQ6.coef.tolist(), strict=True))]
+        ),
+        exhibits.table("eq8", beside(ours, EQ8)),
         common.errors_table("Positioning of Y, all profiles: error without and with compensation", errors),
         *law.tables(found.law),
     ]
@@ -265,16 +262,14 @@ def figures(found: LearnedPositioning) -> list[Figure]:
     hours = learned.states.time / 3600.0
     peak = int(np.abs(k1).argmax())
     states = [*np.linspace(0, peak, 5).round().astype(int).tolist(), len(hours) - 1]
-    drawn = []
-    for number, day, text, label in (
-        (1, found.pitch, "pitch of Y (the paper shows its yaw)", "pitch of Y [urad]"),
-        (6, learned, "positioning errors of Y", "positioning error of Y [um]"),
-    ):
-        profiles = [PlotCurve(f"after {hours[k]:.1f} h", day.position, day.values[k]) for k in states]
-        drawn.append(figure(number, f"{text} in several thermal states.", ("position of Y [mm]", label), profiles))
-    for number, method in ((7, MRA), (13, NET)):
-        slopes = {"measured": k1, method: found.predicted(found.fits[method], learned)}
-        text = f"slope of the positioning error of Y, and the fit by the {method}."
-        lines = curves(hours, slopes, points=["measured"])
-        drawn.append(figure(number, text, ("time [h]", "slope [um/m]"), lines))
-    return drawn
+    pitch, errors = (
+        [PlotCurve(f"after {hours[k]:.1f} h", day.position, day.values[k]) for k in states]
+        for day in (found.pitch, learned)
+    )
+    mra, net = ({"measured": k1, m: found.predicted(found.fits[m], learned)} for m in (MRA, NET))
+    return [
+        exhibits.figure("chen1996-fig1", pitch),
+        exhibits.figure("chen1996-fig6", errors),
+        exhibits.figure("chen1996-fig7", (hours, mra)),
+        exhibits.figure("chen1996-fig13", (hours, net)),
+    ]

@@ -12,11 +12,9 @@ from thermocomp.models.numerics.leastsquares import effective_sample_size
 from thermocomp.papers import common
 from thermocomp.papers.chen1996 import setup
 from thermocomp.papers.chen1996.drift import LearnedDrift
-from thermocomp.papers.chen1996.setup import COMPETITIVE, DRIFTS, WELL, drift_samples, recordings
-from thermocomp.papers.chen1996.show import figure
+from thermocomp.papers.chen1996.setup import COMPETITIVE, DRIFTS, WELL, drift_samples, exhibits, recordings
 from thermocomp.papers.claims import Claims, Facts
 from thermocomp.papers.common import Errors, trained
-from thermocomp.papers.pictures import curves
 from thermocomp.papers.study import Figure, FloatArray, StudyTable
 from thermocomp.recordings.samples import Samples
 
@@ -275,16 +273,10 @@ def figures(found: Unseen) -> list[Figure]:
     """Return Figs. 14 to 17."""
     constant, random = found.tests
     noisy = common.with_noise(constant, NOISE, "uniform", 0)
-    return [
-        _figure(found, 14, "z", constant, "drift in z at 1250 1/min, a speed that was not learned."),
-        _figure(found, 15, "z", random, "drift in z at random speeds."),
-        _figure(found, 16, "z", noisy, f"as Fig. 14, with uniform noise of {NOISE} degC on all temperatures."),
-        _figure(found, 17, "x", found.cut, "drift in x at 1250 1/min with the spindle temperature T2 cut off."),
-    ]
-
-
-def _figure(found: Unseen, number: int, target: str, samples: Samples, text: str) -> Figure:
-    drift = {"measured": common.take_measured(samples, target)}
-    drift |= {m: common.predict_deviation(models[target], samples) for m, models in found.models.items()}
-    lines = curves(samples.time / 3600.0, drift, dashed=[DYNAMIC], points=["measured"])
-    return figure(number, text, ("time [h]", f"{target} [um]"), lines)
+    shown = {14: ("z", constant), 15: ("z", random), 16: ("z", noisy), 17: ("x", found.cut)}
+    drawn = []
+    for number, (target, samples) in shown.items():
+        drift = {"measured": common.take_measured(samples, target)}
+        drift |= {m: common.predict_deviation(models[target], samples) for m, models in found.models.items()}
+        drawn.append(exhibits.figure(f"chen1996-fig{number}", (samples.time / 3600.0, drift)))
+    return drawn

@@ -15,6 +15,7 @@ from thermocomp.models.selection.maximal_correlation import (
     subsets_up_to,
 )
 from thermocomp.papers.claims import Claims, Facts
+from thermocomp.papers.exhibits import Exhibits
 from thermocomp.papers.study import FloatArray, Part, Progress, StudyTable
 from thermocomp.virtual.datasets import record
 from thermocomp.virtual.protocol import Physics
@@ -149,7 +150,7 @@ def name_set(places: Sequence[int]) -> str:
 
 # -- claims ------------------------------------------------------------------------------------------------------------
 
-claims = Claims[Selection](__name__)
+claims, exhibits = Claims[Selection](__name__), Exhibits(__name__)
 
 
 @claims.facts
@@ -196,25 +197,15 @@ def _shared(s: Selection) -> Facts:
 def _tables(s: Selection) -> tuple[StudyTable, ...]:
     targets = [f"S{d + 1}" for d in range(len(s.psi.psi))]
     special = {"the paper's": PAPERS_OWN, "chosen": s.chosen}
-    listed = [r for k, r in enumerate(s.small.table()) if k < 12 or r.subset in special.values()]
-    return (
-        StudyTable(
-            "Appendix B: mean Psi of the best set of each size",
-            ("temperatures", *targets),
-            [[str(k), *(f"{v:.4f}" for v in best)] for k, best in s.by_size.items()],
-        ),
-        StudyTable(
-            "Appendix B: sets of at most three, first those as good as the best for most displacements",
-            ("set", *(f"mean Psi {t}" for t in targets), "smallest p", "as good for", ""),
-            [
-                [
-                    name_set(r.subset),
-                    *(f"{v / len(s.psi.tests):.4f}" for v in r.summed),
-                    f"{min(r.p_values):.2g}",
-                    " ".join(targets[d] for d in r.equivalent),
-                    " ".join(word for word, subset in special.items() if subset == r.subset),
-                ]
-                for r in listed
-            ],
-        ),
-    )
+    listed = [
+        (
+            name_set(r.subset),
+            [v / len(s.psi.tests) for v in r.summed],
+            min(r.p_values),
+            [targets[d] for d in r.equivalent],
+            [word for word, subset in special.items() if subset == r.subset],
+        )
+        for k, r in enumerate(s.small.table())
+        if k < 12 or r.subset in special.values()
+    ]
+    return exhibits.table("sizes", s.by_size.items()), exhibits.table("sets", listed)

@@ -9,8 +9,9 @@ import numpy as np
 from thermocomp.models.ace import ACE
 from thermocomp.papers.claims import Claims, Facts
 from thermocomp.papers.common import rms
+from thermocomp.papers.exhibits import Exhibits
 from thermocomp.papers.pictures import curves
-from thermocomp.papers.study import BoolArray, Figure, Panel, Part, Progress, StudyTable
+from thermocomp.papers.study import BoolArray, Figure, Panel, Part, Progress
 from thermocomp.papers.wessel2004.trial import (
     ACE_NAME,
     SLIGHT,
@@ -97,11 +98,7 @@ def spindle(seed: int, progress: Progress, physics: Physics | None = None) -> Pa
     s = Spindle(recordings, found, peaked)
     tables = (
         found.table("Finite-element spindle: the displacement at the tip in the test series"),
-        StudyTable(
-            "ACE in the test series with k neighbours",
-            ("k", "RMS [um]", "RMS difference from k = 2 [um]"),
-            [[str(k), f"{error:.3f}", f"{difference:.3f}"] for k, (error, difference) in s.sweep.items()],
-        ),
+        exhibits.table("neighbours", s.sweep.items()),
     )
     numbers = found.numbers("fem") | found.rms_by_method("fem")
     numbers |= {
@@ -115,7 +112,7 @@ def spindle(seed: int, progress: Progress, physics: Physics | None = None) -> Pa
 
 # -- claims ------------------------------------------------------------------------------------------------------------
 
-claims = Claims[Spindle](__name__)
+claims, exhibits = Claims[Spindle](__name__), Exhibits(__name__)
 
 
 @claims.facts
@@ -191,36 +188,14 @@ def _figures(spindle: Spindle) -> tuple[Figure, ...]:
         Panel("(v)", "theta", "sum of phi", curves(total.x, {"": total.y}, "points")),
         Panel("(vi)", f"{s} [um]", "theta - sum of phi", curves(theta.x, {"": total.x - total.y}, "points")),
     ]
-    hours, warned = found.unseen.time / 3600, "ACE, flagged by the guard"
+    hours, warm = found.unseen.time / 3600, named(found.unseen)
     estimated = {"measured": found.measured, "ACE": found.estimates[ACE_NAME]}
     if found.flagged.any():
-        estimated[warned] = np.where(found.flagged, found.estimates[ACE_NAME], np.nan)
+        estimated["ACE, flagged by the guard"] = np.where(found.flagged, found.estimates[ACE_NAME], np.nan)
+    reference = recorded(spindle.recordings[:1], range(len(temperatures)))
     return (
-        Figure(
-            "wessel2004-fig2a",
-            "Fig. 2a: the reference series.",
-            recorded(spindle.recordings[:1], range(len(temperatures))),
-        ),
-        Figure(
-            "wessel2004-fig2b",
-            f"Fig. 2b: optimal transformations for {s}, their sum against theta, and what is left.",
-            transformed,
-            columns=2,
-        ),
-        Figure(
-            "wessel2004-fig3",
-            f"Fig. 3: temperatures of the test series, and {s} measured and estimated; where the guard warns, a "
-            "temperature is outside what was learned.",
-            [
-                Panel("", "time [h]", "temperature [degC]", curves(hours, named(found.unseen))),
-                Panel("", "time [h]", f"{s} [um]", curves(hours, estimated, dashed=["ACE"], points=[warned])),
-            ],
-        ),
-        Figure(
-            "wessel2004-loops",
-            f"Not in the paper: {s} against each temperature in the reference series. The loops are the hysteresis: "
-            "one temperature, two displacements.",
-            loops(found.learned),
-            columns=3,
-        ),
+        exhibits.figure("wessel2004-fig2a", *reference),
+        exhibits.figure("wessel2004-fig2b", *transformed, s=s),
+        exhibits.figure("wessel2004-fig3", (hours, warm), (hours, estimated), s=s),
+        exhibits.figure("wessel2004-loops", *loops(found.learned), s=s),
     )

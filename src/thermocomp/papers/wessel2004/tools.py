@@ -10,6 +10,7 @@ from scipy.stats import spearmanr
 from thermocomp.models.ace import ACE
 from thermocomp.papers.claims import Claims, Facts
 from thermocomp.papers.common import rms
+from thermocomp.papers.exhibits import Exhibits
 from thermocomp.papers.pictures import curves
 from thermocomp.papers.study import Figure, Panel, Part, Progress, StudyTable
 from thermocomp.papers.wessel2004.sets import PAPERS_OWN, Selection, name_set
@@ -128,6 +129,7 @@ def milling_machine(seed: int, progress: Progress, physics: Physics | None = Non
 
 resting = Claims[Resting](__name__, section="resting")
 milling = Claims[MillingTrial](__name__, section="milling")
+exhibits = Exhibits(__name__)
 
 
 def _better(found: MillingTrial, temperatures: Sequence[int]) -> Facts:
@@ -225,15 +227,9 @@ def _sets_table(r: Resting) -> StudyTable:
     names = {PAPERS_OWN: "the paper's", chosen: "chosen by Appendix B"}
     if chosen == PAPERS_OWN:
         names[chosen] = "the paper's, and chosen by Appendix B"
-    return StudyTable(
-        "Resting tool: ACE (at most 300 sweeps) with other sets, by their RMS in the independent test (in hindsight)",
-        ("place", "set", "RMS S1 [um]", "mean Psi S1 in the data sets", ""),
-        [
-            [str(k), name_set(s), f"{r.by_set[s]:.2f}", f"{psi[s]:.4f}", names.get(s, "")]
-            for k, s in enumerate(r.order, start=1)
-            if k <= 5 or k == len(r.order) or s in names
-        ],
-    )
+    rows = [(k, name_set(s), r.by_set[s], psi[s], names.get(s, "")) for k, s in enumerate(r.order, start=1)]
+    shown = [row for s, row in zip(r.order, rows, strict=True) if row[0] in (*range(6), len(rows)) or s in names]
+    return exhibits.table("by_set", shown)
 
 
 # -- figures -----------------------------------------------------------------------------------------------------------
@@ -252,37 +248,17 @@ def _estimated(found: MillingTrial) -> list[Panel]:
 def _tool_figures(recordings: list[Recording], r: Resting) -> tuple[Figure, ...]:
     chosen = r.selection.chosen
     return (
-        Figure(
-            "wessel2004-fig5",
-            f"Fig. 5: the resting tool, training. Temperatures {name_set(chosen)}.",
-            recorded(recordings[:1], chosen),
-        ),
-        Figure("wessel2004-fig6", "Fig. 6: the resting tool, independent test.", recorded(recordings[-1:], chosen)),
-        Figure(
-            "wessel2004-fig7",
-            "Fig. 7: S1 of the test, measured and estimated, and what is left; 'dynamic' is not in the paper.",
-            _estimated(r.own),
-        ),
-        Figure(
-            "wessel2004-tool-loops",
-            "Not in the paper: S1 of the training against each temperature. The loops are the hysteresis.",
-            loops(r.own.learned),
-            columns=3,
-        ),
+        exhibits.figure("wessel2004-fig5", *recorded(recordings[:1], chosen), set=name_set(chosen)),
+        exhibits.figure("wessel2004-fig6", *recorded(recordings[-1:], chosen)),
+        exhibits.figure("wessel2004-fig7", *_estimated(r.own)),
+        exhibits.figure("wessel2004-tool-loops", *loops(r.own.learned)),
     )
 
 
 def _milling_figures(recordings: list[Recording], found: MillingTrial) -> tuple[Figure, ...]:
-    warm = curves(points(found.unseen), named(found.unseen))
+    days = recorded(recordings[:-1], range(len(found.unseen.inputs)))
+    warm = Panel("", "measuring point", "temperature [degC]", curves(points(found.unseen), named(found.unseen)))
     return (
-        Figure(
-            "wessel2004-fig8",
-            "Fig. 8: the working machine, training: four days one after the other.",
-            recorded(recordings[:-1], range(len(found.unseen.inputs))),
-        ),
-        Figure(
-            "wessel2004-fig9",
-            "Fig. 9: the fifth day: temperatures; the displacement measured and estimated; what is left.",
-            [Panel("", "measuring point", "temperature [degC]", warm), *_estimated(found)],
-        ),
+        exhibits.figure("wessel2004-fig8", *days),
+        exhibits.figure("wessel2004-fig9", warm, *_estimated(found)),
     )
