@@ -1,4 +1,4 @@
-"""Tables and figures of a paper's study as data: entries of ``exhibits.toml`` beside it, filled with numbers.
+"""Tables, figures and numbers of a paper's study as data: entries of ``exhibits.toml`` beside it, filled with numbers.
 
 ``tables``
     ``caption``, and ``columns``: heading, and template of the cells, of each. A row is a tuple, whose items are
@@ -7,10 +7,14 @@
     ``caption``; ``columns``: number of panels next to each other (default: 1); ``panels``: title and labels of x and y
     of each; ``style``, and the labels of curves that are ``dashed`` or ``points``.
 
+``numbers``
+    Names of the study's numbers, and the values they have: attributes of the results, or further values. Of a
+    collection it is the number of its items.
+
 Captions and labels are templates; see `thermocomp.papers.sentences.Sentences`.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Sized
 from types import ModuleType
 from typing import Any
 
@@ -23,7 +27,7 @@ Drawn = Sequence[PlotCurve] | tuple[FloatArray, Mapping[str, FloatArray]]
 
 
 class Exhibits:
-    """Tables and figures of a study.
+    """Tables, figures and numbers of a study.
 
     Parameters
     ----------
@@ -60,3 +64,9 @@ class Exhibits:
             shown = curves(*each, **styles) if isinstance(each, tuple) else each
             panels.append(Panel(title, xlabel, ylabel, shown))
         return Figure(key, said.fill(entry["caption"]), panels, entry.get("columns", 1))
+
+    def numbers(self, found: object, **facts: Any) -> dict[str, float]:
+        """Return the numbers of a study by name."""
+        said = self._file.sentences(facts, found)
+        values = {name: said.value(path) for name, path in self._file.content["numbers"].items()}
+        return {name: float(len(v) if isinstance(v, Sized) else v) for name, v in values.items()}

@@ -7,7 +7,7 @@ import numpy as np
 from thermocomp.models.selection.collinearity import contributions
 from thermocomp.models.selection.grouping import group, interval_of
 from thermocomp.papers.claims import Claims, Facts
-from thermocomp.papers.common import described, rms
+from thermocomp.papers.common import described
 from thermocomp.papers.hwang import setup, show
 from thermocomp.papers.hwang.setup import JUDGED, LINEAR, NAMES, NONE, OPTIMAL, QUADRATIC, SINGLE, Computed, named
 from thermocomp.papers.study import Part, Progress, Study
@@ -28,7 +28,8 @@ def run(seed: int, progress: Progress) -> Study:
     Study
     """
     c = setup.compute(seed, progress)
-    return Study.of("hwang", TITLE, Part(claims(c), show.tables(c), show.figures(c), _numbers(c)))
+    numbers = show.exhibits.numbers(c, models=sum(c.grouped.searched_), shaken=c.shaken["uniform", 0.4])
+    return Study.of("hwang", TITLE, Part(claims(c), show.tables(c), show.figures(c), numbers))
 
 
 def _listed(groups: Sequence[Sequence[int]]) -> list[str]:
@@ -98,14 +99,14 @@ def _fits(c: Computed) -> Facts:
 @claims.facts
 def _predicts(c: Computed) -> Facts:
     z, ours, judged = (c.residuals[name] for name in (NONE, OPTIMAL, JUDGED))
-    errors = {"ours": rms(ours), "judged": rms(judged), "none": rms(z), "ratio": rms(ours) / rms(judged)}
-    return _takes(c) | errors | {"ours_r2": described(ours, z), "judged_r2": described(judged, z)}
+    facts = {"ours_r2": described(ours, z), "judged_r2": described(judged, z)}
+    return _takes(c) | facts | {"ratio": c.errors[OPTIMAL].rms / c.errors[JUDGED].rms}
 
 
 @claims.facts
 def _costs(c: Computed) -> Facts:
-    new, without = rms(c.residuals[OPTIMAL]), rms(c.residuals[SINGLE])
-    return {"new": new, "without": without, "ratio": new / without, "cost": new > without}
+    ratio = c.errors[OPTIMAL].rms / c.errors[SINGLE].rms
+    return {"ratio": ratio, "cost": ratio > 1}
 
 
 @claims.facts
@@ -139,27 +140,3 @@ def _noise(c: Computed) -> Facts:
     facts = {"linear": at[LINEAR], "quadratic": at[QUADRATIC], "alone": alone}
     facts |= {"least": min(ratios.values()), "most": max(ratios.values()), "worse": worse, "not_above": bool(worse)}
     return facts | {"choice": alone > 0.5 * ratios["uniform", 0.4], "holds": not worse}
-
-
-# -- numbers -----------------------------------------------------------------------------------------------------------
-
-
-def _numbers(c: Computed) -> dict[str, float]:
-    at = c.shaken["uniform", 0.4]
-    left = {NONE: "none", OPTIMAL: "", JUDGED: "judgement", SINGLE: "without_grouping"}
-    return {
-        "rows": float(len(c.fit)),
-        "groups": float(len(c.grouped.groups_)),
-        "models_tried": float(sum(c.grouped.searched_)),
-        "models_tried_without_grouping": float(c.single.searched_[0]),
-        "variables": float(len(c.grouped.selected_)),
-        "variables_without_grouping": float(len(c.single.selected_)),
-        "r_squared": c.fits[OPTIMAL].r_squared,
-        "standard_error_um": c.fits[OPTIMAL].error,
-        "r_squared_judgement": c.fits[JUDGED].r_squared,
-        "standard_error_judgement_um": c.fits[JUDGED].error,
-        "smallest_eigenvalue_degC2": c.grouped.spectrum_.smallest,
-        "smallest_eigenvalue_without_grouping_degC2": c.single.spectrum_.smallest,
-        "std_r_squared_linear": at[LINEAR].std,
-        "std_r_squared_quadratic": at[QUADRATIC].std,
-    } | {f"rms_new_{short}{short and '_'}um": rms(c.residuals[name]) for name, short in left.items()}

@@ -19,7 +19,16 @@ from thermocomp.judging.sensitivity import Sensitivity, sensitivity
 from thermocomp.models.grouping import CorrelationGrouping
 from thermocomp.models.numerics.leastsquares import effective_sample_size, lstsq
 from thermocomp.models.selection.grouping import Groups, Interval, intervals
-from thermocomp.papers.common import PAPERS_SUPPORT, every, frozen, predict_deviation, rename_channels, stacked, trained
+from thermocomp.papers.common import (
+    PAPERS_SUPPORT,
+    Errors,
+    every,
+    frozen,
+    predict_deviation,
+    rename_channels,
+    stacked,
+    trained,
+)
 from thermocomp.papers.study import FloatArray, Progress
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
@@ -174,6 +183,11 @@ class Computed:
         z = self.new.deviations[:, 0]
         left = {name: z - predict_deviation(f.model, self.new) for name, f in self.fits.items()}
         return {NONE: z} | left | {"dynamic (not of the paper)": self.dynamic}
+
+    @cached_property
+    def errors(self) -> dict[str, Errors]:
+        """Error figures of each model in the new tests."""
+        return {name: Errors.of(e) for name, e in self.residuals.items()}
 
 
 def compute(seed: int, progress: Progress) -> Computed:

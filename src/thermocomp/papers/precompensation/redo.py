@@ -10,7 +10,7 @@ import numpy as np
 
 from thermocomp.models.selection.orders import Order
 from thermocomp.papers.claims import Claims, Facts
-from thermocomp.papers.common import Errors, errors_table, rms
+from thermocomp.papers.common import errors_table, rms
 from thermocomp.papers.exhibits import Exhibits
 from thermocomp.papers.precompensation import cutting, cuttingtold, setup
 from thermocomp.papers.precompensation.setup import CHOSEN, CUTS, LEAST, NET, POSITIONS, Computed
@@ -40,7 +40,7 @@ def run(seed: int, progress: Progress) -> Study:
     c = setup.compute(seed, lambda share, what: progress(share / 2, what))
     models = c.models | cutting.house_models(c.learn)
     m = cutting.compute(models, seed, lambda share, what: progress((1 + share) / 2, what))
-    recorded = Part(claims(c), _tables(c), _figures(c), _numbers(c))
+    recorded = Part(claims(c), _tables(c), _figures(c), exhibits.numbers(c, first=c.by_fpe[0]))
     milled = Part(cuttingtold.claims(m), cuttingtold.tables(m), cuttingtold.figures(m), cuttingtold.numbers(m))
     return Study.of("precompensation", TITLE, recorded, milled)
 
@@ -51,36 +51,23 @@ claims, exhibits = Claims[Computed](__name__, setup), Exhibits(__name__)
 @claims.facts
 def _orders(c: Computed) -> Facts:
     plain = [next(o.fpe for o in table if (o.k, o.m) == setup.PAPERS_ORDERS) for table in c.orders]
-    chosen, least = rms(c.left[CHOSEN]), rms(c.left[LEAST])
     return {
         "best": [(p, o.k, o.m) for p, o in zip(POSITIONS, c.by_fpe, strict=True)],
         "holds": all((o.k, o.m) == setup.PAPERS_ORDERS for o in c.by_fpe),
         "more": max(p / o.fpe for p, o in zip(plain, c.by_fpe, strict=True)),
-        "chosen": chosen,
-        "least": least,
-        "worth": chosen < least,
+        "worth": c.errors[CHOSEN].rms < c.errors[LEAST].rms,
         "others": [(h / 60, *orders) for h, (orders, _, _) in c.clocks.items()],
     }
-
-
-@claims.facts
-def _net(c: Computed) -> Facts:
-    return {"net": rms(c.left[NET]), "least": rms(c.left[LEAST])}
 
 
 @claims.facts
 def _described(c: Computed) -> Facts:
     z, learned, left, shares = c.judge.deviations, c.learn.deviations, c.left[NET], c.shares(NET)
     beyond = (z < learned.min(axis=0)) | (z > learned.max(axis=0))
-    facts = {"shares": shares, "net": rms(left), "drift": rms(z), "holds": all(s >= WELL for s in shares)}
-    facts |= {"greatest": Errors.of(left).max_abs, "outside": beyond.mean() > BEYOND, "beyond": beyond.mean()}
+    facts = {"shares": shares, "holds": all(s >= WELL for s in shares)}
+    facts |= {"outside": beyond.mean() > BEYOND, "beyond": beyond.mean()}
     facts |= {"learned": learned.min(), "judged": z.min(), "within": rms(left[~beyond])}
     return facts | {"least_share": min(c.shares(LEAST)), "fpe_share": min(c.shares(CHOSEN))}
-
-
-@claims.facts
-def _one_step(c: Computed) -> Facts:
-    return {"least": rms(c.left[LEAST])}
 
 
 @claims.facts
@@ -93,8 +80,7 @@ def _interpolated(c: Computed) -> Facts:
 
 @claims.facts
 def _scheduled(c: Computed) -> Facts:
-    step = np.abs(np.diff(c.schedule, axis=0)).max()
-    return {"scheduled": rms(c.judge.deviations + c.schedule), "net": rms(c.left[NET]), "step": step}
+    return {"step": np.abs(np.diff(c.schedule, axis=0)).max()}
 
 
 @claims.facts
@@ -108,11 +94,6 @@ def _depth(c: Computed) -> Facts:
 def _warm(c: Computed) -> Facts:
     cold, carried, none = (rms(e[c.warm.hours <= 1]) for e in (c.warm.cold, c.warm.carried, c.warm.drift))
     return {"cold": cold, "carried": carried, "none": none, "harmful": cold > none}
-
-
-@claims.facts
-def _room(c: Computed) -> Facts:
-    return {"net": rms(c.left[NET])}
 
 
 # -- tables, figures, numbers ------------------------------------------------------------------------------------------
@@ -150,21 +131,3 @@ def _figures(c: Computed) -> tuple[Figure, ...]:
         exhibits.figure("precompensation-cut", (np.arange(1.0, CUTS + 1), {"without": without, "with": with_})),
         exhibits.figure("precompensation-warm", (c.warm.hours, warm)),
     )
-
-
-def _numbers(c: Computed) -> dict[str, float]:
-    without, with_ = c.depths
-    return {
-        "k": float(c.by_fpe[0].k),
-        "m": float(c.by_fpe[0].m),
-        "rms_none_um": rms(c.left[setup.NONE]),
-        "rms_net_um": rms(c.left[NET]),
-        "rms_least_squares_um": rms(c.left[LEAST]),
-        "rms_orders_by_fpe_um": rms(c.left[CHOSEN]),
-        "rms_one_step_um": c.one_step,
-        "rms_scheduled_um": rms(c.judge.deviations + c.schedule),
-        "depth_difference_um": without,
-        "depth_difference_corrected_um": with_,
-        "rms_net_workshop_um": c.workshop,
-        "room_peak_to_peak_um": c.room,
-    }

@@ -31,7 +31,8 @@ def run(seed: int, progress: Progress) -> Study:
     Study
     """
     c = setup.compute(seed, progress)
-    return Study.of("stepwise2017", TITLE, Part(claims(c), _tables(c), _figures(c), _numbers(c)))
+    numbers = exhibits.numbers(c, temperatures=len(c.fit.inputs) - 1, fewest=c.thinned[-1].names)
+    return Study.of("stepwise2017", TITLE, Part(claims(c), _tables(c), _figures(c), numbers))
 
 
 def _place(name: str) -> str:
@@ -126,21 +127,3 @@ def _figures(c: Computed) -> tuple[Figure, ...]:
         exhibits.figure("stepwise2017-fig6", (clock, estimated), (clock, left)),
         exhibits.figure("stepwise2017-rows", (rows, {"": kept})),
     )
-
-
-def _numbers(c: Computed) -> dict[str, float]:
-    short = {
-        setup.NONE: "_none",
-        STEPWISE: "",
-        LEAST: "_least_squares",
-        PURSUIT: "_projection_pursuit",
-        setup.COMPONENTS: "_principal_components",
-        setup.SLICED: "_sliced_inverse",
-    }
-    return {
-        "temperatures": float(len(c.fit.inputs) - 1),
-        "chosen": float(len(c.chosen)),
-        "max_online_um": c.errors[STEPWISE].max_abs,
-        "rms_fit_um": rms(c.left_in_fit[STEPWISE]),
-        "chosen_of_fewest_rows": float(len(c.thinned[-1].names)),
-    } | {f"rms_online{name}_um": c.errors[m].rms for m, name in short.items()}
