@@ -8,7 +8,8 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 import pytest
 
-from thermocomp.papers.claims import Claims, Facts, Sentences
+from thermocomp.papers.claims import Claims, Facts
+from thermocomp.papers.sentences import Sentences
 
 FILE = """
 [parts]

@@ -12,7 +12,7 @@ from thermocomp.models.mlp import SigmoidNet
 from thermocomp.models.ols import LeastSquares
 from thermocomp.papers import common, pictures
 from thermocomp.papers.common import Errors
-from thermocomp.papers.study import Part, Study, StudyTable
+from thermocomp.papers.study import Figure, Part, Study, StudyTable
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.stacking import stack
@@ -148,7 +148,7 @@ def test_tests_are_put_end_to_end(tests: Samples) -> None:
 
 
 def test_a_study_is_its_parts_one_after_the_other() -> None:
-    table, figure = StudyTable("t", ("a",), []), pictures.single("k", "c", ("x", "y"), [])
+    table, figure = StudyTable("t", ("a",), []), Figure("k", "c", [])
     made = Study.of("n", "T", Part([], [table], [figure], {"a": 1.0}), Part([], [], [figure], {"b": 2.0}))
     assert (made.name, made.title, made.claims, made.tables) == ("n", "T", (), (table,))
     assert made.figures == (figure, figure)

@@ -13,7 +13,7 @@ from thermocomp.judging.splits import Judging, Split, leave_one_cycle_out
 from thermocomp.models.methods import expand
 from thermocomp.papers.claims import Claims, Facts
 from thermocomp.papers.common import rms, stacked
-from thermocomp.papers.pictures import curves, single
+from thermocomp.papers.exhibits import Exhibits
 from thermocomp.papers.study import Figure, Progress, Study, StudyTable, tell_nobody
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
@@ -313,6 +313,7 @@ def _fit_rms(task: Task, blocks: Sequence[Assessment]) -> float:
 
 simulated = Claims[Sequence[Row]](__name__, section="simulated")
 measured = Claims[Sequence[Row]](__name__, section="measured")
+exhibits = Exhibits(__name__)
 
 
 @simulated.facts
@@ -347,27 +348,23 @@ def _overview(rows: Sequence[Sequence[Row]]) -> StudyTable:
         [first.method, *("-" if mine[k].failure else f"{mine[k].rms:.2f}" for mine in rows)]
         for k, first in enumerate(rows[0])
     ]
+    tasks = (mine[0].task.replace(", ", " ") for mine in rows)
     caption = (
         "RMS [um] in tests that were not learned from (X-03). Every method is offered all temperatures and the spindle "
         "speed, and takes what it can use; -: it could not be fitted."
     )
-    return StudyTable(caption, ("method", *(mine[0].task.replace(", ", " ") for mine in rows)), cells)
+    return StudyTable(caption, ("method", *tasks), cells)
 
 
 def _table(rows: Sequence[Row]) -> StudyTable:
-    header = ("method", "fit", "unseen", "max", "p-p", "noise", "cut off", "worst input", "inputs", "fit [s]")
-    cells = []
+    cells: list[tuple[str, list[str], str, str, str]] = []
     for r in rows:
         if r.failure:
-            cells.append([r.method, *["-"] * 6, f"not fitted: {r.failure.partition(':')[0]}", "", ""])
+            cells.append((r.method, ["-"] * 6, f"not fitted: {r.failure.partition(':')[0]}", "", ""))
             continue
-        errors = (r.fit_rms, r.rms, r.max_abs, r.peak_to_peak, r.noise_rms, r.lost_rms)
-        cells.append([r.method, *(f"{e:.2f}" for e in errors), r.lost, str(r.sensors), f"{r.fit_s:.2f}"])
-    caption = (
-        f"{rows[0].task}: RMS of the fit and where it was unseen, its maximum and peak-to-peak, RMS with noise of "
-        "0.4 degC on all temperatures and with the worst input cut off [um]"
-    )
-    return StudyTable(caption, header, cells)
+        errors = [f"{e:.2f}" for e in (r.fit_rms, r.rms, r.max_abs, r.peak_to_peak, r.noise_rms, r.lost_rms)]
+        cells.append((r.method, errors, r.lost, str(r.sensors), f"{r.fit_s:.2f}"))
+    return exhibits.table("task", cells, task=rows[0].task)
 
 
 def _figure(rows: Sequence[Sequence[Row]]) -> Figure:
@@ -375,10 +372,5 @@ def _figure(rows: Sequence[Sequence[Row]]) -> Figure:
     shares = {
         first.method: np.array([mine[k].rms / mine[0].rms for mine in rows]) for k, first in enumerate(rows[0]) if k
     }
-    told = "; ".join(f"{k} {mine[0].task}" for k, mine in enumerate(rows, start=1))
-    return single(
-        "cross-unseen",
-        f"RMS in the unseen test as a share of that without compensation. Experiments: {told}.",
-        ("experiment", "RMS / RMS without compensation"),
-        curves(places, shares, "points"),
-    )
+    tasks = [f"{k} {mine[0].task}" for k, mine in enumerate(rows, start=1)]
+    return exhibits.figure("cross-unseen", (places, shares), tasks=tasks)

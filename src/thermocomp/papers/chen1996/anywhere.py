@@ -4,10 +4,11 @@ The synthesis itself is in ref. 6 of the paper; here that of `thermocomp.volumet
 by `thermocomp.virtual.volume`, which models the machine independently of that synthesis.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from itertools import chain
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -118,8 +119,8 @@ def judge(learned: LearnedVolume, seed: int) -> Volume:
     rng = np.random.default_rng(seed)
     tests = list(simulate(virtual.find_experiment("volumetric-new"), seed=seed, whole=True))
     share = -(-POINTS // len(tests))
-    parts = [_points(learned, test, min(share, POINTS - share * k), rng) for k, test in enumerate(tests)]
-    p = _Points._make(map(np.vstack, zip(*parts, strict=True)))
+    parts = (_points(learned, test, min(share, POINTS - share * k), rng) for k, test in enumerate(tests))
+    p = _Points._make(map(np.array, zip(*chain.from_iterable(parts), strict=True)))
     truth, kinematics = VolumetricTruth(MachiningCentre().observables), Kinematics(learned.machine)
 
     def effect(values: FloatArray, codes: Collection[str] = INDEX) -> FloatArray:
@@ -153,7 +154,8 @@ def judge(learned: LearnedVolume, seed: int) -> Volume:
     )
 
 
-def _points(learned: LearnedVolume, test: SimulatedTest, n: int, rng: np.random.Generator) -> _Points:
+def _points(learned: LearnedVolume, test: SimulatedTest, n: int, rng: np.random.Generator) -> Iterator[tuple[Any, ...]]:
+    """Yield what `_Points` has of each point."""
     model = VolumetricModel(learned.machine)
     recording = virtual.make_recording(test)
     states = model.replay(recording.time, {name: recording.table[name].to_numpy() for name in model.inputs})
@@ -161,24 +163,18 @@ def _points(learned: LearnedVolume, test: SimulatedTest, n: int, rng: np.random.
     points = rng.uniform(size=(n, 3)) * [TRAVEL[a] for a in AXES]
     tools = np.stack([np.zeros(n), np.zeros(n), -rng.uniform(*TOOLS, n)], axis=-1)
     assert test.observables is not None
-    now, start = test.observables[rows], np.tile(test.observables[0], (n, 1))
-    told, full, lines, begin = [], [], [], []
     for row, point, tool in zip(rows.tolist(), points, tools, strict=True):
         straight = straight_lines(states[row], MIDDLE, tool, grid=2).lines
-        told.append(states[row].components(point))
-        full.append(states[row].correction(point, tool))
-        lines.append([line.correction.at(p) for line, p in zip(straight, point.tolist(), strict=True)])
-        begin.append(states[0].correction(point, tool))
-    return _Points(
-        now=now,
-        start=start,
-        points=points,
-        tools=tools,
-        told=np.array(told),
-        full=np.array(full),
-        lines=np.array(lines),
-        begin=np.array(begin),
-    )
+        yield (
+            test.observables[row],
+            test.observables[0],
+            point,
+            tool,
+            states[row].components(point),
+            states[row].correction(point, tool),
+            [line.correction.at(p) for line, p in zip(straight, point.tolist(), strict=True)],
+            states[0].correction(point, tool),
+        )
 
 
 def as_measured(truth: VolumetricTruth, now: FloatArray, start: FloatArray, points: FloatArray) -> FloatArray:

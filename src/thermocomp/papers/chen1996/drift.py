@@ -14,7 +14,8 @@ from thermocomp.papers import common
 from thermocomp.papers.chen1996 import setup
 from thermocomp.papers.chen1996.setup import CLOSELY, COMPETITIVE, DRIFTS, TEMPERATURES, drift_samples, recordings
 from thermocomp.papers.claims import Claims, Facts
-from thermocomp.papers.study import FloatArray
+from thermocomp.papers.pictures import end_to_end
+from thermocomp.papers.study import Figure, FloatArray, StudyTable
 from thermocomp.recordings.samples import Samples
 
 #: printed: numbers of screened terms (C-20), mean absolute errors after training [um] (C-31)
@@ -23,6 +24,16 @@ MAE_NET = {"x": 6.5, "y": 4.2, "z": 6.0}
 MAE_MRA = {"x": 8.9, "y": 3.8, "z": 6.9}
 #: printed: fit of x (C-19)
 R2_X, SEE_X = 0.988, 10.628
+#: Eq. 5 (C-18)
+EQ5 = {
+    "T2": -0.586,
+    "T3": 7.527,
+    "(T6-T7)": -36.966,
+    "(T8-T9)": 10.809,
+    "T3*T3": -0.149,
+    "(T6-T7)*(T6-T7)": -18.119,
+    "T2*(T6-T7)": 2.499,
+}
 #: hidden nodes of the chosen net (C-26) and number of trainings; alternatives and number of trainings of each
 HIDDEN, STARTS = 20, 5
 SWEEP, SWEEP_STARTS = (5, 10, 15, 25, 30), 3
@@ -267,3 +278,49 @@ def numbers(found: LearnedDrift) -> dict[str, float]:
             f"mae_net_{t}_um": found.net[t],
         }
     return made
+
+
+# -- tables and figures -----------------------------------------------------------------------------------------------
+
+
+def tables(found: LearnedDrift) -> list[StudyTable]:
+    """Return Tables 1 and 2, the fits, Eq. 5 next to our coefficients, the logs of Fig. 2 and the sweep."""
+    sensors = [(name, setup.SENSORS.get(name, "mean of T6 to T9"), r) for name, r in screening(found).items()]
+    printed = {"x": (f" ({R2_X})", f" ({SEE_X:.1f})")}
+    fits = []
+    for t, regression in found.regressions.items():
+        counts = (found.candidates[t], found.terms[t], TERMS[t])
+        errors = (found.mra[t], MAE_MRA[t], found.net[t], MAE_NET[t])
+        fits.append((t, setup.SUBGROUPS[t], *counts, regression, *printed.get(t, ("", "")), *errors))
+    x, y = found.regressions["x"], found.regressions["y"]
+    nets = {**found.others, "9-20-3": found.nets}
+    return [
+        setup.exhibits.table("sensors", sensors),
+        setup.exhibits.table("fits", fits),
+        setup.exhibits.table("eq5", beside(dict(zip(x.terms_, x.coef_.tolist(), strict=True)), EQ5)),
+        setup.exhibits.table("log_x", [(s, s.action.upper()) for s in x.log_]),
+        setup.exhibits.table("log_y", [(s, s.action.upper()) for s in y.log_]),
+        setup.exhibits.table("nets", [_mean_errors(kind, trained) for kind, trained in nets.items()]),
+    ]
+
+
+def _mean_errors(kind: str, nets: Sequence[LearnedNet]) -> tuple[str, Sequence[LearnedNet], list[float], float]:
+    mae = [float(np.mean([n.mae[t] for n in nets])) for t in DRIFTS]
+    return kind, nets, mae, float(np.mean(mae))
+
+
+def beside(ours: Mapping[str, float], paper: Mapping[str, float]) -> list[tuple[str, str, str]]:
+    """Return the rows of a table of coefficients by term, ours next to those of the paper; empty if there is none."""
+    texts = [{term: f"{coefficient:.3f}" for term, coefficient in c.items()} for c in (ours, paper)]
+    return [(term, texts[0].get(term, ""), texts[1].get(term, "")) for term in {**ours, **paper}]
+
+
+def figures(found: LearnedDrift) -> list[Figure]:
+    """Return Figs. 3 to 5 and 10 to 12: measurements and fits."""
+    samples, drawn = found.samples, []
+    for kind, first, models in (("MRA", 3, found.models), ("net", 10, found.typical.models)):
+        for number, (target, model) in enumerate(models.items(), start=first):
+            hours, measured = end_to_end(samples, common.take_measured(samples, target))
+            _, fitted = end_to_end(samples, common.predict_deviation(model, samples))
+            drawn.append(setup.exhibits.figure(f"chen1996-fig{number}", (hours, {"measured": measured, kind: fitted})))
+    return drawn

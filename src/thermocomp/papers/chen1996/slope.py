@@ -12,9 +12,9 @@ from thermocomp.models.mlp import SigmoidNet
 from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.papers import common
 from thermocomp.papers.chen1996 import law, setup
+from thermocomp.papers.chen1996.drift import beside
 from thermocomp.papers.chen1996.law import HIDDEN, Law, r2_about_zero
 from thermocomp.papers.chen1996.setup import CLOSELY, EQ6, EQ8, SLOPE_VARIABLES, exhibits, recordings, with_differences
-from thermocomp.papers.chen1996.show import beside
 from thermocomp.papers.claims import Claims, Facts
 from thermocomp.papers.common import PAPERS_SUPPORT, Errors, rms
 from thermocomp.papers.study import Claim, Figure, FloatArray, PlotCurve, StudyTable

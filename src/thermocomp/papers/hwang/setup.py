@@ -19,16 +19,7 @@ from thermocomp.judging.sensitivity import Sensitivity, sensitivity
 from thermocomp.models.grouping import CorrelationGrouping
 from thermocomp.models.numerics.leastsquares import effective_sample_size, lstsq
 from thermocomp.models.selection.grouping import Groups, Interval, intervals
-from thermocomp.papers.common import (
-    PAPERS_SUPPORT,
-    Errors,
-    every,
-    frozen,
-    predict_deviation,
-    rename_channels,
-    stacked,
-    trained,
-)
+from thermocomp.papers import common
 from thermocomp.papers.study import FloatArray, Progress
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
@@ -82,7 +73,7 @@ class PaperFit:
 def samples_of(tests: Sequence[Recording]) -> Samples:
     """Return samples with the names of the paper and absolute temperatures."""
     names = {f"t_{p}_C": n for p, n in zip(HWANG_PLACES, NAMES, strict=True)} | {TARGET: TARGET}
-    return stacked([rename_channels(r, names) for r in tests], [TARGET], NAMES, rezero=False)
+    return common.stacked([common.rename_channels(r, names) for r in tests], [TARGET], NAMES, rezero=False)
 
 
 def nearest(found: Sequence[Interval], groups: int) -> Interval:
@@ -113,7 +104,7 @@ def polynomial(samples: Samples, names: Sequence[str], degree: int) -> PaperFit:
     y = samples.deviations[:, 0]
     solved = lstsq(X, y)
     found = solved.coefficients.tolist()
-    model = frozen(samples, columns, found, solved.intercept, variables=variables, terms=terms)
+    model = common.frozen(samples, columns, found, solved.intercept, variables=variables, terms=terms)
     total = float(np.sum((y - y.mean()) ** 2))
     return PaperFit(model, 1 - solved.rss / total, float(np.sqrt(solved.rss / (len(y) - len(terms) - 1))))
 
@@ -175,19 +166,19 @@ class Computed:
 
     def fitted(self, name: str) -> FloatArray:
         """Return the output of a model for the training rows [um]."""
-        return predict_deviation(self.fits[name].model, self.fit)
+        return common.predict_deviation(self.fits[name].model, self.fit)
 
     @cached_property
     def residuals(self) -> dict[str, FloatArray]:
         """Residuals of each model in the new tests [um]."""
         z = self.new.deviations[:, 0]
-        left = {name: z - predict_deviation(f.model, self.new) for name, f in self.fits.items()}
+        left = {name: z - common.predict_deviation(f.model, self.new) for name, f in self.fits.items()}
         return {NONE: z} | left | {"dynamic (not of the paper)": self.dynamic}
 
     @cached_property
-    def errors(self) -> dict[str, Errors]:
+    def errors(self) -> dict[str, common.Errors]:
         """Error figures of each model in the new tests."""
-        return {name: Errors.of(e) for name, e in self.residuals.items()}
+        return {name: common.Errors.of(e) for name, e in self.residuals.items()}
 
 
 def compute(seed: int, progress: Progress) -> Computed:
@@ -219,7 +210,7 @@ def compute(seed: int, progress: Progress) -> Computed:
     progress(0.6, "random sensor error")
     shown = {LINEAR: fits[OPTIMAL].model, QUADRATIC: fits[JUDGED].model, PLAIN: polynomial(fit, JUDGEMENT, 1).model}
     shaken: dict[tuple[str, float], dict[str, Sensitivity]] = {
-        (law, size): sensitivity(shown, fit, every(fit), size=size, law=law, draws=DRAWS, seed=seed)
+        (law, size): sensitivity(shown, fit, common.every(fit), size=size, law=law, draws=DRAWS, seed=seed)
         for law in LAWS
         for size in NOISES
     }
@@ -242,16 +233,16 @@ def _grouped(samples: Samples, threshold: float) -> CorrelationGrouping:
 
 
 def _fit_of(g: CorrelationGrouping, samples: Samples) -> PaperFit:
-    inputs = samples.model_inputs(range(len(NAMES)), every(samples))
-    model = g.freeze(target=TARGET, inputs=inputs, support=PAPERS_SUPPORT)
+    inputs = samples.model_inputs(range(len(NAMES)), common.every(samples))
+    model = g.freeze(target=TARGET, inputs=inputs, support=common.PAPERS_SUPPORT)
     return PaperFit(model, float(g.r_squared_), float(g.standard_error_))
 
 
 def _dynamic(tests: Sequence[Recording]) -> FloatArray:
     """Return the residuals of `dynamic` in the new tests; trained on the first test, relative to each start."""
     inputs = [*(f"t_{p}_C" for p in HWANG_PLACES), "spindle_rpm"]
-    learned, new = (stacked(r, [TARGET], inputs) for r in (tests[:1], tests[1:]))
-    return new.deviations[:, 0] - predict_deviation(trained("dynamic", learned), new)
+    learned, new = (common.stacked(r, [TARGET], inputs) for r in (tests[:1], tests[1:]))
+    return new.deviations[:, 0] - common.predict_deviation(common.trained("dynamic", learned), new)
 
 
 def named(columns: Sequence[int]) -> str:
