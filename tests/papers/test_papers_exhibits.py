@@ -13,7 +13,7 @@ from thermocomp.papers.study import Panel, PlotCurve
 FILE = """
 [tables.rows]
 caption = "Rows of {subject}, {UNIT}"
-columns = [["", "{0}"], ["", "{1.rms:.1f}"], ["both", "{1.names:#}: {1.names| }"]]
+columns = [["", "{0}"], ["", "{1.rms:.1f}"], ["both", "{1.names:#}: {1.names:| }"]]
 
 [tables.objects]
 caption = "Objects"
