@@ -26,7 +26,7 @@ panels = [["left", "time [h]", "{subject} [um]"], ["", "a", "b"]]
 dashed = ["fit"]
 style = "points"
 
-[numbers]
+[numbers.study]
 rms_um = "best.rms"
 names = "best.names"
 limit = "limit"
@@ -68,7 +68,7 @@ def test_a_figure_has_curves_by_label_or_ready_ones(exhibits: Exhibits) -> None:
 
 
 def test_numbers_are_values_or_counts(exhibits: Exhibits) -> None:
-    assert exhibits.numbers(SimpleNamespace(best=RESULT), limit=np.float64(3)) == {
+    assert exhibits.numbers("study", SimpleNamespace(best=RESULT), limit=np.float64(3)) == {
         "rms_um": 1.25,
         "names": 2.0,
         "limit": 3.0,

@@ -8,7 +8,7 @@
     of each; ``style``, and the labels of curves that are ``dashed`` or ``points``.
 
 ``numbers``
-    Names of the study's numbers, and the values they have: attributes of the results, or further values. Of a
+    Names of numbers by section, and the values they have: attributes of the results, or further values. Of a
     collection it is the number of its items.
 
 Captions and labels are templates; see `thermocomp.papers.sentences.Sentences`.
@@ -65,8 +65,8 @@ class Exhibits:
             panels.append(Panel(title, xlabel, ylabel, shown))
         return Figure(key, said.fill(entry["caption"]), panels, entry.get("columns", 1))
 
-    def numbers(self, found: object, **facts: Any) -> dict[str, float]:
-        """Return the numbers of a study by name."""
+    def numbers(self, section: str, found: object, **facts: Any) -> dict[str, float]:
+        """Return the numbers of a section by name."""
         said = self._file.sentences(facts, found)
-        values = {name: said.value(path) for name, path in self._file.content["numbers"].items()}
+        values = {name: said.value(path) for name, path in self._file.content["numbers"][section].items()}
         return {name: float(len(v) if isinstance(v, Sized) else v) for name, v in values.items()}

@@ -259,9 +259,8 @@ def _lines(found: Volume) -> Facts:
 
 def numbers(found: Volume) -> dict[str, float]:
     """Return the numbers asserted by the documentation."""
-    made = {"volume_closure_um": found.closure, "volume_gain": found.gain(), "volume_gain_lines": found.gain(LINES)}
-    short = {WITHOUT: "none", LINES: "lines", WITH: "all"}
-    return made | {f"volume_{short[name]}_um": rms(e) for name, e in found.sizes.items()}
+    sizes = {name: rms(size) for name, size in found.sizes.items()}
+    return exhibits.numbers("anywhere", found, gain=found.gain(), gain_lines=found.gain(LINES), rms=sizes)
 
 
 # -- tables and figures ------------------------------------------------------------------------------------------------

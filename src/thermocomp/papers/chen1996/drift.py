@@ -264,22 +264,6 @@ def screening(found: LearnedDrift) -> dict[str, tuple[float, ...]]:
     }
 
 
-def numbers(found: LearnedDrift) -> dict[str, float]:
-    """Return the numbers asserted by the documentation; medians for the nets."""
-    made = {"rows": float(len(found.samples)), "parameters_net": float(found.typical.net.n_parameters_)}
-    for t, r in found.regressions.items():
-        made |= {
-            f"candidates_{t}": float(found.candidates[t]),
-            f"terms_{t}": float(found.terms[t]),
-            f"r2_mra_{t}": r.r_squared_,
-            f"see_mra_{t}_um": r.standard_error_,
-            f"n_effective_mra_{t}": r.n_effective_,
-            f"mae_mra_{t}_um": found.mra[t],
-            f"mae_net_{t}_um": found.net[t],
-        }
-    return made
-
-
 # -- tables and figures -----------------------------------------------------------------------------------------------
 
 

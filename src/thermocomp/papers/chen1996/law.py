@@ -346,10 +346,7 @@ def _within(found: Law) -> Facts:
 def numbers(found: Law) -> dict[str, float]:
     """Return the numbers asserted by the documentation."""
     ours, paper, cold = (found.recoveries[d] for d in (OURS, DESIGNS[0], DESIGNS[1]))
-    made = {"law_whole": ours.whole, "law_missing": ours.missing, "law_wrong": ours.wrong}
-    made |= {"law_whole_one_warm_up": paper.whole, "law_whole_cold": cold.whole}
-    made |= {"law_net_r2": found.net_r2, "law_net_idle": found.idle}
-    return made | {f"law_elsewhere_{name.lower()}": e for name, e in found.elsewhere.items()}
+    return exhibits.numbers("law", found, ours=ours, paper=paper, cold=cold)
 
 
 def tables(found: Law) -> list[StudyTable]:

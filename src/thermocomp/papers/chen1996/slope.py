@@ -225,11 +225,7 @@ def largest_length_error(found: LearnedPositioning) -> dict[str, float]:
 
 def numbers(found: LearnedPositioning) -> dict[str, float]:
     """Return the numbers asserted by the documentation."""
-    short = {NONE: "none", MRA: "mra", NET: "net", DYNAMIC: "dynamic", MEASURED: "measured"}
-    r = found.regression
-    made = {"slope_sets": float(r.n_rows_), "slope_candidates": float(len(r.candidates_)), "slope_r2_mra": r.r_squared_}
-    made |= {"slope_terms": float(len(r.terms_)), "slope_r2_net": float(np.median(found.net_r2))}
-    made |= {f"lateral_{short[m]}_um": e for m, e in largest_length_error(found).items()}
+    made = exhibits.numbers("slope", found, r2_net=np.median(found.net_r2), lateral=largest_length_error(found))
     return made | law.numbers(found.law)
 
 

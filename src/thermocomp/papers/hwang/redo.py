@@ -30,7 +30,7 @@ def run(seed: int, progress: Progress) -> Study:
     Study
     """
     c = setup.compute(seed, progress)
-    numbers = exhibits.numbers(c, models=sum(c.grouped.searched_), shaken=c.shaken["uniform", 0.4])
+    numbers = exhibits.numbers("redo", c, models=sum(c.grouped.searched_), shaken=c.shaken["uniform", 0.4])
     return Study.of("hwang", TITLE, Part(claims(c), _tables(c), _figures(c), numbers))
 
 

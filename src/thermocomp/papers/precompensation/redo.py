@@ -40,7 +40,7 @@ def run(seed: int, progress: Progress) -> Study:
     c = setup.compute(seed, lambda share, what: progress(share / 2, what))
     models = c.models | cutting.house_models(c.learn)
     m = cutting.compute(models, seed, lambda share, what: progress((1 + share) / 2, what))
-    recorded = Part(claims(c), _tables(c), _figures(c), exhibits.numbers(c, first=c.by_fpe[0]))
+    recorded = Part(claims(c), _tables(c), _figures(c), exhibits.numbers("redo", c, first=c.by_fpe[0]))
     milled = Part(cuttingtold.claims(m), cuttingtold.tables(m), cuttingtold.figures(m), cuttingtold.numbers(m))
     return Study.of("precompensation", TITLE, recorded, milled)
 

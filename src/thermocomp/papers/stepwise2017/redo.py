@@ -31,7 +31,7 @@ def run(seed: int, progress: Progress) -> Study:
     Study
     """
     c = setup.compute(seed, progress)
-    numbers = exhibits.numbers(c, temperatures=len(c.fit.inputs) - 1, fewest=c.thinned[-1].names)
+    numbers = exhibits.numbers("redo", c, temperatures=len(c.fit.inputs) - 1, fewest=c.thinned[-1].names)
     return Study.of("stepwise2017", TITLE, Part(claims(c), _tables(c), _figures(c), numbers))
 
 

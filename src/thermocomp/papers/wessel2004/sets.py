@@ -124,15 +124,9 @@ def appendix_b(seed: int, progress: Progress, physics: Physics | None = None) ->
 
 def told(s: Selection) -> Part:
     """Return the report of Appendix B."""
-    numbers = {
-        "sets_models": float(s.models(s.sets)),
-        "sets_small": float(len(s.psi.subsets)),
-        "sets_common": float(len(s.small.common)),
-        "sets_common_holm": float(len(s.holm.common)),
-        "sets_common_converged": float(len(s.converged.common)),
-        "sets_best_psi": float(s.by_size[MOST].min()),
-    }
-    numbers |= {f"sets_equivalent_s{d}": float(n) for d, n in enumerate(s.small.equivalent.sum(axis=1), start=1)}
+    counts = s.small.equivalent.sum(axis=1)
+    best = s.by_size[MOST].min()
+    numbers = exhibits.numbers("sets", s, models=s.models(s.sets), best_psi=best, equivalent=counts)
     return Part(claims(s), _tables(s), (), numbers)
 
 

@@ -101,12 +101,8 @@ def spindle(seed: int, progress: Progress, physics: Physics | None = None) -> Pa
         exhibits.table("neighbours", s.sweep.items()),
     )
     numbers = found.numbers("fem") | found.rms_by_method("fem")
-    numbers |= {
-        "fem_span_um": s.span,
-        "fem_sweeps": float(len(found.ace.errors_)),
-        "fem_beyond": float(found.beyond.mean()),
-        "fem_neighbours_um": max(d for _, d in s.sweep.values()),
-    }
+    neighbours = max(d for _, d in s.sweep.values())
+    numbers |= exhibits.numbers("spindle", s, beyond=found.beyond.mean(), neighbours=neighbours)
     return Part(claims(s), tables, _figures(s), numbers)
 
 
