@@ -129,9 +129,9 @@ def test_errors_by_hand() -> None:
 
 
 def test_the_table_of_errors_has_a_row_per_residual() -> None:
-    table = common.errors_table("errors", {("z", "none"): np.array([1.0, -1.0]), ("z", "net"): np.zeros(2)}, "urad")
+    table = common.errors_table("errors", {("z", "none"): np.array([1.0, -1.0]), ("z", "net"): np.zeros(2)})
 
-    assert table.header[2] == "RMS [urad]"
+    assert table.header[2] == "RMS [um]"
     assert table.rows[0] == ["z", "none", "1.00", "1.00", "1.00", "2.00"]
     assert table.rows[1][2:] == ["0.00"] * 4
 

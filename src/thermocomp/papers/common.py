@@ -317,16 +317,14 @@ def described(residual: FloatArray, deviation: FloatArray) -> float:
     return float(1 - np.sum(residual**2) / np.sum((deviation - deviation.mean()) ** 2))
 
 
-def errors_table(caption: str, residuals: Mapping[tuple[str, str], FloatArray], unit: str = "um") -> StudyTable:
+def errors_table(caption: str, residuals: Mapping[tuple[str, str], FloatArray]) -> StudyTable:
     """Return a table with the error figures of each residual in a row.
 
     Parameters
     ----------
     caption : str
     residuals : mapping of (str, str) to ndarray
-        Residual by subject and method, such as ``("z, 1250 1/min", "no compensation")``.
-    unit : str
-        Unit of the residuals.
+        Residual by subject and method, such as ``("z, 1250 1/min", "no compensation")`` [um].
 
     Returns
     -------
@@ -336,5 +334,5 @@ def errors_table(caption: str, residuals: Mapping[tuple[str, str], FloatArray], 
     for (what, method), residual in residuals.items():
         e = Errors.of(residual)
         rows.append([what, method, *(f"{v:.2f}" for v in (e.rms, e.mae, e.max_abs, e.peak_to_peak))])
-    header = ("", "method", f"RMS [{unit}]", f"MAE [{unit}]", f"max [{unit}]", f"peak-to-peak [{unit}]")
+    header = ("", "method", "RMS [um]", "MAE [um]", "max [um]", "peak-to-peak [um]")
     return StudyTable(caption, header, rows)

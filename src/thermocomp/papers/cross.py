@@ -112,9 +112,9 @@ class Row:
     peak_to_peak: float
     noise_rms: float
     lost_rms: float
-    lost: str
-    sensors: int
-    fit_s: float
+    lost: str = ""
+    sensors: int = 0
+    fit_s: float = 0.0
     failure: str = ""
 
 
@@ -294,9 +294,6 @@ def _none(task: Task, first: Assessment) -> Row:
         peak_to_peak=first.none_metric("peak_to_peak"),
         noise_rms=none,
         lost_rms=none,
-        lost="",
-        sensors=0,
-        fit_s=0.0,
     )
 
 

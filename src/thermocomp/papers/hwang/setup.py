@@ -30,13 +30,10 @@ from thermocomp.virtual.kits import HWANG_PLACES
 NAMES = tuple(f"T{k}" for k in range(1, 15))
 REFERENCE = "T14"
 TARGET = "z_um"
-#: groups of the paper (Table 1, H-10); R2 and standard error [um] of its two models (Table 2, H-12, H-13)
+#: groups of the paper (Table 1, H-10)
 TABLE_1 = ((7,), (9, 10, 11, 12), (13,), (8, 4), (5,), (2,), (1, 6), (3,))
-TABLE_2 = {"optimal": (0.9704, 6.39), "judgement": (0.9697, 6.72)}
 #: eigenvalues in Table 3 of the paper (H-16): with and without grouping
 TABLE_3 = ((1.1e4, 155.8, 18.6, 3.3), (8861.812, 76.397, 19.835, 2.359, 1.129, 0.114, 0.019))
-#: Eq. 9 (H-17)
-EQUATION_9 = {"T7": 0.9599, "T8": 0.9526, "T2": 0.8064, "T6": 0.8066}
 #: temperatures of the engineering judgement model, which also uses their squares (H-13)
 JUDGEMENT = ("T6", "T7", "T13")
 #: magnitudes of the sensor error [degC] and its distributions (E-H8)

@@ -55,9 +55,9 @@ class Spindle:
     peaked: MillingTrial
 
     @property
-    def how(self) -> str:
-        """Note on `peaked` if it has the two series exchanged; else empty."""
-        return "" if self.peaked is self.found else "the two series exchanged: "
+    def exchanged(self) -> bool:
+        """Whether `peaked` has the two series exchanged."""
+        return self.peaked is not self.found
 
     @property
     def span(self) -> float:

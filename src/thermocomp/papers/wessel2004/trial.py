@@ -30,6 +30,8 @@ FROM_START = "{}, from each start"
 SWEEPS = 20_000
 #: maximum slight difference as a share of the displacement's span: visible limit in a figure
 SLIGHT = 0.01
+#: number of equal intervals of a temperature in which the width of its loop is sought
+LOOP_STEPS = 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,7 +233,7 @@ def trial(
     return MillingTrial(learned=learned, unseen=unseen, ace=ace, estimates=estimates, fits=fits, flagged=flagged)
 
 
-def loop_width(samples: Samples, steps: int = 20) -> float:
+def loop_width(samples: Samples) -> float:
     """Return the range of the displacement at equal temperature, as a fraction of its span: the hysteresis loop.
 
     The span of each temperature is divided into equal intervals; the width is the largest range of the displacement in
@@ -240,7 +242,6 @@ def loop_width(samples: Samples, steps: int = 20) -> float:
     Parameters
     ----------
     samples : Samples
-    steps : int
 
     Returns
     -------
@@ -249,7 +250,7 @@ def loop_width(samples: Samples, steps: int = 20) -> float:
     y = samples.deviations[:, 0]
     widths = []
     for x in samples.values.T:
-        place = np.minimum((steps * (x - x.min()) / max(np.ptp(x), 1e-12)).astype(np.intp), steps - 1)
+        place = np.minimum((LOOP_STEPS * (x - x.min()) / max(np.ptp(x), 1e-12)).astype(np.intp), LOOP_STEPS - 1)
         level = y - np.polyval(np.polyfit(x, y, 1), x) if np.ptp(x) > 0 else y
         widths.append(max(float(np.ptp(level[place == k])) for k in np.unique(place)))
     return min(widths) / float(np.ptp(y))
