@@ -73,7 +73,8 @@ def _described(c: Computed) -> Facts:
 @claims.facts
 def _interpolated(c: Computed) -> Facts:
     z = c.judge.deviations
-    errors = [(POSITIONS[k], rms(z[:, k] - c.interpolated(k, NET)), rms(c.left[NET][:, k])) for k in c.inner]
+    inner = range(1, len(POSITIONS) - 1)
+    errors = [(POSITIONS[k], rms(z[:, k] - c.interpolated(k, NET)), rms(c.left[NET][:, k])) for k in inner]
     holds = all(between <= AS_WELL * own for _, between, own in errors)
     return {"errors": errors, "holds": holds, "apart": rms(z[:, 0] - z[:, -1]), "last": POSITIONS[-1]}
 

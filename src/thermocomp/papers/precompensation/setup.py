@@ -159,11 +159,6 @@ class Computed:
         """Return the explained share of the variance of the drift at each position."""
         return [described(e, z) for e, z in zip(self.left[name].T, self.judge.deviations.T, strict=True)]
 
-    @property
-    def inner(self) -> tuple[int, ...]:
-        """Indices of the positions with a neighbour on either side."""
-        return tuple(range(1, len(POSITIONS) - 1))
-
     def interpolated(self, k: int, name: str) -> FloatArray:
         """Return the prediction for position k by linear interpolation between the models of all other positions."""
         others = [j for j in range(len(POSITIONS)) if j != k]
