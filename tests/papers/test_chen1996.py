@@ -330,6 +330,6 @@ def test_claims_on_slopes_can_fail(slopes: LearnedPositioning) -> None:
     assert isinstance(k1, Polynomial)
     idle = replace(k1, coefficients=(0.0,) * len(k1.coefficients))
     nothing = {m: replace(fit, model=replace(model, slopes=(idle,))) for m, fit in slopes.fits.items()}
-    lateral = find(chen1996_slope.claims(replace(slopes, fits=nothing)), "C-35", "dimensions")
+    lateral = find(chen1996_slope.judge(replace(slopes, fits=nothing)), "C-35", "dimensions")
     assert not lateral.holds
     assert lateral.ours.endswith("1.0 times")
