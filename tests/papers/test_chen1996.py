@@ -14,7 +14,6 @@ from thermocomp.papers import common
 from thermocomp.papers.chen1996 import drift as chen1996_drift
 from thermocomp.papers.chen1996 import law as chen1996_law
 from thermocomp.papers.chen1996 import setup as chen1996_setup
-from thermocomp.papers.chen1996 import show as chen1996_show
 from thermocomp.papers.chen1996 import slope as chen1996_slope
 from thermocomp.papers.chen1996 import unseen as chen1996_unseen
 from thermocomp.papers.chen1996.drift import LearnedDrift
@@ -183,7 +182,7 @@ def test_claims_on_the_fits_can_fail(learned: LearnedDrift) -> None:
 
 def test_the_log_of_the_regression_is_a_table(learned: LearnedDrift) -> None:
     """C-16: Fig. 2."""
-    (log,) = [t for t in chen1996_show.tables(learned) if t.caption == "Fig. 2: steps in x"]
+    (log,) = [t for t in chen1996_drift.tables(learned) if t.caption == "Fig. 2: steps in x"]
     assert len(log.rows) == len(learned.regressions["x"].log_)
     assert log.rows[0][:3] == ["1", "ENTER", learned.regressions["x"].log_[0].term]
 
@@ -331,6 +330,6 @@ def test_claims_on_slopes_can_fail(slopes: LearnedPositioning) -> None:
     assert isinstance(k1, Polynomial)
     idle = replace(k1, coefficients=(0.0,) * len(k1.coefficients))
     nothing = {m: replace(fit, model=replace(model, slopes=(idle,))) for m, fit in slopes.fits.items()}
-    lateral = find(chen1996_slope.claims(replace(slopes, fits=nothing)), "C-35", "dimensions")
+    lateral = find(chen1996_slope.judge(replace(slopes, fits=nothing)), "C-35", "dimensions")
     assert not lateral.holds
     assert lateral.ours.endswith("1.0 times")

@@ -152,10 +152,11 @@ def test_a_method_that_does_harm_is_a_finding() -> None:
     def made(method: str, rms: float) -> Row:
         return Row("a task", method, 1.0, rms, 0.0, 0.0, 0.0, 0.0, "", 1, 0.0)
 
-    (good,) = cross._claims([made("none", 5.0), made("ols", 4.0), made("mlp", 2.0)], real=False)
+    (good,) = cross.simulated([made("none", 5.0), made("ols", 4.0), made("mlp", 2.0)])
     assert good.holds
     assert good.ours == "best mlp 2.00 um of 5.00 um; 0 of 2 do harm"
-    (bad,) = cross._claims([made("none", 5.0), made("ols", 6.0), made("mlp", 2.0)], real=True)
+    (bad,) = cross.measured([made("none", 5.0), made("ols", 6.0), made("mlp", 2.0)])
+    assert bad.ids == ("X-02", "X-03")
     assert bad.holds is False
     assert "Worse than none: ols 6.0 um." in bad.finding
 

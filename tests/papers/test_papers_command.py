@@ -127,13 +127,13 @@ def test_cross_judges_on_measured_recordings_too(
     def made(
         seed: int,
         progress: Progress,
-        tests: Sequence[Recording],
+        recordings: Sequence[Recording],
         *,
         methods: Sequence[str],
         targets: Sequence[str] | None,
         jobs: int,
     ) -> Study:
-        given.append((seed, [t.name for t in tests], tuple(methods), targets, jobs))
+        given.append((seed, [t.name for t in recordings], tuple(methods), targets, jobs))
         return Study("cross", "All methods", (), (StudyTable("RMS", ("method", "drift"), [["ols", "1.25"]]),), (), {})
 
     monkeypatch.setattr(cross, "run", made)

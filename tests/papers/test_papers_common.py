@@ -12,7 +12,7 @@ from thermocomp.models.mlp import SigmoidNet
 from thermocomp.models.ols import LeastSquares
 from thermocomp.papers import common, pictures
 from thermocomp.papers.common import Errors
-from thermocomp.papers.study import Claims, Ours, Part, Study, StudyTable
+from thermocomp.papers.study import Figure, Part, Study, StudyTable
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.stacking import stack
@@ -129,9 +129,9 @@ def test_errors_by_hand() -> None:
 
 
 def test_the_table_of_errors_has_a_row_per_residual() -> None:
-    table = common.errors_table("errors", {("z", "none"): np.array([1.0, -1.0]), ("z", "net"): np.zeros(2)}, "urad")
+    table = common.errors_table("errors", {("z", "none"): np.array([1.0, -1.0]), ("z", "net"): np.zeros(2)})
 
-    assert table.header[2] == "RMS [urad]"
+    assert table.header[2] == "RMS [um]"
     assert table.rows[0] == ["z", "none", "1.00", "1.00", "1.00", "2.00"]
     assert table.rows[1][2:] == ["0.00"] * 4
 
@@ -147,32 +147,8 @@ def test_tests_are_put_end_to_end(tests: Samples) -> None:
     assert hours[-1] == pytest.approx((tests.time[n - 1] + tests.time[-1]) / 3600)
 
 
-def test_a_claim_is_judged_by_its_function() -> None:
-    claims, parts = Claims[float](), Claims[int]()
-
-    @claims.add("C-34 C-36", "It is small", "1 um")
-    def _small(error: float) -> Ours:
-        return Ours(f"{error:g} um", np.less(error, 1), "The rest is noise.", note="Of ten rows.")
-
-    @parts.add("C-35", "Rows")
-    def _rows(n: int) -> str:
-        return f"{n}"
-
-    claims.include(parts, int)
-
-    small, rows = claims(0.5)
-    large, _ = claims(2.0)
-    assert (small.ids, small.text, small.paper, small.ours) == (("C-34", "C-36"), "It is small", "1 um", "0.5 um")
-    assert small.holds is True
-    assert small.finding == "Of ten rows."
-    assert large.holds is False
-    assert large.finding == "Of ten rows. The rest is noise."
-    assert (rows.ours, rows.holds, rows.finding) == ("0", None, "")
-    assert _small(2.0) == large
-
-
 def test_a_study_is_its_parts_one_after_the_other() -> None:
-    table, figure = StudyTable("t", ("a",), []), pictures.single("k", "c", ("x", "y"), [])
+    table, figure = StudyTable("t", ("a",), []), Figure("k", "c", [])
     made = Study.of("n", "T", Part([], [table], [figure], {"a": 1.0}), Part([], [], [figure], {"b": 2.0}))
     assert (made.name, made.title, made.claims, made.tables) == ("n", "T", (), (table,))
     assert made.figures == (figure, figure)

@@ -249,7 +249,8 @@ def test_a_row_is_beyond_only_if_one_can_see_it() -> None:
 def peaks(learned: Recording, unseen: Recording) -> tuple[Claim, Claim]:
     found = trial([learned, unseen], 0, (0, 1), beside=False)
     both = wessel2004_spindle.Spindle([learned, unseen], found, found)
-    return wessel2004_spindle._cropped(both), wessel2004_spindle._guarded(both)
+    (cropped,), (guarded,) = (wessel2004_spindle.claims.judged(key, both) for key in ("cropped", "guarded"))
+    return cropped, guarded
 
 
 def test_peaks_are_cropped_and_flagged() -> None:
@@ -320,9 +321,8 @@ def judged(residual: Callable[[FloatArray], tuple[FloatArray, FloatArray]]) -> M
 
 def test_the_local_gain_is_the_greatest_of_ten_stretches() -> None:
     def locally(found: MillingTrial) -> Claim:
-        return wessel2004_tools._locally(
-            wessel2004_tools.Resting(found, found, selection([[[0.4, 0.5, 0.6]]], [(0,)]), {})
-        )
+        resting = wessel2004_tools.Resting(found, found, selection([[[0.4, 0.5, 0.6]]], [(0,)]), {})
+        return wessel2004_tools.resting.judged("locally", resting)[0]
 
     c = locally(judged(lambda x: (np.where(x <= 10, 12.0, 1.0), np.ones(100))))
     assert c.holds
@@ -332,17 +332,18 @@ def test_the_local_gain_is_the_greatest_of_ten_stretches() -> None:
 
 def test_the_worst_episode_is_left_out() -> None:
     spike = judged(lambda x: (np.ones(100), np.where(np.abs(x - 17) <= 5, 9.0 - np.abs(x - 17), 1.5)))
-    c = wessel2004_tools._without_episode(spike)
+    (c,) = wessel2004_tools.milling.judged("without_episode", spike)
     assert c.holds
     assert "1.50 um without points 12-22" in c.ours
-    assert not wessel2004_tools._without_episode(judged(lambda _: (np.ones(100), np.full(100, 2.5)))).holds
+    flat = judged(lambda _: (np.ones(100), np.full(100, 2.5)))
+    assert not wessel2004_tools.milling.judged("without_episode", flat)[0].holds
 
 
 def test_over_and_under_estimates_go_by_the_drift() -> None:
     found = judged(lambda x: (np.where(x <= 40, -1.0, 1.0), np.ones(100)))
     towards = float(np.sign(found.measured.mean()))
     found.estimates[MLR_NAME] = found.measured + towards * np.where(np.arange(1, 101) <= 40, 1.0, -1.0)
-    c = wessel2004_tools._systematic(found)
+    (c,) = wessel2004_tools.milling.judged("systematic", found)
     assert c.holds
     assert c.ours.startswith("mean excess +1.00 um between them, -1.00 um")
 
@@ -370,8 +371,8 @@ def test_the_choice_is_the_greatest_sum_of_the_common_sets() -> None:
     assert wessel2004_sets._choice(small) == best
     found = selection(psi, sets)
     assert found.chosen == best
-    shared = wessel2004_sets._shared(found)
-    assert wessel2004_sets._several(found).holds
+    (several,), (shared,) = (wessel2004_sets.claims.judged(key, found) for key in ("several", "shared"))
+    assert several.holds
     assert shared.holds is False  # T2 is in both, and by itself as good as the best
     assert "{T2} by itself is as good" in shared.finding
 
@@ -380,7 +381,7 @@ def test_no_common_set_is_told() -> None:
     rng = np.random.default_rng(1)
     psi = np.array([[0.9, 0.5], [0.5, 0.9]])[:, :, None] + 1e-4 * rng.normal(size=(2, 2, 23))
     found = selection(psi, [(0,), (1,)])
-    several, shared = wessel2004_sets._several(found), wessel2004_sets._shared(found)
+    (several,), (shared,) = (wessel2004_sets.claims.judged(key, found) for key in ("several", "shared"))
     assert several.holds is False
     assert shared.holds is False
     assert several.ours.endswith("0 common: none")

@@ -25,9 +25,9 @@ from thermocomp.judging.faultlog import find_faults
 from thermocomp.judging.settling.settling import time_constants
 from thermocomp.models.training import train
 from thermocomp.models.watching import find_watch
-from thermocomp.papers.pictures import single
 from thermocomp.papers.report import papers
-from thermocomp.papers.study import Claim, PlotCurve, Study, StudyTable
+from thermocomp.papers.study import Claim, Panel, PlotCurve, Study, StudyTable
+from thermocomp.papers.study import Figure as StudyFigure
 from thermocomp.recordings.checks.findings import Finding
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.stacking import stack
@@ -149,7 +149,7 @@ def test_iso230_and_papers(first: int) -> None:
     study = Study(
         "x", name, (Claim((name,), name, name, other, False, name),),
         (StudyTable(name, (name, other), [[name, other]]),),
-        (single("key", name, (name, other), [curve, replace(curve, label=other)], title=name),), {},
+        (StudyFigure("key", name, [Panel(name, name, other, [curve, replace(curve, label=other)])]),), {},
     )  # fmt: skip
     is_sound(papers.render([study], seed=0))
     said = [t.strip() for t in texts(papers.draw(study.figures[0]))]

@@ -1,8 +1,8 @@
 """Common part of the studies: recordings with a paper's names, replay of models over whole tests, error tables."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -23,8 +23,6 @@ from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.stacking import stack
 from thermocomp.recordings.starts import COLD
-
-_Item = TypeVar("_Item")
 
 #: the papers' models are not limited to their training range: a margin that no reading exceeds
 PAPERS_SUPPORT = Support(margin=1e3)
@@ -319,33 +317,14 @@ def described(residual: FloatArray, deviation: FloatArray) -> float:
     return float(1 - np.sum(residual**2) / np.sum((deviation - deviation.mean()) ** 2))
 
 
-def table(caption: str, items: Iterable[_Item], columns: Mapping[str, Callable[[_Item], str]]) -> StudyTable:
-    """Return a table with a row per item.
-
-    Parameters
-    ----------
-    caption : str
-    items : iterable
-    columns : mapping of str to callable
-        Functions for the cells of an item, by column heading.
-
-    Returns
-    -------
-    StudyTable
-    """
-    return StudyTable(caption, tuple(columns), [[write(item) for write in columns.values()] for item in items])
-
-
-def errors_table(caption: str, residuals: Mapping[tuple[str, str], FloatArray], unit: str = "um") -> StudyTable:
+def errors_table(caption: str, residuals: Mapping[tuple[str, str], FloatArray]) -> StudyTable:
     """Return a table with the error figures of each residual in a row.
 
     Parameters
     ----------
     caption : str
     residuals : mapping of (str, str) to ndarray
-        Residual by subject and method, such as ``("z, 1250 1/min", "no compensation")``.
-    unit : str
-        Unit of the residuals.
+        Residual by subject and method, such as ``("z, 1250 1/min", "no compensation")`` [um].
 
     Returns
     -------
@@ -355,5 +334,5 @@ def errors_table(caption: str, residuals: Mapping[tuple[str, str], FloatArray], 
     for (what, method), residual in residuals.items():
         e = Errors.of(residual)
         rows.append([what, method, *(f"{v:.2f}" for v in (e.rms, e.mae, e.max_abs, e.peak_to_peak))])
-    header = ("", "method", f"RMS [{unit}]", f"MAE [{unit}]", f"max [{unit}]", f"peak-to-peak [{unit}]")
+    header = ("", "method", "RMS [um]", "MAE [um]", "max [um]", "peak-to-peak [um]")
     return StudyTable(caption, header, rows)

@@ -11,9 +11,10 @@ from thermocomp.judging.replay import replay
 from thermocomp.judging.results import Assessment
 from thermocomp.judging.splits import Judging, Split, leave_one_cycle_out
 from thermocomp.models.methods import expand
+from thermocomp.papers.claims import Claims, Facts
 from thermocomp.papers.common import rms, stacked
-from thermocomp.papers.pictures import curves, single
-from thermocomp.papers.study import Claim, Figure, Progress, Study, StudyTable, tell_nobody
+from thermocomp.papers.exhibits import Exhibits
+from thermocomp.papers.study import Figure, Progress, Study, StudyTable, tell_nobody
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
 from thermocomp.virtual.datasets import record
@@ -111,9 +112,9 @@ class Row:
     peak_to_peak: float
     noise_rms: float
     lost_rms: float
-    lost: str
-    sensors: int
-    fit_s: float
+    lost: str = ""
+    sensors: int = 0
+    fit_s: float = 0.0
     failure: str = ""
 
 
@@ -248,7 +249,12 @@ def run(
     return Study(
         name="cross",
         title="The methods on all experiments",
-        claims=tuple(c for k, mine in enumerate(rows) for c in _claims(mine, real=k >= len(experiments))),
+        claims=tuple(
+            claim
+            for k, mine in enumerate(rows)
+            if any(not r.failure for r in mine[1:])
+            for claim in (simulated if k < len(experiments) else measured)(mine)
+        ),
         tables=(_overview(rows), *map(_table, rows)) if rows else (),
         figures=(_figure(rows),),
         numbers={f"{r.task}, {r.method}: rms_um": r.rms for mine in rows for r in mine if not r.failure},
@@ -288,9 +294,6 @@ def _none(task: Task, first: Assessment) -> Row:
         peak_to_peak=first.none_metric("peak_to_peak"),
         noise_rms=none,
         lost_rms=none,
-        lost="",
-        sensors=0,
-        fit_s=0.0,
     )
 
 
@@ -305,36 +308,35 @@ def _fit_rms(task: Task, blocks: Sequence[Assessment]) -> float:
     return rms(np.concatenate(residuals))
 
 
-def _claims(rows: Sequence[Row], *, real: bool) -> tuple[Claim, ...]:
-    """Return the claims implied by every paper: its method is useful in an unseen test."""
+simulated = Claims[Sequence[Row]](__name__, section="simulated")
+measured = Claims[Sequence[Row]](__name__, section="measured")
+exhibits = Exhibits(__name__)
+
+
+@simulated.facts
+@measured.facts
+def _useful(rows: Sequence[Row]) -> Facts:
+    """Return the facts of the claim implied by every paper: its method is useful in an unseen test."""
     none, *judged = rows
     fitted = [r for r in judged if not r.failure]
-    if not fitted:
-        return ()
-    best = min(fitted, key=lambda r: r.rms)
-    closest = min(fitted, key=lambda r: r.fit_rms)
-    harmful = [r for r in fitted if not r.rms < none.rms]
-    ratio = float(np.median([r.rms / r.fit_rms for r in fitted if r.fit_rms > 0]))
-    told = f"Unseen RMS over fit RMS: {ratio:.1f} in the median. "
-    if len(fitted) > 2:
-        rank = float(spearmanr([r.fit_rms for r in fitted], [r.rms for r in fitted]).statistic)
-        told += f"Rank correlation of the two: {rank:.2f}. "
-    told += f"The closest fit is that of {closest.method}: {closest.fit_rms:.2f} um, unseen {closest.rms:.2f} um."
-    if harmful:
-        told += " Worse than none: " + ", ".join(f"{r.method} {r.rms:.1f} um" for r in harmful) + "."
     failed = [r.method for r in judged if r.failure]
-    if failed:
-        told += f" Not fitted: {', '.join(failed)}."
-    return (
-        Claim(
-            ids=("X-02", "X-03") if real else ("X-03",),
-            text=f"{none.task}: every method is better than no compensation where it was not trained",
-            paper="",
-            ours=f"best {best.method} {best.rms:.2f} um of {none.rms:.2f} um; {len(harmful)} of {len(fitted)} do harm",
-            holds=not harmful,
-            finding=told,
-        ),
-    )
+    harmful = [(r.method, r.rms) for r in fitted if not r.rms < none.rms]
+    several = len(fitted) > 2
+    return {
+        "none": none,
+        "best": min(fitted, key=lambda r: r.rms),
+        "fitted": len(fitted),
+        "harmful": harmful,
+        "holds": not harmful,
+        "compared": True,
+        "ratio": np.median([r.rms / r.fit_rms for r in fitted if r.fit_rms > 0]),
+        "ranked": several,
+        "rank": spearmanr([r.fit_rms for r in fitted], [r.rms for r in fitted]).statistic if several else np.nan,
+        "closest": min(fitted, key=lambda r: r.fit_rms),
+        "worse": bool(harmful),
+        "unfitted": bool(failed),
+        "failed": failed,
+    }
 
 
 def _overview(rows: Sequence[Sequence[Row]]) -> StudyTable:
@@ -343,27 +345,23 @@ def _overview(rows: Sequence[Sequence[Row]]) -> StudyTable:
         [first.method, *("-" if mine[k].failure else f"{mine[k].rms:.2f}" for mine in rows)]
         for k, first in enumerate(rows[0])
     ]
+    tasks = (mine[0].task.replace(", ", " ") for mine in rows)
     caption = (
         "RMS [um] in tests that were not learned from (X-03). Every method is offered all temperatures and the spindle "
         "speed, and takes what it can use; -: it could not be fitted."
     )
-    return StudyTable(caption, ("method", *(mine[0].task.replace(", ", " ") for mine in rows)), cells)
+    return StudyTable(caption, ("method", *tasks), cells)
 
 
 def _table(rows: Sequence[Row]) -> StudyTable:
-    header = ("method", "fit", "unseen", "max", "p-p", "noise", "cut off", "worst input", "inputs", "fit [s]")
-    cells = []
+    cells: list[tuple[str, list[str], str, str, str]] = []
     for r in rows:
         if r.failure:
-            cells.append([r.method, *["-"] * 6, f"not fitted: {r.failure.partition(':')[0]}", "", ""])
+            cells.append((r.method, ["-"] * 6, f"not fitted: {r.failure.partition(':')[0]}", "", ""))
             continue
-        errors = (r.fit_rms, r.rms, r.max_abs, r.peak_to_peak, r.noise_rms, r.lost_rms)
-        cells.append([r.method, *(f"{e:.2f}" for e in errors), r.lost, str(r.sensors), f"{r.fit_s:.2f}"])
-    caption = (
-        f"{rows[0].task}: RMS of the fit and where it was unseen, its maximum and peak-to-peak, RMS with noise of "
-        "0.4 degC on all temperatures and with the worst input cut off [um]"
-    )
-    return StudyTable(caption, header, cells)
+        errors = [f"{e:.2f}" for e in (r.fit_rms, r.rms, r.max_abs, r.peak_to_peak, r.noise_rms, r.lost_rms)]
+        cells.append((r.method, errors, r.lost, str(r.sensors), f"{r.fit_s:.2f}"))
+    return exhibits.table("task", cells, task=rows[0].task)
 
 
 def _figure(rows: Sequence[Sequence[Row]]) -> Figure:
@@ -371,10 +369,5 @@ def _figure(rows: Sequence[Sequence[Row]]) -> Figure:
     shares = {
         first.method: np.array([mine[k].rms / mine[0].rms for mine in rows]) for k, first in enumerate(rows[0]) if k
     }
-    told = "; ".join(f"{k} {mine[0].task}" for k, mine in enumerate(rows, start=1))
-    return single(
-        "cross-unseen",
-        f"RMS in the unseen test as a share of that without compensation. Experiments: {told}.",
-        ("experiment", "RMS / RMS without compensation"),
-        curves(places, shares, "points"),
-    )
+    tasks = [f"{k} {mine[0].task}" for k, mine in enumerate(rows, start=1)]
+    return exhibits.figure("cross-unseen", (places, shares), tasks=tasks)

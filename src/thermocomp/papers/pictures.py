@@ -1,10 +1,10 @@
-"""Common figures of the studies: curves over the same axis, figures with one panel, tests in sequence."""
+"""Common curves of the studies: curves over the same axis, tests in sequence."""
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from thermocomp.papers.study import Figure, FloatArray, Panel, PlotCurve, Style
+from thermocomp.papers.study import FloatArray, PlotCurve, Style
 from thermocomp.recordings.samples import Samples
 
 
@@ -35,30 +35,6 @@ def curves(
     styles: dict[str, Style] = dict.fromkeys(dashed, "dashed")
     styles.update(dict.fromkeys(points, "points"))
     return [PlotCurve(label, x, y, styles.get(label, style)) for label, y in values.items()]
-
-
-def single(
-    key: str, caption: str, axes: tuple[str, str], curves: Sequence[PlotCurve], *, title: str = "", columns: int = 1
-) -> Figure:
-    """Return a figure with one panel.
-
-    Parameters
-    ----------
-    key, caption : str
-        See `thermocomp.papers.study.Figure`.
-    axes : tuple of str
-        Labels of x and y.
-    curves : sequence of PlotCurve
-    title : str
-        Title of the panel.
-    columns : int
-        Number of columns filled, out of 2.
-
-    Returns
-    -------
-    Figure
-    """
-    return Figure(key, caption, [Panel(title, *axes, curves)], columns)
 
 
 def end_to_end(samples: Samples, values: FloatArray) -> tuple[FloatArray, FloatArray]:

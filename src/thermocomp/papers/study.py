@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, Literal, NamedTuple, TypeVar
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,83 +61,6 @@ class Claim:
     def __post_init__(self) -> None:
         if self.holds is False and not self.finding:
             raise ValueError(f"{', '.join(self.ids)}: a claim that does not hold needs a finding")
-
-
-#: type of the results by which the claims of a study are judged
-_Found = TypeVar("_Found")
-
-
-class Ours(NamedTuple):
-    """Result here for a claim.
-
-    Parameters
-    ----------
-    text : str
-        Our number, as text.
-    holds : bool or None
-        See `Claim`.
-    otherwise : str
-        Reason why it does not hold; shown only in this case.
-    note : str
-        Limitation; always shown, before the reason.
-    """
-
-    text: str
-    holds: bool | None = None
-    otherwise: str = ""
-    note: str = ""
-
-
-class Claims(Generic[_Found]):
-    """Claims of a study in order of presentation, each with the function that computes our result."""
-
-    def __init__(self) -> None:
-        self._judges: list[Callable[[_Found], Sequence[Claim]]] = []
-
-    def add(
-        self, ids: str, text: str, paper: str = ""
-    ) -> Callable[[Callable[[_Found], Ours | str]], Callable[[_Found], Claim]]:
-        """Return a decorator that adds a claim, judged by the decorated function.
-
-        Parameters
-        ----------
-        ids, text, paper : str
-            See `Claim`; several ids separated by spaces.
-
-        Returns
-        -------
-        callable
-            Decorator of a function of the results, which returns an `Ours`, or only its text for a number for
-            information.
-        """
-
-        def register(ours: Callable[[_Found], Ours | str]) -> Callable[[_Found], Claim]:
-            def judge(found: _Found) -> Claim:
-                told = ours(found)
-                mine = Ours(told) if isinstance(told, str) else told
-                holds = None if mine.holds is None else bool(mine.holds)
-                finding = (mine.note, mine.otherwise if holds is False else "")
-                return Claim(
-                    ids=tuple(ids.split()),
-                    text=text,
-                    paper=paper,
-                    ours=mine.text,
-                    holds=holds,
-                    finding=" ".join(filter(None, finding)),
-                )
-
-            self._judges.append(lambda found: (judge(found),))
-            return judge
-
-        return register
-
-    def include(self, others: "Claims[Any]", part: Callable[[_Found], Any]) -> None:
-        """Append all claims about a part of the results."""
-        self._judges.append(lambda found: others(part(found)))
-
-    def __call__(self, found: _Found) -> tuple[Claim, ...]:
-        """Return all claims, judged by the results."""
-        return tuple(claim for judge in self._judges for claim in judge(found))
 
 
 @dataclass(frozen=True, eq=False)

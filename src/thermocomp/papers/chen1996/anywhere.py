@@ -4,19 +4,20 @@ The synthesis itself is in ref. 6 of the paper; here that of `thermocomp.volumet
 by `thermocomp.virtual.volume`, which models the machine independently of that synthesis.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from itertools import chain
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from thermocomp.core.components import BY_CODE, COMPONENTS
-from thermocomp.papers.chen1996.setup import TENFOLD
+from thermocomp.papers.chen1996.setup import TENFOLD, exhibits
 from thermocomp.papers.chen1996.volume import LearnedVolume
+from thermocomp.papers.claims import Claims, Facts
 from thermocomp.papers.common import Errors, rms
-from thermocomp.papers.pictures import single
-from thermocomp.papers.study import Claims, Figure, FloatArray, Ours, PlotCurve, StudyTable
+from thermocomp.papers.study import Figure, FloatArray, PlotCurve, StudyTable
 from thermocomp.runtime.geometry.kinematics import INDEX, Kinematics
 from thermocomp.runtime.geometry.straight import straight_lines
 from thermocomp.runtime.geometry.volumetric import VolumetricModel
@@ -118,8 +119,8 @@ def judge(learned: LearnedVolume, seed: int) -> Volume:
     rng = np.random.default_rng(seed)
     tests = list(simulate(virtual.find_experiment("volumetric-new"), seed=seed, whole=True))
     share = -(-POINTS // len(tests))
-    parts = [_points(learned, test, min(share, POINTS - share * k), rng) for k, test in enumerate(tests)]
-    p = _Points._make(map(np.vstack, zip(*parts, strict=True)))
+    parts = (_points(learned, test, min(share, POINTS - share * k), rng) for k, test in enumerate(tests))
+    p = _Points._make(map(np.array, zip(*chain.from_iterable(parts), strict=True)))
     truth, kinematics = VolumetricTruth(MachiningCentre().observables), Kinematics(learned.machine)
 
     def effect(values: FloatArray, codes: Collection[str] = INDEX) -> FloatArray:
@@ -153,7 +154,8 @@ def judge(learned: LearnedVolume, seed: int) -> Volume:
     )
 
 
-def _points(learned: LearnedVolume, test: SimulatedTest, n: int, rng: np.random.Generator) -> _Points:
+def _points(learned: LearnedVolume, test: SimulatedTest, n: int, rng: np.random.Generator) -> Iterator[tuple[Any, ...]]:
+    """Yield what `_Points` has of each point."""
     model = VolumetricModel(learned.machine)
     recording = virtual.make_recording(test)
     states = model.replay(recording.time, {name: recording.table[name].to_numpy() for name in model.inputs})
@@ -161,24 +163,18 @@ def _points(learned: LearnedVolume, test: SimulatedTest, n: int, rng: np.random.
     points = rng.uniform(size=(n, 3)) * [TRAVEL[a] for a in AXES]
     tools = np.stack([np.zeros(n), np.zeros(n), -rng.uniform(*TOOLS, n)], axis=-1)
     assert test.observables is not None
-    now, start = test.observables[rows], np.tile(test.observables[0], (n, 1))
-    told, full, lines, begin = [], [], [], []
     for row, point, tool in zip(rows.tolist(), points, tools, strict=True):
         straight = straight_lines(states[row], MIDDLE, tool, grid=2).lines
-        told.append(states[row].components(point))
-        full.append(states[row].correction(point, tool))
-        lines.append([line.correction.at(p) for line, p in zip(straight, point.tolist(), strict=True)])
-        begin.append(states[0].correction(point, tool))
-    return _Points(
-        now=now,
-        start=start,
-        points=points,
-        tools=tools,
-        told=np.array(told),
-        full=np.array(full),
-        lines=np.array(lines),
-        begin=np.array(begin),
-    )
+        yield (
+            test.observables[row],
+            test.observables[0],
+            point,
+            tool,
+            states[row].components(point),
+            states[row].correction(point, tool),
+            [line.correction.at(p) for line, p in zip(straight, point.tolist(), strict=True)],
+            states[0].correction(point, tool),
+        )
 
 
 def as_measured(truth: VolumetricTruth, now: FloatArray, start: FloatArray, points: FloatArray) -> FloatArray:
@@ -224,74 +220,47 @@ def as_measured(truth: VolumetricTruth, now: FloatArray, start: FloatArray, poin
 # -- claims ------------------------------------------------------------------------------------------------------------
 
 
-claims = Claims[Volume]()
+claims = Claims[Volume](__name__)
 
 
-@claims.add(
-    "C-01 C-08",
-    "The error anywhere is synthesised from components of the machine's elements (here from the true ones, to "
-    f"first order; the true error, composed exactly, is met within {CLOSED} um)",
-)
-def _closes(found: Volume) -> Ours:
-    return Ours(f"{found.closure:.3f} um at most", found.closure <= CLOSED, "angles are too large for first order")
+@claims.facts
+def _first_order(found: Volume) -> Facts:
+    enough = {code: fit.enough for code, fit in found.learned.fits.items()}
+    more = {code: m for code, m in enough.items() if m > 1}
+    straight = sum(m == 1 for m in enough.values())
+    return {
+        "straight": straight,
+        "fits": len(enough),
+        "bent": bool(more),
+        "more": more,
+        "holds": 2 * straight > len(enough),
+    }
 
 
-@claims.add(
-    "C-05",
-    "In most cases first order describes the thermal part of a position-dependent component well enough",
-    "m = 1",
-)
-def _first_order(found: Volume) -> Ours:
-    fits = found.learned.fits
-    more = [f"{code} (m = {fit.enough})" for code, fit in fits.items() if fit.enough > 1]
-    straight = sum(fit.enough == 1 for fit in fits.values())
-    return Ours(
-        f"{straight} of {len(fits)} components" + (f"; all but {', '.join(more)}" if more else ""),
-        2 * straight > len(fits),
-        "the bent parts of bed and column make parabolas",
-    )
+@claims.facts
+def _bed(found: Volume) -> Facts:
+    return {"flat": _off(found.learned.flat), "full": _off(found.learned.fits["EYX"])}
 
 
-@claims.add(
-    "C-06",
-    "The cold profile of a slide may depend on the other coordinates too (here EYX on Z: the bed gives way "
-    "under the column): with them the profile is nearer to the true one, RMS over the travels of both",
-)
-def _bed(found: Volume) -> Ours:
-    flat, full = (_off(f) for f in (found.learned.flat, found.learned.fits["EYX"]))
-    return Ours(f"{flat:.2f} -> {full:.2f} um", full < flat, "the dependence is smaller than the noise")
-
-
-@claims.add(
-    "C-35",
-    f"Compensation of all components makes the volumetric error ten times smaller, here at {POINTS} random "
-    "points, tools and thermal states of tests that were not learned from (RMS)",
-    "ten times",
-)
-def _tenfold(found: Volume) -> Ours:
-    told = ", ".join(f"{c} {e:.1f}" for c, e in found.by_component.items() if e >= 1.0)
+@claims.facts
+def _tenfold(found: Volume) -> Facts:
     spindle, axes, start = (rms(np.linalg.norm(found.causes[c], axis=1)) for c in (SPINDLE, AXES_SHARE, START))
     ratio = found.sizes[WITHOUT] / found.sizes[WITH]
-    return Ours(
-        f"{rms(found.sizes[WITHOUT]):.1f} -> {rms(found.sizes[WITH]):.2f} um, {found.gain():.1f} times, at the median "
-        f"point {np.median(ratio):.0f} times, at {np.mean(ratio >= TENFOLD):.0%} ten times or more; what is left is "
-        f"the {SPINDLE} ({spindle:.2f} um) and the {AXES_SHARE} ({axes:.2f} um); {start:.2f} um are there already at "
-        f"the {START}; by component: {told}",
-        found.gain() >= TENFOLD,
-        "temperatures do not tell all that the screws and the spindle's shaft do",
-    )
+    facts: Facts = {"without": rms(found.sizes[WITHOUT]), "with": rms(found.sizes[WITH]), "gain_all": found.gain()}
+    facts |= {"median": np.median(ratio), "often": np.mean(ratio >= TENFOLD)}
+    facts |= {"spindle": spindle, "axes": axes, "start": start}
+    return facts | {"components": {c: e for c, e in found.by_component.items() if e >= 1.0}}
 
 
-@claims.add("C-35", "What a controller reaches that takes one straight line per axis, K0 + tan b (P - P0) (ours)")
-def _lines(found: Volume) -> str:
-    return f"{rms(found.sizes[LINES]):.1f} um, {found.gain(LINES):.1f} times"
+@claims.facts
+def _lines(found: Volume) -> Facts:
+    return {"lines": rms(found.sizes[LINES]), "gain_lines": found.gain(LINES)}
 
 
 def numbers(found: Volume) -> dict[str, float]:
     """Return the numbers asserted by the documentation."""
-    made = {"volume_closure_um": found.closure, "volume_gain": found.gain(), "volume_gain_lines": found.gain(LINES)}
-    short = {WITHOUT: "none", LINES: "lines", WITH: "all"}
-    return made | {f"volume_{short[name]}_um": rms(e) for name, e in found.sizes.items()}
+    sizes = {name: rms(size) for name, size in found.sizes.items()}
+    return exhibits.numbers("anywhere", found, gain=found.gain(), gain_lines=found.gain(LINES), rms=sizes)
 
 
 # -- tables and figures ------------------------------------------------------------------------------------------------
@@ -299,12 +268,10 @@ def numbers(found: Volume) -> dict[str, float]:
 
 def tables(found: Volume) -> list[StudyTable]:
     """Return the errors before and after compensation, and source and residual of each component."""
-    rows = []
-    for name, size in found.sizes.items():
-        along = [f"{rms(found.errors[name][:, k]):.2f}" for k in range(3)]
-        e = Errors.of(size)
-        rows.append([name, f"{e.rms:.2f}", f"{np.percentile(size, MOST):.2f}", f"{e.max_abs:.2f}", *along])
-    header = ("", "RMS", f"{MOST} %", "max", "X RMS", "Y RMS", "Z RMS")
+    sizes = [
+        (name, Errors.of(size), np.percentile(size, MOST), [rms(e) for e in found.errors[name].T])
+        for name, size in found.sizes.items()
+    ]
     parts = []
     for c in COMPONENTS:
         fit = found.learned.fits.get(c.code)
@@ -312,26 +279,16 @@ def tables(found: Volume) -> list[StudyTable]:
         how = "no model: in the spindle's drifts" if source is None else "constant" if fit is None else ""
         if c.group == "spindle":
             how = "drift"
-        made = ["", "", ""] if fit is None else [f"{fit.profile.order[0]}", f"{fit.enough}", f"{fit.thermal_rms:.2f}"]
-        parts.append([c.code, c.description, how, *made, f"{found.by_component[c.code]:.2f}"])
-    return [
-        StudyTable(f"Length of the error at {POINTS} random points and thermal states [um]", header, rows),
-        StudyTable(
-            "The 32 components: degree of the cold profile, m, thermal part [um, urad RMS], and what its own error "
-            "does to the tool point [um RMS]",
-            ("", "", "", "degree", "m", "thermal", "left"),
-            parts,
-        ),
-    ]
+        made = ("", "", "") if fit is None else (fit.profile.order[0], fit.enough, f"{fit.thermal_rms:.2f}")
+        parts.append((c, how, *made, found.by_component[c.code]))
+    return [exhibits.table("errors", sizes, points=POINTS), exhibits.table("components", parts)]
 
 
 def figures(found: Volume) -> list[Figure]:
     """Return the cumulative distribution of the error over the points, before and after."""
     share = 100.0 * np.arange(1, POINTS + 1) / POINTS
     lines = [PlotCurve(name, np.sort(size), share) for name, size in found.sizes.items()]
-    text = f"The volumetric error at {POINTS} random points and thermal states, before and after."
-    axes = "length of the error vector [um]", "points with a smaller one [%]"
-    return [single("chen1996-volume", text, axes, lines)]
+    return [exhibits.figure("chen1996-volume", lines, points=POINTS)]
 
 
 def _off(fit: PositionFit) -> float:

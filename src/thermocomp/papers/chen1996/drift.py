@@ -13,16 +13,27 @@ from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.papers import common
 from thermocomp.papers.chen1996 import setup
 from thermocomp.papers.chen1996.setup import CLOSELY, COMPETITIVE, DRIFTS, TEMPERATURES, drift_samples, recordings
-from thermocomp.papers.study import Claims, FloatArray, Ours
+from thermocomp.papers.claims import Claims, Facts
+from thermocomp.papers.pictures import end_to_end
+from thermocomp.papers.study import Figure, FloatArray, StudyTable
 from thermocomp.recordings.samples import Samples
 
-#: printed: numbers of unscreened and screened terms (C-10, C-20), mean absolute errors after training [um] (C-31)
-CANDIDATES = {"x": 20, "y": 35, "z": 20}
+#: printed: numbers of screened terms (C-20), mean absolute errors after training [um] (C-31)
 TERMS = {"x": 7, "y": 15, "z": 7}
 MAE_NET = {"x": 6.5, "y": 4.2, "z": 6.0}
 MAE_MRA = {"x": 8.9, "y": 3.8, "z": 6.9}
-#: printed: fit of x (C-19), number of removals in the log, which belongs to y (C-17, E-C1)
-R2_X, SEE_X, REMOVALS = 0.988, 10.628, 6
+#: printed: fit of x (C-19)
+R2_X, SEE_X = 0.988, 10.628
+#: Eq. 5 (C-18)
+EQ5 = {
+    "T2": -0.586,
+    "T3": 7.527,
+    "(T6-T7)": -36.966,
+    "(T8-T9)": 10.809,
+    "T3*T3": -0.149,
+    "(T6-T7)*(T6-T7)": -18.119,
+    "T2*(T6-T7)": 2.499,
+}
 #: hidden nodes of the chosen net (C-26) and number of trainings; alternatives and number of trainings of each
 HIDDEN, STARTS = 20, 5
 SWEEP, SWEEP_STARTS = (5, 10, 15, 25, 30), 3
@@ -82,6 +93,15 @@ class LearnedDrift:
     def typical(self) -> LearnedNet:
         """The net with the median error after training, which is shown in the figures."""
         return sorted(self.nets, key=lambda t: t.mean)[len(self.nets) // 2]
+
+    @property
+    def mean(self) -> float:
+        """Mean error of the nets after training [um]."""
+        return float(np.mean([n.mean for n in self.nets]))
+
+    def mean_of(self, kind: str) -> float:
+        """Return the mean error of the nets of one of `others` after training [um]."""
+        return float(np.mean([n.mean for n in self.others[kind]]))
 
     @cached_property
     def mra_residual(self) -> dict[str, FloatArray]:
@@ -170,148 +190,69 @@ def _train(net: SigmoidNet, heat: Samples) -> LearnedNet:
 
 # -- claims ------------------------------------------------------------------------------------------------------------
 
-claims = Claims[LearnedDrift]()
+claims = Claims[LearnedDrift](__name__)
 
 
-def _listed(values: Mapping[str, float], form: str = "") -> str:
-    return " / ".join(format(v, form) for v in values.values())
-
-
-@claims.add("C-14", "810 sets of five tests, each 6 h of warm-up and 10 h of cool-down", "810")
-def _sets(found: LearnedDrift) -> str:
-    return f"{len(found.samples)} of {len(found.samples.test_names)} tests"
-
-
-@claims.add("C-11", "The nine temperatures have strong correlations with the drifts")
-def _correlated(found: LearnedDrift) -> str:
+@claims.facts
+def _correlated(found: LearnedDrift) -> Facts:
     weakest, *_, strongest = sorted(((max(r), t) for t, r in screening(found).items()), key=lambda best: best[0])
-    return f"|r| with the drift it goes with best: {weakest[0]:.2f} ({weakest[1]}) to {strongest[0]:.2f}"
+    return {"weakest": weakest, "strongest": strongest}
 
 
-@claims.add(
-    "C-09 C-10 C-12 C-13",
-    "The second-order models of the subgroups of Table 2 have 20, 35 and 20 coefficients",
-    _listed(CANDIDATES),
-)
-def _coefficients(found: LearnedDrift) -> str:
-    return _listed(found.candidates)
-
-
-@claims.add(
-    "C-15 C-20",
-    "Stepwise regression reduces the coefficients in every direction to half or fewer",
-    f"{_listed(TERMS)} are left",
-)
-def _halved(found: LearnedDrift) -> Ours:
+@claims.facts
+def _halved(found: LearnedDrift) -> Facts:
     many = [t for t in DRIFTS if found.terms[t] > found.candidates[t] / 2]
-    return Ours(
-        f"{_listed(found.terms)} are left",
-        not many,
-        f"more than half stay in {' and '.join(many)}: significances take the {len(found.samples)} rows as "
-        f"independent, but they count as {_listed(found.independent, '.0f')}",
-    )
+    return {"many": many, "holds": not many}
 
 
-@claims.add("C-16 C-17", "Terms that have entered are removed again later", f"{REMOVALS} times in y")
-def _removed(found: LearnedDrift) -> Ours:
+@claims.facts
+def _removed(found: LearnedDrift) -> Facts:
     removals = {t: sum(s.action == "remove" for s in r.log_) for t, r in found.regressions.items()}
-    return Ours(
-        f"{_listed(removals)} times in x, y, z",
-        any(removals.values()),
-        "no term that entered lost its significance to later ones",
-    )
+    return {"removals": removals, "holds": any(removals.values())}
 
 
-@claims.add(
-    "C-19 C-36",
-    f"The regressions fit the drifts closely (R2 >= {CLOSELY}, without constant, about zero: E-C10)",
-    f"R2 {R2_X} in x",
-)
-def _closely(found: LearnedDrift) -> Ours:
+@claims.facts
+def _closely(found: LearnedDrift) -> Facts:
     r2 = {t: r.r_squared_ for t, r in found.regressions.items()}
     loose = [t for t in DRIFTS if round(r2[t], 3) < CLOSELY]
-    return Ours(
-        _listed(r2, ".3f"),
-        not loose,
-        f"these temperatures do not explain {' and '.join(loose)} that far: standard error of estimate "
-        f"{_listed({t: r.standard_error_ for t, r in found.regressions.items()}, '.2f')} um in x, y, z "
-        f"beside drifts of {_listed(found.ranges, '.0f')} um",
-    )
+    return {
+        "r2": r2,
+        "errors": [r.standard_error_ for r in found.regressions.values()],
+        "loose": loose,
+        "holds": not loose,
+    }
 
 
-@claims.add("C-18 C-19", "Standard error of estimate in x", f"{SEE_X:.1f} um")
-def _standard_error(found: LearnedDrift) -> str:
-    return f"{found.regressions['x'].standard_error_:.2f} um; the drift in x ranges over {found.ranges['x']:.0f} um"
-
-
-@claims.add("E-C12", "The rows of a drift are no independent observations: of 810, the residuals count as (ours)")
-def _independent(found: LearnedDrift) -> str:
-    return f"{_listed(found.independent, '.0f')} in x, y, z"
-
-
-@claims.add(
-    "C-25 C-26",
-    "More than 20 hidden nodes do not improve the net (mean error after training, beyond what the start of the "
-    "training makes)",
-    "9-20-3",
-)
-def _nodes(found: LearnedDrift) -> Ours:
+@claims.facts
+def _nodes(found: LearnedDrift) -> Facts:
     at_20 = np.array([n.mean for n in found.nets])
     mean, spread = at_20.mean(), at_20.std(ddof=1)
-    above = {h: np.mean([n.mean for n in found.others[f"9-{h}-3"]]) for h in SWEEP if h > HIDDEN}
-    better = " and ".join(f"{h}" for h, error in above.items() if error < mean - spread)
-    return Ours(
-        f"{mean:.2f} +- {spread:.2f} um with 20, {', '.join(f'{e:.2f} with {h}' for h, e in above.items())}",
-        not better,
-        f"{better} nodes learn the 810 rows better; whether that is worth anything only new tests tell",
-    )
+    above = {h: found.mean_of(f"9-{h}-3") for h in SWEEP if h > HIDDEN}
+    better = [h for h, error in above.items() if error < mean - spread]
+    return {"mean": mean, "spread": spread, "above": above, "better": better, "holds": not better}
 
 
-def _rejected(found: LearnedDrift, kind: str) -> Ours:
-    """Return our result for a rejected alternative: its mean error after training must exceed the chosen one's."""
-    chosen, other = (float(np.mean([n.mean for n in nets])) for nets in (found.nets, found.others[kind]))
-    return Ours(
-        f"{chosen:.2f} um; {kind} {other:.2f} um",
-        chosen < other,
-        f"after the same {found.typical.net.n_epochs} epochs {kind} ends with {other:.2f} um, not above {chosen:.2f}",
-    )
+@claims.facts
+def _scaling(found: LearnedDrift) -> Facts:
+    return {"chosen": found.mean, "other": found.mean_of("common scaling")}
 
 
-@claims.add("C-28", "Scaling each channel by its own range is better than a common factor")
-def _scaling(found: LearnedDrift) -> Ours:
-    return _rejected(found, "common scaling")
+@claims.facts
+def _update(found: LearnedDrift) -> Facts:
+    return {"chosen": found.mean, "other": found.mean_of("batch update")}
 
 
-@claims.add("C-30", "Pattern update ends with smaller errors than batch update")
-def _update(found: LearnedDrift) -> Ours:
-    return _rejected(found, "batch update")
-
-
-@claims.add(
-    "C-29 C-31",
-    f"Mean absolute errors of net and regression are very close (within a factor of {COMPETITIVE:g} of each "
-    "other in every direction)",
-    f"net {_listed(MAE_NET, '.1f')}, regression {_listed(MAE_MRA, '.1f')} um",
-)
-def _close(found: LearnedDrift) -> Ours:
-    wide = {t: float(np.abs(common.residual(m, found.samples)).mean()) for t, m in found.wide.items()}
+@claims.facts
+def _close(found: LearnedDrift) -> Facts:
+    wide = [np.abs(common.residual(m, found.samples)).mean() for m in found.wide.values()]
     ratios = {t: found.net[t] / found.mra[t] for t in DRIFTS}
     apart = {t: r for t, r in ratios.items() if not 1 / COMPETITIVE <= r <= COMPETITIVE}
-    return Ours(
-        f"net {_listed(found.net, '.2f')}, regression {_listed(found.mra, '.2f')} um",
-        not apart,
-        f"in {' and '.join(apart)} the net has {_listed(apart, '.2f')} of the regression's "
-        f"error. Against {_listed(found.terms)} terms it has "
-        f"{found.typical.net.n_parameters_} weights and thresholds, and all nine temperatures: a regression on "
-        f"these gets {_listed(wide, '.2f')} um in x, y, z. What is learned by heart of it, the new tests tell",
-    )
+    return {"apart": apart, "directions": list(apart), "wide_mae": wide, "holds": not apart}
 
 
-@claims.add(
-    "C-31", f"A net depends on its start (ours): smallest and largest mean absolute error of {STARTS} trainings"
-)
-def _starts(found: LearnedDrift) -> str:
-    return "; ".join(f"{t} {found.mae_net(t).min():.2f}-{found.mae_net(t).max():.2f}" for t in DRIFTS) + " um"
+@claims.facts
+def _starts(found: LearnedDrift) -> Facts:
+    return {"extremes": [(t, found.mae_net(t).min(), found.mae_net(t).max()) for t in DRIFTS]}
 
 
 def screening(found: LearnedDrift) -> dict[str, tuple[float, ...]]:
@@ -323,17 +264,47 @@ def screening(found: LearnedDrift) -> dict[str, tuple[float, ...]]:
     }
 
 
-def numbers(found: LearnedDrift) -> dict[str, float]:
-    """Return the numbers asserted by the documentation; medians for the nets."""
-    made = {"rows": float(len(found.samples)), "parameters_net": float(found.typical.net.n_parameters_)}
-    for t, r in found.regressions.items():
-        made |= {
-            f"candidates_{t}": float(found.candidates[t]),
-            f"terms_{t}": float(found.terms[t]),
-            f"r2_mra_{t}": r.r_squared_,
-            f"see_mra_{t}_um": r.standard_error_,
-            f"n_effective_mra_{t}": r.n_effective_,
-            f"mae_mra_{t}_um": found.mra[t],
-            f"mae_net_{t}_um": found.net[t],
-        }
-    return made
+# -- tables and figures -----------------------------------------------------------------------------------------------
+
+
+def tables(found: LearnedDrift) -> list[StudyTable]:
+    """Return Tables 1 and 2, the fits, Eq. 5 next to our coefficients, the logs of Fig. 2 and the sweep."""
+    sensors = [(name, setup.SENSORS.get(name, "mean of T6 to T9"), r) for name, r in screening(found).items()]
+    printed = {"x": (f" ({R2_X})", f" ({SEE_X:.1f})")}
+    fits = []
+    for t, regression in found.regressions.items():
+        counts = (found.candidates[t], found.terms[t], TERMS[t])
+        errors = (found.mra[t], MAE_MRA[t], found.net[t], MAE_NET[t])
+        fits.append((t, setup.SUBGROUPS[t], *counts, regression, *printed.get(t, ("", "")), *errors))
+    x, y = found.regressions["x"], found.regressions["y"]
+    nets = {**found.others, "9-20-3": found.nets}
+    return [
+        setup.exhibits.table("sensors", sensors),
+        setup.exhibits.table("fits", fits),
+        setup.exhibits.table("eq5", beside(dict(zip(x.terms_, x.coef_.tolist(), strict=True)), EQ5)),
+        setup.exhibits.table("log_x", [(s, s.action.upper()) for s in x.log_]),
+        setup.exhibits.table("log_y", [(s, s.action.upper()) for s in y.log_]),
+        setup.exhibits.table("nets", [_mean_errors(kind, trained) for kind, trained in nets.items()]),
+    ]
+
+
+def _mean_errors(kind: str, nets: Sequence[LearnedNet]) -> tuple[str, Sequence[LearnedNet], list[float], float]:
+    mae = [float(np.mean([n.mae[t] for n in nets])) for t in DRIFTS]
+    return kind, nets, mae, float(np.mean(mae))
+
+
+def beside(ours: Mapping[str, float], paper: Mapping[str, float]) -> list[tuple[str, str, str]]:
+    """Return the rows of a table of coefficients by term, ours next to those of the paper; empty if there is none."""
+    texts = [{term: f"{coefficient:.3f}" for term, coefficient in c.items()} for c in (ours, paper)]
+    return [(term, texts[0].get(term, ""), texts[1].get(term, "")) for term in {**ours, **paper}]
+
+
+def figures(found: LearnedDrift) -> list[Figure]:
+    """Return Figs. 3 to 5 and 10 to 12: measurements and fits."""
+    samples, drawn = found.samples, []
+    for kind, first, models in (("MRA", 3, found.models), ("net", 10, found.typical.models)):
+        for number, (target, model) in enumerate(models.items(), start=first):
+            hours, measured = end_to_end(samples, common.take_measured(samples, target))
+            _, fitted = end_to_end(samples, common.predict_deviation(model, samples))
+            drawn.append(setup.exhibits.figure(f"chen1996-fig{number}", (hours, {"measured": measured, kind: fitted})))
+    return drawn

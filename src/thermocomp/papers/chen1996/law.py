@@ -17,9 +17,18 @@ from thermocomp.core.polynomial import Polynomial
 from thermocomp.models.mlp import SigmoidNet
 from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.papers.chen1996 import setup
-from thermocomp.papers.chen1996.setup import EQ6, EQ8, SLOPE_VARIABLES, TEMPERATURES, recordings, with_differences
+from thermocomp.papers.chen1996.setup import (
+    EQ6,
+    EQ8,
+    SLOPE_VARIABLES,
+    TEMPERATURES,
+    exhibits,
+    recordings,
+    with_differences,
+)
+from thermocomp.papers.claims import Claims, Facts
 from thermocomp.papers.common import rms
-from thermocomp.papers.study import Claims, FloatArray, Ours, StudyTable
+from thermocomp.papers.study import FloatArray, StudyTable
 from thermocomp.recordings.cycles import make_single_cycle as whole_test
 from thermocomp.recordings.profiles import Profiles
 from thermocomp.recordings.recording import Recording
@@ -314,82 +323,39 @@ def r2_about_zero(measured: FloatArray, predicted: FloatArray) -> float:
 # -- claims ------------------------------------------------------------------------------------------------------------
 
 
-claims = Claims[Law]()
+claims = Claims[Law](__name__)
 
 
-@claims.add(
-    "C-23 C-24",
-    f"A known law comes back from 51 profiles: Eq. 8, planted on temperatures of the virtual machine, its "
-    f"{len(EQ8)} terms of 20 and none that is not there, in at least {MOST:.0%} of the draws (ours)",
-    "20 -> 4 terms",
-)
-def _whole(found: Law) -> Ours:
-    ours = found.recoveries[OURS]
-    return Ours(
-        f"whole in {ours.whole:.1%} of {len(ours.found)} draws, a term missing in {ours.missing:.1%}, a wrong one "
-        f"in {ours.wrong:.1%} (16 idle terms at a significance of .001 may give 1.6%)",
-        ours.whole >= MOST,
-        "51 profiles with this noise do not tell it",
-    )
+@claims.facts
+def _whole(found: Law) -> Facts:
+    return {"ours": found.recoveries[OURS]}
 
 
-@claims.add("C-23 E-C12", "The same law, measured and counted otherwise (ours)")
-def _otherwise(found: Law) -> str:
-    return "; ".join(f"{d.name}: {r.whole:.0%}" for d, r in found.recoveries.items() if d is not OURS)
+@claims.facts
+def _otherwise(found: Law) -> Facts:
+    return {"others": [(d.name, r.whole) for d, r in found.recoveries.items() if d != OURS]}
 
 
-@claims.add("C-24", "Coefficients that came back are within three standard errors of the planted ones (ours)")
-def _within(found: Law) -> Ours:
+@claims.facts
+def _within(found: Law) -> Facts:
     errors = np.array([found.fit.coefficient_errors[0].get(t, np.nan) for t in EQ8])
     off = np.abs(found.recoveries[OURS].coefficients - np.array(list(EQ8.values()))) / errors
-    two, three = (float(np.mean(off < k)) for k in (2, 3))
-    return Ours(
-        f"{two:.0%} within two, {three:.0%} within three",
-        three >= MOST,
-        "noise of the temperatures makes coefficients too small, and their standard errors do not know it",
-    )
-
-
-@claims.add("C-27", "The 5-8-1 net learns the same profiles, but tells no law (ours)")
-def _net(found: Law) -> str:
-    return (
-        f"R2 {found.net_r2:.4f}; T1, which is not in the law, moves its slope by up to {found.idle:.1f} um/m; in a "
-        f"test that warms all together it misses {found.elsewhere['net']:.2f} um/m (RMS) of "
-        f"{found.elsewhere['law']:.1f}, the regression {found.elsewhere['MRA']:.2f}; {found.net.caution_}"
-    )
+    return {"two": np.mean(off < 2), "three": np.mean(off < 3)}
 
 
 def numbers(found: Law) -> dict[str, float]:
     """Return the numbers asserted by the documentation."""
     ours, paper, cold = (found.recoveries[d] for d in (OURS, DESIGNS[0], DESIGNS[1]))
-    made = {"law_whole": ours.whole, "law_missing": ours.missing, "law_wrong": ours.wrong}
-    made |= {"law_whole_one_warm_up": paper.whole, "law_whole_cold": cold.whole}
-    made |= {"law_net_r2": found.net_r2, "law_net_idle": found.idle}
-    return made | {f"law_elsewhere_{name.lower()}": e for name, e in found.elsewhere.items()}
+    return exhibits.numbers("law", found, ours=ours, paper=paper, cold=cold)
 
 
 def tables(found: Law) -> list[StudyTable]:
     """Return the frequency of recovery of the law, and its coefficients."""
-    rates = [
-        [d.name, f"{d.laser:g}", f"{d.sensor:g}", *(f"{v:.1%}" for v in (r.whole, r.missing, r.wrong))]
-        for d, r in found.recoveries.items()
-    ]
     got, errors = found.fit.model.slopes[0], found.fit.coefficient_errors[0]
     first = got.coefficients_by_name() if isinstance(got, Polynomial) else {}
     drawn = found.recoveries[OURS].coefficients
     coefficients = [
-        [t, f"{true:.3f}", *(f"{v[t]:.3f}" if t in v else "" for v in (first, errors)), f"{mean:.3f}", f"{spread:.3f}"]
+        (t, true, *(f"{v[t]:.3f}" if t in v else "" for v in (first, errors)), mean, spread)
         for (t, true), mean, spread in zip(EQ8.items(), drawn.mean(axis=0), drawn.std(axis=0), strict=True)
     ]
-    return [
-        StudyTable(
-            "A planted law sought: share of the draws",
-            ("51 profiles", "laser [um]", "sensor [degC]", "whole", "a term missing", "a wrong one"),
-            rates,
-        ),
-        StudyTable(
-            "Coefficients of the planted law [um/m per degC]",
-            ("term", "planted", "found, first draw", "standard error", "mean of draws", "spread of draws"),
-            coefficients,
-        ),
-    ]
+    return [exhibits.table("rates", found.recoveries.items()), exhibits.table("law", coefficients)]

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from thermocomp.papers.chen1996 import anywhere, drift, show, slope, unseen, volume
+from thermocomp.papers.chen1996 import anywhere, drift, slope, unseen, volume
+from thermocomp.papers.chen1996.setup import exhibits
 from thermocomp.papers.study import Figure, Part, Progress, Study
 
 TITLE = "J. S. Chen, J. Yuan, J. Ni (1996): Thermal Error Modelling for Real-Time Error Compensation"
@@ -37,8 +38,13 @@ def run(seed: int, progress: Progress) -> Study:
     study = Study.of(
         "chen1996",
         TITLE,
-        Part(drift.claims(learned), show.tables(learned), show.figures(learned), drift.numbers(learned)),
-        Part(slope.claims(slopes), slope.tables(slopes), slope.figures(slopes), slope.numbers(slopes)),
+        Part(
+            drift.claims(learned),
+            drift.tables(learned),
+            drift.figures(learned),
+            exhibits.numbers("drift", learned),
+        ),
+        Part(slope.judge(slopes), slope.tables(slopes), slope.figures(slopes), slope.numbers(slopes)),
         Part(unseen.claims(observed), unseen.tables(observed), unseen.figures(observed), unseen.numbers(observed)),
         Part(anywhere.claims(volumes), anywhere.tables(volumes), anywhere.figures(volumes), anywhere.numbers(volumes)),
     )

@@ -6,6 +6,7 @@ import numpy as np
 
 from thermocomp.core.machine import Channel
 from thermocomp.papers.common import add_derived_channel, rename_channels, stacked
+from thermocomp.papers.exhibits import Exhibits
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
 from thermocomp.virtual.datasets import record
@@ -50,6 +51,9 @@ COMPETITIVE = 1.5
 WELL = 0.8
 #: headline: accuracy improved by a factor of ten (C-35)
 TENFOLD = 10.0
+
+
+exhibits = Exhibits(__name__)
 
 
 def recordings(experiment: str, seed: int, sensor_noise: float | None = None) -> list[Recording]:

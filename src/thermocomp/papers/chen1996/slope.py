@@ -12,20 +12,16 @@ from thermocomp.models.mlp import SigmoidNet
 from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.papers import common
 from thermocomp.papers.chen1996 import law, setup
+from thermocomp.papers.chen1996.drift import beside
 from thermocomp.papers.chen1996.law import HIDDEN, Law, r2_about_zero
-from thermocomp.papers.chen1996.setup import CLOSELY, EQ6, EQ8, SLOPE_VARIABLES, recordings, with_differences
-from thermocomp.papers.chen1996.show import beside, figure
+from thermocomp.papers.chen1996.setup import CLOSELY, EQ6, EQ8, SLOPE_VARIABLES, exhibits, recordings, with_differences
+from thermocomp.papers.claims import Claims, Facts
 from thermocomp.papers.common import PAPERS_SUPPORT, Errors, rms
-from thermocomp.papers.pictures import curves
-from thermocomp.papers.study import Claims, Figure, FloatArray, Ours, PlotCurve, StudyTable
+from thermocomp.papers.study import Claim, Figure, FloatArray, PlotCurve, StudyTable
 from thermocomp.recordings.profiles import Profiles
 from thermocomp.recordings.readers.profiles import from_recording
 from thermocomp.volumetric.models.position import PositionFit, PositionOptions, fit_position, slope_samples
 
-#: numbers of sets, unscreened and screened coefficients (C-23)
-SETS, CANDIDATES = 51, 20
-#: error of a dimension along Y before and after compensation [um] (C-35)
-LATERAL = (92.4, 7.2)
 #: number of trainings of the 5-8-1 net (C-27)
 STARTS = 5
 #: maximum nonlinear share of the thermal part for a straight line to be sufficient (C-05)
@@ -90,6 +86,11 @@ class LearnedPositioning:
         """Return the RMS residual of the slope with a model on the other day [um/m]."""
         return rms(self.slope(self.other) - self.predicted(fit, self.other))
 
+    @property
+    def other_slopes(self) -> float:
+        """RMS of the slope on the other day [um/m]."""
+        return rms(self.slope(self.other))
+
     @cached_property
     def elsewhere(self) -> dict[str, float]:
         """RMS residuals of the slope on the other day, by method [um/m]."""
@@ -150,107 +151,64 @@ def _net(fit: PositionFit) -> Any:
 # -- claims ------------------------------------------------------------------------------------------------------------
 
 
-claims = Claims[LearnedPositioning]()
+claims = Claims[LearnedPositioning](__name__, law)
+length = Claims[LearnedPositioning](__name__, setup, section="length")
 
 
-@claims.add(
-    "C-22 C-36",
-    "A polynomial of fifth order describes the cold profile (the virtual machine's own is Eq. 6, so this tells "
-    "only what the noise of the laser does)",
-    "-18.5 .. 8.5 um",
-)
-def _cold(found: LearnedPositioning) -> str:
+def judge(found: LearnedPositioning) -> tuple[Claim, ...]:
+    """Return all claims, those on the known law before that on a length."""
+    return claims(found) + law.claims(found.law) + length(found)
+
+
+@claims.facts
+def _cold(found: LearnedPositioning) -> Facts:
     geometric = found.geometric(found.learned)
     apart = np.abs(geometric - EQ6(found.learned.position)).max()
-    return f"{geometric.min():.1f} .. {geometric.max():.1f} um, within {apart:.2f} um of Eq. 6"
+    return {"least": geometric.min(), "most": geometric.max(), "apart": apart}
 
 
-@claims.add(
-    "C-04 C-05 C-07",
-    f"Only the slope of the profile varies: a straight line leaves at most {STRAIGHT:.0%} of its thermal part",
-)
-def _straight(found: LearnedPositioning) -> Ours:
+@claims.facts
+def _straight(found: LearnedPositioning) -> Facts:
     left = residuals(found, found.learned)
-    bent = rms(left[MEASURED]) / rms(left[NONE])
-    return Ours(
-        f"{bent:.1%}",
-        bent <= STRAIGHT,
-        f"the screw does not warm evenly, and {bent:.1%} of the thermal part (RMS) is no straight line",
-    )
+    return {"bent": rms(left[MEASURED]) / rms(left[NONE])}
 
 
-@claims.add("C-23", f"{SETS} sets of slopes, {CANDIDATES} unscreened coefficients", f"{SETS}, {CANDIDATES}")
-def _sets(found: LearnedPositioning) -> str:
-    return f"{len(found.learned)}, {len(found.regression.candidates_)}"
+@claims.facts
+def _terms(found: LearnedPositioning) -> Facts:
+    second = [t for t in found.regression.terms_ if "*" in t]
+    return {"second": second, "holds": not second, "first": found.left(found.linear), "slopes": found.other_slopes}
 
 
-@claims.add("C-23 C-24", "Stepwise regression needs neither higher-order nor product terms", f"{', '.join(EQ8)}")
-def _terms(found: LearnedPositioning) -> Ours:
-    terms = found.regression.terms_
-    second = [t for t in terms if "*" in t]
-    return Ours(
-        ", ".join(terms),
-        not second,
-        f"{', '.join(second)} came in; on another day this model leaves {found.elsewhere[MRA]:.2f} um/m (RMS) and one "
-        f"of first-order terms alone {found.left(found.linear):.2f}, of slopes of {rms(found.slope(found.other)):.1f}",
-    )
+@claims.facts
+def _closely(found: LearnedPositioning) -> Facts:
+    holds = round(found.regression.r_squared_, 3) >= CLOSELY
+    return {"holds": holds, "steepest": Errors.of(found.k1).max_abs}
 
 
-@claims.add(
-    "C-24 C-36",
-    f"The regression fits the slopes closely in warm-up and cool-down (R2 >= {CLOSELY})",
-    "Fig. 7",
-)
-def _closely(found: LearnedPositioning) -> Ours:
-    return Ours(
-        f"R2 {found.regression.r_squared_:.3f}",
-        round(found.regression.r_squared_, 3) >= CLOSELY,
-        f"standard error of estimate {found.regression.standard_error_:.2f} um/m beside slopes of up to "
-        f"{Errors.of(found.k1).max_abs:.1f} um/m",
-    )
-
-
-@claims.add("C-27 C-36", f"The 5-8-1 net can also fit the slopes (R2 >= {CLOSELY})", "Fig. 13")
-def _net_closely(found: LearnedPositioning) -> Ours:
+@claims.facts
+def _net_closely(found: LearnedPositioning) -> Facts:
     r2 = float(np.median(found.net_r2))
-    return Ours(
-        f"R2 {r2:.3f} ({found.net_r2.min():.3f}-{found.net_r2.max():.3f})",
-        round(r2, 3) >= CLOSELY,
-        f"after {_net(found.nets[0]).n_epochs} epochs of {len(found.learned)} patterns it is no nearer",
-    )
+    facts = {"r2": r2, "least": found.net_r2.min(), "most": found.net_r2.max(), "net": _net(found.nets[0])}
+    return facts | {"holds": round(r2, 3) >= CLOSELY}
 
 
-@claims.add("C-27", "The net has more weights than there are sets (ours: it warns)")
-def _weights(found: LearnedPositioning) -> str:
+@claims.facts
+def _weights(found: LearnedPositioning) -> Facts:
     net = _net(found.nets[0])
-    return f"{net.n_parameters_} for {net.n_patterns_}; {net.caution_ or 'no warning'}"
+    return {"net": net, "caution": net.caution_ or "no warning"}
 
 
-@claims.add("C-24", "Slope on another day that was not learned: RMS left (ours)")
-def _elsewhere(found: LearnedPositioning) -> str:
-    left = ", ".join(f"{m} {e:.2f}" for m, e in found.elsewhere.items())
-    return f"{rms(found.slope(found.other)):.2f} um/m; {left} um/m"
+@claims.facts
+def _another_day(found: LearnedPositioning) -> Facts:
+    return {"slopes": found.other_slopes, "left": found.elsewhere}
 
 
-claims.include(law.claims, lambda found: found.law)
-
-
-@claims.add(
-    "C-35",
-    "Errors of dimensions along Y shrink by a factor of ten or more. Here: largest error of a length of the whole "
-    "travel on another day",
-    f"{LATERAL[0]} -> {LATERAL[1]} um, {LATERAL[0] / LATERAL[1]:.1f} times",
-)
-def _lateral(found: LearnedPositioning) -> Ours:
-    left = largest_length_error(found)
-    best = left[NONE] / min(left[MRA], left[NET])
-    after = ", ".join(f"{m} {left[m]:.1f}" for m in found.fits)
-    return Ours(
-        f"{left[NONE]:.1f} um; {after} um: {best:.1f} times",
-        best >= setup.TENFOLD,
-        f"even the measured slope leaves {left[MEASURED]:.1f} um; the temperatures tell the slope to "
-        f"{min(found.elsewhere[MRA], found.elsewhere[NET]):.2f} um/m (RMS)",
-    )
+@length.facts
+def _lateral(found: LearnedPositioning) -> Facts:
+    errors = largest_length_error(found)
+    told = min(found.elsewhere[MRA], found.elsewhere[NET])
+    best = errors[NONE] / min(errors[MRA], errors[NET])
+    return {"errors": errors, "after": {m: errors[m] for m in found.fits}, "best": best, "told": told}
 
 
 def residuals(found: LearnedPositioning, day: Profiles) -> dict[str, FloatArray]:
@@ -267,11 +225,7 @@ def largest_length_error(found: LearnedPositioning) -> dict[str, float]:
 
 def numbers(found: LearnedPositioning) -> dict[str, float]:
     """Return the numbers asserted by the documentation."""
-    short = {NONE: "none", MRA: "mra", NET: "net", DYNAMIC: "dynamic", MEASURED: "measured"}
-    r = found.regression
-    made = {"slope_sets": float(r.n_rows_), "slope_candidates": float(len(r.candidates_)), "slope_r2_mra": r.r_squared_}
-    made |= {"slope_terms": float(len(r.terms_)), "slope_r2_net": float(np.median(found.net_r2))}
-    made |= {f"lateral_{short[m]}_um": e for m, e in largest_length_error(found).items()}
+    made = exhibits.numbers("slope", found, r2_net=np.median(found.net_r2), lateral=largest_length_error(found))
     return made | law.numbers(found.law)
 
 
@@ -284,17 +238,15 @@ def tables(found: LearnedPositioning) -> list[StudyTable]:
     ours = dict(zip(found.regression.terms_, found.regression.coef_.tolist(), strict=True))
     # in powers of mm, as in the paper
     cold = np.polynomial.polynomial.polyfit(learned.position, found.geometric(learned), EQ6.degree())
-    eq6 = [
-        [f"y^{k}", f"{1e-3 * c:.3e}", f"{1e-3 * p:.3e}"]
-        for k, (c, p) in enumerate(zip(cold, EQ6.coef.tolist(), strict=True))
-    ]
     errors = {}
     for day, what in ((learned, "learned"), (found.other, "another day")):
         errors[what, NONE] = day.values
         errors |= {(what, "cold profile alone" if m == NONE else m): e for m, e in residuals(found, day).items()}
     return [
-        StudyTable("Cold profile [mm, y in mm] here and in Eq. 6", ("term", "here", "Eq. 6"), eq6),
-        beside("Slope of Y: coefficients [um/m per degC, degC2]", "Eq. 8", ours, EQ8),
+        exhibits.table(
+            "cold", [(k, 1e-3 * c, 1e-3 * p) for k, (c, p) in enumerate(zip(cold, EQ6.coef.tolist(), strict=True))]
+        ),
+        exhibits.table("eq8", beside(ours, EQ8)),
         common.errors_table("Positioning of Y, all profiles: error without and with compensation", errors),
         *law.tables(found.law),
     ]
@@ -306,16 +258,14 @@ def figures(found: LearnedPositioning) -> list[Figure]:
     hours = learned.states.time / 3600.0
     peak = int(np.abs(k1).argmax())
     states = [*np.linspace(0, peak, 5).round().astype(int).tolist(), len(hours) - 1]
-    drawn = []
-    for number, day, text, label in (
-        (1, found.pitch, "pitch of Y (the paper shows its yaw)", "pitch of Y [urad]"),
-        (6, learned, "positioning errors of Y", "positioning error of Y [um]"),
-    ):
-        profiles = [PlotCurve(f"after {hours[k]:.1f} h", day.position, day.values[k]) for k in states]
-        drawn.append(figure(number, f"{text} in several thermal states.", ("position of Y [mm]", label), profiles))
-    for number, method in ((7, MRA), (13, NET)):
-        slopes = {"measured": k1, method: found.predicted(found.fits[method], learned)}
-        text = f"slope of the positioning error of Y, and the fit by the {method}."
-        lines = curves(hours, slopes, points=["measured"])
-        drawn.append(figure(number, text, ("time [h]", "slope [um/m]"), lines))
-    return drawn
+    pitch, errors = (
+        [PlotCurve(f"after {hours[k]:.1f} h", day.position, day.values[k]) for k in states]
+        for day in (found.pitch, learned)
+    )
+    mra, net = ({"measured": k1, m: found.predicted(found.fits[m], learned)} for m in (MRA, NET))
+    return [
+        exhibits.figure("chen1996-fig1", pitch),
+        exhibits.figure("chen1996-fig6", errors),
+        exhibits.figure("chen1996-fig7", (hours, mra)),
+        exhibits.figure("chen1996-fig13", (hours, net)),
+    ]

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -10,18 +10,16 @@ import numpy as np
 from thermocomp.core.model import ErrorModel
 from thermocomp.models.numerics.leastsquares import effective_sample_size
 from thermocomp.papers import common
+from thermocomp.papers.chen1996 import setup
 from thermocomp.papers.chen1996.drift import LearnedDrift
-from thermocomp.papers.chen1996.setup import COMPETITIVE, DRIFTS, TENFOLD, WELL, drift_samples, recordings
-from thermocomp.papers.chen1996.show import figure
+from thermocomp.papers.chen1996.setup import COMPETITIVE, DRIFTS, WELL, drift_samples, exhibits, recordings
+from thermocomp.papers.claims import Claims, Facts
 from thermocomp.papers.common import Errors, trained
-from thermocomp.papers.pictures import curves
-from thermocomp.papers.study import Claims, Figure, FloatArray, Ours, StudyTable
+from thermocomp.papers.study import Figure, FloatArray, StudyTable
 from thermocomp.recordings.samples import Samples
 
 #: level of the noise [degC] and number of draws (C-33, E-C9)
 NOISE, DRAWS = 0.4, 20
-#: printed: depth difference before and after compensation [um] (C-35)
-DEPTH = (196.0, 8.0)
 #: tests of new observations (C-32)
 TESTS = ("1250 1/min", "random speed")
 NONE, MRA, NET, DYNAMIC = "no compensation", "MRA", "net", "dynamic (ours)"
@@ -112,143 +110,87 @@ def observe(learned: LearnedDrift, seed: int) -> Unseen:
 # -- claims ------------------------------------------------------------------------------------------------------------
 
 
-claims = Claims[Unseen]()
+claims = Claims[Unseen](__name__, setup)
 
 
 def _bad(left: float, none: float) -> bool:
     return left > (1 - WELL) * none
 
 
-def _new_observations(found: Unseen, test: int) -> Ours:
-    samples, none = found.tests[test], found.errors(test, "z", NONE).rms
+@claims.facts
+def _new_observations(found: Unseen, test: str) -> Facts:
+    number = TESTS.index(test)
+    samples, none = found.tests[number], found.errors(number, "z", NONE).rms
     nets, wide = found.nets("z", samples), rms(found.learned.wide["z"], samples)
     mra, net, ours = found.left("z", samples).values()
-    equal = net <= COMPETITIVE * mra and mra <= COMPETITIVE * net
-    reasons = [f"the {m} leaves {e / none:.0%} of the drift" for m, e in ((MRA, mra), (NET, net)) if _bad(e, none)]
-    if not equal:
-        reasons.append(
-            f"the net's error is {net:.2f} um, that of the MRA {mra:.2f} um; on all nine temperatures, which the net "
-            f"has, an MRA leaves {wide:.2f} um"
-        )
-    if ours < BETTER * min(mra, net, wide):
-        reasons.append(
-            f"a model that also knows the speed and remembers leaves {ours:.2f} um, so what they lack is the past"
-        )
-    return Ours(
-        f"RMS {none:.1f} um; MRA {mra:.2f}, net {net:.2f} ({nets.min():.2f}-{nets.max():.2f}) um",
-        equal and not _bad(mra, none) and not _bad(net, none),
-        "; ".join(reasons),
-    )
+    reasons = {
+        "mra": _bad(mra, none),
+        "net": _bad(net, none),
+        "apart": net > COMPETITIVE * mra or mra > COMPETITIVE * net,
+        "past": ours < BETTER * min(mra, net, wide),
+    }
+    facts = {"figure": 14 + number, "none": none, "mra": mra, "net": net, "ours": ours, "wide": wide}
+    facts |= {"least": nets.min(), "most": nets.max(), "mra_share": mra / none, "net_share": net / none}
+    holds = not (reasons["mra"] or reasons["net"] or reasons["apart"])
+    return facts | {"reasons": [reason for reason, true in reasons.items() if true], "holds": holds}
 
 
-for _test, _name in enumerate(TESTS):
-    claims.add(
-        "C-32 C-36",
-        f"New observations of z, {_name}: MRA and net predict well (at least {WELL:.0%} of the RMS vanishes) and "
-        f"almost equally well (within a factor of {COMPETITIVE:g})",
-        f"Fig. {14 + _test}",
-    )(partial(_new_observations, test=_test))
-
-
-@claims.add("C-32", "RMS over both new tests, without compensation -> MRA / net / a model with a memory (ours)")
-def _memory(found: Unseen) -> str:
-    parts = []
+@claims.facts
+def _memory(found: Unseen) -> Facts:
+    drifts = []
     for t in DRIFTS:
         none, *left = (common.rms(np.concatenate([r[t][m] for r in found.residuals])) for m in (NONE, *found.models))
-        parts.append(f"{t} {none:.1f} -> {' / '.join(f'{e:.2f}' for e in left)}")
-    return f"{'; '.join(parts)} um"
+        drifts.append((t, none, left))
+    return {"drifts": drifts}
 
 
-def _shaken(found: Unseen, left: Mapping[str, float]) -> str:
-    listed = ", ".join(f"{name} {value:.2f}" for name, value in left.items())
-    return f"RMS {found.errors(0, 'z', NONE).rms:.1f} um; {listed} um"
-
-
-@claims.add(
-    "C-33 C-36 E-C9",
-    f"z, 1250 1/min, uniform noise of {NOISE} degC on all temperatures: both predict well (at least {WELL:.0%} of the "
-    "RMS vanishes)",
-    "Fig. 16",
-)
-def _uniform(found: Unseen) -> Ours:
+@claims.facts
+def _uniform(found: Unseen) -> Facts:
     none, noisy, clean = found.errors(0, "z", NONE).rms, found.noisy, found.left("z", found.tests[0])
-    reasons = [
-        f"the {m} leaves {noisy[m] / none:.0%} of the drift with noise, {clean[m] / none:.0%} without"
-        for m in (MRA, NET)
-        if _bad(noisy[m], none)
-    ]
+    bad = [short for m, short in ((MRA, "mra"), (NET, "net")) if _bad(noisy[m], none)]
+    shares = {m.lower(): (noisy[m] / none, clean[m] / none) for m in (MRA, NET)}
     steepest = float(np.abs(found.learned.regressions["z"].coef_).max())
-    through = f"noise goes through coefficients of up to {steepest:.1f} um/degC in the MRA"
-    return Ours(f"{_shaken(found, noisy)} (mean of {DRAWS} draws)", not reasons, "; ".join([*reasons, through]))
+    facts = {"noisy": True, "none": none, "left": noisy, "steepest": steepest}
+    return facts | shares | {"reasons": [*bad, "through"], "holds": not bad}
 
 
-@claims.add("C-33 E-C9", f"z, 1250 1/min, normal noise of {NOISE} degC on all temperatures (ours)")
-def _normal(found: Unseen) -> str:
-    return _shaken(found, noise(found, "normal"))
+@claims.facts
+def _normal(found: Unseen) -> Facts:
+    return {"noisy": True, "none": found.errors(0, "z", NONE).rms, "left": noise(found, "normal")}
 
 
-def _fault(found: Unseen, target: str) -> Ours:
+@claims.facts
+def _fault(found: Unseen, target: str) -> Facts:
     regression = found.learned.models[target]
     intact, cut = (rms(regression, s) for s in (found.tests[0], found.cut))
     nets, nets_cut = (found.nets(target, s) for s in (found.tests[0], found.cut))
-    worse, worse_net = cut - intact, float(np.median(nets_cut - nets))
-    reason = f"the RMS of the MRA rises by {worse:.2f} um and that of the net by {worse_net:.2f}"
-    if "T2" not in regression.sensors:
-        reason = f"the stepwise selection left T2 out of the regression of {target}, so its loss cannot hurt"
-    return Ours(
-        f"RMS {found.errors(0, target, NONE).rms:.1f} um; MRA {intact:.2f} -> {cut:.2f}, "
-        f"net {np.median(nets):.2f} -> {np.median(nets_cut):.2f} ({nets_cut.min():.2f}-{nets_cut.max():.2f}), "
-        f"dynamic -> {rms(found.dynamic[target], found.cut):.2f} um",
-        worse_net < worse,
-        reason,
-    )
+    facts = {"none": found.errors(0, target, NONE).rms, "intact": intact, "cut": cut, "worse": cut - intact}
+    facts |= {"net": np.median(nets), "net_cut": np.median(nets_cut), "worse_net": np.median(nets_cut - nets)}
+    facts |= {"least": nets_cut.min(), "most": nets_cut.max(), "dynamic": rms(found.dynamic[target], found.cut)}
+    return facts | {"figure": target, "whose": target, "uses_t2": "T2" in regression.sensors}
 
 
-for _target in DRIFTS:
-    claims.add(
-        "C-34 C-36",
-        f"{_target}, 1250 1/min, spindle temperature T2 cut off: the net degrades less than the MRA"
-        + ("" if _target == "x" else " (ours: the paper shows x)"),
-        "Fig. 17" if _target == "x" else "",
-    )(partial(_fault, target=_target))
-
-
-def _tenfold(found: Unseen, largest: Mapping[str, float]) -> Ours:
+def _tenfold(found: Unseen, largest: Mapping[str, float]) -> Facts:
     closest = min((MRA, NET), key=lambda m: largest[m])
     none, best = largest[NONE], largest[closest]
-    times = none / best if best else float("inf")
     fitted = {
-        m: max(Errors.of(common.residual(models[t], found.learned.samples)).max_abs for t in DRIFTS)
+        f"fitted_{m.lower()}": max(Errors.of(common.residual(models[t], found.learned.samples)).max_abs for t in DRIFTS)
         for m, models in found.models.items()
         if m != DYNAMIC
     }
-    return Ours(
-        f"{none:.1f} um; MRA {largest[MRA]:.1f}, net {largest[NET]:.1f} um: the better of them {times:.1f} times; "
-        f"dynamic (ours) {largest[DYNAMIC]:.1f} um",
-        times >= TENFOLD,
-        f"even in the rows they were fitted to, the regressions are wrong by up to {fitted[MRA]:.1f} um and the net by "
-        f"{fitted[NET]:.1f}; the largest error of the {closest} in the new tests stands "
-        f"{60 * _since_change(found, closest):.0f} min after the spindle changed its speed",
-    )
+    facts: Facts = {"none": none, "mra": largest[MRA], "net": largest[NET], "dynamic": largest[DYNAMIC]}
+    facts |= {"times": none / best if best else float("inf"), "closest": closest}
+    facts |= {"minutes": 60 * _since_change(found, closest), "better_of_both": True, "not_tenfold": True}
+    return facts | fitted
 
 
-@claims.add(
-    "C-35",
-    "The accuracy of the machine improves by a factor of ten. Here, as far as built: the largest error of the "
-    "tool point (length of x, y, z) in both new tests, at one position; the whole volume needs its kinematics",
-    "10 times",
-)
-def _tool_point(found: Unseen) -> Ours:
+@claims.facts
+def _tool_point(found: Unseen) -> Facts:
     return _tenfold(found, largest_error(found))
 
 
-@claims.add(
-    "C-35",
-    "The difference in depth from the growth of the spindle shrinks by a factor of ten or more. Here: largest "
-    "peak-to-peak of z in a new test",
-    f"{DEPTH[0]:g} -> {DEPTH[1]:g} um, {DEPTH[0] / DEPTH[1]:.1f} times",
-)
-def _depth(found: Unseen) -> Ours:
+@claims.facts
+def _depth(found: Unseen) -> Facts:
     return _tenfold(found, largest_depth(found))
 
 
@@ -331,16 +273,10 @@ def figures(found: Unseen) -> list[Figure]:
     """Return Figs. 14 to 17."""
     constant, random = found.tests
     noisy = common.with_noise(constant, NOISE, "uniform", 0)
-    return [
-        _figure(found, 14, "z", constant, "drift in z at 1250 1/min, a speed that was not learned."),
-        _figure(found, 15, "z", random, "drift in z at random speeds."),
-        _figure(found, 16, "z", noisy, f"as Fig. 14, with uniform noise of {NOISE} degC on all temperatures."),
-        _figure(found, 17, "x", found.cut, "drift in x at 1250 1/min with the spindle temperature T2 cut off."),
-    ]
-
-
-def _figure(found: Unseen, number: int, target: str, samples: Samples, text: str) -> Figure:
-    drift = {"measured": common.take_measured(samples, target)}
-    drift |= {m: common.predict_deviation(models[target], samples) for m, models in found.models.items()}
-    lines = curves(samples.time / 3600.0, drift, dashed=[DYNAMIC], points=["measured"])
-    return figure(number, text, ("time [h]", f"{target} [um]"), lines)
+    shown = {14: ("z", constant), 15: ("z", random), 16: ("z", noisy), 17: ("x", found.cut)}
+    drawn = []
+    for number, (target, samples) in shown.items():
+        drift = {"measured": common.take_measured(samples, target)}
+        drift |= {m: common.predict_deviation(models[target], samples) for m, models in found.models.items()}
+        drawn.append(exhibits.figure(f"chen1996-fig{number}", (samples.time / 3600.0, drift)))
+    return drawn

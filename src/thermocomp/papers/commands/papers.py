@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
     from thermocomp.papers.study import Claim, Study, StudyTable
     from thermocomp.papers.study import Progress as Told
-    from thermocomp.recordings.recording import Recording
-    from thermocomp.virtual.protocol import Physics
 
 Name = Literal["chen1996", "wessel2004", "hwang", "precompensation", "stepwise2017", "cross"]
 Names = Annotated[list[Name], Parameter(show_default=False)]
@@ -33,6 +31,8 @@ CROSS = "cross"
 #: width of the tables of `cross` [characters]
 TABLE_WIDTH = 120
 
+#: attributes of a claim by their keys in JSON
+_CLAIM = {"ids": "ids", "claim": "text"} | {n: n for n in ("paper", "ours", "holds", "again", "finding")}
 _TONES = {"yes": "good", "no": "grave", "-": "soft"}
 
 
@@ -95,9 +95,10 @@ def papers(
     """
     _check_numbers(seed, repeats, jobs)
     from thermocomp.judging.sharing import shared_among
-    from thermocomp.papers.studies import PHYSICS, STUDIES
+    from thermocomp.papers import cross, studies
+    from thermocomp.papers.studies import PHYSICS
 
-    chosen: list[str] = list(dict.fromkeys(names)) or list(STUDIES)
+    chosen: list[str] = list(dict.fromkeys(names)) or list(studies.STUDIES)
     for name in (n for n in chosen if physics and n not in PHYSICS):
         raise InputError(
             f"--physics is for {', '.join(PHYSICS)}, not for {name}: thermocomp papers {PHYSICS[0]} --physics {physics}"
@@ -117,11 +118,11 @@ def papers(
         for number, name in enumerate(chosen, start=1):
             begin = time.perf_counter()
             with show_share(f"{number}/{len(chosen)} {name}", hidden=json) as progress:
-                run = (
-                    partial(_cross, seed, tests=tests, models=models, targets=target, jobs=jobs)
-                    if name == CROSS
-                    else partial(_run, name, seed, repeats, physics, jobs)
-                )
+                if name == CROSS:
+                    methods = models or cross.FAST
+                    run = partial(cross.run, seed, recordings=tests, methods=methods, targets=target, jobs=jobs)
+                else:
+                    run = partial(studies.repeat, name, seed=seed, repeats=repeats, physics=physics, jobs=jobs)
                 study = _tried(name, run, progress)
             done.append((study, time.perf_counter() - begin))
             if not json:
@@ -146,36 +147,17 @@ def _check_numbers(seed: int, repeats: int, jobs: int) -> None:
         raise InputError("--jobs 0: name a number of processes, or -1 for all cores")
 
 
-def _tried(name: str, run: "Callable[[Told], Study]", progress: "Told") -> "Study":
+def _tried(name: str, run: "Callable[..., Study]", progress: "Told") -> "Study":
     """Return a study, or if it fails one with the reason, so that the other studies still run."""
     from thermocomp.judging.pieces import explain
     from thermocomp.papers.studies import not_redone
 
     try:
-        return run(progress)
+        return run(progress=progress)
     except InputError:  # invalid input
         raise
     except Exception as e:  # noqa: BLE001 - a failure of one study does not affect the others
         return not_redone(name, explain(e))
-
-
-def _run(name: str, seed: int, repeats: int, physics: "Physics | None", jobs: int, progress: "Told") -> "Study":
-    from thermocomp.papers import studies
-
-    return studies.repeat(name, seed=seed, repeats=repeats, progress=progress, physics=physics, jobs=jobs)
-
-
-def _cross(
-    seed: int,
-    progress: "Told",
-    tests: "list[Recording]",
-    models: list[str] | None,
-    targets: list[str] | None,
-    jobs: int,
-) -> "Study":
-    from thermocomp.papers import cross
-
-    return cross.run(seed, progress, tests, methods=models or cross.FAST, targets=targets, jobs=jobs)
 
 
 def _show(study: "Study", seconds: float) -> None:
@@ -220,18 +202,7 @@ def _content(study: "Study", seconds: float) -> dict[str, Any]:
         "name": study.name,
         "title": study.title,
         "seconds": seconds,
-        "claims": [
-            {
-                "ids": c.ids,
-                "claim": c.text,
-                "paper": c.paper,
-                "ours": c.ours,
-                "holds": c.holds,
-                "again": c.again,
-                "finding": c.finding,
-            }
-            for c in study.claims
-        ],
+        "claims": [{key: getattr(claim, name) for key, name in _CLAIM.items()} for claim in study.claims],
         "tables": [{"caption": t.caption, "header": t.header, "rows": t.rows} for t in study.tables],
         "numbers": study.numbers,
     }

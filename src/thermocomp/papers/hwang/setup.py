@@ -19,7 +19,7 @@ from thermocomp.judging.sensitivity import Sensitivity, sensitivity
 from thermocomp.models.grouping import CorrelationGrouping
 from thermocomp.models.numerics.leastsquares import effective_sample_size, lstsq
 from thermocomp.models.selection.grouping import Groups, Interval, intervals
-from thermocomp.papers.common import PAPERS_SUPPORT, every, frozen, predict_deviation, rename_channels, stacked, trained
+from thermocomp.papers import common
 from thermocomp.papers.study import FloatArray, Progress
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
@@ -30,13 +30,10 @@ from thermocomp.virtual.kits import HWANG_PLACES
 NAMES = tuple(f"T{k}" for k in range(1, 15))
 REFERENCE = "T14"
 TARGET = "z_um"
-#: groups of the paper (Table 1, H-10); R2 and standard error [um] of its two models (Table 2, H-12, H-13)
+#: groups of the paper (Table 1, H-10)
 TABLE_1 = ((7,), (9, 10, 11, 12), (13,), (8, 4), (5,), (2,), (1, 6), (3,))
-TABLE_2 = {"optimal": (0.9704, 6.39), "judgement": (0.9697, 6.72)}
 #: eigenvalues in Table 3 of the paper (H-16): with and without grouping
 TABLE_3 = ((1.1e4, 155.8, 18.6, 3.3), (8861.812, 76.397, 19.835, 2.359, 1.129, 0.114, 0.019))
-#: Eq. 9 (H-17)
-EQUATION_9 = {"T7": 0.9599, "T8": 0.9526, "T2": 0.8064, "T6": 0.8066}
 #: temperatures of the engineering judgement model, which also uses their squares (H-13)
 JUDGEMENT = ("T6", "T7", "T13")
 #: magnitudes of the sensor error [degC] and its distributions (E-H8)
@@ -73,7 +70,7 @@ class PaperFit:
 def samples_of(tests: Sequence[Recording]) -> Samples:
     """Return samples with the names of the paper and absolute temperatures."""
     names = {f"t_{p}_C": n for p, n in zip(HWANG_PLACES, NAMES, strict=True)} | {TARGET: TARGET}
-    return stacked([rename_channels(r, names) for r in tests], [TARGET], NAMES, rezero=False)
+    return common.stacked([common.rename_channels(r, names) for r in tests], [TARGET], NAMES, rezero=False)
 
 
 def nearest(found: Sequence[Interval], groups: int) -> Interval:
@@ -104,7 +101,7 @@ def polynomial(samples: Samples, names: Sequence[str], degree: int) -> PaperFit:
     y = samples.deviations[:, 0]
     solved = lstsq(X, y)
     found = solved.coefficients.tolist()
-    model = frozen(samples, columns, found, solved.intercept, variables=variables, terms=terms)
+    model = common.frozen(samples, columns, found, solved.intercept, variables=variables, terms=terms)
     total = float(np.sum((y - y.mean()) ** 2))
     return PaperFit(model, 1 - solved.rss / total, float(np.sqrt(solved.rss / (len(y) - len(terms) - 1))))
 
@@ -166,14 +163,19 @@ class Computed:
 
     def fitted(self, name: str) -> FloatArray:
         """Return the output of a model for the training rows [um]."""
-        return predict_deviation(self.fits[name].model, self.fit)
+        return common.predict_deviation(self.fits[name].model, self.fit)
 
     @cached_property
     def residuals(self) -> dict[str, FloatArray]:
         """Residuals of each model in the new tests [um]."""
         z = self.new.deviations[:, 0]
-        left = {name: z - predict_deviation(f.model, self.new) for name, f in self.fits.items()}
+        left = {name: z - common.predict_deviation(f.model, self.new) for name, f in self.fits.items()}
         return {NONE: z} | left | {"dynamic (not of the paper)": self.dynamic}
+
+    @cached_property
+    def errors(self) -> dict[str, common.Errors]:
+        """Error figures of each model in the new tests."""
+        return {name: common.Errors.of(e) for name, e in self.residuals.items()}
 
 
 def compute(seed: int, progress: Progress) -> Computed:
@@ -205,7 +207,7 @@ def compute(seed: int, progress: Progress) -> Computed:
     progress(0.6, "random sensor error")
     shown = {LINEAR: fits[OPTIMAL].model, QUADRATIC: fits[JUDGED].model, PLAIN: polynomial(fit, JUDGEMENT, 1).model}
     shaken: dict[tuple[str, float], dict[str, Sensitivity]] = {
-        (law, size): sensitivity(shown, fit, every(fit), size=size, law=law, draws=DRAWS, seed=seed)
+        (law, size): sensitivity(shown, fit, common.every(fit), size=size, law=law, draws=DRAWS, seed=seed)
         for law in LAWS
         for size in NOISES
     }
@@ -228,16 +230,16 @@ def _grouped(samples: Samples, threshold: float) -> CorrelationGrouping:
 
 
 def _fit_of(g: CorrelationGrouping, samples: Samples) -> PaperFit:
-    inputs = samples.model_inputs(range(len(NAMES)), every(samples))
-    model = g.freeze(target=TARGET, inputs=inputs, support=PAPERS_SUPPORT)
+    inputs = samples.model_inputs(range(len(NAMES)), common.every(samples))
+    model = g.freeze(target=TARGET, inputs=inputs, support=common.PAPERS_SUPPORT)
     return PaperFit(model, float(g.r_squared_), float(g.standard_error_))
 
 
 def _dynamic(tests: Sequence[Recording]) -> FloatArray:
     """Return the residuals of `dynamic` in the new tests; trained on the first test, relative to each start."""
     inputs = [*(f"t_{p}_C" for p in HWANG_PLACES), "spindle_rpm"]
-    learned, new = (stacked(r, [TARGET], inputs) for r in (tests[:1], tests[1:]))
-    return new.deviations[:, 0] - predict_deviation(trained("dynamic", learned), new)
+    learned, new = (common.stacked(r, [TARGET], inputs) for r in (tests[:1], tests[1:]))
+    return new.deviations[:, 0] - common.predict_deviation(common.trained("dynamic", learned), new)
 
 
 def named(columns: Sequence[int]) -> str:

@@ -130,6 +130,16 @@ class Computed:
         return {NONE: z} | {name: z - p for name, p in self.free_run.items()}
 
     @cached_property
+    def errors(self) -> dict[str, Errors]:
+        """Error figures of each model in the verification, over all positions."""
+        return {name: Errors.of(e) for name, e in self.left.items()}
+
+    @property
+    def scheduled(self) -> float:
+        """RMS residual of the verification with the schedule [um]."""
+        return rms(self.judge.deviations + self.schedule)
+
+    @cached_property
     def schedule(self) -> FloatArray:
         """Values added to the programmed Z in the verification, by the nets, (n_rows, n_positions) [um]."""
         return schedule_corrections(self.judge.time, self.free_run[NET])
@@ -148,11 +158,6 @@ class Computed:
     def shares(self, name: str) -> list[float]:
         """Return the explained share of the variance of the drift at each position."""
         return [described(e, z) for e, z in zip(self.left[name].T, self.judge.deviations.T, strict=True)]
-
-    @property
-    def inner(self) -> tuple[int, ...]:
-        """Indices of the positions with a neighbour on either side."""
-        return tuple(range(1, len(POSITIONS) - 1))
 
     def interpolated(self, k: int, name: str) -> FloatArray:
         """Return the prediction for position k by linear interpolation between the models of all other positions."""

@@ -11,17 +11,7 @@ from thermocomp.judging.robustness import Robustness, stress
 from thermocomp.models.numerics.leastsquares import effective_sample_size, lstsq
 from thermocomp.models.numerics.stepwise import r_squared_of_f
 from thermocomp.models.partial_f import PartialF
-from thermocomp.papers.common import (
-    PAPERS_SUPPORT,
-    Errors,
-    every,
-    fit_and_freeze,
-    frozen,
-    predict_deviation,
-    rms,
-    stacked,
-    trained,
-)
+from thermocomp.papers import common
 from thermocomp.papers.study import FloatArray, Progress
 from thermocomp.recordings.samples import Samples
 from thermocomp.virtual.datasets import record
@@ -29,8 +19,8 @@ from thermocomp.virtual.datasets import record
 TARGET = "x1_um"
 #: F to enter and F to delete (T-03)
 F_ENTER, F_DELETE = 100.0, 50.0
-#: numbers of the temperatures kept in the paper's model, out of 24 (T-07); its bound on the residual [um] (T-08)
-PAPERS_CHOICE = (3, 9, 11, 18, 23)
+#: number of temperatures kept in the paper's model, out of 24 (T-07); its bound on the residual [um] (T-08)
+PAPERS_COUNT = 5
 PAPERS_RESIDUAL = 5.0
 #: methods by name in the study: the paper's and those compared (T-08), related methods (T-10), and ours
 METHODS = {
@@ -112,9 +102,14 @@ class Computed:
         return _left(self.models, self.online)
 
     @cached_property
-    def errors(self) -> dict[str, Errors]:
+    def errors(self) -> dict[str, common.Errors]:
         """Error figures of each model in the on-line test."""
-        return {name: Errors.of(e) for name, e in self.left.items()}
+        return {name: common.Errors.of(e) for name, e in self.left.items()}
+
+    @property
+    def fitted(self) -> common.Errors:
+        """Error figures of the stepwise model in the training test."""
+        return common.Errors.of(self.left_in_fit[STEPWISE])
 
     @property
     def chosen(self) -> tuple[str, ...]:
@@ -141,32 +136,32 @@ def compute(seed: int, progress: Progress) -> Computed:
     """
     progress(0.0, "the two tests")
     test, online = record("stepwise2017", seed=seed)[0], record("stepwise2017-online", seed=seed)[0]
-    learn, judge = (stacked([t], [TARGET]) for t in (test, online))
+    learn, judge = (common.stacked([t], [TARGET]) for t in (test, online))
     heat = [c.name for c in test.temperatures]
     warm, now = learn.only(heat), judge.only(heat)
     progress(0.1, "stepwise regression")
     selection = PartialF(f_enter=F_ENTER, f_delete=F_DELETE)
-    models = fit_and_freeze(selection, warm, [TARGET])
+    models = common.fit_and_freeze(selection, warm, [TARGET])
     found = {STEPWISE: models[TARGET]}
     for k, (name, method) in enumerate(METHODS.items()):
         progress(0.2 + 0.1 * k, name)
         if method and name not in found:
-            found[name] = trained(method, learn, support=PAPERS_SUPPORT)
+            found[name] = common.trained(method, learn, support=common.PAPERS_SUPPORT)
     found[SLICED] = sliced_inverse(warm)
     progress(0.8, "noise and lost sensors")
     measured = judge.deviations[:, 0]
-    shaken = {m: stress(found[m], judge, measured, every(judge)).robustness for m in (STEPWISE, LEAST, PURSUIT)}
+    shaken = {m: stress(found[m], judge, measured, common.every(judge)).robustness for m in (STEPWISE, LEAST, PURSUIT)}
     progress(0.95, "fewer rows")
     thinned = tuple(_thinned(warm, now, step) for step in THINNED)
-    raw, new = (stacked([r], [TARGET], heat, rezero=False) for r in (test, online))
-    absolute = fit_and_freeze(PartialF(f_enter=F_ENTER, f_delete=F_DELETE), raw, [TARGET])[TARGET]
+    raw, new = (common.stacked([r], [TARGET], heat, rezero=False) for r in (test, online))
+    absolute = common.fit_and_freeze(PartialF(f_enter=F_ENTER, f_delete=F_DELETE), raw, [TARGET])[TARGET]
     return Computed(
         fit=learn,
         online=judge,
         selection=selection,
         models={name: found[name] for name in METHODS},
         thinned=thinned,
-        absolute=rms(measured - predict_deviation(absolute, new)),
+        absolute=common.rms(measured - common.predict_deviation(absolute, new)),
         shaken=shaken,
     )
 
@@ -199,24 +194,24 @@ def sliced_inverse(samples: Samples) -> ErrorModel:
     _, directions = linalg.eigh(between)
     onto = whitening @ directions[:, ::-1][:, :DIRECTIONS]
     solved = lstsq(X @ onto, y)
-    return frozen(samples, range(X.shape[1]), (onto @ solved.coefficients).tolist(), solved.intercept)
+    return common.frozen(samples, range(X.shape[1]), (onto @ solved.coefficients).tolist(), solved.intercept)
 
 
 def _thinned(warm: Samples, online: Samples, step: int) -> Thinned:
     some = warm.take(np.arange(0, len(warm), step))
     selection = PartialF(f_enter=F_ENTER, f_delete=F_DELETE)
-    model = fit_and_freeze(selection, some, [TARGET])[TARGET]
+    model = common.fit_and_freeze(selection, some, [TARGET])[TARGET]
     residual = some.deviations[:, 0] - selection.predict(some.frame())
-    error = online.deviations[:, 0] - predict_deviation(model, online)
+    error = online.deviations[:, 0] - common.predict_deviation(model, online)
     return Thinned(
         rows=len(some),
         effective=effective_sample_size(residual),
         first=r_squared_of_f(F_ENTER, len(some) - 2),
         names=selection.terms_,
-        rms=rms(error),
+        rms=common.rms(error),
     )
 
 
 def _left(models: dict[str, ErrorModel], samples: Samples) -> dict[str, FloatArray]:
     x = samples.deviations[:, 0]
-    return {NONE: x} | {name: x - predict_deviation(model, samples) for name, model in models.items()}
+    return {NONE: x} | {name: x - common.predict_deviation(model, samples) for name, model in models.items()}

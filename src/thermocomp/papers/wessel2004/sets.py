@@ -14,14 +14,15 @@ from thermocomp.models.selection.maximal_correlation import (
     maximal_correlations,
     subsets_up_to,
 )
-from thermocomp.papers.study import Claims, FloatArray, Ours, Part, Progress, StudyTable
+from thermocomp.papers.claims import Claims, Facts
+from thermocomp.papers.exhibits import Exhibits
+from thermocomp.papers.study import FloatArray, Part, Progress, StudyTable
 from thermocomp.virtual.datasets import record
 from thermocomp.virtual.protocol import Physics
 
 #: numbers of temperature sets (nine temperatures), of models of all sets and of models of at most three (W-10)
 PAPER_SETS, PAPER_MODELS, PAPER_SMALL_SETS = 511, 35_259, 129
-#: numbers of equivalent sets for S1, S2, S3 and of common ones; the common sets; the chosen one, 0-based (W-11)
-PAPER_EQUIVALENT, PAPER_COMMON = (46, 7, 27), ((0, 1, 7), (1, 3, 7), (1, 4, 7), (1, 7, 8))
+#: the chosen set, 0-based (W-11)
 PAPERS_OWN = (0, 1, 7)
 #: Psi exceeded by triples, so that larger sets were not examined (W-12)
 ENOUGH_PSI = 0.99
@@ -123,15 +124,9 @@ def appendix_b(seed: int, progress: Progress, physics: Physics | None = None) ->
 
 def told(s: Selection) -> Part:
     """Return the report of Appendix B."""
-    numbers = {
-        "sets_models": float(s.models(s.sets)),
-        "sets_small": float(len(s.psi.subsets)),
-        "sets_common": float(len(s.small.common)),
-        "sets_common_holm": float(len(s.holm.common)),
-        "sets_common_converged": float(len(s.converged.common)),
-        "sets_best_psi": float(s.by_size[MOST].min()),
-    }
-    numbers |= {f"sets_equivalent_s{d}": float(n) for d, n in enumerate(s.small.equivalent.sum(axis=1), start=1)}
+    counts = s.small.equivalent.sum(axis=1)
+    best = s.by_size[MOST].min()
+    numbers = exhibits.numbers("sets", s, models=s.models(s.sets), best_psi=best, equivalent=counts)
     return Part(claims(s), _tables(s), (), numbers)
 
 
@@ -149,81 +144,45 @@ def name_set(places: Sequence[int]) -> str:
 
 # -- claims ------------------------------------------------------------------------------------------------------------
 
-claims = Claims[Selection]()
+claims, exhibits = Claims[Selection](__name__), Exhibits(__name__)
 
 
-@claims.add(
-    "W-10",
-    "Nine temperatures, 23 data sets and three displacements make more models than can be calculated",
-    f"{PAPER_SETS} sets, {PAPER_MODELS} models; of at most {MOST}: {PAPER_SMALL_SETS} sets",
-)
-def _calculated(s: Selection) -> Ours:
+@claims.facts
+def _calculated(s: Selection) -> Facts:
     small, models = len(s.psi.subsets), s.models(s.sets)
     matches = (s.sets, models, small) == (PAPER_SETS, PAPER_MODELS, PAPER_SMALL_SETS)
-    limit = f"Data sets of {min(s.rows)} to {max(s.rows)} rows. The number is the paper's, the limit has gone."
-    return Ours(
-        f"{s.sets} sets, {models} models in {s.seconds:.1f} s; of at most {MOST}: {small} sets, "
-        f"{s.models(small)} models",
-        None if matches else False,
-        "The experiment has other numbers of sensors, probes or data sets than the paper's.",
-        note=limit if matches else "",
-    )
+    facts = {"models": models, "small": small, "small_models": s.models(small), "holds": None if matches else False}
+    return facts | {"matches": matches, "fewest": min(s.rows), "most": max(s.rows)}
 
 
-@claims.add(
-    "W-12",
-    f"Three temperatures are enough: the best triples have a maximal correlation above {ENOUGH_PSI}",
-    f"> {ENOUGH_PSI}",
-)
-def _enough(s: Selection) -> Ours:
+@claims.facts
+def _enough(s: Selection) -> Facts:
     best = s.by_size
-    listed = "; ".join(f"{k}: {', '.join(f'{v:.4f}' for v in best[k])}" for k in (1, 2, MOST, max(best)))
-    least = next((k for k, psi in best.items() if (psi > ENOUGH_PSI).all()), None)
-    return Ours(
-        f"mean Psi of the best set for each displacement, by its size: {listed}",
-        bool((best[MOST] > ENOUGH_PSI).all()),
-        note=f"Least number of temperatures with a mean above {ENOUGH_PSI} for every displacement: {least or 'none'}.",
-    )
+    least = next((k for k, psi in best.items() if (psi > ENOUGH_PSI).all()), "none")
+    holds = (best[MOST] > ENOUGH_PSI).all()
+    return {"best": [(k, best[k]) for k in (1, 2, MOST, max(best))], "least": least, "holds": holds}
 
 
-def _counted(equivalent: Sequence[int], common: int) -> str:
-    return f"{', '.join(str(n) for n in equivalent)} sets, {common} common"
-
-
-@claims.add(
-    "W-11 E-W6",
-    "Several sets are as good as the best, and some are for all displacements",
-    f"{', '.join(str(n) for n in PAPER_EQUIVALENT)} sets for S1, S2, S3; {len(PAPER_COMMON)} common: "
-    + " ".join(map(name_set, PAPER_COMMON)),
-)
-def _several(s: Selection) -> Ours:
+@claims.facts
+def _several(s: Selection) -> Facts:
     common = s.small.common
-    small, holm, converged = (
-        _counted(e.equivalent.sum(axis=1).tolist(), len(e.common)) for e in (s.small, s.holm, s.converged)
-    )
-    return Ours(
-        f"{small}: {' '.join(map(name_set, common[:6])) + (' ...' if len(common) > 6 else '') or 'none'}",
-        len(common) > 0,
-        note=f"Level 0.05, which the paper does not state, without correction for the number of sets; by Holm's rule "
-        f"{holm}; with sweeps to the limit instead of the paper's rule {converged}.",
-    )
+    shown = " ".join(map(name_set, common[:6])) + (" ..." if len(common) > 6 else "")
+    facts: Facts = {"shown": shown or "none", "holds": len(common) > 0}
+    for name, found in (("small", s.small), ("holm", s.holm), ("converged", s.converged)):
+        facts |= {f"counts_{name}": True, f"equivalent_{name}": found.equivalent.sum(axis=1)}
+    return facts
 
 
-@claims.add("W-11", "Some temperatures are in all common sets, but do not suffice by themselves", "T2 and T8")
-def _shared(s: Selection) -> Ours:
+@claims.facts
+def _shared(s: Selection) -> Facts:
     small, common = s.small, s.small.common
     pair = tuple(sorted(set.intersection(*map(set, common)))) if common else ()
-    worse = bool(pair) and pair not in common
-    if not common:
-        why = "No set is as good as the best for all displacements."
-    elif not pair:
-        why = "No temperature is in all of the common sets."
-    elif not worse:
-        why = f"{name_set(pair)} by itself is as good as the best for all displacements."
-    else:
-        p_values = ", ".join(f"{p:.2g}" for p in small.p_values[:, small.subsets.index(pair)])
-        why = f"{name_set(pair)} by itself is told from the best: p = {p_values} for the displacements in turn."
-    return Ours(name_set(pair) if pair else "none", worse, note=why)
+    if not pair:
+        return {"pair": "none", "holds": False, "why": "nothing" if common else "none"}
+    if pair in common:
+        return {"pair": name_set(pair), "holds": False, "why": "enough"}
+    p_values = small.p_values[:, small.subsets.index(pair)]
+    return {"pair": name_set(pair), "holds": True, "why": "worse", "p_values": p_values}
 
 
 # -- tables ------------------------------------------------------------------------------------------------------------
@@ -232,25 +191,15 @@ def _shared(s: Selection) -> Ours:
 def _tables(s: Selection) -> tuple[StudyTable, ...]:
     targets = [f"S{d + 1}" for d in range(len(s.psi.psi))]
     special = {"the paper's": PAPERS_OWN, "chosen": s.chosen}
-    listed = [r for k, r in enumerate(s.small.table()) if k < 12 or r.subset in special.values()]
-    return (
-        StudyTable(
-            "Appendix B: mean Psi of the best set of each size",
-            ("temperatures", *targets),
-            [[str(k), *(f"{v:.4f}" for v in best)] for k, best in s.by_size.items()],
-        ),
-        StudyTable(
-            "Appendix B: sets of at most three, first those as good as the best for most displacements",
-            ("set", *(f"mean Psi {t}" for t in targets), "smallest p", "as good for", ""),
-            [
-                [
-                    name_set(r.subset),
-                    *(f"{v / len(s.psi.tests):.4f}" for v in r.summed),
-                    f"{min(r.p_values):.2g}",
-                    " ".join(targets[d] for d in r.equivalent),
-                    " ".join(word for word, subset in special.items() if subset == r.subset),
-                ]
-                for r in listed
-            ],
-        ),
-    )
+    listed = [
+        (
+            name_set(r.subset),
+            [v / len(s.psi.tests) for v in r.summed],
+            min(r.p_values),
+            [targets[d] for d in r.equivalent],
+            [word for word, subset in special.items() if subset == r.subset],
+        )
+        for k, r in enumerate(s.small.table())
+        if k < 12 or r.subset in special.values()
+    ]
+    return exhibits.table("sizes", s.by_size.items()), exhibits.table("sets", listed)

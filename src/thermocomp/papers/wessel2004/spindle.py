@@ -7,12 +7,13 @@ from functools import cached_property
 import numpy as np
 
 from thermocomp.models.ace import ACE
+from thermocomp.papers.claims import Claims, Facts
 from thermocomp.papers.common import rms
+from thermocomp.papers.exhibits import Exhibits
 from thermocomp.papers.pictures import curves
-from thermocomp.papers.study import BoolArray, Claims, Figure, Ours, Panel, Part, Progress, StudyTable
+from thermocomp.papers.study import BoolArray, Figure, Panel, Part, Progress
 from thermocomp.papers.wessel2004.trial import (
     ACE_NAME,
-    MLR_NAME,
     SLIGHT,
     SWEEPS,
     MillingTrial,
@@ -26,8 +27,6 @@ from thermocomp.recordings.recording import Recording
 from thermocomp.virtual.datasets import record
 from thermocomp.virtual.protocol import Physics
 
-#: maximal correlation of the reference series, number of its rows and their interval [s] (W-06)
-PAPER_PSI, PAPER_ROWS, PAPER_INTERVAL = 0.9994, 199, 100.0
 #: numbers of neighbours tried in the paper (W-05)
 NEIGHBOURS = range(1, 11)
 
@@ -56,9 +55,9 @@ class Spindle:
     peaked: MillingTrial
 
     @property
-    def how(self) -> str:
-        """Note on `peaked` if it has the two series exchanged; else empty."""
-        return "" if self.peaked is self.found else "the two series exchanged: "
+    def exchanged(self) -> bool:
+        """Whether `peaked` has the two series exchanged."""
+        return self.peaked is not self.found
 
     @property
     def span(self) -> float:
@@ -99,131 +98,66 @@ def spindle(seed: int, progress: Progress, physics: Physics | None = None) -> Pa
     s = Spindle(recordings, found, peaked)
     tables = (
         found.table("Finite-element spindle: the displacement at the tip in the test series"),
-        StudyTable(
-            "ACE in the test series with k neighbours",
-            ("k", "RMS [um]", "RMS difference from k = 2 [um]"),
-            [[str(k), f"{error:.3f}", f"{difference:.3f}"] for k, (error, difference) in s.sweep.items()],
-        ),
+        exhibits.table("neighbours", s.sweep.items()),
     )
     numbers = found.numbers("fem") | found.rms_by_method("fem")
-    numbers |= {
-        "fem_span_um": s.span,
-        "fem_sweeps": float(len(found.ace.errors_)),
-        "fem_beyond": float(found.beyond.mean()),
-        "fem_neighbours_um": max(d for _, d in s.sweep.values()),
-    }
+    neighbours = max(d for _, d in s.sweep.values())
+    numbers |= exhibits.numbers("spindle", s, beyond=found.beyond.mean(), neighbours=neighbours)
     return Part(claims(s), tables, _figures(s), numbers)
 
 
 # -- claims ------------------------------------------------------------------------------------------------------------
 
-claims = Claims[Spindle]()
+claims, exhibits = Claims[Spindle](__name__), Exhibits(__name__)
 
 
-@claims.add("W-06", "Two series, each of 199 rows 100 s apart", f"{PAPER_ROWS} rows, {PAPER_INTERVAL:g} s")
-def _series(s: Spindle) -> str:
-    intervals = ", ".join(f"{r.sampling_interval:g}" for r in s.recordings)
-    return f"{', '.join(str(len(r)) for r in s.recordings)} rows, {intervals} s"
+@claims.facts
+def _series(s: Spindle) -> Facts:
+    return {"rows": [len(r) for r in s.recordings], "intervals": [r.sampling_interval for r in s.recordings]}
 
 
-@claims.add(
-    "W-02 W-03 W-04 W-06 E-W3 E-W5",
-    f"The transformations fit: the maximal correlation of the reference series is above {GOOD_PSI}",
-    f"Psi = {PAPER_PSI}",
-)
-def _fits(s: Spindle) -> Ours:
-    ace = s.found.ace
-    return Ours(
-        f"Psi = {ace.psi_:.4f}",
-        ace.psi_ > GOOD_PSI,
-        note=f"After {len(ace.errors_)} sweeps (until the error fails to decrease). Psi is a fit, and does not "
-        f"depend on which side is normalised (E-W3). theta falls over {ace.falling_theta_:.0%} of its steps, "
-        "where its inverse is not unique (E-W5).",
-    )
-
-
-@claims.add(
-    "W-05 W-13",
-    f"The estimate is quite close to the test series: RMS below {CLOSE:.0%} of the displacement's span",
-    "a figure",
-)
-def _close(s: Spindle) -> Ours:
+@claims.facts
+def _close(s: Spindle) -> Facts:
     ace = s.found.rms(ACE_NAME)
-    others = ", ".join(f"{m} {s.found.rms(m):.2f} um" for m in s.found.estimates if m != ACE_NAME)
-    return Ours(
-        f"{ace:.2f} um, {ace / s.span:.1%} of {s.span:.1f} um",
-        ace < CLOSE * s.span,
-        note=f"By the other methods: {others}.",
-    )
+    return {"ace": ace, "share": ace / s.span, "beside": s.found.rms_beside(ACE_NAME)}
 
 
-@claims.add(
-    "W-01",
-    "Linear regression is not sufficient: ACE has the smaller RMS in the test series",
-    "no number for this series",
-)
-def _bent(s: Spindle) -> Ours:
-    ace, mlr = s.found.rms(ACE_NAME), s.found.rms(MLR_NAME)
-    return Ours(
-        f"MLR {mlr:.2f} um, ACE {ace:.2f} um",
-        ace < mlr,
-        "The paper's evidence is that the curves are bent; bends of several can cancel.",
-        note=s.found.reasons(),
-    )
+@claims.facts
+def _bent(s: Spindle) -> Facts:
+    return s.found.reasons()
 
 
-@claims.add("W-05", f"k = 1 to 10 neighbours: only slight differences, below {SLIGHT:.0%} of the span", "slight")
-def _neighbours(s: Spindle) -> Ours:
-    errors, learned = [e for e, _ in s.sweep.values()], s.found.learned
+@claims.facts
+def _neighbours(s: Spindle) -> Facts:
+    errors = [e for e, _ in s.sweep.values()]
     worst = max(s.sweep, key=lambda k: s.sweep[k][1])
     differs = s.sweep[worst][1]
-    step = float(np.median(np.abs(np.diff(np.sort(learned.deviations[:, 0])))))
-    return Ours(
-        f"at most {differs:.2f} um ({differs / s.span:.1%}) from the estimate with k = 2, at k = {worst}",
-        differs < SLIGHT * s.span,
-        f"The RMS error itself goes from {min(errors):.2f} to {max(errors):.2f} um. Neighbours are averaged among "
-        f"{len(learned)} rows whose displacements are {step:.2f} um apart in the median, and across the branches of a "
-        f"theta that falls over {s.found.ace.falling_theta_:.0%} of its steps.",
-    )
+    step = float(np.median(np.abs(np.diff(np.sort(s.found.learned.deviations[:, 0])))))
+    facts = {"differs": differs, "share": differs / s.span, "holds": differs < SLIGHT * s.span}
+    return facts | {"worst": worst, "least": min(errors), "most": max(errors), "step": step}
 
 
-NO_PEAK = Ours(
-    "no row beyond",
-    note="The displacements that are estimated stay within those that were learned: there is no peak to crop.",
-)
-
-
-@claims.add(
-    "W-07 W-13", "Peaks beyond the displacements that were learned are cropped, and worse than the rest", "a figure"
-)
-def _cropped(s: Spindle) -> Ours:
-    found = s.peaked
-    beyond, estimate, error = found.beyond, found.estimates[ACE_NAME], found.residual(ACE_NAME)
+@claims.facts
+def _cropped(s: Spindle) -> Facts:
+    found, beyond = s.peaked, s.peaked.beyond
     if not beyond.any():
-        return NO_PEAK._replace(holds=False)
-    seen = found.learned.deviations[:, 0]
+        return {"peak": False, "range": False, "holds": False}
+    estimate, error, seen = found.estimates[ACE_NAME], found.residual(ACE_NAME), found.learned.deviations[:, 0]
     out, inside = rms(error[beyond]), rms(error[~beyond])
     kept = bool((estimate[beyond] >= seen.min()).all() and (estimate[beyond] <= seen.max()).all())
-    return Ours(
-        f"{s.how}{beyond.sum()} rows in {len(runs(beyond))} peak(s): RMS {out:.2f} um, {inside:.2f} um in the others",
-        kept and out > inside,
-        note=f"Learned from {seen.min():.1f} to {seen.max():.1f} um, to be estimated from {found.measured.min():.1f} "
-        f"to {found.measured.max():.1f} um.",
-    )
+    facts = {"peak": True, "range": True, "holds": kept and out > inside, "out": out, "inside": inside}
+    facts |= {"beyond": beyond.sum(), "peaks": len(runs(beyond)), "low": seen.min(), "high": seen.max()}
+    return facts | {"lowest": found.measured.min(), "highest": found.measured.max()}
 
 
-@claims.add("W-07", "The support guard flags every cropped peak (ours)")
-def _guarded(s: Spindle) -> Ours:
+@claims.facts
+def _guarded(s: Spindle) -> Facts:
     beyond, flagged = s.peaked.beyond, s.peaked.flagged
     if not beyond.any():
-        return NO_PEAK
+        return {"peak": False, "range": False}
     met = [bool(flagged[p].any()) for p in runs(beyond)]
-    return Ours(
-        f"{s.how}{sum(met)} of {len(met)} peak(s), {flagged[beyond].mean():.0%} of their rows; "
-        f"{flagged[~beyond].mean():.0%} of the others",
-        all(met),
-        "The guard looks at temperatures; in the peaks it missed only the displacement left its range.",
-    )
+    facts = {"peak": True, "range": True, "holds": all(met), "met": sum(met), "peaks": len(met)}
+    return facts | {"inside": flagged[beyond].mean(), "others": flagged[~beyond].mean()}
 
 
 def runs(rows: BoolArray) -> list[slice]:
@@ -250,36 +184,14 @@ def _figures(spindle: Spindle) -> tuple[Figure, ...]:
         Panel("(v)", "theta", "sum of phi", curves(total.x, {"": total.y}, "points")),
         Panel("(vi)", f"{s} [um]", "theta - sum of phi", curves(theta.x, {"": total.x - total.y}, "points")),
     ]
-    hours, warned = found.unseen.time / 3600, "ACE, flagged by the guard"
+    hours, warm = found.unseen.time / 3600, named(found.unseen)
     estimated = {"measured": found.measured, "ACE": found.estimates[ACE_NAME]}
     if found.flagged.any():
-        estimated[warned] = np.where(found.flagged, found.estimates[ACE_NAME], np.nan)
+        estimated["ACE, flagged by the guard"] = np.where(found.flagged, found.estimates[ACE_NAME], np.nan)
+    reference = recorded(spindle.recordings[:1], range(len(temperatures)))
     return (
-        Figure(
-            "wessel2004-fig2a",
-            "Fig. 2a: the reference series.",
-            recorded(spindle.recordings[:1], range(len(temperatures))),
-        ),
-        Figure(
-            "wessel2004-fig2b",
-            f"Fig. 2b: optimal transformations for {s}, their sum against theta, and what is left.",
-            transformed,
-            columns=2,
-        ),
-        Figure(
-            "wessel2004-fig3",
-            f"Fig. 3: temperatures of the test series, and {s} measured and estimated; where the guard warns, a "
-            "temperature is outside what was learned.",
-            [
-                Panel("", "time [h]", "temperature [degC]", curves(hours, named(found.unseen))),
-                Panel("", "time [h]", f"{s} [um]", curves(hours, estimated, dashed=["ACE"], points=[warned])),
-            ],
-        ),
-        Figure(
-            "wessel2004-loops",
-            f"Not in the paper: {s} against each temperature in the reference series. The loops are the hysteresis: "
-            "one temperature, two displacements.",
-            loops(found.learned),
-            columns=3,
-        ),
+        exhibits.figure("wessel2004-fig2a", *reference),
+        exhibits.figure("wessel2004-fig2b", *transformed, s=s),
+        exhibits.figure("wessel2004-fig3", (hours, warm), (hours, estimated), s=s),
+        exhibits.figure("wessel2004-loops", *loops(found.learned), s=s),
     )

@@ -8,9 +8,11 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from thermocomp.models.ace import ACE
+from thermocomp.papers.claims import Claims, Facts
 from thermocomp.papers.common import rms
+from thermocomp.papers.exhibits import Exhibits
 from thermocomp.papers.pictures import curves
-from thermocomp.papers.study import Claims, Figure, Ours, Panel, Part, Progress, StudyTable
+from thermocomp.papers.study import Figure, Panel, Part, Progress, StudyTable
 from thermocomp.papers.wessel2004.sets import PAPERS_OWN, Selection, name_set
 from thermocomp.papers.wessel2004.trial import (
     ACE_NAME,
@@ -29,8 +31,6 @@ from thermocomp.recordings.recording import Recording
 from thermocomp.virtual.datasets import record
 from thermocomp.virtual.protocol import Physics
 
-#: RMS in the independent test by linear regression and by ACE: resting tool, milling machine [um] (W-08, W-09)
-PAPER_TOOL, PAPER_MILLING = (5.7, 1.0), (5.0, 2.2)
 #: largest local gain over linear regression (E-W1); accuracy in the milling test without one episode [um] (E-W2)
 PAPER_GAIN, PAPER_ACCURACY = 10.0, 2.0
 
@@ -127,144 +127,79 @@ def milling_machine(seed: int, progress: Progress, physics: Physics | None = Non
 
 # -- claims ------------------------------------------------------------------------------------------------------------
 
-resting, milling = Claims[Resting](), Claims[MillingTrial]()
-
-BETTER = "ACE beats multiple linear regression under hysteresis: smaller total RMS in the unseen test"
-
-
-def _times(mlr: float, ace: float) -> str:
-    return f"MLR {mlr} um, ACE {ace} um: {mlr / ace:.1f}x"
+resting = Claims[Resting](__name__, section="resting")
+milling = Claims[MillingTrial](__name__, section="milling")
+exhibits = Exhibits(__name__)
 
 
-def _better(found: MillingTrial, temperatures: Sequence[int]) -> Ours:
-    mlr, ace = found.rms(MLR_NAME), found.rms(ACE_NAME)
-    beside = [f"{m} {found.rms(m):.2f} um" for m in found.estimates if m not in (ACE_NAME, MLR_NAME)]
-    return Ours(
-        f"MLR {mlr:.2f} um, ACE {ace:.2f} um: {mlr / ace:.2f}x, with {name_set(temperatures)}",
-        ace < mlr,
-        note=f"{found.reasons()} Without compensation {rms(found.measured):.2f} um; {', '.join(beside)}.",
-    )
+def _better(found: MillingTrial, temperatures: Sequence[int]) -> Facts:
+    facts = found.reasons() | {"better": True, "limits": True, "set": name_set(temperatures)}
+    facts |= {"times": facts["mlr"] / facts["ace_rms"], "none": rms(found.measured)}
+    return facts | {"beside": found.rms_beside(ACE_NAME, MLR_NAME)}
 
 
-@resting.add("W-08", f"{BETTER} (resting tool, the paper's set)", _times(*PAPER_TOOL))
-def _better_by_theirs(r: Resting) -> Ours:
-    return _better(r.paper, PAPERS_OWN)
+@resting.facts
+def _better_at_rest(r: Resting, sets: str) -> Facts:
+    return _better(r.paper, PAPERS_OWN) if sets == "the paper's set" else _better(r.own, r.selection.chosen)
 
 
-@resting.add("W-08", f"{BETTER} (resting tool, the set of our own Appendix B)", _times(*PAPER_TOOL))
-def _better_by_ours(r: Resting) -> Ours:
-    return _better(r.own, r.selection.chosen)
-
-
-@milling.add("W-09", f"{BETTER} (working milling machine, the fifth day)", _times(*PAPER_MILLING))
-def _better_at_work(found: MillingTrial) -> Ours:
+@milling.facts
+def _better_at_work(found: MillingTrial) -> Facts:
     return _better(found, range(len(found.learned.inputs)))
 
 
-@resting.add(
-    "W-08 E-W1",
-    "Locally the error is up to 10 times smaller than by linear regression, above all in the warm-up at the start",
-    f"up to {PAPER_GAIN:g}x; in total {PAPER_TOOL[0] / PAPER_TOOL[1]:.1f}x",
-)
-def _locally(r: Resting) -> Ours:
+@resting.facts
+def _locally(r: Resting) -> Facts:
     """Return our result for the "10-fold" of the abstract, which the overall RMS does not support (E-W1)."""
-    found = r.own
-    parts = np.array_split(np.arange(len(found.unseen)), STRETCHES)
-    linear, ace = found.residual(MLR_NAME), found.residual(ACE_NAME)
+    parts = np.array_split(np.arange(len(r.own.unseen)), STRETCHES)
+    linear, ace = r.own.residual(MLR_NAME), r.own.residual(ACE_NAME)
     gains = [rms(linear[p]) / max(rms(ace[p]), 1e-9) for p in parts]
     best = int(np.argmax(gains))
-    return Ours(
-        f"up to {gains[best]:.1f}x, in rows {parts[best][0] + 1}-{parts[best][-1] + 1} of {len(found.unseen)}; "
-        f"in total {rms(linear) / rms(ace):.1f}x",
-        gains[best] >= PAPER_GAIN,
-        note=f"RMS by linear regression over that by ACE in {STRETCHES} stretches of the test: "
-        + ", ".join(f"{g:.1f}" for g in gains),
-    )
+    facts = {"gains": gains, "gain": gains[best], "total": rms(linear) / rms(ace)}
+    return facts | {"first": parts[best][0] + 1, "last": parts[best][-1] + 1}
 
 
-@resting.add(
-    "W-08",
-    f"With the break the training covers the test: at most {FEW:.0%} of its rows have a temperature outside",
-    "a sufficient range, above all from 30 to 50 degC",
-)
-def _range(r: Resting) -> Ours:
+@resting.facts
+def _range(r: Resting) -> Facts:
     learned, tested = named(r.own.learned), named(r.own.unseen)
-    share = float(r.own.flagged.mean())
-    ranges = ", ".join(
-        f"{name} {x.min():.1f}-{x.max():.1f} (test {tested[name].min():.1f}-{tested[name].max():.1f})"
-        for name, x in learned.items()
-    )
-    return Ours(
-        f"{share:.0%} of the rows outside by temperature, {r.own.beyond.mean():.0%} by displacement",
-        share <= FEW,
-        note=f"Learned and tested [degC]: {ranges}.",
-    )
+    ranges = [(n, x.min(), x.max(), tested[n].min(), tested[n].max()) for n, x in learned.items()]
+    return {"flagged": r.own.flagged.mean(), "beyond": r.own.beyond.mean(), "ranges": ranges}
 
 
-@resting.add(
-    "W-11", "The set with the greatest Psi estimates an independent test well (ours; Psi is a fit within each data set)"
-)
-def _by_psi(r: Resting) -> Ours:
+@resting.facts
+def _by_psi(r: Resting) -> Facts:
     small, chosen, best = r.selection.small, r.selection.chosen, r.order[0]
     rank = float(spearmanr(small.summed[0], [-r.by_set[s] for s in small.subsets]).statistic)
-    return Ours(
-        f"the chosen set is number {r.order.index(chosen) + 1} of {len(r.order)} by RMS in the test, "
-        f"{r.by_set[chosen]:.2f} um; the best, {name_set(best)}, has {r.by_set[best]:.2f} um",
-        note="ACE with at most 300 sweeps. Rank correlation of the summed Psi with a small RMS in the test: "
-        f"{rank:.2f}.",
-    )
+    facts = {"place": r.order.index(chosen) + 1, "rms": r.by_set[chosen], "rank": rank}
+    return facts | {"best": name_set(best), "best_rms": r.by_set[best]}
 
 
-@resting.add(
-    "E-W8",
-    f"A boxcar of N = {WINDOW:.0%} of the rows on each side does as well as that of N = 10 (ours)",
-    "N = 10 whatever the number of rows",
-)
-def _window(r: Resting) -> str:
+@resting.facts
+def _window(r: Resting) -> Facts:
     learned, found = r.own.learned, r.own
     wide = ACE(window_share=WINDOW, max_sweeps=SWEEPS).fit(learned.values, learned.deviations[:, 0])
     left = rms(found.measured - wide.predict(found.unseen.values))
-    return (
-        f"{len(learned)} rows: N = {wide.half_window_} has {left:.2f} um, N = {found.ace.half_window_} "
-        f"{found.rms(ACE_NAME):.2f} um"
-    )
+    return {"wide": wide, "left": left, "ace": found.rms(ACE_NAME)}
 
 
-@milling.add(
-    "W-09 E-W2",
-    "Without the worst episode ACE is accurate to 1-2 um",
-    f"at most {PAPER_ACCURACY:g} um without the errors round point 17; {PAPER_MILLING[1]} um in total",
-)
-def _without_episode(found: MillingTrial) -> Ours:
+@milling.facts
+def _without_episode(found: MillingTrial) -> Facts:
     error = found.residual(ACE_NAME)
     worst = int(np.argmax(np.abs(error)))
     first, last = max(0, worst - EPISODE), min(len(error), worst + EPISODE + 1)
-    left = rms(np.delete(error, slice(first, last)))
-    return Ours(
-        f"{left:.2f} um without points {first + 1}-{last}; {found.rms(ACE_NAME):.2f} um in total",
-        left <= PAPER_ACCURACY,
-        note=f"The largest error, {error[worst]:.1f} um, is at point {worst + 1}; {found.flagged.mean():.0%} of the "
-        "rows have a temperature outside what was learned. The fit itself has an RMS of "
-        f"{found.fit_rms(ACE_NAME):.2f} um.",
-    )
+    facts = {"left": rms(np.delete(error, slice(first, last))), "first": first + 1, "last": last}
+    facts |= {"total": rms(error), "worst": error[worst], "point": worst + 1}
+    return facts | {"warned": found.flagged.mean(), "fit": found.fit_rms(ACE_NAME)}
 
 
-@milling.add(
-    "W-09",
-    f"Linear regression over-estimates between points {OVER[0]} and {OVER[1]} and under-estimates from {UNDER} on",
-    "a figure",
-)
-def _systematic(found: MillingTrial) -> Ours:
+@milling.facts
+def _systematic(found: MillingTrial) -> Facts:
     """Return our result for the sign of the error of linear regression; over-estimated: too much drift predicted."""
     drift = np.sign(found.measured.mean()) or 1.0
     excess, ace = (-drift * found.residual(m) for m in (MLR_NAME, ACE_NAME))
     middle, late = float(excess[OVER[0] - 1 : OVER[1]].mean()), float(excess[UNDER - 1 :].mean())
-    return Ours(
-        f"mean excess {middle:+.2f} um between them, {late:+.2f} um from {UNDER} on",
-        middle > 0 > late,
-        note=f"Mean excess over the whole test {excess.mean():+.2f} um, by ACE {ace.mean():+.2f} um. "
-        "The paper does not print the order of its speeds.",
-    )
+    facts = {"middle": middle, "late": late, "holds": middle > 0 > late}
+    return facts | {"excess": excess.mean(), "ace_excess": ace.mean()}
 
 
 # -- every set of temperatures -----------------------------------------------------------------------------------------
@@ -292,15 +227,9 @@ def _sets_table(r: Resting) -> StudyTable:
     names = {PAPERS_OWN: "the paper's", chosen: "chosen by Appendix B"}
     if chosen == PAPERS_OWN:
         names[chosen] = "the paper's, and chosen by Appendix B"
-    return StudyTable(
-        "Resting tool: ACE (at most 300 sweeps) with other sets, by their RMS in the independent test (in hindsight)",
-        ("place", "set", "RMS S1 [um]", "mean Psi S1 in the data sets", ""),
-        [
-            [str(k), name_set(s), f"{r.by_set[s]:.2f}", f"{psi[s]:.4f}", names.get(s, "")]
-            for k, s in enumerate(r.order, start=1)
-            if k <= 5 or k == len(r.order) or s in names
-        ],
-    )
+    rows = [(k, name_set(s), r.by_set[s], psi[s], names.get(s, "")) for k, s in enumerate(r.order, start=1)]
+    shown = [row for s, row in zip(r.order, rows, strict=True) if row[0] in (*range(6), len(rows)) or s in names]
+    return exhibits.table("by_set", shown)
 
 
 # -- figures -----------------------------------------------------------------------------------------------------------
@@ -319,37 +248,17 @@ def _estimated(found: MillingTrial) -> list[Panel]:
 def _tool_figures(recordings: list[Recording], r: Resting) -> tuple[Figure, ...]:
     chosen = r.selection.chosen
     return (
-        Figure(
-            "wessel2004-fig5",
-            f"Fig. 5: the resting tool, training. Temperatures {name_set(chosen)}.",
-            recorded(recordings[:1], chosen),
-        ),
-        Figure("wessel2004-fig6", "Fig. 6: the resting tool, independent test.", recorded(recordings[-1:], chosen)),
-        Figure(
-            "wessel2004-fig7",
-            "Fig. 7: S1 of the test, measured and estimated, and what is left; 'dynamic' is not in the paper.",
-            _estimated(r.own),
-        ),
-        Figure(
-            "wessel2004-tool-loops",
-            "Not in the paper: S1 of the training against each temperature. The loops are the hysteresis.",
-            loops(r.own.learned),
-            columns=3,
-        ),
+        exhibits.figure("wessel2004-fig5", *recorded(recordings[:1], chosen), set=name_set(chosen)),
+        exhibits.figure("wessel2004-fig6", *recorded(recordings[-1:], chosen)),
+        exhibits.figure("wessel2004-fig7", *_estimated(r.own)),
+        exhibits.figure("wessel2004-tool-loops", *loops(r.own.learned)),
     )
 
 
 def _milling_figures(recordings: list[Recording], found: MillingTrial) -> tuple[Figure, ...]:
-    warm = curves(points(found.unseen), named(found.unseen))
+    days = recorded(recordings[:-1], range(len(found.unseen.inputs)))
+    warm = Panel("", "measuring point", "temperature [degC]", curves(points(found.unseen), named(found.unseen)))
     return (
-        Figure(
-            "wessel2004-fig8",
-            "Fig. 8: the working machine, training: four days one after the other.",
-            recorded(recordings[:-1], range(len(found.unseen.inputs))),
-        ),
-        Figure(
-            "wessel2004-fig9",
-            "Fig. 9: the fifth day: temperatures; the displacement measured and estimated; what is left.",
-            [Panel("", "measuring point", "temperature [degC]", warm), *_estimated(found)],
-        ),
+        exhibits.figure("wessel2004-fig8", *days),
+        exhibits.figure("wessel2004-fig9", warm, *_estimated(found)),
     )

@@ -14,6 +14,7 @@ from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.dynamic import DynamicRidge
 from thermocomp.models.ols import LeastSquares
 from thermocomp.papers import common
+from thermocomp.papers.claims import Facts
 from thermocomp.papers.common import errors_table, every, fit_and_freeze, predict_deviation, rms
 from thermocomp.papers.pictures import curves
 from thermocomp.papers.study import BoolArray, FloatArray, Panel, StudyTable
@@ -29,6 +30,8 @@ FROM_START = "{}, from each start"
 SWEEPS = 20_000
 #: maximum slight difference as a share of the displacement's span: visible limit in a figure
 SLIGHT = 0.01
+#: number of equal intervals of a temperature in which the width of its loop is sought
+LOOP_STEPS = 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,44 +131,31 @@ class MillingTrial:
         above = known[(rank + n).clip(max=len(known) - 1)] - known[rank]
         return np.asarray(np.maximum(above, known[rank] - known[(rank - n).clip(min=0)]))
 
-    def straight(self) -> str:
-        """Return the linearity of the transformations as text: if linear, linear regression is sufficient (W-01)."""
+    def straight(self) -> dict[str, float]:
+        """Return the linearity of each transformation, R2: if linear, linear regression is sufficient (W-01)."""
         curves = {f"theta({place(self.target)})": self.ace.theta_}
         curves |= {f"phi({place(c.name)})": phi for c, phi in zip(self.learned.inputs, self.ace.phi_, strict=True)}
-        told = []
-        for name, curve in curves.items():
-            varies = np.ptp(curve.x) > 0 and np.ptp(curve.y) > 0
-            told.append(f"{name} {np.corrcoef(curve.x, curve.y)[0, 1] ** 2 if varies else 1.0:.3f}")
-        return f"Share of the variance of each curve that a straight line explains: {', '.join(told)}."
+        varying = {name: np.ptp(curve.x) > 0 and np.ptp(curve.y) > 0 for name, curve in curves.items()}
+        return {n: np.corrcoef(c.x, c.y)[0, 1] ** 2 if varying[n] else 1.0 for n, c in curves.items()}
 
-    def reasons(self) -> str:
-        """Return the limits of the estimate by ACE as text, and the results of linear regression and of a memory."""
-        error, out, seen = self.residual(ACE_NAME), self.flagged, self.learned.deviations[:, 0]
-        linear = float(np.corrcoef(seen, self.fits[MLR_NAME])[0, 1])
-        text = (
-            f"Learned: Psi {self.ace.psi_:.4f} and fit RMS {self.fit_rms(ACE_NAME):.2f} um; multiple linear regression "
-            f"has a correlation of {linear:.4f} and {self.fit_rms(MLR_NAME):.2f} um. At equal temperature the "
-            f"displacement differs by {loop_width(self.learned):.0%} of its span, which no function of one temperature "
-            f"can tell; theta falls over {self.ace.falling_theta_:.0%} of its steps. {self.straight()} Unseen: "
-        )
-        if out.any():
-            inside = f", {rms(error[~out]):.2f} um in the others" if not out.all() else ""
-            text += (
-                f"{out.sum()} of {len(out)} rows have a temperature outside what was learned, the RMS of ACE is "
-                f"{rms(error[out]):.2f} um in them{inside}"
-            )
-        else:
-            text += "no temperature lies outside what was learned"
-        reach = self.reach()
+    def rms_beside(self, *methods: str) -> dict[str, float]:
+        """Return `rms` by the names of all other methods."""
+        return {m: self.rms(m) for m in self.estimates if m not in methods}
+
+    def reasons(self) -> Facts:
+        """Return the limits of the estimate by ACE, and the results of linear regression and of a memory."""
+        error, out, reach = self.residual(ACE_NAME), self.flagged, self.reach()
         wide = reach >= np.quantile(reach, 0.9)
-        text += (
-            f"; the boxcar of {2 * self.ace.half_window_ + 1} ranks reaches up to {reach.max():.1f} um to one side "
-            f"where rows are few, and the tenth of the rows where it reaches furthest have "
-            f"{np.sum(error[wide] ** 2) / np.sum(error**2):.0%} of the squared error of ACE"
-        )
-        if "dynamic" in self.estimates:
-            text += f"; with a memory ('dynamic', same temperatures) the RMS is {self.rms('dynamic'):.2f} um"
-        return text + "."
+        linear = np.corrcoef(self.learned.deviations[:, 0], self.fits[MLR_NAME])[0, 1]
+        facts = {"reasons": True, "ace": self.ace, "ace_rms": rms(error), "mlr": self.rms(MLR_NAME)}
+        facts |= {"fit": self.fit_rms(ACE_NAME), "fit_mlr": self.fit_rms(MLR_NAME), "correlation": linear}
+        facts |= {"loop": loop_width(self.learned), "straight": self.straight()}
+        facts |= {"outside": out.any(), "flagged": out.sum(), "rows": len(out), "partly": not out.all()}
+        facts |= {"out": rms(error[out]) if out.any() else 0.0, "inside": rms(error[~out]) if not out.all() else 0.0}
+        facts |= {"ranks": 2 * self.ace.half_window_ + 1, "reach": reach.max()}
+        facts |= {"wide": np.sum(error[wide] ** 2) / np.sum(error**2)}
+        memory = "dynamic" in self.estimates
+        return facts | {"memory": memory, "dynamic": self.rms("dynamic") if memory else 0.0}
 
 
 def stacked(
@@ -243,7 +233,7 @@ def trial(
     return MillingTrial(learned=learned, unseen=unseen, ace=ace, estimates=estimates, fits=fits, flagged=flagged)
 
 
-def loop_width(samples: Samples, steps: int = 20) -> float:
+def loop_width(samples: Samples) -> float:
     """Return the range of the displacement at equal temperature, as a fraction of its span: the hysteresis loop.
 
     The span of each temperature is divided into equal intervals; the width is the largest range of the displacement in
@@ -252,7 +242,6 @@ def loop_width(samples: Samples, steps: int = 20) -> float:
     Parameters
     ----------
     samples : Samples
-    steps : int
 
     Returns
     -------
@@ -261,7 +250,7 @@ def loop_width(samples: Samples, steps: int = 20) -> float:
     y = samples.deviations[:, 0]
     widths = []
     for x in samples.values.T:
-        place = np.minimum((steps * (x - x.min()) / max(np.ptp(x), 1e-12)).astype(np.intp), steps - 1)
+        place = np.minimum((LOOP_STEPS * (x - x.min()) / max(np.ptp(x), 1e-12)).astype(np.intp), LOOP_STEPS - 1)
         level = y - np.polyval(np.polyfit(x, y, 1), x) if np.ptp(x) > 0 else y
         widths.append(max(float(np.ptp(level[place == k])) for k in np.unique(place)))
     return min(widths) / float(np.ptp(y))
