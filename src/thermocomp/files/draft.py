@@ -31,10 +31,8 @@ class Drafts(dict[Path, Path]):
 
     Parameters
     ----------
-    drafts : dict of Path to Path
     places : dict of Path to Path
         Real path of each target, with links followed.
-    overwrite : bool
     """
 
     def __init__(self, drafts: dict[Path, Path], places: dict[Path, Path], overwrite: bool) -> None:
@@ -43,15 +41,7 @@ class Drafts(dict[Path, Path]):
         self._overwrite = overwrite
 
     def publish(self) -> None:
-        """Flush the drafts to disk and rename them to their targets in order: all of them, or none.
-
-        Raises
-        ------
-        InputError
-            A target file was created in the meantime, and overwriting is not allowed.
-        OSError
-            A disk error; the previous files have been restored.
-        """
+        """Flush the drafts to disk and rename them to their targets in order: all of them, or none."""
         moves = [_Move(path, self._places[target]) for target, path in self.items()]
         for move in moves:
             move.seal()
@@ -115,11 +105,6 @@ class _Move(NamedTuple):
         """Move the draft to a target that does not exist.
 
         On a file system without hard links, an empty file exists at the target for a moment.
-
-        Raises
-        ------
-        FileExistsError
-            The target exists.
         """
         try:
             self.place.hardlink_to(self.path)
@@ -143,24 +128,7 @@ class _Move(NamedTuple):
 
 @contextmanager
 def drafts(targets: Sequence[Path], *, overwrite: bool) -> Iterator[Drafts]:
-    """Provide a draft for each target; all drafts become the targets when they are published, or none.
-
-    Parameters
-    ----------
-    targets : sequence of Path
-    overwrite : bool
-        Existing files are replaced. Otherwise a file created before the end is kept.
-
-    Yields
-    ------
-    Drafts
-
-    Raises
-    ------
-    InputError
-        A file cannot be written, exists and must not be replaced, or a disk error occurred (such as a full disk);
-        previous files are unchanged.
-    """
+    """Provide a draft for each target; all drafts become the targets when they are published, or none."""
     with ExitStack() as stack:
         folders: dict[Path, Path] = {}
         places = {target: find_place(target) for target in targets}
@@ -179,42 +147,14 @@ def drafts(targets: Sequence[Path], *, overwrite: bool) -> Iterator[Drafts]:
 
 @contextmanager
 def draft(target: Path, *, overwrite: bool) -> Iterator[Path]:
-    """Provide the path of a draft of one file, which becomes that file if the block ends without an error.
-
-    Parameters
-    ----------
-    target, overwrite
-        See `drafts`.
-
-    Yields
-    ------
-    Path
-        Path of a file that does not exist yet.
-
-    Raises
-    ------
-    InputError
-        See `drafts`.
-    """
+    """Provide the path of a draft of one file, which becomes that file if the block ends without an error."""
     with drafts([target], overwrite=overwrite) as started:
         yield started[target]
         started.publish()
 
 
 def write_text(text: str, target: str | Path, *, overwrite: bool) -> Path:
-    """Write a text in UTF-8 and return the path.
-
-    Parameters
-    ----------
-    text : str
-    target, overwrite
-        See `drafts`.
-
-    Raises
-    ------
-    InputError
-        See `drafts`.
-    """
+    """Write a text in UTF-8 and return the path."""
     with draft(Path(target), overwrite=overwrite) as path:
         path.write_text(text, encoding="utf-8", newline="\n")
     return Path(target)

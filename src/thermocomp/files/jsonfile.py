@@ -34,7 +34,6 @@ class Format:
     ----------
     name : str
         Name as in the file.
-    version : int
     words : str
         Name of the format in messages.
     command : str
@@ -56,21 +55,7 @@ _KNOWN = {f.name: f for f in (MODELS, POSITION_MODELS)}
 
 
 def pack(kind: Format, body: list[Any], shared: dict[str, Any] | None = None) -> str:
-    """Return the text of a file; floats are written such that reading restores them bit for bit.
-
-    Parameters
-    ----------
-    kind : Format
-    body : list
-        The models.
-    shared : dict, optional
-        Data stored once for all models of the file.
-
-    Raises
-    ------
-    ValueError
-        A number is not finite.
-    """
+    """Return the text of a file; floats are written such that reading restores them bit for bit."""
     shared = shared or {}
     content = {"format": kind.name, "version": kind.version, "sha256": digest(body, shared), "models": body, **shared}
     text = _lay_out(content) + "\n"
@@ -93,25 +78,7 @@ def _lay_out(value: Any, depth: int = 1) -> str:
 
 
 def unpack(kind: Format, entry: Any, text: str, source: str, **shared: Any) -> Any:
-    """Return the content of a file's text: its ``models``, and the data common to all of them.
-
-    Parameters
-    ----------
-    kind : Format
-        Expected format.
-    entry : type
-        Expected type of each model.
-    text : str
-    source : str
-        Name of the source in an error.
-    **shared : type
-        Types of the data stored once for all models.
-
-    Raises
-    ------
-    ModelFileError
-        Not JSON, of another kind or version, altered or incomplete, or with invalid models.
-    """
+    """Return the content of a file's text: its ``models``, and the data common to all of them."""
     content = _parse(text, f"{source}: not a {kind.words}", source, kind.command)
     _check_kind(kind, content, source)
     body = content.get("models")
@@ -161,24 +128,12 @@ def _stop_at_first(schema: Any) -> None:
 
 
 def write(text: str, path: str | Path, *, overwrite: bool) -> None:
-    """Write the text of a file.
-
-    Raises
-    ------
-    InputError
-        See `thermocomp.files.draft.drafts`.
-    """
+    """Write the text of a file."""
     write_text(text, Path(path), overwrite=overwrite)
 
 
 def read(kind: Format, path: str | Path) -> tuple[str, str]:
-    """Return the text of a file, and its name for messages.
-
-    Raises
-    ------
-    ModelFileError
-        The file does not exist, is not a regular file, is too large, or is not text.
-    """
+    """Return the text of a file, and its name for messages."""
     return read_text(path, kind.words, MOST, ModelFileError), str(path)
 
 

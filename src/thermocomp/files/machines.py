@@ -182,7 +182,6 @@ class _Sources:
     ----------
     folder : Path
         Folder of the model files.
-    structure : Structure
     axes : mapping of str to Axis
         Axes of the structure that could be read.
     """

@@ -18,28 +18,7 @@ _MOST = 600
 
 
 def read_text(path: str | Path, what: str, most: int, failure: type[InputError] = InputError) -> str:
-    """Read a text file.
-
-    Parameters
-    ----------
-    path : str or Path
-    what : str
-        Name of the kind of file, such as ``machine file``.
-    most : int
-        Maximum size in bytes.
-    failure : type of InputError
-        Exception type to raise.
-
-    Returns
-    -------
-    str
-        Content without a byte order mark.
-
-    Raises
-    ------
-    InputError
-        The file does not exist, is not a regular file (a folder, a pipe, a device), is too large, or is not UTF-8.
-    """
+    """Read a text file."""
     source = Path(path)
     try:
         if not stat.S_ISREG(source.stat().st_mode):

@@ -28,11 +28,6 @@ def dumps(models: Sequence[PositionModel]) -> str:
     """Return position models as the text of a file.
 
     Floats are written such that reading restores them bit for bit.
-
-    Raises
-    ------
-    ModelFileError
-        A model of time belongs to a family that cannot be stored.
     """
     for model in models:
         for part in model.models:
@@ -41,40 +36,16 @@ def dumps(models: Sequence[PositionModel]) -> str:
 
 
 def loads(text: str, source: str = "position model") -> tuple[PositionModel, ...]:
-    """Read the text of a file of position models.
-
-    Parameters
-    ----------
-    text : str
-    source : str
-        Name of the source in an error.
-
-    Raises
-    ------
-    ModelFileError
-        Not JSON, not a position model file, of a newer version, altered or incomplete; the message lists all faults.
-    """
+    """Read the text of a file of position models."""
     entries = jsonfile.unpack(jsonfile.POSITION_MODELS, _Entry, text, source).models
     return tuple(PositionModel(**{f.name: getattr(e, f.name) for f in fields(e)}) for e in entries)
 
 
 def write(models: Sequence[PositionModel], path: str | Path, *, overwrite: bool = False) -> None:
-    """Write position models to a file.
-
-    Raises
-    ------
-    InputError
-        The file exists and `overwrite` is False.
-    """
+    """Write position models to a file."""
     jsonfile.write(dumps(models), path, overwrite=overwrite)
 
 
 def read(path: str | Path) -> tuple[PositionModel, ...]:
-    """Read a file of position models.
-
-    Raises
-    ------
-    ModelFileError
-        The file does not exist or cannot be used; see `loads`.
-    """
+    """Read a file of position models."""
     return loads(*jsonfile.read(jsonfile.POSITION_MODELS, path))

@@ -29,11 +29,6 @@ def scratch(folder: Path | None = None) -> Iterator[Path]:
     folder : Path, optional
         Destination of the files that will be moved out: on the same disk, a move is a single step. Default: the
         system's folder for temporary files.
-
-    Yields
-    ------
-    Path
-        Path of a folder that contains only its lock.
     """
     folder = folder or Path(gettempdir())
     _clear(folder)

@@ -18,24 +18,7 @@ DEPTH = 32
 
 
 def read_toml(path: str | Path, what: str) -> dict[str, Any]:
-    """Read a TOML file.
-
-    Parameters
-    ----------
-    path : str or Path
-    what : str
-        Name of the kind of file, such as ``machine file``.
-
-    Returns
-    -------
-    dict
-        Content of the file.
-
-    Raises
-    ------
-    InputError
-        The file does not exist, is too large, or is not text or TOML; the message names the file.
-    """
+    """Read a TOML file."""
     source = Path(path)
     text = read_text(source, what, MOST)
     for n, line in enumerate(text.splitlines(), start=1):

@@ -35,15 +35,6 @@ def decode(kind: Any, value: Any, place: str) -> Any:
     ----------
     kind : type
         Type made of named tuples, dataclasses, tuples, dicts, arrays, plain values and ``None``.
-    value : Any
-        Result of `encode`.
-    place : str
-        Name of the source in an error.
-
-    Raises
-    ------
-    ValueError
-        The value is invalid; the message contains the location and the value found.
     """
     if get_origin(kind) in (Union, UnionType):
         (inner,) = (p for p in get_args(kind) if p is not NoneType)
@@ -66,11 +57,8 @@ def want(right: bool, value: Any, place: str, what: str) -> None:
 
     Parameters
     ----------
-    right : bool
     value : Any
         Value found; None is not shown.
-    place, what : str
-        Location, and expected value.
     """
     if not right:
         raise ValueError(f"{place}: expected {what}" + ("" if value is None else f", found {value!r:.40}"))

@@ -21,24 +21,13 @@ def replay_models(
 
     Parameters
     ----------
-    recording : Recording
-    models : sequence of ErrorModel
     start : Start or None
         Initial state of the recording. Default: determined from the recording.
-    limits : Limits
-        Limits of the compensator.
 
     Returns
     -------
     residuals : dict of str to ndarray of shape (n_rows,)
         Residual of each model in its channel, by channel [its unit].
-    notes : list of str
-        Notes on the models.
-
-    Raises
-    ------
-    InputError
-        A model belongs to no channel, or the initial state of the recording cannot be determined.
     """
     found: dict[str, FloatArray] = {}
     notes = []

@@ -74,8 +74,6 @@ class PositioningResult:
 
     Parameters
     ----------
-    test : Positioning
-    up, down : Direction or None
     mean : ndarray of shape (n_targets,) or None
         Mean bidirectional deviation at each target.
     reversal : ndarray of shape (n_targets,) or None
@@ -121,16 +119,7 @@ class PositioningResult:
 
 
 def assess(test: Positioning) -> PositioningResult:
-    """Evaluate a positioning test in one thermal state.
-
-    Parameters
-    ----------
-    test : Positioning
-
-    Returns
-    -------
-    PositioningResult
-    """
+    """Evaluate a positioning test in one thermal state."""
     up, down = (None if d is None else _direction(d) for d in (test.up, test.down))
     if up is None or down is None:
         return PositioningResult(test=test, up=up, down=down, notes=_shortfalls(test))

@@ -58,13 +58,7 @@ def paired_names(recording: Recording) -> dict[tuple[str, int], str]:
 
 
 def find_probe(recording: Recording, name: str) -> str:
-    """Return the full channel name of a displacement; ``y1`` is accepted for ``y1_um``.
-
-    Raises
-    ------
-    InputError
-        Channel missing, or not a displacement.
-    """
+    """Return the full channel name of a displacement; ``y1`` is accepted for ``y1_um``."""
     short = [c for c in recording.displacements if _base(c) == name]
     channel = short[0] if short else recording.channel(name)
     if channel.quantity != "displacement":
@@ -95,31 +89,12 @@ def assess(
 
     Parameters
     ----------
-    recording : Recording
     kind : {'etve', 'spindle', 'axis'}, optional
         Type of test. Default: determined by `detect`.
-    pairs : sequence of Pair
-        Paired probes; see `find_pairs`.
     ambient : str, optional
         Channel of the ambient temperature. Default: `Recording.ambient`.
-    models : sequence of ErrorModel
-        Models of displacements or angles of the recording: the residual of each quantity is reported, too. They are
-        replayed reading by reading from the start of the recording, as a compensator would run them.
     start : Start, optional
         Initial state of the recording. Default: determined from the recording.
-    limits : Limits
-        Limits of the compensator.
-
-    Returns
-    -------
-    tuple of ThermalTest
-        In chronological order.
-
-    Raises
-    ------
-    InputError
-        There is no displacement, a channel is missing, no model belongs to the recording, or the initial state of the
-        recording, which a model needs, cannot be determined.
     """
     kind = detect(recording) if kind is None else kind
     if not _probes(recording):

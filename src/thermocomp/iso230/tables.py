@@ -25,16 +25,7 @@ WITH = "with model"
 
 
 def thermal_tables(test: ThermalTest) -> tuple[Table, ...]:
-    """Return the results of a thermal test: displacements, tilts, targets and lengths, each in a separate table.
-
-    Parameters
-    ----------
-    test : ThermalTest
-
-    Returns
-    -------
-    tuple of Table
-    """
+    """Return the results of a thermal test: displacements, tilts, targets and lengths, each in a separate table."""
     groups: list[tuple[str, Sequence[ThermalCurve]]] = []
     for unit, title in (("um", "Displacements [um]"), ("urad", "Angles [urad]")):
         groups.append((title, [c for c in test.curves if c.unit == unit]))
@@ -132,17 +123,7 @@ def _slopes(test: ThermalTest, targets: Targets) -> Table:
 
 
 def time_constant_tables(settlings: Sequence[Settling]) -> tuple[Table, ...]:
-    """Return the time constants of all channels, one table per phase.
-
-    Parameters
-    ----------
-    settlings : sequence of Settling
-        Settlings of one recording.
-
-    Returns
-    -------
-    tuple of Table
-    """
+    """Return the time constants of all channels, one table per phase."""
     tables = []
     for phase in dict.fromkeys(s.phase for s in settlings):
         mine = [s for s in settlings if s.phase == phase]
@@ -190,16 +171,7 @@ def _taus(s: Settling, n: int) -> list[str]:
 
 
 def positioning_tables(results: Sequence[PositioningResult]) -> tuple[Table, ...]:
-    """Return the values of each axis, all states next to each other, and the values at each target.
-
-    Parameters
-    ----------
-    results : sequence of PositioningResult
-
-    Returns
-    -------
-    tuple of Table
-    """
+    """Return the values of each axis, all states next to each other, and the values at each target."""
     tables = []
     for key in dict.fromkeys((r.test.axis, r.test.unit, r.test.source) for r in results):
         mine = [r for r in results if (r.test.axis, r.test.unit, r.test.source) == key]

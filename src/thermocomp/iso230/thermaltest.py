@@ -123,20 +123,16 @@ class ThermalCurve:
     ----------
     name : str
         Channel; for a tilt its letter, for a length its end points.
-    unit : {'um', 'urad'}
     place : str
         Location as text.
     values : ndarray of shape (n_rows,)
         Change since the start of the test, for each row; nan where missing.
     course : AveragedCurve
         Averaged curve, from which `figures` are taken.
-    figures : Figures
     settling : Settling or None
         Settling after the start of the drives; None if they never start.
     after : ndarray of shape (n_rows,) or None
         Residual with a model; None without a model.
-    after_course : AveragedCurve or None
-    after_figures : Figures or None
     """
 
     name: str
@@ -159,7 +155,6 @@ class Targets:
     ----------
     name : str
         Prefix of the channels' names, such as ``x_laser``.
-    axis : {'X', 'Y', 'Z'}
     positions : ndarray of shape (n_targets,)
         Target positions, increasing [mm].
     curves : tuple of ThermalCurve
@@ -186,8 +181,6 @@ class ThermalTest:
 
     Parameters
     ----------
-    kind : {'etve', 'spindle', 'axis'}
-    name : str
     recording : Recording
         Recording of which it is a part.
     start, stop, end : int
@@ -199,7 +192,6 @@ class ThermalTest:
         Curves of all displacements and angles that are not targets.
     tilts : tuple of ThermalCurve
         Tilts from paired probes [urad].
-    pairs : tuple of Pair
     targets : tuple of Targets
         Linear axis only.
     ambient : Channel or None
@@ -262,15 +254,8 @@ def evaluate_averaged_curve(time: FloatArray, course: AveragedCurve, rows: Float
     ----------
     time : ndarray of shape (n_rows,)
         Time since the start of the test [s].
-    course : AveragedCurve
     rows : ndarray of shape (n_rows,)
         The curve before averaging; nan where missing.
-    stop : int
-        Row of the stop of the drives; the last one if they do not stop.
-
-    Returns
-    -------
-    Figures
     """
     told = evaluate_curve(time, course.values, stop)
     known = np.flatnonzero(np.isfinite(course.values))
@@ -297,8 +282,6 @@ def evaluate_curve(time: FloatArray, values: FloatArray, stop: int) -> Figures:
         Time since the start of the test [s].
     values : ndarray of shape (n_rows,)
         Change since the start of the test; nan where missing.
-    stop : int
-        Row of the stop of the drives; the last one if they do not stop.
 
     Returns
     -------

@@ -36,7 +36,6 @@ class Judged:
 
     Parameters
     ----------
-    models : tuple of ErrorModel
     assessments : tuple of Assessment
         Per model and cycle, and per model over all cycles.
     seen : tuple of str
@@ -75,29 +74,8 @@ def assess(
 
     Parameters
     ----------
-    models : sequence of ErrorModel
-    recordings : sequence of Recording
-        With the inputs and targets of the models.
-    rules : Rules
-        Rules stated before judging.
-    limits : Limits
-        Limits of the judged compensator.
     starts : Start or sequence of Start, optional
         Initial state of each recording, or of all of them. Default: determined from the recordings.
-    probings : Probings, optional
-        Made in the judged rows: see `thermocomp.runtime.adaptation`.
-    progress : callable
-        Called with a line of text per model.
-
-    Returns
-    -------
-    Judged
-
-    Raises
-    ------
-    InputError
-        There is no model, a model to be probed was never judged, a channel that all models need is missing from the
-        recordings, or the initial state of a recording is unknown. A model that fails alone is refused.
     """
     if not models:
         raise InputError("no model given: name a model file, or give at least one model")
@@ -205,14 +183,7 @@ def _assess(
     guard: Guard | None,
     looked_after: Sequence[str],
 ) -> tuple[Assessment, Judging]:
-    """Judge a model on unseen rows (not `known`); on all rows if there are no others, with a caveat.
-
-    Returns
-    -------
-    Assessment
-    Judging
-        Scheme with its units.
-    """
+    """Judge a model on unseen rows (not `known`); on all rows if there are no others, with a caveat."""
     judged = np.isfinite(samples.deviations[:, 0])
     n, of = int((known & judged).sum()), int(judged.sum())
     caveat = ""

@@ -32,7 +32,6 @@ class Budget:
 
     Parameters
     ----------
-    targets : tuple of str
     unit : str
         Common unit of the targets, see `thermocomp.judging.sensorsets.weigh_targets`.
     scales : ndarray of shape (n_targets,)
@@ -41,7 +40,6 @@ class Budget:
         All temperatures.
     sensors : tuple of tuple of str
         Sets of 1, 2, ... sensors selected on all rows, each including the previous one; the last has all temperatures.
-    models : tuple of str
     blocks : tuple of str
         Unseen blocks.
     rms : ndarray of shape (n_models, n_sizes, n_targets, n_blocks)
@@ -131,7 +129,6 @@ class Budget:
 
         Returns
         -------
-        model : str
         place : int
             None if no model could be fitted in all blocks, or no set is better than no compensation.
         """
@@ -194,29 +191,6 @@ def budget(
     In each split the sets are selected on the training rows (`thermocomp.models.selection.standins.reduce_sensors`),
     the same for all targets; every model is then trained on these sensors, and on the spindle speed if the model uses
     it. A block without a value of one of the targets is left out.
-
-    Parameters
-    ----------
-    samples : Samples
-    judging : Judging
-    models : sequence of str
-        Methods to be trained on the selected sensors.
-    max_sensors : int
-    jobs : int
-        Number of parallel processes; -1: one per core.
-    progress : callable
-        Called with a line of text after each task; there are `n_pieces` of them.
-
-    Returns
-    -------
-    Budget
-
-    Raises
-    ------
-    InputError
-        `max_sensors` is below 1, or there is no temperature.
-    FitError
-        There is no block with values of all targets, or there are too few rows for selecting sensors.
     """
     names, targets = expand(models), samples.targets
     temperatures = [c.name for c in samples.inputs if c.quantity == "temperature"]
@@ -296,13 +270,7 @@ def _judged(
 
 
 def judged_blocks(samples: Samples, target: int, judging: Judging) -> BoolArray:
-    """Return the blocks in which a target has a value for judging, (n_splits,).
-
-    Raises
-    ------
-    FitError
-        There is no such block.
-    """
+    """Return the blocks in which a target has a value for judging, (n_splits,)."""
     found = np.array([np.isfinite(samples.deviations[split.judge, target]).any() for split in judging.splits])
     if not found.any():
         raise FitError(f"{samples.targets[target].name} has no value in any of the blocks to judge by")
@@ -310,19 +278,7 @@ def judged_blocks(samples: Samples, target: int, judging: Judging) -> BoolArray:
 
 
 def n_pieces(samples: Samples, judging: Judging, models: Sequence[str], max_sensors: int) -> int:
-    """Return the maximum number of tasks of `budget`.
-
-    Parameters
-    ----------
-    samples : Samples
-    judging : Judging
-    models : sequence of str
-    max_sensors : int
-
-    Returns
-    -------
-    int
-    """
+    """Return the maximum number of tasks of `budget`."""
     temperatures, blocks = sum(c.quantity == "temperature" for c in samples.inputs), len(judging.splits)
     return 1 + blocks + blocks * len(expand(models)) * min(max_sensors + 1, temperatures)
 
@@ -347,9 +303,6 @@ def unseen_rms(samples: Samples, name: str, learn: BoolArray, judge: BoolArray) 
 
     Parameters
     ----------
-    samples : Samples
-    name : str
-        Name of the method.
     learn, judge : ndarray of bool of shape (n_rows,)
         Rows for training, and unseen rows.
 

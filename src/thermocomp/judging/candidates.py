@@ -20,7 +20,6 @@ class Candidates:
 
     Parameters
     ----------
-    target : str
     X : DataFrame of shape (n_rows, n_temperatures)
         Temperatures minus their reference.
     y : ndarray of shape (n_rows,)

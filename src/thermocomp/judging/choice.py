@@ -68,13 +68,7 @@ class Settings:
     holm: bool = False
 
     def check(self, method: str) -> None:
-        """Reject settings that a method does not use.
-
-        Raises
-        ------
-        InputError
-            A setting was given that only other methods use.
-        """
+        """Reject settings that a method does not use."""
         for f in fields(self):
             default = f.default_factory() if f.default_factory is not MISSING else f.default
             if getattr(self, f.name) != default and method not in LOOKED_AT_BY[f.name]:
@@ -82,13 +76,7 @@ class Settings:
                 raise InputError(f"{option} is for --method {' or '.join(LOOKED_AT_BY[f.name])}, not for {method}")
 
     def most(self, method: str) -> int:
-        """Return the maximum number of sensors of a method.
-
-        Raises
-        ------
-        InputError
-            The number is below 1.
-        """
+        """Return the maximum number of sensors of a method."""
         if self.max_sensors is not None and self.max_sensors < 1:
             raise InputError(f"--max-sensors {self.max_sensors}: expected at least 1")
         return self.max_sensors if self.max_sensors is not None else {"ace": 3, "pareto": 6}.get(method, 10)
@@ -100,13 +88,10 @@ class Table:
 
     Parameters
     ----------
-    title : str
     columns : tuple of str
         Headings; units in brackets.
-    rows : tuple of tuple
     marked : int or None
         Index of the chosen row.
-    caption : str
     """
 
     title: str
@@ -134,13 +119,10 @@ class Choice:
 
     Parameters
     ----------
-    method : str
     target : str
         Displacement channel, or several separated by commas if sensors are selected for all of them.
-    sensors : tuple of str
     reason : str
         Reason for the selection, as text.
-    tables : tuple of Table
     notes : tuple of str
         Cautions for the user.
     details : object

@@ -40,22 +40,7 @@ class ClusterError(InputError):
 
 @contextmanager
 def connect(address: str) -> Iterator["Cluster"]:
-    """Connect to a Dask scheduler.
-
-    Parameters
-    ----------
-    address : str
-        Such as ``tcp://192.168.1.20:8786``.
-
-    Yields
-    ------
-    Cluster
-
-    Raises
-    ------
-    ClusterError
-        There is no scheduler within `ANSWERS` seconds, no worker within `WORKERLESS`, or versions differ (`ALIKE`).
-    """
+    """Connect to a Dask scheduler."""
     host, port, speaks = _read_address(address)
     with _unlogged():
         try:
@@ -106,7 +91,6 @@ class Cluster:
 
     Parameters
     ----------
-    client : Client
     address : str
         Address of the scheduler, for messages.
     """
@@ -126,14 +110,7 @@ class Cluster:
     def share(
         self, work: Callable[[Any], Any], pieces: Sequence[Any], failed: Callable[[Any, str], Any]
     ) -> Iterator[Any]:
-        """Yield the results of the tasks, in their order; see `thermocomp.judging.pieces.work_through`.
-
-        Raises
-        ------
-        ClusterError
-            The scheduler is lost: reported when its connection breaks, or within twice `ASKED` seconds if it is silent.
-            There has been no worker for `WORKERLESS` seconds.
-        """
+        """Yield the results of the tasks, in their order; see `thermocomp.judging.pieces.work_through`."""
         waiting: dict[int, Any] = {}
         turn = 0
         for number, found in self._results(work, pieces, failed):

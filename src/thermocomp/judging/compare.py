@@ -51,38 +51,11 @@ def compare(
 
     Parameters
     ----------
-    samples : Samples
-    methods : sequence of str or estimator
-        ``all`` selects all methods; see `thermocomp.models.methods.expand`.
-    judging : Judging
-        Training and validation data.
-    rules : Rules
-        Rules stated before judging.
-    support : Support
-        Behaviour of the models outside their training range.
-    robustness : bool
-        Also replay with noise and lost sensors.
-    refit : bool
-        With `robustness`: also test accepted models as written to the file, fitted to all rows.
     limits : Limits or None
         Limits of the judged compensator. None: the models alone are judged, as in papers, and their sensors are not
         monitored.
     watched : sequence of str, optional
         Inputs of the sensor watch. Default: all.
-    jobs : int
-        Number of parallel processes; -1: one per core.
-    progress : callable
-        Called with a line of text after each task; there are `n_pieces` of them.
-
-    Returns
-    -------
-    Comparison
-
-    Raises
-    ------
-    InputError
-        A method is unknown, or the primary method is not among them.
-        Rows occur twice in the samples and would be used for training and judging at the same time.
     """
     refuse_leaks(samples, judging)
     names = expand(methods)
@@ -207,17 +180,7 @@ def _scores(
 
 
 def n_pieces(samples: Samples, methods: Sequence[Any], judging: Judging, rules: Rules = Rules()) -> int:
-    """Return the number of tasks of `compare`.
-
-    Parameters
-    ----------
-    samples, methods, judging, rules
-        As for `compare`.
-
-    Returns
-    -------
-    int
-    """
+    """Return the number of tasks of `compare`."""
     names = expand(methods)
     by_target = [drop_unreadable(samples, k, judging) for k in range(len(samples.targets))]
     choices = sum(deployable(name) for name in names)

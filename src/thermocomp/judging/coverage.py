@@ -29,20 +29,7 @@ _SAME_SPEED = 0.02
 
 
 def find_validity(samples: Samples, judging: Judging, recordings: Sequence[Recording] = ()) -> Validity:
-    """Return the conditions covered by the units of a judging scheme.
-
-    Parameters
-    ----------
-    samples : Samples
-    judging : Judging
-        Scheme whose blocks are the units.
-    recordings : sequence of Recording
-        Tests of `samples`, in the same order: for the ambient temperature.
-
-    Returns
-    -------
-    Validity
-    """
+    """Return the conditions covered by the units of a judging scheme."""
     blocks = [rows for split in judging.splits if (rows := split.judge & samples.valid).any()]
     judged = np.any(blocks, axis=0) if blocks else np.zeros(len(samples), dtype=np.bool_)
     distances = unit_distances(samples, blocks)
@@ -68,7 +55,6 @@ def unit_distances(samples: Samples, blocks: Sequence[BoolArray]) -> FloatArray:
 
     Parameters
     ----------
-    samples : Samples
     blocks : sequence of ndarray of bool of shape (n_rows,)
         Rows of each unit; every input must be finite in them.
 
@@ -134,17 +120,7 @@ def _ambient(
 
 
 def table(named: dict[str, Validity]) -> Table:
-    """Return the covered conditions as a short table: one column per judging scheme.
-
-    Parameters
-    ----------
-    named : dict of str to Validity
-        Validity by name; at least one.
-
-    Returns
-    -------
-    Table
-    """
+    """Return the covered conditions as a short table: one column per judging scheme."""
     columns = [_cells(v) for v in named.values()]
     rows: list[tuple[Cell, ...]] = [(heading, *(c[heading] for c in columns)) for heading in columns[0]]
     caption = f"Alike: inputs less than {ALIKE:g} of their spread apart all the way; copies count once."

@@ -14,7 +14,6 @@ class Collinearity:
 
     Parameters
     ----------
-    names : tuple of str
     condition_number : float
         Largest over smallest eigenvalue of the correlation matrix; for X'X itself see `Diagnosis.spectrum`.
     vif : tuple of float
@@ -33,11 +32,6 @@ def collinearity(values: FloatArray, names: tuple[str, ...]) -> Collinearity:
     ----------
     values : ndarray of shape (n_rows, n_inputs)
         Finite values; constant columns are left out.
-    names : tuple of str
-
-    Returns
-    -------
-    Collinearity
     """
     spread = values.std(axis=0)
     varying = spread > 1e-12 * np.abs(values).max(axis=0, initial=1e-300)
@@ -60,7 +54,6 @@ class Diagnosis:
 
     Parameters
     ----------
-    names : tuple of str
     spectrum : Spectrum
         Eigenvalues of X'X without the column of ones, as in Table 3, with the smallest, the sum of inverses and the
         condition number (H-14 to H-16, E-H6).
@@ -84,11 +77,6 @@ def diagnose(values: FloatArray, deviation: FloatArray, names: tuple[str, ...]) 
     values : ndarray of shape (n_rows, n_variables)
         Temperatures minus their reference, as used in the model; finite [degC].
     deviation : ndarray of shape (n_rows,)
-    names : tuple of str
-
-    Returns
-    -------
-    Diagnosis
     """
     found = collinearity(values, names)
     vif = dict(zip(found.names, found.vif, strict=True))

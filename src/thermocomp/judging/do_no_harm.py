@@ -48,8 +48,6 @@ class JudgedUnit:
 
     Parameters
     ----------
-    name : str
-    rows : int
     rms, largest : float
         RMS and largest absolute value of the residual [um].
     baselines : tuple of float
@@ -106,7 +104,6 @@ class Verdict:
 
     Parameters
     ----------
-    units : tuple of JudgedUnit
     unit : str
         Unit of the deviations.
     caps : tuple of str
@@ -280,21 +277,10 @@ def measure(
 
     Parameters
     ----------
-    name : str
     measured, predicted : ndarray of shape (n_rows,)
         Deviations of one unseen cycle or file [um].
-    learned : Learned
-        Training statistics of the target.
-    unit : str
-        Unit of the deviations.
     margin : float, optional
         Tolerated degradation [um], stated before judging; see `margin_of`.
-    stretch : bool
-        The block continues the training data: compare also with both curves re-zeroed at its start.
-
-    Returns
-    -------
-    JudgedUnit
     """
     residual = measured - predicted
     size = Size.of(residual)
@@ -333,18 +319,7 @@ def margin_of(learned: Learned, unit: str = "um") -> float:
 
 
 def holm(verdicts: Sequence[Verdict]) -> list[Verdict]:
-    """Correct the verdicts on several methods for their number (Holm 1979).
-
-    Parameters
-    ----------
-    verdicts : sequence of Verdict
-        Verdicts on all methods tried for one target.
-
-    Returns
-    -------
-    list of Verdict
-        Verdicts with corrected p-values.
-    """
+    """Correct the verdicts on several methods for their number (Holm 1979)."""
     n = len(verdicts)
     raw = np.array([v.p_values[v.worst] if v.units else 1.0 for v in verdicts])
     order = np.argsort(raw, kind="stable")

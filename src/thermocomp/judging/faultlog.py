@@ -41,7 +41,6 @@ class FaultLog:
     ----------
     recording : int
         Index of the recording.
-    name : str
     time : ndarray of shape (n_rows,)
         [s]
     watch : Watch
@@ -85,17 +84,6 @@ def find_faults(judged: Judged, recordings: Sequence[Recording]) -> tuple[FaultL
 
     Data-quality problems that `thermocomp.recordings.checks.quality.check` detects afterwards are not excluded, since
     they would be unknown at the machine.
-
-    Parameters
-    ----------
-    judged : Judged
-    recordings : sequence of Recording
-        On which the models were judged, in their order.
-
-    Returns
-    -------
-    tuple of FaultLog
-        One per recording and per distinct watch; empty without a watch or without the speeds it needs.
     """
     watches = list[Watch]()
     for m in judged.models:
@@ -105,21 +93,7 @@ def find_faults(judged: Judged, recordings: Sequence[Recording]) -> tuple[FaultL
 
 
 def find_costs(model: ErrorModel, assessment: Assessment, logs: Sequence[FaultLog]) -> tuple[Cost, ...]:
-    """Return the residual of a model before and after its sensors failed, by the set of failed sensors.
-
-    Parameters
-    ----------
-    model : ErrorModel
-    assessment : Assessment
-        Assessment of the model, over all judged rows.
-    logs : sequence of FaultLog
-        Logs of these recordings; those of other watches are ignored.
-
-    Returns
-    -------
-    tuple of Cost
-        In order of appearance; a single one if none of its sensors failed.
-    """
+    """Return the residual of a model before and after its sensors failed, by the set of failed sensors."""
     own = {log.recording: log for log in logs if log.watch == model.watch}
     if assessment.failure or not own:
         return ()

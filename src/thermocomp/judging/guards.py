@@ -24,7 +24,6 @@ class Guard:
 
     Parameters
     ----------
-    watch : Watch
     readings : dict of (tuple of str) to dict of int to ndarray of shape (n_rows,)
         By failed sensors: columns of the samples in which the passed readings differ from the recorded ones.
     """
@@ -43,7 +42,6 @@ def find_guard(samples: Samples, learn: BoolArray, rows: BoolArray) -> Guard | N
 
     Parameters
     ----------
-    samples : Samples
     learn : ndarray of bool of shape (n_rows,)
         Training rows of the watch.
     rows : ndarray of bool of shape (n_rows,)
@@ -63,15 +61,8 @@ def let_fail(watch: Watch, samples: Samples, rows: BoolArray) -> Guard:
 
     Parameters
     ----------
-    watch : Watch
-    samples : Samples
-        Samples with all inputs of the watch.
     rows : ndarray of bool of shape (n_rows,)
         Judged rows: their tests are replayed up to the last of these rows.
-
-    Returns
-    -------
-    Guard
     """
     together = combinations(watch.names, 2) if len(watch.names) <= FEW else ()
     failing = [*((name,) for name in watch.names), *together]

@@ -22,20 +22,7 @@ from thermocomp.recordings.samples import Samples
 
 
 def drop_unreadable(samples: Samples, target: int, judging: Judging) -> Judging:
-    """Return a judging scheme without the blocks in which a target has too few values for a result.
-
-    Parameters
-    ----------
-    samples : Samples
-    target : int
-        Index into ``samples.targets``.
-    judging : Judging
-
-    Returns
-    -------
-    Judging
-        Unchanged if there are too few values in every block.
-    """
+    """Return a judging scheme without the blocks in which a target has too few values for a result."""
     known = np.isfinite(samples.deviations[:, target])
     kept = tuple(s for s in judging.splits if np.count_nonzero(s.judge & known) >= MIN_ROWS)
     return replace(judging, splits=kept) if kept else judging
@@ -64,36 +51,16 @@ def judge(
 
     Parameters
     ----------
-    name : str
-        Name of the model.
-    model : ErrorModel
-    samples : Samples
-        With all of the model's inputs, and its target.
-    split : Split
-        Only its block is used.
     learned : Learned, optional
         Reference for the model. Default: its own training statistics.
-    rules : Rules
-        Rules stated before judging.
     fit_s : float
         Duration of the fit [s].
-    robustness : bool
-        Also replay with noise and lost sensors.
     limits : Limits or None
         Limits of the compensator; None: the model alone is judged.
     guard : Guard, optional
         Readings that a watch, trained without the block, passes while sensors fail. Default: failures go undetected.
-    probings : Probings, optional
-        Probings made in the block.
     widening : ndarray of shape (n_rows,), optional
         See `replay_compensated`.
-    watched : collection of str
-        Temperatures monitored by a watch in these samples.
-
-    Returns
-    -------
-    Assessment
-
     """
     target = [c.name for c in samples.targets].index(model.target)
     rows, piece = split.judge & np.isfinite(samples.deviations[:, target]), (target, name, split)
@@ -205,20 +172,7 @@ def _caps(
 
 
 def refuse_method(samples: Samples, piece: tuple[int, str, Split], why: str) -> Assessment:
-    """Return the assessment of a method without a prediction: refused.
-
-    Parameters
-    ----------
-    samples : Samples
-    piece : tuple of (int, str, Split)
-        Index into ``samples.targets``, name of the method, and split.
-    why : str
-        Reason for the missing prediction: in the fit, or in the replay with noise.
-
-    Returns
-    -------
-    Assessment
-    """
+    """Return the assessment of a method without a prediction: refused."""
     target, name, split = piece
     rows = split.judge & np.isfinite(samples.deviations[:, target])
     measured = samples.deviations[rows, target]

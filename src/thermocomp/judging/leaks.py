@@ -16,12 +16,6 @@ LEAST_NEW = 0.05
 def find_learned_rows(model: ErrorModel, samples: Samples) -> BoolArray:
     """Return the rows that were used for training a model.
 
-    Parameters
-    ----------
-    model : ErrorModel
-    samples : Samples
-        With the inputs and the only target of the model.
-
     Returns
     -------
     ndarray of bool of shape (n_rows,)
@@ -43,18 +37,7 @@ def find_learned_rows(model: ErrorModel, samples: Samples) -> BoolArray:
 
 
 def refuse_leaks(samples: Samples, judging: Judging) -> None:
-    """Reject rows that occur twice in the data if one of them is used for training and the other for judging.
-
-    Parameters
-    ----------
-    samples : Samples
-    judging : Judging
-
-    Raises
-    ------
-    InputError
-        There are such rows; the message names the files and rows, and the remedy.
-    """
+    """Reject rows that occur twice in the data if one of them is used for training and the other for judging."""
     for target in range(len(samples.targets)):
         source = repeats(samples, target)
         copies = np.flatnonzero(source >= 0)

@@ -26,26 +26,7 @@ ENOUGH_PSI = 0.99
 
 
 def choose(samples: Samples, settings: Settings, *, jobs: int, progress: Progress) -> Choice:
-    """Select for all targets together by maximal correlation (W-10 to W-12); every thermal cycle is a data set.
-
-    Parameters
-    ----------
-    samples : Samples
-    settings : Settings
-    jobs : int
-        Number of parallel processes; -1: one per core.
-    progress : callable
-        Called with a line of text after each thermal cycle.
-
-    Returns
-    -------
-    Choice
-
-    Raises
-    ------
-    FitError
-        No thermal cycle has enough rows, or the search was stopped before the first one was done.
-    """
+    """Select for all targets together by maximal correlation (W-10 to W-12); every thermal cycle is a data set."""
     temperatures = [j for j, c in enumerate(samples.inputs) if c.quantity == "temperature"]
     names = [samples.inputs[j].name for j in temperatures]
     targets = tuple(c.name for c in samples.targets)

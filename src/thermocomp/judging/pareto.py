@@ -20,25 +20,6 @@ PART = 0.2
 def choose(samples: Samples, judging: Judging, settings: Settings, *, jobs: int, progress: Progress) -> Choice:
     """Select sensors for all targets together by the error on unseen blocks as a function of their number.
 
-    Parameters
-    ----------
-    samples : Samples
-    judging : Judging
-    settings : Settings
-    jobs : int
-        Number of parallel processes; -1: one per core.
-    progress : callable
-        Called with a line of text after each task; there are `thermocomp.judging.budget.n_pieces` of them.
-
-    Returns
-    -------
-    Choice
-
-    Raises
-    ------
-    FitError
-        None of the models could be judged in every block.
-
     Notes
     -----
     Without a set better than no compensation, the choice has no sensors, and `Choice.failure` states the reason.
@@ -190,19 +171,7 @@ def _joins(found: Budget, place: int) -> str:
 
 
 def next_to_buy(found: Budget, model: str, place: int) -> str:
-    """Return a recommendation for the next sensor, and whether it is worth its cost.
-
-    Parameters
-    ----------
-    found : Budget
-    model : str
-    place : int
-        Index of the current set in ``found.sensors``.
-
-    Returns
-    -------
-    str
-    """
+    """Return a recommendation for the next sensor, and whether it is worth its cost."""
     margins = found.margin()
     assert margins is not None
     margin, _, least = margins
@@ -298,19 +267,7 @@ def _repeats(candidates: Sequence[Candidates], sensors: Sequence[str]) -> Table:
 
 
 def trade_off(found: Budget, model: str, place: int) -> str:
-    """Return the loss of accuracy due to fewer sensors, compared with the best set of the table and with all sensors.
-
-    Parameters
-    ----------
-    found : Budget
-    model : str
-    place : int
-        Index of the chosen set in ``found.sensors``.
-
-    Returns
-    -------
-    str
-    """
+    """Return the loss of accuracy due to fewer sensors, compared with the best set of the table and with all sensors."""
     mean = found.mean()
     m, n = found.models.index(model), found.sizes[place]
     best = np.unravel_index(int(np.nanargmin(mean)), mean.shape)

@@ -38,19 +38,8 @@ def work_through(
 
     Parameters
     ----------
-    work : callable
-        Function of a task.
-    pieces : sequence
     failed : callable
         Called with a task and the reason of its failure; returns the replacement of the result. Default: the reason.
-    jobs : int
-        Number of parallel processes; 1: in this process, -1: one per core. Ignored within
-        `thermocomp.judging.sharing.shared_among`.
-
-    Yields
-    ------
-    object
-        Result of `work`, or of `failed` if an exception was raised or the process died.
     """
     if (share := elsewhere.get()) is not None:
         yield from share(work, pieces, failed)

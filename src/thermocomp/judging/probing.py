@@ -113,7 +113,6 @@ class Probed:
 
     Parameters
     ----------
-    plan : Probings
     at : ndarray of bool of shape (n_judged,)
         A probing was made: it takes effect from the next row on.
     shift : ndarray of shape (n_judged,)

@@ -39,17 +39,7 @@ class Inner:
 
 
 def inner_splits(judging: Judging) -> list[Inner]:
-    """Return the inner splits needed for a choice inside each unit's training part.
-
-    Parameters
-    ----------
-    judging : Judging
-
-    Returns
-    -------
-    list of Inner
-        Empty with fewer than 3 units.
-    """
+    """Return the inner splits needed for a choice inside each unit's training part."""
     splits = judging.splits
     n = len(splits)
     if n < LEAST:
@@ -75,23 +65,10 @@ def _inner(splits: Sequence[Split], out: Sequence[int], scores: tuple[tuple[int,
 def score(samples: Samples, by_target: Sequence[Judging], piece: tuple[int, str, Inner]) -> list[float]:
     """Return a method's RMS for each score of an inner split.
 
-    Parameters
-    ----------
-    samples : Samples
-    by_target : sequence of Judging
-        Scheme of each target, whose blocks are the units.
-    piece : tuple of (int, str, Inner)
-        Index into ``samples.targets``, name of the method, and inner split.
-
     Returns
     -------
     list of float
         [um]
-
-    Raises
-    ------
-    FitError
-        The method cannot be fitted.
     """
     target, name, inner = piece
     predicted = fit_method(name, samples, target, inner.split.learn).predicted
@@ -109,7 +86,6 @@ class Recommendation:
 
     Parameters
     ----------
-    target, method : str
     chosen : tuple of str
         Method chosen without each unit.
     verdict : Verdict
@@ -130,18 +106,6 @@ def recommend(
     inners: Sequence[Inner],
 ) -> Recommendation | None:
     """Recommend a method for a target.
-
-    Parameters
-    ----------
-    target : str
-    methods : sequence of str
-        Eligible methods.
-    parts : mapping of str to sequence of Verdict
-        Verdicts per method, on each left-out unit.
-    inner : mapping of str to sequence of sequence of float
-        Scores per method, from `score` for each of `inners`; infinite where the method failed.
-    inners : sequence of Inner
-        From `inner_splits`.
 
     Returns
     -------
@@ -175,21 +139,7 @@ def _log(verdict: do_no_harm.Verdict) -> float:
 def correct_verdicts(
     verdicts: Mapping[str, do_no_harm.Verdict], primary: str | None, found: Recommendation | None
 ) -> dict[str, do_no_harm.Verdict]:
-    """Correct the verdicts on the methods tried for one target for the number of methods.
-
-    Parameters
-    ----------
-    verdicts : mapping of str to Verdict
-        Verdicts per method, over all units.
-    primary : str or None
-        Method named before judging: not corrected, as if it were the only one.
-    found : Recommendation or None
-        Judged as a whole: if the choice is accepted, so is the method chosen, unless it does harm itself.
-
-    Returns
-    -------
-    dict of str to Verdict
-    """
+    """Correct the verdicts on the methods tried for one target for the number of methods."""
     after = dict(zip(verdicts, do_no_harm.holm(list(verdicts.values())), strict=True))
     if primary is not None:
         after[primary] = replace(after[primary], p=None, about="named beforehand")

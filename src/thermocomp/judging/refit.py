@@ -21,23 +21,7 @@ from thermocomp.recordings.samples import Samples
 
 
 def stress_written(judged: Assessment, model: ErrorModel, samples: Samples, guard: Guard | None = None) -> Assessment:
-    """Return an assessment with the robustness of the written model, where that is worse.
-
-    Parameters
-    ----------
-    judged : Assessment
-        Assessment over all blocks.
-    model : ErrorModel
-        Model fitted to all rows.
-    samples : Samples
-    guard : Guard, optional
-        Readings that a watch, trained on all rows, passes while sensors fail.
-
-    Returns
-    -------
-    Assessment
-        Unchanged if noise and lost sensors were not tried.
-    """
+    """Return an assessment with the robustness of the written model, where that is worse."""
     if judged.robustness is None:
         return judged
     k = [t.name for t in samples.targets].index(model.target)
@@ -49,24 +33,7 @@ def stress_written(judged: Assessment, model: ErrorModel, samples: Samples, guar
 def refit_accepted(
     judged: Sequence[Assessment], samples: Samples, support: Support, *, watch: bool, jobs: int
 ) -> list[Assessment]:
-    """Fit accepted methods to all rows, as in `thermocomp.judging.study.fit`, and test the robustness of these models.
-
-    Parameters
-    ----------
-    judged : sequence of Assessment
-    samples : Samples
-    support : Support
-        Support of the models.
-    watch : bool
-        Whether a watch detects lost sensors.
-    jobs : int
-        Number of parallel processes; -1: one per core.
-
-    Returns
-    -------
-    list of Assessment
-        Assessments with the worse robustness of the judged and the refitted models.
-    """
+    """Fit accepted methods to all rows, as in `thermocomp.judging.study.fit`, and test the robustness of these models."""
     wanted = [a for a in judged if a.overall and a.accepted and a.deployable]
     everything = np.ones(len(samples), dtype=np.bool_)
     guard = find_guard(samples, everything, everything) if watch and wanted else None

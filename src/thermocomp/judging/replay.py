@@ -73,21 +73,13 @@ def replay_compensated(
 
     Parameters
     ----------
-    model : ErrorModel
-    samples : Samples
     rows : ndarray of bool of shape (n_rows,)
         Judged rows.
     limits : Limits
         Limits of the corrections [um]; a model in another unit runs with the gate but without limits.
-    probings : Probings, optional
-        Made in the judged rows, from the first of each test on: the only displacements used, each from the next row on.
     widening : ndarray of shape (n_rows,), optional
         Band widening that belongs to samples already passed by a watch: see `thermocomp.judging.watched.believe`.
         Default: the samples are first passed through the model's own watch.
-
-    Returns
-    -------
-    Replayed
     """
     columns, within = _columns(model, samples), limits if model.unit == "um" else None
     if widening is None:
@@ -148,8 +140,6 @@ def replay(model: ErrorModel, samples: Samples, rows: BoolArray) -> tuple[FloatA
 
     Parameters
     ----------
-    model : ErrorModel
-    samples : Samples
     rows : ndarray of bool of shape (n_rows,)
         Rows whose prediction is requested.
 
@@ -176,16 +166,8 @@ def walk(model: ErrorModel, samples: Samples, rows: BoolArray, disturb: Disturb 
 
     Parameters
     ----------
-    model : ErrorModel
-    samples : Samples
     rows : ndarray of bool of shape (n_rows,)
         Rows whose state is requested.
-    disturb : callable, optional
-        Returns several variants of each reading; see `Disturb`.
-
-    Yields
-    ------
-    State
     """
     columns = _columns(model, samples)
     values, reference = samples.values[:, columns], samples.reference()[:, columns]
@@ -267,23 +249,7 @@ def _columns(model: ErrorModel, samples: Samples) -> list[int]:
 def rows_until(
     samples: Samples, rows: BoolArray, test: int, zeroing: Zeroing, columns: Sequence[int]
 ) -> NDArray[np.intp]:
-    """Return the rows of a test up to the last requested one, at least up to the one where its zero is known.
-
-    Parameters
-    ----------
-    samples : Samples
-    rows : ndarray of bool
-        Requested rows.
-    test : int
-        Index of the test.
-    zeroing : Zeroing
-    columns : sequence of int
-        Inputs that must be finite.
-
-    Returns
-    -------
-    ndarray of int
-    """
+    """Return the rows of a test up to the last requested one, at least up to the one where its zero is known."""
     mine = np.flatnonzero(samples.test == test)
     stop = int(np.flatnonzero(rows[mine]).max()) + 1
     usable = np.flatnonzero(np.isfinite(samples.values[mine][:, columns]).all(axis=1))

@@ -53,7 +53,6 @@ class Assessment:
 
     Parameters
     ----------
-    model, target, block : str
     measured, predicted : ndarray of shape (n_judged,)
         Deviations [um].
     row, test, cycle : ndarray of int of shape (n_judged,)
@@ -66,7 +65,6 @@ class Assessment:
         Total duration of the fits [s].
     n_effective : float
         Effective sample size of the residual.
-    robustness : Robustness or None
     frozen : ErrorModel or None
         The model replayed; None for several blocks together, or if it could not be fitted.
     failure : str
@@ -220,7 +218,6 @@ class Comparison:
 
     Parameters
     ----------
-    judging : Judging
     assessments : tuple of Assessment
         Per target, method and block; with several blocks, also one over all blocks.
     collinearity : Collinearity

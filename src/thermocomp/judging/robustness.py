@@ -87,17 +87,7 @@ class Robustness:
 
 
 def worse(one: Robustness, other: Robustness) -> Robustness:
-    """Return `one`, with the worse results of both for noise and lost sensors.
-
-    Parameters
-    ----------
-    one, other : Robustness
-        Results for the same rows.
-
-    Returns
-    -------
-    Robustness
-    """
+    """Return `one`, with the worse results of both for noise and lost sensors."""
     noise = {
         law: (max(mean, other.noise_rms[law][0]), max(largest, other.noise_rms[law][1]))
         for law, (mean, largest) in one.noise_rms.items()
@@ -179,20 +169,10 @@ def stress(
 
     Parameters
     ----------
-    model : ErrorModel
-    samples : Samples
     measured : ndarray of shape (n_wanted,)
         Deviations in `rows` [um].
     rows : ndarray of bool of shape (n_rows,)
         Rows to judge.
-    draws : int
-        Number of noise draws per distribution.
-    guard : Guard, optional
-        Readings passed by a watch while sensors fail, also several at once.
-
-    Returns
-    -------
-    Replayed
     """
     temperatures = np.array([i.quantity == "temperature" for i in model.inputs], dtype=np.bool_)
     lost: list[tuple[str, ...]] = [(i.name,) for i in model.inputs if i.name in model.sensors]
@@ -249,8 +229,6 @@ def unlike_rows(model: ErrorModel, samples: Samples, rows: BoolArray) -> BoolArr
 
     Parameters
     ----------
-    model : ErrorModel
-    samples : Samples
     rows : ndarray of bool of shape (n_rows,)
 
     Returns

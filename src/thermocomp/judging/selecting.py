@@ -29,19 +29,7 @@ SHARED = ("pareto", "ace")
 
 
 def n_pieces(method: str, samples: Samples, judging: Judging, settings: Settings) -> int:
-    """Return the maximum number of tasks of `select`.
-
-    Parameters
-    ----------
-    method : str
-    samples : Samples
-    judging : Judging
-    settings : Settings
-
-    Returns
-    -------
-    int
-    """
+    """Return the maximum number of tasks of `select`."""
     if method == "pareto":
         return budget.n_pieces(samples, judging, settings.models, settings.most("pareto"))
     if method == "ace":
@@ -58,36 +46,7 @@ def select(
     jobs: int = 1,
     progress: Progress = lambda _, steps=1: None,  # noqa: ARG005
 ) -> tuple[Choice, ...]:
-    """Select sensors for every target.
-
-    Parameters
-    ----------
-    method : str
-        grouping, partial-f, stepwise, subsets, ace or pareto.
-    samples : Samples
-    judging : Judging
-        Unseen blocks; used by ``pareto`` only.
-    settings : Settings
-    jobs : int
-        Number of parallel processes (or threads); -1: one per core.
-    progress : callable
-        Called with a line of text after each task; there are `n_pieces` of them. Also called with ``steps=0`` about
-        once a second during a long search.
-
-    Returns
-    -------
-    tuple of Choice
-        One per target; for ``pareto`` and ``ace`` one for all targets together. If a method fails for a target, its
-        choice has no sensors, and `Choice.failure` states the reason.
-
-    Raises
-    ------
-    InputError
-        Rows occur twice in the samples and would be used for training and judging at the same time (``pareto``).
-        A cluster is requested for a method other than ``pareto`` and ``ace``.
-    Exception
-        Failure of the method, if it fails for all targets.
-    """
+    """Select sensors for every target."""
     if elsewhere.get() is not None and method not in SHARED:
         raise InputError(f"{method} does not support a scheduler (only {' and '.join(SHARED)} do); omit the scheduler")
     if method == "pareto":

@@ -57,30 +57,10 @@ def sensitivity(
 
     Parameters
     ----------
-    models : mapping of str to ErrorModel
-        Models of the same target.
-    samples : Samples
-        With the inputs of all models.
     rows : ndarray of bool of shape (n_rows,)
         Rows to judge; rows without a measured deviation are ignored.
     size : float
         Uniform: within +-size; normal: standard deviation [degC].
-    law : {'uniform', 'normal'}
-    draws : int
-        At least 2; the paper made 100.
-    seed : int
-        Seed of the error.
-
-    Returns
-    -------
-    dict of str to Sensitivity
-
-    Raises
-    ------
-    InputError
-        The models have different targets or none are given, or size, distribution or number of draws is invalid.
-    FitError
-        The deviation in these rows is constant, so R2 is undefined.
     """
     targets = {m.target for m in models.values()}
     if len(targets) != 1:

@@ -19,14 +19,11 @@ def weigh_targets(samples: Samples, rows: BoolArray) -> tuple[str, FloatArray]:
 
     Parameters
     ----------
-    samples : Samples
     rows : ndarray of bool of shape (n_rows,)
         Rows for the root mean square of the targets without compensation.
 
     Returns
     -------
-    unit : str
-        Unit of the targets; `PERCENT` of the error without compensation if their units differ.
     scales : ndarray of shape (n_targets,)
         1 if the unit is common. Targets without values or without variation keep their own unit.
     """
@@ -44,22 +41,8 @@ def choose_sets(samples: Samples, most: int, learn: BoolArray) -> SensorSets:
 
     Parameters
     ----------
-    samples : Samples
-        The inputs are temperatures and spindle speeds.
-    most : int
-        Size of the largest set, apart from the set of all temperatures.
     learn : ndarray of bool of shape (n_rows,)
         Training rows.
-
-    Returns
-    -------
-    SensorSets
-        Indices among the temperatures, in the order of the inputs; errors and losses in the unit of `weigh_targets`.
-
-    Raises
-    ------
-    FitError
-        There are too few rows with values of every input and target.
     """
     seen = learn & samples.valid & np.isfinite(samples.deviations).all(axis=1)
     if seen.sum() < MIN_ROWS:

@@ -15,13 +15,6 @@ def shared_among(scheduler: str | None) -> Iterator[None]:
     ----------
     scheduler : str or None
         Address of the scheduler, such as ``tcp://192.168.1.20:8786``; None: tasks run on this machine.
-
-    Raises
-    ------
-    ClusterError
-        The cluster cannot be used, or is lost later; see `thermocomp.judging.cluster.connect`.
-    MissingExtraError
-        Dask is not installed.
     """
     if scheduler is None:
         yield

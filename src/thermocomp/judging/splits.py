@@ -49,7 +49,6 @@ class Judging:
     ----------
     name : str
         Description for tables and reports.
-    splits : tuple of Split
     """
 
     name: str
@@ -57,19 +56,7 @@ class Judging:
 
 
 def by_rows(samples: Samples, train: float, test: float) -> Judging:
-    """Train on the first fraction of the rows, judge on the next.
-
-    Parameters
-    ----------
-    samples : Samples
-    train, test : float
-        Fractions of all rows, such as 0.75 and 0.25.
-
-    Raises
-    ------
-    InputError
-        A fraction is not between 0 and 1, or their sum exceeds 1.
-    """
+    """Train on the first fraction of the rows, judge on the next."""
     if not (0 < train < 1 and 0 < test < 1 and train + test <= 1 + 1e-9):
         raise InputError(f"split {train:g}/{test:g}: expected two shares between 0 and 1 whose sum is at most 1")
     own = np.flatnonzero(samples.cycle >= 0)  # without rows of earlier files that tests continue from
@@ -87,7 +74,6 @@ def by_time(samples: Samples, train_s: float, test_s: float) -> Judging:
 
     Parameters
     ----------
-    samples : Samples
     train_s, test_s : float
         [s]
     """
@@ -111,13 +97,6 @@ def join_short_cycles(cycle: IntArray, test: IntArray, least: int = MIN_ROWS) ->
     ----------
     cycle, test : ndarray of int of shape (n_rows,)
         Cycle and test of each row, in chronological order.
-    least : int
-        Minimum number of rows.
-
-    Returns
-    -------
-    list of ndarray of int
-        Cycles of each block. If the first of a test is too short, it joins the next; a test is never joined to another.
     """
     found: list[IntArray] = []
     for k in np.unique(test):
@@ -141,13 +120,7 @@ def name_cycles(samples: Samples, block: IntArray) -> str:
 
 
 def leave_one_cycle_out(samples: Samples) -> Judging:
-    """Judge on each thermal cycle in turn, train on all others; see `join_short_cycles`.
-
-    Raises
-    ------
-    InputError
-        There are fewer than two cycles.
-    """
+    """Judge on each thermal cycle in turn, train on all others; see `join_short_cycles`."""
     n = len(samples.cycle_names)
     if n < 2:
         raise InputError(
@@ -166,13 +139,7 @@ def leave_one_cycle_out(samples: Samples) -> Judging:
 
 
 def leave_one_file_out(samples: Samples) -> Judging:
-    """Judge on each file in turn, train on all others; each file is judged as one unit.
-
-    Raises
-    ------
-    InputError
-        There is only one file.
-    """
+    """Judge on each file in turn, train on all others; each file is judged as one unit."""
     n = len(samples.test_names)
     if n < 2:
         raise InputError("leaving one file out needs at least two recordings")
@@ -186,11 +153,6 @@ def leave_one_day_out(samples: Samples) -> Judging:
     """Judge on each day in turn, train on all others; a day with too few rows is joined to the previous day.
 
     A thermal cycle belongs to the day on which it begins, unless it is longer than a day: then it is split at midnight.
-
-    Raises
-    ------
-    InputError
-        A recording has no time stamps, or there is only one day.
     """
     days = samples.days()
     unknown = np.isnat(days)
@@ -218,19 +180,7 @@ def leave_one_day_out(samples: Samples) -> Judging:
 
 
 def parse(text: str, samples: Samples) -> Judging:
-    """Parse a split as written on the command line.
-
-    Parameters
-    ----------
-    text : str
-        Fractions of the rows (``0.75/0.25``) or hours (``20h/8h``).
-    samples : Samples
-
-    Raises
-    ------
-    InputError
-        The text has neither form.
-    """
+    """Parse a split as written on the command line."""
     parts = text.split("/")
     try:
         if len(parts) == 2 and all(p.strip().endswith("h") for p in parts):

@@ -58,36 +58,7 @@ def fit(
     jobs: int = 1,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Fitted:
-    """Judge a method on unseen blocks, then fit it to all rows.
-
-    Parameters
-    ----------
-    samples : Samples
-    method : str or estimator
-        See `thermocomp.models.methods.expand`.
-    judging : Judging
-    rules : Rules
-        Rules stated before judging.
-    support : Support
-        Support of the models.
-    recordings : sequence of Recording
-        Tests of `samples`, in the same order: for ambient temperatures and days in the models' validity.
-    limits : Limits
-        Limits of the judged compensator.
-    jobs : int
-        Number of parallel processes; -1: one per core.
-    progress : callable
-        Called with a line of text after each task: ``n_pieces`` times, and once per target.
-
-    Returns
-    -------
-    Fitted
-
-    Raises
-    ------
-    InputError
-        The method is unknown, or cannot be frozen, so there would be no model.
-    """
+    """Judge a method on unseen blocks, then fit it to all rows."""
     (method,) = expand([method])
     if not deployable(method):
         raise InputError(f"{method} cannot be frozen to plain numbers: judge it with 'compare', fit another method")
@@ -130,13 +101,7 @@ def fit(
 
 
 def honest_error(overall: Assessment, judging: Judging) -> HonestError:
-    """Summarise an assessment for the model file.
-
-    Raises
-    ------
-    InputError
-        The method could not be fitted in one of the splits, so no error can be stated.
-    """
+    """Summarise an assessment for the model file."""
     if overall.failure:
         raise InputError(f"{overall.target}: cannot be judged: {overall.failure}")
     rms, none = overall.metric("rms"), overall.none_metric("rms")

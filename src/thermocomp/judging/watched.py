@@ -24,16 +24,10 @@ def believe(
 
     Parameters
     ----------
-    model : ErrorModel
-    samples : Samples
     rows : ndarray of bool of shape (n_rows,)
-    watched : Samples, optional
-        The same rows with all inputs of the model's watch, as recorded: see `stack_watched`. Values of failed sensors
-        are replaced.
 
     Returns
     -------
-    samples : Samples
     widening : ndarray of shape (n_rows,)
         See `ErrorModel.widening`; infinite where the model must not run and its correction is held.
     """
@@ -61,17 +55,7 @@ def believe(
 def stack_watched(
     watch: Watch, target: str, recordings: Sequence[Recording], starts: Sequence[Start] | Start | None
 ) -> Samples | None:
-    """Return all rows of recordings with the inputs of a watch, as recorded; None if there are no such inputs.
-
-    Parameters
-    ----------
-    watch : Watch
-    target : str
-        Any displacement channel, since samples must have one.
-    recordings : sequence of Recording
-    starts : Start or sequence of Start or None
-        Initial state of each recording.
-    """
+    """Return all rows of recordings with the inputs of a watch, as recorded; None if there are no such inputs."""
     known = [i.name for i in watch.inputs if all(r.has(i.name) for r in recordings)]
     if not known:
         return None
@@ -90,18 +74,8 @@ def can_look(watch: Watch, samples: Samples) -> bool:
 def look_through(watch: Watch, samples: Samples, test: int) -> Iterator[tuple[int, WatchState, FloatArray]]:
     """Replay a watch over a test; inputs of the watch that the samples lack are treated as missing.
 
-    Parameters
-    ----------
-    watch : Watch
-    samples : Samples
-        Samples with the speeds of the watch.
-    test : int
-
     Yields
     ------
-    row : int
-    state : WatchState
-        State after the reading.
     let : ndarray of shape (n_inputs,)
         Readings passed, in the order of the watch's inputs.
     """

@@ -215,13 +215,7 @@ class ACE(TransformRegressor):
 
 
 def half_window(n_rows: int, fixed: int, share: float | None) -> int:
-    """Return the half width of the boxcar, at most a quarter of the rows.
-
-    Raises
-    ------
-    InputError
-        `fixed` is less than 1, or `share` is not between 0 and 1/4.
-    """
+    """Return the half width of the boxcar, at most a quarter of the rows."""
     if share is None:
         if fixed < 1:
             raise InputError(f"half_window {fixed}: expected at least 1")
@@ -240,16 +234,6 @@ def nearest(table: SampledFunction, k: int) -> Curve:
 
     The k nearest of sorted entries are contiguous; entry i + k replaces entry i half way between them, and at that
     point entry i + k counts as the nearer one. Entries with equal x are averaged first.
-
-    Parameters
-    ----------
-    table : SampledFunction
-        Table with ascending x; equal values are allowed.
-    k : int
-
-    Returns
-    -------
-    Curve
     """
     _, group, count = np.unique(table.x, return_inverse=True, return_counts=True)
     y = (np.bincount(group, table.y) / count)[group]

@@ -31,18 +31,8 @@ def thin(curves: Sequence[Curve], response: Curve, columns: Sequence[FloatArray]
 
     Parameters
     ----------
-    curves : sequence of Curve
-        One per input.
-    response : Curve
-        Curve applied to their sum.
     columns : sequence of ndarray of shape (n_rows,)
         Fitted rows of each input.
-
-    Returns
-    -------
-    curves : tuple of Curve
-    response : Curve
-        Curves and response are returned unchanged if they are small.
     """
     if sum(len(c.x) for c in (*curves, response)) <= SMALL:
         return tuple(curves), response

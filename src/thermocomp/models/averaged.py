@@ -244,7 +244,6 @@ def _main_directions(deviations: FloatArray, moments: Moments) -> FloatArray:
     ----------
     deviations : ndarray of shape (n_structures, n_features)
         Weights minus their mean, times the square root of the structure's share.
-    moments : Moments
     """
     scale = np.sqrt(np.diag(moments.gram.sum(axis=0)) / moments.rows.sum())
     scale[scale == 0] = 1.0

@@ -41,9 +41,6 @@ def find_band(
     cycle : ndarray of int of shape (n_rows,)
     turning : ndarray of bool of shape (n_rows,)
         Whether the spindle turns.
-    speeds : sequence of int
-        Inputs that will indicate whether the spindle turns.
-    level : float
 
     Returns
     -------

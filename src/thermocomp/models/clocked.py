@@ -33,8 +33,6 @@ class TriedSetting:
     ----------
     interval : float
         [s]
-    k, m : int
-    intercept : bool
     hidden : int
         Hidden nodes; 0 for a linear model.
     cv_rms : float
@@ -57,7 +55,6 @@ class Clocked:
     ----------
     interval : float
         [s]
-    runs : list of TickedRun
     y, dt : ndarray of shape (n_rows,)
     folds : ndarray of int of shape (n_rows,)
         -1 for rows that are not used for training.
@@ -76,8 +73,6 @@ class Clocked:
         Parameters
         ----------
         inputs : ndarray of shape (n_rows, n_inputs)
-        y, dt, folds, interval
-            As in the class.
         """
         return cls(interval, ticks.put_on_clock(inputs, dt, interval), y, dt, folds)
 
@@ -215,19 +210,7 @@ def rms(error: FloatArray) -> float:
 
 
 def too_few(n: int, k: int, m: int, data: Clocked) -> str:
-    """Return the message that there are too few rows for the given orders.
-
-    Parameters
-    ----------
-    n : int
-        Ticks available for training.
-    k, m : int
-    data : Clocked
-
-    Returns
-    -------
-    str
-    """
+    """Return the message that there are too few rows for the given orders."""
     return (
         f"k = {k} and m = {m} at an interval of {data.interval:g} s: only {n} ticks have a known past, fewer than "
         "there are coefficients or just as many; take a shorter interval, smaller orders or a longer recording"

@@ -32,8 +32,6 @@ def find_joint_support(change: FloatArray, channels: Sequence[Channel], cycle: I
     ----------
     change : ndarray of shape (n_rows, n_inputs)
         Inputs minus their reference, finite [their units].
-    channels : sequence of Channel
-        Channels of the inputs.
     cycle : ndarray of int of shape (n_rows,)
         Thermal cycle of each row; with a single cycle, its quarters are left out in turn.
 

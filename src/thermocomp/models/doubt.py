@@ -23,7 +23,6 @@ class Doubt:
 
     Parameters
     ----------
-    features : PacedFeatures
     columns : int
         Number of inputs of the recordings.
     covariance : ndarray of shape (n_targets, n_features, n_features)
@@ -93,24 +92,7 @@ class Doubt:
 
 
 def find_doubt(samples: Samples) -> Doubt:
-    """Return the uncertainty of `averaged` after the given recordings.
-
-    Parameters
-    ----------
-    samples : Samples
-        Samples with a spindle speed and at least one temperature.
-
-    Returns
-    -------
-    Doubt
-
-    Raises
-    ------
-    InputError
-        There is no spindle speed, more than one spindle speed, or no temperature.
-    FitError
-        There are too few complete rows.
-    """
+    """Return the uncertainty of `averaged` after the given recordings."""
     of = AveragedDynamic()
     complete = samples.take(samples.valid)
     speeds = [j for j, c in enumerate(complete.inputs) if c.quantity == "spindle_speed"]

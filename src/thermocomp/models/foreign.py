@@ -62,16 +62,6 @@ def catch_failures(what: str) -> Iterator[None]:
     """Convert any exception of an estimator into a `FitError`, so that the results of other estimators are kept.
 
     Errors of thermocomp are passed on unchanged: their messages state the remedy.
-
-    Parameters
-    ----------
-    what : str
-        Failed operation, such as ``Ridge cannot be fitted to z_um``.
-
-    Raises
-    ------
-    FitError
-        Any other exception was raised.
     """
     try:
         yield
@@ -89,18 +79,10 @@ def check_numbers(predicted: Any, n_rows: int, name: str) -> FloatArray:
     Parameters
     ----------
     predicted : array-like of shape (n_rows,) or (n_rows, 1)
-    n_rows : int
-    name : str
-        Name of the method.
 
     Returns
     -------
     ndarray of shape (n_rows,)
-
-    Raises
-    ------
-    FitError
-        The predictions are not one finite number per row.
     """
     with catch_failures(f"{name} predicts no numbers"):
         found = np.asarray(predicted, dtype=np.float64)
@@ -113,24 +95,7 @@ def check_numbers(predicted: Any, n_rows: int, name: str) -> FloatArray:
 
 
 def adopt_estimator(estimator: Any) -> Any:
-    """Return a user-supplied estimator in a form that can be trained and judged.
-
-    Parameters
-    ----------
-    estimator : estimator
-        An estimator of thermocomp, one with a custom `freeze`, a Pipeline, or any scikit-learn regressor.
-
-    Returns
-    -------
-    estimator
-        The estimator itself if it freezes; a `PipelineRegressor` for a Pipeline of parts that freeze; otherwise a
-        `ForeignRegressor`.
-
-    Raises
-    ------
-    InputError
-        The object is not a regressor, or contains a part with a memory that cannot receive the time.
-    """
+    """Return a user-supplied estimator in a form that can be trained and judged."""
     if isinstance(estimator, type):
         raise InputError(f"{estimator.__name__} is a class: give an instance, {estimator.__name__}()")
     if isinstance(estimator, TimedRegressor):

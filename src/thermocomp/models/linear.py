@@ -34,7 +34,6 @@ class TermRegressor(MemorylessRegressor):
         Terms that depend linearly on others (or on the constant); their coefficient is 0.
     condition_ : float
         Condition number of the terms, centred (if there is an intercept) and scaled.
-    n_rows_ : int
     r_squared_, adjusted_r_squared_ : float
         On the training data; nan where undefined.
     r_squared_kind_ : {'centred', 'uncentred'}

@@ -20,7 +20,6 @@ class NamedEstimator(str):
 
     Parameters
     ----------
-    name : str
     estimator : estimator
         See `thermocomp.models.foreign.adopt_estimator`.
     """
@@ -57,13 +56,7 @@ METHODS = _registered()
 
 
 def find_method(name: str) -> Method:
-    """Find a method; an estimator that was passed in uses all inputs.
-
-    Raises
-    ------
-    InputError
-        There is no method of that name.
-    """
+    """Find a method; an estimator that was passed in uses all inputs."""
     if isinstance(name, NamedEstimator):
         kind = type(name.estimator)
         known: tuple[Literal["dt", "cycle"], ...] = ("dt", "cycle")
@@ -78,22 +71,7 @@ def find_method(name: str) -> Method:
 
 
 def expand(names: Sequence[Any]) -> list[str]:
-    """Return the names of methods without duplicates; ``all`` denotes all methods.
-
-    Parameters
-    ----------
-    names : sequence of str or estimator
-        Each estimator becomes a `NamedEstimator` with the name of its class; duplicates are numbered.
-
-    Returns
-    -------
-    list of str
-
-    Raises
-    ------
-    InputError
-        No names are given, a name is unknown, or an object is not a regressor.
-    """
+    """Return the names of methods without duplicates; ``all`` denotes all methods."""
     if not names:
         raise InputError("no model given: name at least one method, such as dynamic, or all of them by all")
     listed: dict[str, None] = {}

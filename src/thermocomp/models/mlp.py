@@ -24,7 +24,6 @@ class HiddenCount:
 
     Parameters
     ----------
-    n_hidden : int
     rms : tuple of float
         RMS of the residual in each left-out cycle, over all outputs [unit of y].
     """

@@ -41,26 +41,7 @@ class NetRegressor(MemorylessRegressor):
         return deviation[:, 0] if self._one_dimensional else deviation
 
     def freeze(self, *, inputs: Sequence[Input] | None = None, output: int | None = None, **header: Any) -> Network:
-        """Return one output of the fitted net as plain numbers, without inputs that were constant in training.
-
-        Parameters
-        ----------
-        inputs : sequence of Input, optional
-            One per feature; see `thermocomp.models.base.ThermalRegressor.freeze`.
-        output : int, optional
-            Column of y; required if y has several. Each column becomes a separate model.
-        **header
-            As in `thermocomp.models.base.ThermalRegressor.freeze`.
-
-        Returns
-        -------
-        Network
-
-        Raises
-        ------
-        InputError
-            The number of `inputs` differs from the number of features, or the output does not exist.
-        """
+        """Return one output of the fitted net as plain numbers, without inputs that were constant in training."""
         return self._frozen(self._inputs(inputs), {"unit": "um", **header}, output)
 
     def _frozen(self, inputs: Sequence[Input], header: dict[str, Any], output: int | None = None) -> Network:

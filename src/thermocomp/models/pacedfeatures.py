@@ -68,10 +68,6 @@ class PacedFeatures:
             Time since the previous row [s], inf at the start of a test.
         learned : ndarray of bool of shape (n_rows,)
             Training rows.
-        speeds : sequence of int
-            Columns that are spindle speeds; the others are temperatures.
-        lags, powers, stopped, running : sequence of float
-            As for `thermocomp.models.averaged.AveragedDynamic`.
         """
         usual = usual_step(step)
         # if the spindle was stopped in all training rows, use the other rows
@@ -164,14 +160,8 @@ class PacedFeatures:
 
         Parameters
         ----------
-        count : int
-        random_state : int
         keep : sequence of int, optional
             Indices in `temperatures` to use; default: all. The random draw does not depend on this.
-
-        Returns
-        -------
-        list of LagStructure
         """
         rng = np.random.default_rng(random_state)
         kept = np.arange(len(self.temperatures)) if keep is None else np.asarray(keep, dtype=np.intp)

@@ -138,10 +138,6 @@ class PipelineRegressor(ThermalRegressor):
             Deviation.
         dt, cycle : array-like of shape (n_rows,), optional
             As in `thermocomp.models.dynamic.DynamicRidge.fit`; rows with cycle -1 are not used for training.
-
-        Returns
-        -------
-        PipelineRegressor
         """
         change, deviation = self._read(X, y)
         folds = np.zeros(len(deviation), dtype=np.intp) if cycle is None else np.asarray(cycle)

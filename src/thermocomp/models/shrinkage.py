@@ -23,8 +23,6 @@ def scaling(X: FloatArray, *, centred: bool = True) -> tuple[FloatArray, FloatAr
     Parameters
     ----------
     X : ndarray of shape (n_rows, n_features)
-    centred : bool
-        False: the columns are not centred.
 
     Returns
     -------
@@ -48,10 +46,6 @@ def choose(rms: FloatArray, rule: Rule) -> tuple[int, int]:
     rule : {'one-standard-error', 'minimum'}
         The smallest mean, or the simplest setting of the same set whose mean is within one standard error of it
         (Breiman et al. 1984).
-
-    Returns
-    -------
-    which_set, setting : int
     """
     if rule not in ("one-standard-error", "minimum"):
         raise InputError(f"rule {rule!r}: expected 'one-standard-error' or 'minimum'")
@@ -198,13 +192,7 @@ class ComponentRegressor(ShrunkRegressor):
 
 
 def sorted_strengths(strengths: ArrayLike) -> FloatArray:
-    """Return strengths in descending order, that is, from the simplest model to the most complex.
-
-    Raises
-    ------
-    InputError
-        There are no strengths, or one is not a positive number.
-    """
+    """Return strengths in descending order, that is, from the simplest model to the most complex."""
     values = np.atleast_1d(np.asarray(strengths, dtype=np.float64))
     if values.size == 0 or not (values > 0).all() or not np.isfinite(values).all():
         raise InputError(f"strengths {strengths!r}: expected positive numbers")
@@ -212,13 +200,7 @@ def sorted_strengths(strengths: ArrayLike) -> FloatArray:
 
 
 def most_components(max_components: int | None, n_features: int) -> int:
-    """Return the number of components of the most complex model.
-
-    Raises
-    ------
-    InputError
-        `max_components` is less than 1.
-    """
+    """Return the number of components of the most complex model."""
     if max_components is not None and max_components < 1:
         raise InputError(f"max_components {max_components}: expected at least 1, or None for as many as inputs")
     return n_features if max_components is None else min(max_components, n_features)

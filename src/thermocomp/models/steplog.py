@@ -32,15 +32,6 @@ class StepwiseRegressor(StaticRegressor, TermRegressor):
 
         In addition to SYSTAT's columns, the text contains the partial F, the corresponding significance, the change of
         R2 (E-T3), the kind of R2 (E-C10) and the effective sample size (E-C12).
-
-        Parameters
-        ----------
-        target : str
-            Name of the predicted quantity.
-
-        Returns
-        -------
-        str
         """
         wide = max((len(s.term) for s in self.log_), default=0)
         lines = [f"STEPWISE REGRESSION WITH {self._rule_text()}", ""]

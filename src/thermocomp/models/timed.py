@@ -228,13 +228,7 @@ class TimedRegressor(ThermalRegressor):
         return super()._names()[self._hidden :]
 
     def _place(self, column: str | int, what: str) -> int:
-        """Return the input specified by a name or by an index into the columns of X.
-
-        Raises
-        ------
-        InputError
-            There is no input of that name, or the column is the time.
-        """
+        """Return the input specified by a name or by an index into the columns of X."""
         names = [str(n) for n in self._names()]
         if isinstance(column, str):
             if column not in names:

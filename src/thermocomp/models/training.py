@@ -38,8 +38,6 @@ class Trained:
 
     Parameters
     ----------
-    method : str
-    estimator : ThermalRegressor
     model : ErrorModel
         Frozen model, unless the method cannot be frozen: see `thermocomp.models.unfrozen`.
     seconds : float
@@ -64,8 +62,6 @@ class FittedMethod:
 
     Parameters
     ----------
-    how : Method
-    estimator : ThermalRegressor
     columns : tuple of int
         Inputs that were used.
     seen : ndarray of bool of shape (n_rows,)
@@ -93,25 +89,9 @@ def fit_method(name: str | BaseEstimator, samples: Samples, target: int, learn: 
 
     Parameters
     ----------
-    name : str or estimator
-        Name of the method; or an estimator with custom settings, which receives all inputs and is cloned, see
-        `thermocomp.models.foreign.adopt_estimator`.
-    samples : Samples
-    target : int
-        Index into ``samples.targets``.
     learn : ndarray of bool of shape (n_rows,)
         Rows whose deviation may be used. A dynamic method also receives the inputs (never the deviations) of the other
         rows, since they describe the thermal history of the machine.
-
-    Returns
-    -------
-    FittedMethod
-
-    Raises
-    ------
-    FitError
-        There are too few rows, the method cannot be fitted to them, or its predictions are not one finite number per
-        row.
     """
     if not isinstance(name, str):
         (name,) = expand([name])
@@ -173,28 +153,7 @@ def train(
     prints: bool = False,
     joint: bool = True,
 ) -> Trained:
-    """Fit a method to selected rows and freeze it.
-
-    Parameters
-    ----------
-    name, samples, target, learn
-        As for `fit_method`.
-    support : Support
-        Behaviour of the frozen model outside its trained range.
-    prints : bool
-        True if the model will be kept: fingerprints of the rows are stored in its provenance.
-    joint : bool
-        Whether the model gets a joint support; a model that only clips has the same output without one.
-
-    Returns
-    -------
-    Trained
-
-    Raises
-    ------
-    FitError
-        See `fit_method`.
-    """
+    """Fit a method to selected rows and freeze it."""
     fit = fit_method(name, samples, target, learn)
     how, estimator, seen, predicted = fit.how, fit.estimator, fit.seen, fit.predicted
     r_squared = float(r2_score(samples.deviations[seen, target], predicted[seen]))

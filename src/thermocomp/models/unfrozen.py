@@ -34,18 +34,9 @@ class UnfrozenRegressor(StaticRegressor):
 
         Parameters
         ----------
-        inputs : sequence of Input, optional
-            One per feature; see `thermocomp.models.base.ThermalRegressor.freeze`.
         rows : ndarray of shape (n_rows, n_features), optional
             Inputs minus their reference for which predictions will be required; computing these in advance is much
             faster.
-        **header
-            As in `thermocomp.models.base.ThermalRegressor.freeze`.
-
-        Returns
-        -------
-        EstimatorModel
-            Model that uses all inputs.
         """
         given = self._inputs(inputs)
         made = None if rows is None else self._predict(rows)

@@ -36,8 +36,6 @@ def find_watch(samples: Samples, learn: BoolArray) -> Watch | None:
 
     Parameters
     ----------
-    samples : Samples
-        Samples with the inputs that will be available on the machine.
     learn : ndarray of bool of shape (n_rows,)
         Training rows.
 

@@ -32,43 +32,14 @@ PAPERS_SUPPORT = Support(margin=1e3)
 
 
 def rename_channels(recording: Recording, names: Mapping[str, str]) -> Recording:
-    """Return selected channels of a recording under the names of a paper, in the given order.
-
-    Parameters
-    ----------
-    recording : Recording
-    names : mapping of str to str
-        New names by channel, such as ``{"t_air_C": "T1"}``; other channels are dropped.
-
-    Returns
-    -------
-    Recording
-
-    Raises
-    ------
-    InputError
-        Channel missing.
-    """
+    """Return selected channels of a recording under the names of a paper, in the given order."""
     channels = tuple(replace(recording.channel(old), name=new) for old, new in names.items())
     columns = recording.values([recording.channel(old) for old in names])
     return replace(recording, table=pd.DataFrame(columns, columns=[c.name for c in channels]), channels=channels)
 
 
 def add_derived_channel(recording: Recording, channel: Channel, weights: Mapping[str, float]) -> Recording:
-    """Return a recording with an additional channel: a weighted sum of others, such as a mean or a difference.
-
-    Parameters
-    ----------
-    recording : Recording
-    channel : Channel
-        The new channel.
-    weights : mapping of str to float
-        Weight of each source channel.
-
-    Returns
-    -------
-    Recording
-    """
+    """Return a recording with an additional channel: a weighted sum of others, such as a mean or a difference."""
     values = recording.values([recording.channel(name) for name in weights]) @ np.array(list(weights.values()))
     table = recording.table.assign(**{channel.name: values})
     return replace(recording, table=table, channels=(*recording.channels, channel))
@@ -77,20 +48,7 @@ def add_derived_channel(recording: Recording, channel: Channel, weights: Mapping
 def stacked(
     recordings: Sequence[Recording], targets: Sequence[str], inputs: Sequence[str] | None = None, *, rezero: bool = True
 ) -> Samples:
-    """Stack tests as in the papers: they start with a cold machine, and their first reading is the zero.
-
-    Parameters
-    ----------
-    recordings : sequence of Recording
-    targets, inputs : sequence of str
-        See `thermocomp.recordings.stacking.stack`.
-    rezero : bool
-        Whether temperatures are relative to the start of each test; False: as read.
-
-    Returns
-    -------
-    Samples
-    """
+    """Stack tests as in the papers: they start with a cold machine, and their first reading is the zero."""
     return stack(recordings, targets, inputs, rezero=rezero, zeroing=FIRST_READING, starts=COLD)
 
 
@@ -104,15 +62,8 @@ def with_noise(samples: Samples, size: float, law: Literal["uniform", "normal"],
 
     Parameters
     ----------
-    samples : Samples
     size : float
         Half-width of the uniform distribution, or standard deviation of the normal one [degC].
-    law : {'uniform', 'normal'}
-    seed : int
-
-    Returns
-    -------
-    Samples
     """
     rng = np.random.default_rng(seed)
     shape = samples.values.shape
@@ -122,23 +73,7 @@ def with_noise(samples: Samples, size: float, law: Literal["uniform", "normal"],
 
 
 def cut_off(samples: Samples, name: str) -> Samples:
-    """Return the same rows with the change of one input zero from the start, as for a cut-off sensor.
-
-    Parameters
-    ----------
-    samples : Samples
-    name : str
-        Name of the input.
-
-    Returns
-    -------
-    Samples
-
-    Raises
-    ------
-    InputError
-        Input missing.
-    """
+    """Return the same rows with the change of one input zero from the start, as for a cut-off sensor."""
     names = [c.name for c in samples.inputs]
     if name not in names:
         raise InputError(f"no input is named {name!r}; there are {', '.join(names)}")
@@ -161,29 +96,6 @@ def fit_and_freeze(
     """Fit an estimator to all rows of the samples, which must be complete, and freeze it.
 
     For a method of `thermocomp.models.methods` with default settings use `thermocomp.models.training.train`.
-
-    Parameters
-    ----------
-    estimator : ThermalRegressor
-        Estimator; fitted in place.
-    samples : Samples
-        Training data; its inputs are the features, see `Samples.only`.
-    targets : sequence of str
-        Targets; several are learned by one estimator, as by a net with several outputs.
-    support : Support
-        Behaviour of the frozen models outside the training range.
-    **fit
-        Keyword arguments of the estimator's ``fit``, such as ``cycle=samples.cycle`` and ``dt=samples.dt()``.
-
-    Returns
-    -------
-    dict of str to ErrorModel
-        Model of each target.
-
-    Raises
-    ------
-    FitError
-        The fit fails.
     """
     columns = [[c.name for c in samples.targets].index(t) for t in targets]
     y = samples.deviations[:, columns]
@@ -200,22 +112,7 @@ def fit_and_freeze(
 
 
 def trained(method: str, samples: Samples, target: int = 0, support: Support = Support()) -> ErrorModel:
-    """Train a method of thermocomp with default settings on all rows of the samples.
-
-    Parameters
-    ----------
-    method : str
-        Key of `thermocomp.models.methods.METHODS`.
-    samples : Samples
-    target : int
-        Index of the target.
-    support : Support
-        Behaviour of the model outside the training range.
-
-    Returns
-    -------
-    ErrorModel
-    """
+    """Train a method of thermocomp with default settings on all rows of the samples."""
     return train(method, samples, target, every(samples), support=support).model
 
 
@@ -226,19 +123,10 @@ def frozen(
 
     Parameters
     ----------
-    samples : Samples
-        Samples of the fit.
-    columns : sequence of int
-        Indices of the inputs.
-    coefficients : sequence of float
     intercept : float
         [unit of the target]
     **shape
         ``variables`` and ``terms`` of the polynomial. Default: each input linearly.
-
-    Returns
-    -------
-    Polynomial
     """
     inputs = samples.model_inputs(columns, every(samples))
     single = tuple(Variable.single(c.name, k) for k, c in enumerate(inputs))
@@ -257,12 +145,6 @@ def frozen(
 
 def predict_deviation(model: ErrorModel, samples: Samples) -> FloatArray:
     """Replay a frozen model reading by reading from the start of each test; return its deviation in all rows.
-
-    Parameters
-    ----------
-    model : ErrorModel
-    samples : Samples
-        Samples with the inputs of the model.
 
     Returns
     -------
@@ -322,13 +204,8 @@ def errors_table(caption: str, residuals: Mapping[tuple[str, str], FloatArray]) 
 
     Parameters
     ----------
-    caption : str
     residuals : mapping of (str, str) to ndarray
         Residual by subject and method, such as ``("z, 1250 1/min", "no compensation")`` [um].
-
-    Returns
-    -------
-    StudyTable
     """
     rows = []
     for (what, method), residual in residuals.items():

@@ -68,10 +68,8 @@ class Task:
 
     Parameters
     ----------
-    name : str
     samples : Samples
         Samples with one target.
-    judging : Judging
     """
 
     name: str
@@ -85,7 +83,6 @@ class Row:
 
     Parameters
     ----------
-    task, method : str
     fit_rms : float
         RMS of the replay in the training rows, pooled over several trainings [um].
     rms, max_abs, peak_to_peak : float
@@ -119,17 +116,7 @@ class Row:
 
 
 def simulate_task(experiment: CrossExperiment, seed: int) -> Task:
-    """Run an experiment on the virtual machine; its last tests are unseen.
-
-    Parameters
-    ----------
-    experiment : CrossExperiment
-    seed : int
-
-    Returns
-    -------
-    Task
-    """
+    """Run an experiment on the virtual machine; its last tests are unseen."""
     recordings = experiment.recordings(seed)
     target = experiment.target
     name = target if isinstance(target, str) else recordings[0].displacements[target].name
@@ -140,46 +127,14 @@ def simulate_task(experiment: CrossExperiment, seed: int) -> Task:
 
 
 def take_task(recordings: Sequence[Recording], target: str) -> Task:
-    """Return a task from recordings of a real machine: each thermal cycle is unseen once (X-02).
-
-    Parameters
-    ----------
-    recordings : sequence of Recording
-        One or several tests.
-    target : str
-        Displacement channel.
-
-    Returns
-    -------
-    Task
-
-    Raises
-    ------
-    InputError
-        Channel missing, or fewer than two thermal cycles.
-    """
+    """Return a task from recordings of a real machine: each thermal cycle is unseen once (X-02)."""
     samples = stacked(recordings, [target])
     name = f"{samples.test_names[0]}{' ...' if len(recordings) > 1 else ''}, {target}"
     return Task(name, samples, leave_one_cycle_out(samples))
 
 
 def judge(task: Task, methods: Sequence[str], progress: Progress = tell_nobody, *, jobs: int = 1) -> list[Row]:
-    """Judge methods on a task, starting with no compensation.
-
-    Parameters
-    ----------
-    task : Task
-    methods : sequence of str
-        Methods; ``all`` denotes all of them.
-    progress : callable
-        Called with the completed fraction after each step.
-    jobs : int
-        Number of parallel processes; -1: one per core.
-
-    Returns
-    -------
-    list of Row
-    """
+    """Judge methods on a task, starting with no compensation."""
     pieces, done = n_pieces(task.samples, methods, task.judging), 0
 
     def tell(what: str) -> None:
@@ -208,27 +163,8 @@ def run(
 
     Parameters
     ----------
-    seed : int
-    progress : callable
-        Called with the completed fraction and the next step.
-    recordings : sequence of Recording
-        Tests of one measured machine.
-    methods : sequence of str
-        Methods; ``all`` denotes all of `thermocomp.models.methods.METHODS`.
-    experiments : sequence of CrossExperiment
     targets : sequence of str, optional
         Displacements of the measured machine. Default: all.
-    jobs : int
-        Number of parallel processes; -1: one per core.
-
-    Returns
-    -------
-    Study
-
-    Raises
-    ------
-    InputError
-        A method or channel is unknown, or the recordings have fewer than two thermal cycles.
     """
     names = expand(methods)
     if targets is None:

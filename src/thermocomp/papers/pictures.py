@@ -25,12 +25,6 @@ def curves(
         Values by label.
     style : {'line', 'dashed', 'points'}
         Style of all other curves.
-    dashed, points : sequence of str
-        Labels of curves with these styles.
-
-    Returns
-    -------
-    list of PlotCurve
     """
     styles: dict[str, Style] = dict.fromkeys(dashed, "dashed")
     styles.update(dict.fromkeys(points, "points"))
@@ -42,7 +36,6 @@ def end_to_end(samples: Samples, values: FloatArray) -> tuple[FloatArray, FloatA
 
     Parameters
     ----------
-    samples : Samples
     values : ndarray of shape (n_rows,)
 
     Returns

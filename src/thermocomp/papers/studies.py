@@ -23,18 +23,8 @@ def run(name: str, *, seed: int = 0, progress: Progress = tell_nobody, physics: 
 
     Parameters
     ----------
-    name : str
-        One of `STUDIES`.
-    seed : int
-        Random seed of weather, noise and random draws.
-    progress : callable
-        Called with the completed fraction and the next step.
     physics : {'linear', 'nonlinear'}, optional
         Physics of the virtual machine, in `PHYSICS`. Default: as defined by the experiments.
-
-    Returns
-    -------
-    Study
     """
     options = {"physics": physics} if physics else {}
     study: Study = import_module(f"thermocomp.papers.{name}.redo").run(seed, progress, **options)
@@ -54,24 +44,8 @@ def repeat(
 
     Parameters
     ----------
-    name : str
-        One of `STUDIES`.
-    seed : int
-        Random seed of the first run; the following runs are `APART` apart, as a study increments its own seeds by one.
-    repeats : int
-        Number of runs.
-    progress : callable
-        Called with the completed fraction and the next step.
     physics : {'linear', 'nonlinear'}, optional
         See `run`.
-    jobs : int
-        Number of parallel processes; -1: one per core. With several, or on a cluster, progress is reported after each
-        run.
-
-    Returns
-    -------
-    Study
-        Study of the first run; its claims include whether they hold in the other runs.
     """
     if jobs != 1 or elsewhere.get() is not None:
         return _joined(_together(name, [seed + APART * k for k in range(repeats)], progress, physics, jobs), seed)
@@ -114,17 +88,7 @@ def _joined(found: Sequence[Study], seed: int) -> Study:
 
 
 def not_redone(name: str, why: str) -> Study:
-    """Return the replacement of a study that failed.
-
-    Parameters
-    ----------
-    name : str
-    why : str
-
-    Returns
-    -------
-    Study
-    """
+    """Return the replacement of a study that failed."""
     claim = Claim(ids=("-",), text="The study can be redone here", paper="", ours="it failed", holds=False, finding=why)
     return Study(name=name, title=f"{name}: not redone", claims=(claim,), tables=(), figures=(), numbers={}, ran=False)
 

@@ -73,7 +73,6 @@ class PlotCurve:
         Label; "" for none.
     x, y : ndarray of shape (n,)
         Values; nan breaks the line.
-    style : {'line', 'dashed', 'points'}
     """
 
     label: str
@@ -90,7 +89,6 @@ class Panel:
     ----------
     title, xlabel, ylabel : str
         Texts, with the unit in brackets.
-    curves : sequence of PlotCurve
     """
 
     title: str
@@ -109,7 +107,6 @@ class Figure:
         Stem of a file name, such as ``chen1996-fig14``.
     caption : str
         Description of the figure in one or two sentences; begins with the figure number of the paper.
-    panels : sequence of Panel
     columns : int
         Number of panels next to each other.
     """
@@ -122,14 +119,7 @@ class Figure:
 
 @dataclass(frozen=True, eq=False)
 class StudyTable:
-    """A table of a study.
-
-    Parameters
-    ----------
-    caption : str
-    header : sequence of str
-    rows : sequence of sequence of str
-    """
+    """A table of a study."""
 
     caption: str
     header: Sequence[str]
@@ -162,9 +152,6 @@ class Study:
         One of `thermocomp.papers.studies.STUDIES`.
     title : str
         Title of the paper, with authors and year.
-    claims : tuple of Claim
-    tables : tuple of StudyTable
-    figures : tuple of Figure
     numbers : mapping of str to float
         Numbers asserted by the gallery page, by a name that includes the unit (``mae_ann_x_um``).
     ran : bool

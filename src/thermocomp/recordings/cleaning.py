@@ -250,24 +250,7 @@ class Resample(Step):
 
 
 def clean(rows: Rows, steps: Sequence[Step]) -> Rows:
-    """Apply the steps of a cleaning in order.
-
-    Parameters
-    ----------
-    rows : Rows
-    steps : sequence of Step
-        Steps whose times count from the first row of the file, even if it was removed.
-
-    Returns
-    -------
-    Rows
-        Cleaned rows, with a note on each step.
-
-    Raises
-    ------
-    InputError
-        A channel or a row does not exist, or no rows would be left.
-    """
+    """Apply the steps of a cleaning in order."""
     for step in steps:
         rows = step.apply(rows)
     return rows

@@ -29,20 +29,7 @@ def beside(target: str) -> tuple[str, str]:
 
 
 def refuse_compensated(recordings: Sequence[Recording], targets: Sequence[str]) -> None:
-    """Reject recordings whose displacements are not those of an uncompensated machine.
-
-    Parameters
-    ----------
-    recordings : sequence of Recording
-    targets : sequence of str
-        Displacement channels for training or judging.
-
-    Raises
-    ------
-    RecordingError
-        The correction in force is unknown; a residual has no uncompensated deviation, or is itself the target; or the
-        three columns are inconsistent.
-    """
+    """Reject recordings whose displacements are not those of an uncompensated machine."""
     for recording in recordings:
         where = recording.source or recording.name
         if recording.compensation == "unknown":

@@ -49,11 +49,6 @@ def find_cycles(
         [1/min]; NaN counts as the last known speed.
     min_run, min_stop : float
         Shorter runs and stops (a tool change, a lost reading) do not split the test [s].
-
-    Returns
-    -------
-    tuple of Cycle
-        A single cycle over the whole test if the spindle does not restart.
     """
     known = np.isfinite(speed)
     if not known.any():
@@ -88,13 +83,7 @@ def make_single_cycle(n_rows: int) -> tuple[Cycle, ...]:
 
 
 def split_by_labels(labels: Sequence[object]) -> tuple[Cycle, ...]:
-    """Split by a column of labels: each run of equal labels is a cycle.
-
-    Raises
-    ------
-    RecordingError
-        A label recurs after another one.
-    """
+    """Split by a column of labels: each run of equal labels is a cycle."""
     text = [f"{v:g}" if isinstance(v, float) else str(v) for v in labels]
     starts = [0, *(k for k in range(1, len(text)) if text[k] != text[k - 1])]
     names = [text[k] for k in starts]

@@ -68,13 +68,7 @@ def fingerprint(samples: Samples, target: int, learn: BoolArray, *, thin: bool =
 
     Parameters
     ----------
-    samples : Samples
-    target : int
-        Index into ``samples.targets``.
     learn : ndarray of bool of shape (n_rows,)
-    thin : bool
-        Keep only as many runs as a model file may contain, evenly spread over the rows; of neighbouring runs the one
-        least sensitive to another rounding of the file. False: all are kept.
 
     Returns
     -------
@@ -152,10 +146,6 @@ def hash_runs(x: FloatArray, step: float, stride: int, length: int = LENGTH) -> 
     x : ndarray of shape (n_rows,)
     step : float
         Rounding step of differences [unit of x].
-    stride : int
-        Distance between the rows of a run.
-    length : int
-        Number of differences in a run.
     """
     ratio = _rounded(x, step, stride)
     finite = np.isfinite(ratio)

@@ -65,7 +65,6 @@ class Meaning:
         Channel name: the heading with the suffix of the house unit.
     base : str
         Heading without its unit.
-    unit : Unit
     """
 
     name: str
@@ -81,11 +80,6 @@ def understand(heading: str) -> Meaning | None:
     Meaning or None
         None if there is no unit. A length is a position if the heading names it as such (``x_mm``, ``pos_x_mm``), or a
         residual or correction of a machine under compensation (``z_residual_um``, ``z_correction_um``).
-
-    Raises
-    ------
-    UnitError
-        The brackets contain what looks like a mistyped unit.
     """
     heading = strip_heading(heading)
     said = _in_brackets(heading) if "[" in heading or "(" in heading else _behind(heading)

@@ -18,14 +18,6 @@ SAME_RATE = 0.05
 def overlap(prints: Prints, samples: Samples, target: int) -> IntArray:
     """Find training rows of a model.
 
-    Parameters
-    ----------
-    prints : Prints
-        Fingerprints of the training rows.
-    samples : Samples
-    target : int
-        Index into ``samples.targets``; it is compared with the target of the fingerprints whatever its name.
-
     Returns
     -------
     ndarray of int of shape (n_rows,)
@@ -37,12 +29,6 @@ def overlap(prints: Prints, samples: Samples, target: int) -> IntArray:
 
 def repeats(samples: Samples, target: int) -> IntArray:
     """Find rows that repeat earlier rows of the same or another test.
-
-    Parameters
-    ----------
-    samples : Samples
-    target : int
-        Index into ``samples.targets``.
 
     Returns
     -------

@@ -57,13 +57,7 @@ class ProfileOptions:
 
     @property
     def about(self) -> tuple[str, Literal["um", "urad"]]:
-        """Axis and unit of the profiles.
-
-        Raises
-        ------
-        InputError
-            Axis or unit is neither given nor defined by the component.
-        """
+        """Axis and unit of the profiles."""
         component = BY_CODE.get(self.target)
         axis = self.axis or (component.depends_on if component else "") or ""
         unit = self.unit or (component.unit if component else "")
@@ -115,7 +109,6 @@ class Profiles:
     ----------
     target : str
         Code of the component, such as ``EYY``, or any other name.
-    unit : {'um', 'urad'}
     axis : {'X', 'Y', 'Z'}
         Axis along which the component was measured.
     points : ndarray of shape (n_points, 3)
@@ -232,18 +225,7 @@ class Profiles:
         return digest.hexdigest()
 
     def reference_rows(self, reference: int | Sequence[int] = 0) -> IntArray:
-        """Return the states that are regarded as cold.
-
-        Parameters
-        ----------
-        reference : int or sequence of int
-            Indices of the states, from 0; negative ones count from the end.
-
-        Raises
-        ------
-        InputError
-            The state does not exist.
-        """
+        """Return the states that are regarded as cold."""
         rows = np.atleast_1d(np.asarray(reference, dtype=np.intp))
         n = len(self)
         wrong = [int(k) for k in rows if not -n <= k < n]
@@ -253,11 +235,6 @@ class Profiles:
 
     def cold(self, reference: int | Sequence[int] = 0) -> FloatArray:
         """Return the profile in the reference state (C-07).
-
-        Parameters
-        ----------
-        reference : int or sequence of int
-            See `reference_rows`; for several states the mean is used.
 
         Returns
         -------
@@ -271,13 +248,7 @@ class Profiles:
         return np.where(count > 0, np.nansum(rows, axis=0) / np.maximum(count, 1), np.nan)
 
     def thermal(self, reference: int | Sequence[int] = 0) -> FloatArray:
-        """Return the profiles minus the cold profile, shape (n_states, n_points) [unit] (C-07).
-
-        Parameters
-        ----------
-        reference : int or sequence of int
-            See `reference_rows`.
-        """
+        """Return the profiles minus the cold profile, shape (n_states, n_points) [unit] (C-07)."""
         return self.values - self.cold(reference)
 
     def slopes(
@@ -294,21 +265,8 @@ class Profiles:
         ----------
         order : int
             Highest power m; Chen finds 1 sufficient (C-05).
-        offset : bool
-            Fit k_0 as well; otherwise the lines pass through the reference position, as in Chen.
-        reference : int or sequence of int
-            See `reference_rows`.
         reference_position : float
             Position at which q is zero [mm].
-
-        Returns
-        -------
-        Slopes
-
-        Raises
-        ------
-        InputError
-            There is nothing to fit, or the number of positions does not exceed the number of factors.
         """
         powers = tuple(range(0 if offset else 1, order + 1))
         n_positions = len(np.unique(self.position[self.position != reference_position])) + offset

@@ -87,19 +87,7 @@ class Rows:
         return replace(self, changed=(*self.changed, *changes))
 
     def seconds(self, at: Instant, owner: str) -> float:
-        """Return a time as seconds since the first row of the file [s].
-
-        Parameters
-        ----------
-        at : float, datetime or str
-        owner : str
-            Owner, for messages.
-
-        Raises
-        ------
-        InputError
-            The text is not a timestamp, or the file has no timestamps.
-        """
+        """Return a time as seconds since the first row of the file [s]."""
         if isinstance(at, int | float):
             return float(at)
         if not self.start:
@@ -117,13 +105,7 @@ class Rows:
             ) from e
 
     def columns(self, names: Sequence[str], owner: str) -> list[str]:
-        """Return the names of existing channels.
-
-        Raises
-        ------
-        InputError
-            A channel does not exist; the message names the most similar one.
-        """
+        """Return the names of existing channels."""
         known = [str(c) for c in self.table.columns]
         for name in names:
             if name not in known:

@@ -39,24 +39,12 @@ def stack(
 
     Parameters
     ----------
-    recordings : sequence of Recording
-        The tests; each has a separate zero.
-    targets : sequence of str
-        Displacement channels to predict.
     inputs : sequence of str, optional
         Channels that models may use. Default: all temperatures and the first spindle speed.
-    rezero : bool
-        True: temperatures are relative to the start of each test (ISO 230-3); False: they are absolute.
     zeroing : Zeroing, optional
         Averaging time at the start. Default: that of `Zeroing`, with the spindle speed of the first recording.
     starts : Start or sequence of Start, optional
         Initial state of each recording, or of all of them. Default: determined from the recordings.
-
-    Raises
-    ------
-    InputError
-        A channel is missing in one of the recordings, a displacement is requested as an input, the initial state of a
-        recording cannot be determined, or the uncompensated deviation of a recording under compensation is unknown.
     """
     if not recordings:
         raise InputError("no recording given")

@@ -108,23 +108,10 @@ COLD = Start()
 def bridge_files(start: Start, recording: Recording) -> tuple[Start, FloatArray]:
     """Determine the time between the files of a test.
 
-    Parameters
-    ----------
-    start : Start
-    recording : Recording
-        Recording that continues the earlier files of `start`.
-
     Returns
     -------
-    start : Start
-        Start with known gaps.
     begins : ndarray of shape (n_earlier + 1,)
         Start time of each earlier file and of the recording itself, relative to the first file [s].
-
-    Raises
-    ------
-    InputError
-        According to its time stamps, a file starts before the end of the file it follows.
     """
     begins, words, every = [0.0], [], (*start.earlier, recording)
     for before, after in pairwise(every):
@@ -156,22 +143,6 @@ def find_starts(
 
     A displacement that starts near zero was zeroed there. If it does not, and continues from the end of the previous
     file (by time stamps), the test continues that file. Other cases are undetermined.
-
-    Parameters
-    ----------
-    recordings : sequence of Recording
-        Recordings that are given together.
-    targets : sequence of Channel
-        Displacements used for training or judging.
-    zeroing : Zeroing
-        Definition of the zero at the start.
-    absolute : bool
-        Temperatures are used as absolute values: their zero is known.
-
-    Raises
-    ------
-    InputError
-        The state cannot be determined, and a model started at zero would be wrong by the initial displacement.
     """
     if absolute:
         return tuple(Start("known", "temperatures are taken as they are") for _ in recordings)
@@ -188,12 +159,6 @@ def find_starts(
 def find_resting_rows(recording: Recording, zeroing: Zeroing) -> BoolArray:
     """Return the rows in which the spindle is known to be stopped.
 
-    Parameters
-    ----------
-    recording : Recording
-    zeroing : Zeroing
-        Defines the channel of the spindle speed.
-
     Returns
     -------
     ndarray of bool of shape (n_rows,)
@@ -205,23 +170,7 @@ def find_resting_rows(recording: Recording, zeroing: Zeroing) -> BoolArray:
 
 
 def level(recording: Recording, name: str, zeroing: Zeroing, *, end: bool = False) -> float:
-    """Return the level of a channel at its start or at its end.
-
-    Parameters
-    ----------
-    recording : Recording
-    name : str
-        Name of the channel.
-    zeroing : Zeroing
-        Averaging time at the start.
-    end : bool
-        Return the last value instead.
-
-    Returns
-    -------
-    float
-        Level in the unit of the channel; NaN if it has no value.
-    """
+    """Return the level of a channel at its start or at its end."""
     values = recording.table[recording.channel(name).name].to_numpy(dtype=np.float64)
     there = np.flatnonzero(np.isfinite(values))
     if not there.size:

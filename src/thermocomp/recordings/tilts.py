@@ -12,26 +12,10 @@ from thermocomp.recordings.recording import Recording
 def with_tilts(tests: Sequence[Recording], tilts: Sequence[str]) -> tuple[list[Recording], list[str]]:
     """Return recordings with the tilts of the test bar as additional channels.
 
-    Parameters
-    ----------
-    tests : sequence of Recording
-    tilts : sequence of str
-        ``NAME=TIP:SPINDLE:DISTANCE``, such as ``A0C=y1_um:y2_um:100mm``: the probe at the tip of the test bar, the one
-        nearer to the spindle, and their distance. A name that starts with A denotes the rotation about X,
-        (tip - spindle) / distance for two probes along Y; one with B the rotation about Y, (spindle - tip) / distance
-        for two probes along X.
-
     Returns
     -------
     list of Recording
         Recordings with the additional channels [urad].
-    list of str
-        Names of these channels.
-
-    Raises
-    ------
-    InputError
-        A tilt has another format, a probe does not exist, or the name is in use.
     """
     found, names = list(tests), []
     for text in tilts:

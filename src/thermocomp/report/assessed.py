@@ -21,18 +21,7 @@ from thermocomp.report.summary import summarise
 
 
 def render(judged: Judged, recordings: Sequence[Recording]) -> str:
-    """Return the page.
-
-    Parameters
-    ----------
-    judged : Judged
-    recordings : sequence of Recording
-        Recordings on which the models were judged, in order.
-
-    Returns
-    -------
-    str
-    """
+    """Return the page."""
     nothing = Collinearity((), math.nan, ())
     seen = Comparison(Judging("all cycles", ()), judged.assessments, nothing, starts=judged.starts)
     overall = judged.overall()

@@ -10,18 +10,7 @@ from thermocomp.judging.results import Assessment
 
 
 def describe_bands(models: Sequence[ErrorModel], assessments: Sequence[Assessment]) -> list[str]:
-    """Return a line for each model that has a band.
-
-    Parameters
-    ----------
-    models : sequence of ErrorModel
-    assessments : sequence of Assessment
-        Overall assessments, one per model, in order.
-
-    Returns
-    -------
-    list of str
-    """
+    """Return a line for each model that has a band."""
     lines = []
     for model, a in zip(models, assessments, strict=True):
         if model.band is not None:

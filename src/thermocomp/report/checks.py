@@ -25,18 +25,7 @@ _NAMED = 14
 
 
 def render(recordings: Sequence[Recording], findings: Sequence[Sequence[Finding]]) -> str:
-    """Return the page.
-
-    Parameters
-    ----------
-    recordings : sequence of Recording
-    findings : sequence of sequence of Finding
-        Findings of each recording, the most serious first.
-
-    Returns
-    -------
-    str
-    """
+    """Return the page."""
     return page(
         "check.html",
         recordings=[_recording(r, found) for r, found in zip(recordings, findings, strict=True)],
@@ -54,18 +43,7 @@ def draw(recording: Recording, findings: Sequence[Finding]) -> str:
 
 
 def figure(recording: Recording, findings: Sequence[Finding]) -> Figure:
-    """Plot each channel with its findings marked; the number of a finding is its position in the list.
-
-    Parameters
-    ----------
-    recording : Recording
-    findings : sequence of Finding
-
-    Returns
-    -------
-    Figure
-        Without axes if there is nothing to draw.
-    """
+    """Plot each channel with its findings marked; the number of a finding is its position in the list."""
     shown = {q: recording.of_quantity(q) for q in _PANELS if recording.of_quantity(q)}
     numbers: dict[str, list[tuple[int, Finding]]] = {}
     for number, f in enumerate(findings, start=1):

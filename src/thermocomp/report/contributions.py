@@ -27,18 +27,7 @@ class Answer(NamedTuple):
 
 
 def explain(model: PacedDynamic, samples: Samples) -> Answer:
-    """Return the contributions to the output of a model in some recordings.
-
-    Parameters
-    ----------
-    model : PacedDynamic
-    samples : Samples
-        Samples with all inputs of the model.
-
-    Returns
-    -------
-    Answer
-    """
+    """Return the contributions to the output of a model in some recordings."""
     return Answer(_draw(model, samples), _table(model, usual_step(samples.dt())), _lags(model))
 
 

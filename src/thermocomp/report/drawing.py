@@ -58,28 +58,14 @@ class Drawn(str):
 
 @contextmanager
 def drawing(salt: str) -> Iterator[None]:
-    """Apply the style of the reports while drawing; text is never interpreted as a formula.
-
-    Parameters
-    ----------
-    salt : str
-        Seed of the SVG ids: distinct for each figure of a page, and the same in each run.
-    """
+    """Apply the style of the reports while drawing; text is never interpreted as a formula."""
     rc: Any = {**_STYLE, "svg.hashsalt": ascii(salt)}
     with mpl.rc_context(rc):
         yield
 
 
 def add_legend(where: Axes | Figure, **how: Any) -> None:
-    """Add a legend of all labelled items; matplotlib ignores labels that begin with ``_``.
-
-    Parameters
-    ----------
-    where : Axes or Figure
-        The legend of a figure contains each label of its axes once.
-    **how
-        Keyword arguments of matplotlib's ``legend``.
-    """
+    """Add a legend of all labelled items; matplotlib ignores labels that begin with ``_``."""
     if isinstance(where, Axes):
         named = list(_labelled(where))
     else:
@@ -107,12 +93,8 @@ def name_ticks(axis: Axis, names: Sequence[str], longest: int = _NAME, **how: An
 
     Parameters
     ----------
-    axis : matplotlib.axis.Axis
-    names : sequence of str
     longest : int
         Maximum length of a name [characters].
-    **how
-        Properties of the labels, such as ``fontsize``.
     """
     axis.set_ticks(range(len(names)), [shorten(name, longest) for name in names], **how)
 
@@ -121,13 +103,6 @@ def log_ticks(ax: Axes, which: Literal["x", "y"], dense: float = 0.7) -> None:
     """Make an axis logarithmic, with plain numbers at ticks that do not overlap.
 
     Call this function after all drawing.
-
-    Parameters
-    ----------
-    ax : Axes
-    which : {'x', 'y'}
-    dense : float
-        Range in decades up to which each digit is labelled; up to three times this range 1, 2 and 5 are.
     """
     ax.set(**{f"{which}scale": "log"})
     axis = ax.xaxis if which == "x" else ax.yaxis

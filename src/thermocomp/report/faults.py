@@ -32,17 +32,7 @@ TITLE = "Sensors"
 
 
 def section(judged: Judged, recordings: Sequence[Recording]) -> Section:
-    """Return the section of the page about failed sensors.
-
-    Parameters
-    ----------
-    judged : Judged
-    recordings : sequence of Recording
-
-    Returns
-    -------
-    Section
-    """
+    """Return the section of the page about failed sensors."""
     logs = find_faults(judged, recordings)
     if not logs:
         known = any(m.watch is not None for m in judged.models)
@@ -76,17 +66,7 @@ def section(judged: Judged, recordings: Sequence[Recording]) -> Section:
 
 
 def describe_faults(logs: Sequence[FaultLog], recordings: Sequence[Recording]) -> Iterator[str]:
-    """Yield a line per failure found by a watch, for the first failures of each recording.
-
-    Parameters
-    ----------
-    logs : sequence of FaultLog
-    recordings : sequence of Recording
-
-    Yields
-    ------
-    str
-    """
+    """Yield a line per failure found by a watch, for the first failures of each recording."""
     for log in logs:
         for f in log.faults[:TOLD]:
             recording = recordings[log.recording]
@@ -98,17 +78,7 @@ def describe_faults(logs: Sequence[FaultLog], recordings: Sequence[Recording]) -
 
 
 def describe_held(judged: Judged, logs: Sequence[FaultLog]) -> Iterator[str]:
-    """Yield the residual while a correction was held because of failures, one line per model and failure.
-
-    Parameters
-    ----------
-    judged : Judged
-    logs : sequence of FaultLog
-
-    Yields
-    ------
-    str
-    """
+    """Yield the residual while a correction was held because of failures, one line per model and failure."""
     for model, a in zip(judged.models, judged.overall(), strict=True):
         yield from (_held_words(a.target, model.unit, c) for c in find_costs(model, a, logs) if not c.runs_on)
 
@@ -121,18 +91,7 @@ def _held_words(target: str, unit: str, cost: Cost) -> str:
 
 
 def draw_timeline(log: FaultLog, recording: Recording) -> Drawn:
-    """Plot when and why each sensor was rejected, with the spindle speed above.
-
-    Parameters
-    ----------
-    log : FaultLog
-    recording : Recording
-        Recording of the log.
-
-    Returns
-    -------
-    Drawn
-    """
+    """Plot when and why each sensor was rejected, with the spindle speed above."""
     names, hours = log.watch.names, log.time / 3600
     speed = recording.speed
     with drawing("timeline" + log.name):
@@ -174,16 +133,7 @@ def draw_timeline(log: FaultLog, recording: Recording) -> Drawn:
 
 
 def draw_stand_ins(log: FaultLog) -> Drawn:
-    """Plot the readings of failed sensors, and the substitute temperatures.
-
-    Parameters
-    ----------
-    log : FaultLog
-
-    Returns
-    -------
-    Drawn
-    """
+    """Plot the readings of failed sensors, and the substitute temperatures."""
     shown = log.failed[:MOST]
     columns = min(len(shown), 3)
     rows = -(-len(shown) // columns)

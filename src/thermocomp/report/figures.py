@@ -100,10 +100,6 @@ def prediction(assessment: Assessment, blocks: Sequence[Assessment], time: Seque
 
     Parameters
     ----------
-    assessment : Assessment
-        Assessment of the model over all blocks.
-    blocks : sequence of Assessment
-        Assessments of the single blocks, one panel each.
     time : sequence of ndarray
         Times of each recording's rows [s].
     """

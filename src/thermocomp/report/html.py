@@ -21,20 +21,7 @@ from thermocomp.report.summary import summarise
 
 
 def render(comparison: Comparison, recordings: Sequence[Recording], samples: Samples | None = None) -> str:
-    """Return the report as a self-contained HTML page.
-
-    Parameters
-    ----------
-    comparison : Comparison
-    recordings : sequence of Recording
-        Recordings of the comparison, in the order of its rows.
-    samples : Samples, optional
-        All rows of the comparison: the formula shown is that of the best method fitted to these rows.
-
-    Returns
-    -------
-    str
-    """
+    """Return the report as a self-contained HTML page."""
     overall = comparison.overall()
     drawn = draw_runs(comparison, recordings)
     stressed = dict.fromkeys(model for model, *_ in drawn.values())
@@ -60,18 +47,7 @@ def render(comparison: Comparison, recordings: Sequence[Recording], samples: Sam
 
 
 def draw_runs(comparison: Comparison, recordings: Sequence[Recording]) -> dict[str, tuple[str, Drawn, str]]:
-    """Return figures of the best model of each target; if none may be used, of the least bad one, marked as refused.
-
-    Parameters
-    ----------
-    comparison : Comparison
-    recordings : sequence of Recording
-
-    Returns
-    -------
-    dict of str to (str, Drawn, str)
-        By target: model, its course over the judged blocks, and coverage of its band; only targets with a course.
-    """
+    """Return figures of the best model of each target; if none may be used, of the least bad one, marked as refused."""
     times = [r.time for r in recordings]
     overall = comparison.overall()
     drawn = {}
@@ -93,18 +69,7 @@ def _held(shown: Assessment) -> str:
 
 
 def render_choices(choices: Sequence[Choice], recordings: Sequence[Recording]) -> str:
-    """Return a selection of sensors as a self-contained HTML page.
-
-    Parameters
-    ----------
-    choices : sequence of Choice
-        Choices, all by one method.
-    recordings : sequence of Recording
-
-    Returns
-    -------
-    str
-    """
+    """Return a selection of sensors as a self-contained HTML page."""
     return page(
         "selection.html",
         recordings=[r.source or r.name for r in recordings],

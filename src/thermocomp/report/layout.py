@@ -14,7 +14,6 @@ class Toned(str):
 
     Parameters
     ----------
-    text : str
     tone : str
         good, doubtful, bad, grave, soft or strong.
     """
@@ -39,13 +38,11 @@ class Column:
 
     Parameters
     ----------
-    heading : str
     value : str, int or callable
         Name or index of the value in the row, or a function of the row.
     form : str
         Python format of numbers, or ``um``: hundredths, or fewer digits on a page where appropriate. Default: text,
         left-aligned; with ``>`` right-aligned.
-    unit : str
     whole : bool
         Whether its cells are never wrapped.
     """
@@ -76,10 +73,8 @@ class Layout:
 
     Parameters
     ----------
-    columns : sequence of Column
     rows : sequence
         Source of the column values: records, tuples or results.
-    title : str
     caption : str
         Meaning of the numbers; a page explains it in its text around the table.
     note : str
@@ -126,7 +121,6 @@ class PrintedLine:
 
     Parameters
     ----------
-    text : str
     mark : Toned or None
         Highlighted text before the line.
     whole : bool

@@ -7,17 +7,7 @@ from thermocomp.core.model import ErrorModel
 
 
 def describe_losses(models: Sequence[ErrorModel]) -> Iterator[str]:
-    """Yield lines about watched models: the effect of each lost sensor, and sensors that are watched poorly.
-
-    Parameters
-    ----------
-    models : sequence of ErrorModel
-        Models of one file.
-
-    Yields
-    ------
-    str
-    """
+    """Yield lines about watched models: the effect of each lost sensor, and sensors that are watched poorly."""
     watch = next((m.watch for m in models if m.watch is not None), None)
     if watch is None:
         return

@@ -17,17 +17,7 @@ _STAR: dict[str, Any] = {"marker": "*", "ms": 12, "ls": "", "color": RESIDUAL, "
 
 
 def draw(plan: Plan, curve: LearningCurve | None) -> Drawn:
-    """Draw the recorded data with the next test in its gap; below it all tests, and the learning curve if any.
-
-    Parameters
-    ----------
-    plan : Plan
-    curve : LearningCurve or None
-
-    Returns
-    -------
-    Drawn
-    """
+    """Draw the recorded data with the next test in its gap; below it all tests, and the learning curve if any."""
     with drawing("plan"):
         below = 1.4 + 0.22 * len(plan.candidates)
         figure = Figure(figsize=(9.6, 3.0 + below), layout="constrained")

@@ -15,17 +15,7 @@ from thermocomp.report.sections import Section, Shown
 
 
 def describe_probings(assessments: Sequence[Assessment]) -> Iterator[str]:
-    """Yield lines about models judged with probings.
-
-    Parameters
-    ----------
-    assessments : sequence of Assessment
-        Overall assessments of models and targets.
-
-    Yields
-    ------
-    str
-    """
+    """Yield lines about models judged with probings."""
     for a in assessments:
         if (probed := a.probed) is None:
             continue
@@ -40,17 +30,7 @@ def describe_probings(assessments: Sequence[Assessment]) -> Iterator[str]:
 
 
 def section(judged: Judged, recordings: Sequence[Recording]) -> Section | None:
-    """Return the section of the page about probings; None if there were none.
-
-    Parameters
-    ----------
-    judged : Judged
-    recordings : sequence of Recording
-
-    Returns
-    -------
-    Section or None
-    """
+    """Return the section of the page about probings; None if there were none."""
     probed = [a for a in judged.overall() if a.probed is not None and not a.failure]
     if not probed:
         return None

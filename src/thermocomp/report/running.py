@@ -9,18 +9,7 @@ MOST = 4
 
 
 def describe_running(assessments: Sequence[Assessment]) -> list[str]:
-    """Return the effect of the compensator around the models on the results.
-
-    Parameters
-    ----------
-    assessments : sequence of Assessment
-        Overall assessments of models and targets.
-
-    Returns
-    -------
-    list of str
-        Limits and residuals of the models alone; targets without limits; readings rejected by the gate.
-    """
+    """Return the effect of the compensator around the models on the results."""
     judged = [a for a in assessments if a.alone is not None and not a.failure]
     limited = [a for a in judged if a.limits is not None]
     lines = []

@@ -71,13 +71,7 @@ def rows(table: Table, value: int, target: str) -> Drawn:
 
 
 def grouping(g: Any, target: str) -> Drawn:
-    """Plot collinear temperatures, groups in the correlation matrix, and the useful number of sensors: MSE_p.
-
-    Parameters
-    ----------
-    g : CorrelationGrouping
-    target : str
-    """
+    """Plot collinear temperatures, groups in the correlation matrix, and the useful number of sensors: MSE_p."""
     order = [i for members in g.groups_ for i in members]
     names = [str(n) for n in g.feature_names_in_[order]]
     places = [g.candidates_.index(i) for i in order]

@@ -30,15 +30,9 @@ def summarise(
 
     Parameters
     ----------
-    comparison : Comparison
-    recordings : sequence of Recording
     samples : Samples, optional
         All rows of the comparison: the best method is fitted to them for its formula, as ``thermocomp fit`` does.
         Default: none, the formula is that of one fold, and is marked accordingly.
-
-    Returns
-    -------
-    dict
     """
     targets = list(dict.fromkeys(a.target for a in comparison.assessments))
     return {

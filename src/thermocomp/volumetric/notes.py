@@ -19,12 +19,7 @@ def notes(machine: Machine) -> tuple[str, ...]:
 
 
 def note_untilted(machine: Machine) -> tuple[str, ...]:
-    """Return a note if the spindle tilt is unknown and the tool length differs from that of the drift measurement.
-
-    Parameters
-    ----------
-    machine : Machine
-    """
+    """Return a note if the spindle tilt is unknown and the tool length differs from that of the drift measurement."""
     longer = float(np.linalg.norm(np.subtract(machine.tool, machine.spindle_tool)))
     unknown = [code for code in ("A0C", "B0C") if code not in machine.components]
     drifts = any(code in machine.components for code in ("X0C", "Y0C", "Z0C"))
@@ -43,16 +38,6 @@ def note_counted_twice(machine: Machine) -> tuple[str, ...]:
     An instrument between table and spindle that measures axis j also measures the rotation of an axis i nearer to the
     workpiece as rotation times travel of j, because the travel of j is a lever of i. Unless the rotation is relative to
     the position of i during that measurement, readings and rotation contain the same error.
-
-    Parameters
-    ----------
-    machine : Machine
-        Machine in its reference state: constants and profiles; time-dependent models start at zero.
-
-    Returns
-    -------
-    tuple of str
-        One sentence per rotation and axis.
     """
     kinematics, found = Kinematics(machine), []
     for axis in machine.structure.axes:

@@ -16,18 +16,7 @@ Settlings = Sequence[tuple[Recording, Sequence[Settling]]]
 
 
 def render(thermal: Sequence[ThermalTest], settlings: Settlings, positioned: Sequence[PositioningResult]) -> str:
-    """Return the page.
-
-    Parameters
-    ----------
-    thermal : sequence of ThermalTest
-    settlings : sequence of (Recording, sequence of Settling)
-    positioned : sequence of PositioningResult
-
-    Returns
-    -------
-    str
-    """
+    """Return the page."""
     names = [t.name for t in thermal] + list(dict.fromkeys(Path(r.test.source).name for r in positioned))
     return page(
         "iso230.html",

@@ -111,14 +111,7 @@ def _mark(ax: Axes, test: ThermalTest) -> None:
 
 
 def profiles(test: ThermalTest, number: int) -> str:
-    """Plot the error of an axis over its travel: at the start, after 60 min, at the stop of the drives, at the end.
-
-    Parameters
-    ----------
-    test : ThermalTest
-    number : int
-        Index of the target.
-    """
+    """Plot the error of an axis over its travel: at the start, after 60 min, at the stop of the drives, at the end."""
     targets = test.targets[number]
     time, running = test.time, test.running
     moments = [(0.0, "start"), (HOUR, "60 min"), (running, f"{running / HOUR:.3g} h: drives stop")]

@@ -47,8 +47,6 @@ class LearningCurve:
 
     Parameters
     ----------
-    model : str
-    points : tuple of Point
     none : float
         RMS without compensation, mean over blocks and targets [um].
     """
@@ -116,29 +114,7 @@ def learning_curve(
     jobs: int = 1,
     progress: Progress = lambda _, steps=1: None,  # noqa: ARG005
 ) -> LearningCurve:
-    """Train on some cycles and judge on others: for each unseen cycle, train on 1, 2, ... of the remaining ones.
-
-    Parameters
-    ----------
-    samples : Samples
-    judging : Judging
-        Its blocks are left out in turn; training blocks are drawn from the others.
-    model : str
-        Name of the method.
-    jobs : int
-        Number of parallel processes; -1: one per core.
-    progress : callable
-        Called with a line of text after each task; there are `n_pieces` of them.
-
-    Returns
-    -------
-    LearningCurve
-
-    Raises
-    ------
-    FitError
-        There are fewer than three blocks, or no model could be fitted.
-    """
+    """Train on some cycles and judge on others: for each unseen cycle, train on 1, 2, ... of the remaining ones."""
     blocks = [split.judge for split in judging.splits]
     if len(blocks) < 3:
         raise FitError(f"a learning curve needs at least three thermal cycles or files; there are {len(blocks)}")

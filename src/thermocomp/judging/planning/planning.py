@@ -35,7 +35,6 @@ class Candidate:
 
     Parameters
     ----------
-    trial : Trial
     doubt : float
         Expected error in the test itself, mean over the targets [um].
     gain : float
@@ -112,7 +111,6 @@ class Plan:
 
     Parameters
     ----------
-    candidates : tuple of Candidate
     expected : float
         Expected error over all tests of the grid at present, mean over the targets [um]. From the same calculation as
         the gains; an order of magnitude, not a judged error.
@@ -139,15 +137,6 @@ def make_grid(top_speed: float, hours: float) -> tuple[Trial, ...]:
         Maximum spindle speed of the machine [1/min].
     hours : float
         Duration of each test, after a stop of 15 min [h].
-
-    Returns
-    -------
-    tuple of Trial
-
-    Raises
-    ------
-    InputError
-        The speed is invalid, or the duration is below two hours.
     """
     if not 0 < top_speed < np.inf:
         raise InputError(f"top speed {top_speed:g} 1/min: expected the highest of the machine, above 0")
@@ -176,8 +165,6 @@ def plan(samples: Samples, top_speed: float | None = None, *, hours: float = 12.
 
     Parameters
     ----------
-    samples : Samples
-        Samples of the recordings so far.
     top_speed : float, optional
         Maximum spindle speed of the machine [1/min]. Default: the highest recorded speed.
     hours : float
@@ -185,17 +172,6 @@ def plan(samples: Samples, top_speed: float | None = None, *, hours: float = 12.
     swing : float
         Change of the room temperature within this duration [degC]; 0: the room temperature is constant, and no test of
         its effect is proposed.
-
-    Returns
-    -------
-    Plan
-
-    Raises
-    ------
-    InputError
-        A setting is invalid, there is no spindle speed or no temperature, or the spindle never turned.
-    FitError
-        There are too few complete rows.
     """
     if not 0 <= swing <= 50:
         raise InputError(f"a room that changes by {swing:g} degC: expected 0 to 50")

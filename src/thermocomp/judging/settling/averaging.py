@@ -86,8 +86,6 @@ class AveragedCurve:
         Averages minus the zero; 0 in the first row; nan where missing [unit of the curve].
     u : ndarray of shape (n_rows,)
         Standard uncertainty of the averages, without the contribution of the zero.
-    zero : Zero
-    noise : Noise
     """
 
     values: FloatArray
@@ -156,13 +154,6 @@ def noise_of(time: FloatArray, values: FloatArray, stop: int | None = None) -> N
         [s]
     values : ndarray of shape (n_rows,)
         nan where missing.
-    stop : int, optional
-        Row in which the drives stop: a bend of the curve, which is not noise.
-
-    Returns
-    -------
-    Noise
-        With fewer than three values, `moves` is False.
     """
     there = np.isfinite(values)
     t, y = time[there], values[there]
@@ -230,9 +221,6 @@ def zero_of(time: FloatArray, values: FloatArray, noise: Noise, *, rests: bool =
     ----------
     time, values : ndarray of shape (n_rows,)
         Rows up to the one in which the test begins; nan where missing.
-    noise : Noise
-    rests : bool
-        The machine has been at rest all the time, so that the mean is its state; otherwise a straight line is fitted.
 
     Returns
     -------
@@ -258,17 +246,6 @@ def average_test(
     ----------
     time, values : ndarray of shape (n_rows,)
         Including the rows before the test; nan where missing.
-    start, stop : int
-        Rows in which the drives start and stop; `stop` is the last row if they do not stop.
-    rests : bool
-        The machine has rested in all rows before `start`.
-    smooth : bool
-        The curve has no bend in the row `start`: the zero is taken from the rows after it.
-
-    Returns
-    -------
-    AveragedCurve
-        The curve from `start` on.
     """
     parts = (slice(None, start + 1), slice(start + 1, stop + 1), slice(stop + 1, None))
     clean = np.concatenate([replace_outliers(values[part]) for part in parts])
@@ -301,7 +278,6 @@ def average_curve(time: FloatArray, values: FloatArray, noise: Noise) -> tuple[F
     ----------
     time, values : ndarray of shape (n_rows,)
         nan where missing.
-    noise : Noise
 
     Returns
     -------

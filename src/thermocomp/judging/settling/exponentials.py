@@ -39,7 +39,6 @@ class ExponentialFit:
         Value at the start [unit].
     terms : tuple of Exponential
         The faster one first.
-    r_squared : float
     rms : float
         RMS of the residual [unit].
     duration : float
@@ -82,7 +81,6 @@ def fit(t: FloatArray, y: FloatArray) -> tuple[ExponentialFit | None, Exponentia
 
     Returns
     -------
-    one : ExponentialFit or None
     two : ExponentialFit or None
         None if the second exponential is not justified: it does not lower the BIC, or the two time constants differ by
         less than a factor of two, or an amplitude is below twice its standard error.

@@ -36,7 +36,6 @@ class Phase:
 
     Parameters
     ----------
-    kind : {'warm-up', 'cool-down'}
     number : int
         Number among the phases of its kind (1-based).
     start, end : int
@@ -55,8 +54,6 @@ class Settling:
 
     Parameters
     ----------
-    channel, unit : str
-    phase : Phase
     change : float
         Value at the end minus value at the start, both averaged [unit].
     uncertainty : float
@@ -141,14 +138,8 @@ def find_phases(recording: Recording, interruption: float = INTERRUPTION) -> tup
 
     Parameters
     ----------
-    recording : Recording
     interruption : float
         Shortest stop or run that counts [s].
-
-    Returns
-    -------
-    tuple of Phase
-        Empty if the drives never run, or were not recorded.
     """
     on = find_driven_rows(recording)
     if on is None or not on.any():
@@ -178,16 +169,8 @@ def time_constants(
 
     Parameters
     ----------
-    recording : Recording
     phases : tuple of Phase, optional
         Default: the result of `find_phases`.
-    leave_out : collection of str
-        Channels to be omitted.
-
-    Returns
-    -------
-    tuple of Settling
-        Ordered by phase, then by channel.
     """
     phases = find_phases(recording) if phases is None else phases
     channels = [
@@ -225,16 +208,6 @@ def settle(
         [s]
     values : ndarray of shape (n_rows,)
         nan where missing; such rows are ignored.
-    channel, unit : str
-    phase : Phase
-    lead : int
-        Number of rows before the phase over which its initial value is averaged.
-    rests : bool
-        The machine has rested in these rows.
-
-    Returns
-    -------
-    Settling
     """
     there = np.isfinite(values)
     lead, (t, y) = int(there[:lead].sum()), (time[there], values[there])

@@ -120,10 +120,6 @@ def foretell(time: FloatArray, values: FloatArray) -> SteadyState:
         Time since the start of the phase, in ascending order [s].
     values : ndarray of shape (n_rows,)
         nan where missing.
-
-    Returns
-    -------
-    SteadyState
     """
     there = np.isfinite(values)
     t, y = time[there], values[there]
@@ -159,24 +155,7 @@ def foretell(time: FloatArray, values: FloatArray) -> SteadyState:
 
 
 def judge_running(recording: Recording, targets: Sequence[str]) -> Running:
-    """Judge whether the last phase of a running test may end.
-
-    Parameters
-    ----------
-    recording : Recording
-        Recording of the test, up to now.
-    targets : sequence of str
-        Names of displacement channels.
-
-    Returns
-    -------
-    Running
-
-    Raises
-    ------
-    InputError
-        The spindle has not started or was not recorded, or there is no such channel.
-    """
+    """Judge whether the last phase of a running test may end."""
     phases = find_phases(recording, SPLITS)
     if not phases:
         raise InputError(

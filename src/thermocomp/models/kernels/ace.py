@@ -89,26 +89,12 @@ def solve(
 ) -> tuple[FloatArray, FloatArray, float, FloatArray]:
     """Sweep until the error fails to decrease by more than `tolerance`, or to convergence.
 
-    Parameters
-    ----------
-    order, bounds, groups, start
-        As returned by `rank`.
-    half : int
-        Half width of the boxcar.
-    tolerance : float
-    max_sweeps : int
-    converged : bool
-        True: sweep with `triangle` instead of the boxcar until a sweep changes the functions by at most `tolerance`:
-        the root of the mean square over the rows, summed over all phi; theta has norm 1. Sweeps are accelerated by
-        momentum (Nesterov), which restarts whenever the change increases.
-
     Returns
     -------
     theta : ndarray of shape (n,)
         In the order of the ranks of S.
     phi : ndarray of shape (p, n)
         Each phi in the order of the ranks of its variable.
-    psi : float
     errors : ndarray of shape (n_sweeps,)
         E[(theta - sum phi)^2] after each sweep.
     """

@@ -282,10 +282,6 @@ def correlations(
 
     Parameters
     ----------
-    order, bounds, groups, start
-        As returned by `rank`.
-    accelerate : bool
-        As `converged` of `thermocomp.models.kernels.ace.solve`.
     subsets : ndarray of bool of shape (n_subsets, p)
         Consecutive subsets should share most of their variables.
 

@@ -103,22 +103,12 @@ def train(  # noqa: PLR0912, PLR0915 - a single function is a sixth faster
     weights : ndarray of shape ((n_inputs + 1) * n_hidden + n_outputs * n_hidden + n_outputs,)
         First the hidden layer, (n_inputs + 1, n_hidden), with the thresholds in row 0; then the weights of the outputs,
         (n_outputs, n_hidden); then their thresholds. Modified in place.
-    n_hidden : int
     inputs : ndarray of shape (n_patterns, n_inputs), C order
         Scaled inputs.
     targets : ndarray of shape (n_patterns, n_outputs), C order
         Scaled targets.
     rates : ndarray of shape (n_epochs,)
         Learning rate of each epoch.
-    momentum : float
-    batch : bool
-        True: the weights change once per epoch; False: after every pattern.
-    shuffled : bool
-        True: the patterns are presented in a new random order in every epoch.
-    seed : uint64
-        Seed of that order.
-    goal : float
-        Stop after the first epoch whose loss does not exceed this.
 
     Returns
     -------

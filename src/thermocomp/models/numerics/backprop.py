@@ -23,10 +23,6 @@ def scaling_in(low: FloatArray, high: FloatArray) -> Affine:
     Parameters
     ----------
     low, high : ndarray of shape (n_channels,)
-
-    Returns
-    -------
-    Affine
     """
     still = constant(low, high)
     gain = np.where(still, 0.0, (HIGH - LOW) / np.where(still, 1.0, high - low))
@@ -39,10 +35,6 @@ def scaling_out(low: FloatArray, high: FloatArray) -> Affine:
     Parameters
     ----------
     low, high : ndarray of shape (n_channels,)
-
-    Returns
-    -------
-    Affine
     """
     still = constant(low, high)
     gain = np.where(still, 0.0, (high - low) / (HIGH - LOW))
@@ -59,20 +51,12 @@ def learning_rates(n_epochs: int, start: float, end: float, schedule: str) -> Fl
 
     Parameters
     ----------
-    n_epochs : int
-    start, end : float
-        Equal values give a constant rate.
     schedule : {'geometric', 'harmonic'}
         Decrease by the same factor in every epoch, or as 1 / (1 + c epoch), fast at first and slowly later.
 
     Returns
     -------
     ndarray of shape (n_epochs,)
-
-    Raises
-    ------
-    InputError
-        ``start >= end > 0`` does not hold, or there is no epoch.
     """
     if n_epochs < 1 or not 0 < end <= start < np.inf:
         raise InputError(
@@ -125,8 +109,6 @@ def train_net(
         Scaled inputs, see `scaling_in`.
     targets : ndarray of shape (n_patterns, n_outputs)
         Scaled targets.
-    n_hidden : int
-        Number of hidden nodes.
     rng : numpy.random.Generator
         Generator of the initial weights and thresholds, uniform in -0.3 .. 0.3 (C-29), and of the shuffling seed.
     rates : ndarray of shape (n_epochs,)
@@ -136,21 +118,6 @@ def train_net(
     order : {'shuffled', 'fixed'}
         New random order of the patterns in every epoch, or the given order. In the given order, consecutive rows of a
         drift test are nearly equal, and a net with a learning rate of 0.5 forgets the beginning of the test by its end.
-    momentum : float
-        Share of the previous change that is added to the next one.
-    goal : float
-        Stop after the first epoch whose loss does not exceed this.
-
-    Returns
-    -------
-    TrainedNet
-
-    Raises
-    ------
-    FitError
-        `inputs` and `targets` are not tables with the same number of rows, or contain non-finite numbers.
-    InputError
-        A setting is out of its range.
     """
     from thermocomp.models.kernels import backprop  # numba is slow to import
 

@@ -14,14 +14,11 @@ def number_folds(cycle: ArrayLike | None, n_rows: int) -> tuple[IntArray, str]:
     ----------
     cycle : array-like of int of shape (n_rows,), or None
         Cycle of each row; -1 for rows that are not used for training.
-    n_rows : int
 
     Returns
     -------
     folds : ndarray of int of shape (n_rows,)
         0, 1, ... in the order of the cycles; a cycle too short for a separate fold joins the previous one. -1 remains.
-    description : str
-        Left-out units as text.
     """
     if cycle is None:
         return np.arange(n_rows) * min(5, n_rows) // n_rows, "five stretches of equal length, left out in turn"
@@ -67,8 +64,6 @@ def halve(folds: IntArray, turning: BoolArray) -> tuple[IntArray, str]:
     parts : ndarray of int of shape (n_rows,)
         0, 1, ...; -1 remains. A fold that does not end in a stop is split in the middle of its rows. With many folds
         none is split, and with very many several folds form one part.
-    description : str
-        Left-out units as text.
     """
     n_folds = int(folds.max()) + 1
     if 2 * n_folds > _MOST_PARTS:

@@ -27,7 +27,6 @@ class Coefficients:
     ----------
     a : ndarray of shape (k,)
     b : ndarray of shape (m + 1, n_inputs)
-    intercept : float
     """
 
     a: FloatArray
@@ -97,13 +96,8 @@ def output_error(
 
     Parameters
     ----------
-    runs : sequence of TickedRun
     targets : sequence of ndarray of shape (n_ticks + 1,)
         Displacement at each tick of each run; nan where unknown.
-    k, m : int
-    intercept : bool
-    largest_root : float
-        Upper bound of all poles.
 
     Returns
     -------

@@ -24,8 +24,6 @@ class Triangle:
         R of the QR factorisation; the last column belongs to y.
     centre : ndarray of shape (n_columns + 1,)
         Offsets subtracted from the columns: their means, or zeros without an intercept.
-    n_rows : int
-    intercept : bool
     """
 
     factor: FloatArray
@@ -88,12 +86,6 @@ def triangle(work: FloatArray, *, intercept: bool) -> Triangle:
     ----------
     work : ndarray of shape (n_rows, n_columns + 1), Fortran order
         Table from `join_columns`; overwritten.
-    intercept : bool
-        Centre the columns first, which is equivalent to an additional column of ones.
-
-    Returns
-    -------
-    Triangle
     """
     n_rows, width = work.shape
     centre = np.zeros(width)
@@ -114,7 +106,6 @@ class Solution:
     ----------
     coefficients : ndarray of shape (n_columns,)
         Zero for dependent columns.
-    intercept : float
     dependent : tuple of int
         Columns left out because they depend linearly on the constant and on the others.
     rank : int
@@ -151,11 +142,6 @@ def lstsq(X: FloatArray, y: FloatArray, *, intercept: bool = True) -> Solution:
     X : ndarray of shape (n_rows, n_columns)
         The number of columns may exceed the number of rows.
     y : ndarray of shape (n_rows,)
-    intercept : bool
-
-    Returns
-    -------
-    Solution
     """
     found = solve(X, y, triangle(join_columns(X, y), intercept=intercept))
     if found.condition < ILL:
@@ -179,12 +165,6 @@ def solve(X: FloatArray, y: FloatArray, tri: Triangle, *, columns: Sequence[int]
     y : ndarray of shape (n_rows,)
     tri : Triangle
         Triangular factor of [X y].
-    columns : sequence of int, optional
-        Columns to fit; ``Solution.coefficients`` and ``Solution.dependent`` follow their order.
-
-    Returns
-    -------
-    Solution
     """
     if columns is not None:
         tri = tri.part(columns)
@@ -221,10 +201,6 @@ def effective_sample_size(residual: FloatArray) -> float:
     ----------
     residual : ndarray of shape (n_rows,)
         Residual in chronological order.
-
-    Returns
-    -------
-    float
     """
     n_rows = len(residual)
     centred = residual - residual.mean()

@@ -13,8 +13,6 @@ def accumulate(tables: Iterable[tuple[slice, FloatArray]], targets: FloatArray, 
 
     Parameters
     ----------
-    tables : iterable of (slice, ndarray)
-        Rows and their features.
     targets : ndarray of shape (n_rows, n_targets)
     parts : ndarray of int of shape (n_rows,)
         Part of each row; -1: unused.

@@ -136,7 +136,6 @@ class StepwiseStep:
     ----------
     number : int
         Number of the step (1-based).
-    action : {'enter', 'remove'}
     index : int
         Index of the term among the candidates.
     term : str
@@ -177,7 +176,6 @@ class StepwiseSelection:
     ----------
     selected : tuple of int
         Terms in the model, in ascending order.
-    steps : tuple of StepwiseStep
     cycled : bool
         True if the selection stopped because a model occurred for the second time.
     """
@@ -207,18 +205,8 @@ def stepwise(
 
     Parameters
     ----------
-    triangle : Triangle
-        Triangular factor of the candidates and y.
-    rule : Rule
-    names : sequence of str
-        Names of the candidates.
     needs : sequence of frozenset of int, optional
         For each candidate, the candidates that must be in the model before it enters and as long as it stays (C-21).
-    tolerance : float
-
-    Returns
-    -------
-    StepwiseSelection
     """
     work = _Tableau(triangle, tolerance)
     steps: list[StepwiseStep] = []

@@ -58,11 +58,6 @@ class Moments:
 def average(moments: Moments, structures: Sequence[LagStructure]) -> tuple[FloatArray, FloatArray]:
     """Return the weights of the features, averaged over structures, and the error of the average on left-out parts.
 
-    Parameters
-    ----------
-    moments : Moments
-    structures : sequence of LagStructure
-
     Returns
     -------
     weights : ndarray of shape (n_features, n_targets)
@@ -78,8 +73,6 @@ def fit_each(moments: Moments, structures: Sequence[LagStructure], parts: Iterab
 
     Parameters
     ----------
-    moments : Moments
-    structures : sequence of LagStructure
     parts : iterable of int
         Without any part, the weights are nan.
 

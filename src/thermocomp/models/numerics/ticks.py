@@ -48,13 +48,7 @@ class TickedRun:
 
 
 def check_steps(dt: ArrayLike, n_rows: int) -> FloatArray:
-    """Check time steps [s].
-
-    Raises
-    ------
-    InputError
-        The number of steps differs from the number of rows, or a step is negative or nan.
-    """
+    """Check time steps [s]."""
     found = np.asarray(dt, dtype=np.float64)
     if found.shape != (n_rows,) or not (found >= 0).all():
         raise InputError(f"dt: expected {n_rows} time steps that are not negative")
@@ -77,10 +71,6 @@ def put_on_clock(inputs: FloatArray, dt: FloatArray, interval: float) -> list[Ti
         Time since the previous row [s]; inf marks the start of a test, as is always assumed for the first row.
     interval : float
         [s]
-
-    Returns
-    -------
-    list of TickedRun
     """
     starts = np.flatnonzero(np.isinf(dt))
     if not starts.size or starts[0] != 0:
@@ -122,7 +112,6 @@ def displacements(
 
     Parameters
     ----------
-    runs : sequence of TickedRun
     y, dt : ndarray of shape (n_rows,)
     known : ndarray of bool of shape (n_rows,)
         Rows whose displacement may be used.
@@ -161,10 +150,7 @@ def interpolate_at_rows(
 
     Parameters
     ----------
-    run : TickedRun
     ticked : ndarray of shape (n_ticks + 1,)
-    ahead : callable
-        Predicts the tick that follows each of the given ticks with the given inputs: ``ahead(ticks, inputs)``.
 
     Returns
     -------
@@ -189,7 +175,6 @@ def regressors(own: FloatArray, drive: FloatArray, ticks: IntArray, k: int, m: i
     drive : ndarray of shape (n_ticks, n_inputs)
     ticks : ndarray of int of shape (n_wanted,)
         Ticks t.
-    k, m : int
     now : ndarray of shape (n_wanted, n_inputs)
         Inputs at t.
 

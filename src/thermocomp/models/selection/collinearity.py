@@ -52,10 +52,6 @@ def spectrum(X: FloatArray) -> Spectrum:
     ----------
     X : ndarray of shape (n_rows, n_columns)
         Table, or any matrix with the same X'X, such as a triangular factor.
-
-    Returns
-    -------
-    Spectrum
     """
     if X.shape[1] == 0:
         return Spectrum(())
@@ -96,11 +92,6 @@ def correlation(X: FloatArray) -> FloatArray:
     -------
     ndarray of shape (n_columns, n_columns)
         Symmetric, with ones on the diagonal.
-
-    Raises
-    ------
-    FitError
-        A column is constant, so its correlation is undefined.
     """
     constant = np.flatnonzero(~find_varying(X))
     if constant.size:

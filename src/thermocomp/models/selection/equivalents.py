@@ -70,7 +70,6 @@ class SensorSet:
 
     Parameters
     ----------
-    subset : tuple of int
     summed, p_values : tuple of float
         One value per displacement.
     equivalent : tuple of int
@@ -97,22 +96,6 @@ def equivalents(
     ----------
     psi : sequence of array-like of shape (n_subsets, n_tests)
         One array per displacement; the numbers of data sets may differ.
-    subsets : sequence of sequence of int
-        Sets of sensors, in the order of the rows of `psi`.
-    level : float
-        Significance level; the paper does not state one (E-W6).
-    holm : bool
-        True: apply Holm's step-down correction for the number of sets compared with the best. Fewer sets are rejected,
-        so more are equivalent.
-
-    Returns
-    -------
-    Equivalents
-
-    Raises
-    ------
-    InputError
-        The arrays do not match or contain non-finite numbers, or the level is not between 0 and 1.
     """
     sets = tuple(tuple(s) for s in subsets)
     if not 0 < level < 1:

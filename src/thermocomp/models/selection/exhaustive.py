@@ -28,7 +28,6 @@ class Subset:
 
     Parameters
     ----------
-    columns : tuple of int
     mse : float
         MSE_p = SSE_p / (n - p - 1) (Eq. 4), n - p without an intercept [square of the unit of y].
     """
@@ -66,19 +65,6 @@ def search_subsets(tri: Triangle, columns: Sequence[int], *, limit: int = LIMIT)
     ----------
     tri : Triangle
         Triangular factor of [X y].
-    columns : sequence of int
-        Candidates, in order of preference.
-    limit : int
-        Maximum number of subsets.
-
-    Returns
-    -------
-    Search
-
-    Raises
-    ------
-    FitError
-        The number of subsets exceeds `limit`, or no degree of freedom remains.
     """
     g = len(columns)
     count = 2**g - 1
@@ -109,20 +95,6 @@ def search_members(tri: Triangle, groups: Sequence[Sequence[int]], *, limit: int
     ----------
     tri : Triangle
         Triangular factor of [X y].
-    groups : sequence of sequence of int
-        Participating groups.
-    limit : int
-        Maximum number of combinations.
-
-    Returns
-    -------
-    Search
-        Its curve contains only the best combination.
-
-    Raises
-    ------
-    FitError
-        The number of combinations exceeds `limit`, or no degree of freedom remains.
     """
     count = math.prod(len(g) for g in groups)
     if count > limit:

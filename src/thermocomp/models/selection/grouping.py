@@ -42,20 +42,6 @@ def group(correlation: FloatArray, threshold: float, *, absolute: bool = False) 
     ----------
     correlation : ndarray of shape (n_variables, n_variables)
         Symmetric matrix.
-    threshold : float
-        From -1 to 1. The paper does not state its value (E-H1).
-    absolute : bool
-        True: use the magnitude of the correlation, since two sensors with opposite changes are not thermally distant;
-        the paper uses the signed correlation (E-H2).
-
-    Returns
-    -------
-    tuple of tuple of int
-
-    Raises
-    ------
-    InputError
-        The threshold is outside -1 to 1, or the matrix is not a correlation matrix.
     """
     close = _checked(correlation, absolute)
     if not -1 <= threshold <= 1:
@@ -89,7 +75,6 @@ class Interval:
     ----------
     low, high : float
         low <= threshold < high; the last interval includes its upper end, 1.
-    groups : tuple of tuple of int
     """
 
     low: float
@@ -106,13 +91,6 @@ def intervals(correlation: FloatArray, *, absolute: bool = False) -> tuple[Inter
     Parameters
     ----------
     correlation : ndarray of shape (n_variables, n_variables)
-    absolute : bool
-        As in `group`.
-
-    Returns
-    -------
-    tuple of Interval
-        In ascending order, without gaps, from -1 (or 0, if `absolute`) to 1.
     """
     close = _checked(correlation, absolute)
     start = 0.0 if absolute else -1.0
@@ -128,19 +106,7 @@ def intervals(correlation: FloatArray, *, absolute: bool = False) -> tuple[Inter
 
 
 def interval_of(groups: Sequence[Sequence[int]], found: Sequence[Interval]) -> Interval | None:
-    """Return the interval of thresholds for the given groups, in any order; None if there is none.
-
-    Parameters
-    ----------
-    groups : sequence of sequence of int
-        Groups to find, such as those of the paper's Table 1.
-    found : sequence of Interval
-        Result of `intervals`.
-
-    Returns
-    -------
-    Interval or None
-    """
+    """Return the interval of thresholds for the given groups, in any order; None if there is none."""
     wanted = {frozenset(g) for g in groups}
     return next((i for i in found if {frozenset(g) for g in i.groups} == wanted), None)
 
@@ -166,13 +132,6 @@ def representatives(tri: Triangle, groups: Groups) -> tuple[int, ...]:
     ----------
     tri : Triangle
         Triangular factor of [X y].
-    groups : tuple of tuple of int
-        Groups as columns of X.
-
-    Returns
-    -------
-    tuple of int
-        Representatives in the order of the regressions.
     """
     images = uncentre(tri)
     rounding = float(tri.noise[-1]) ** 2
@@ -210,7 +169,6 @@ class Grouped:
 
     Parameters
     ----------
-    groups : tuple of tuple of int
     representatives : tuple of int
         In the order of the successive regression.
     subsets : Search
@@ -240,19 +198,6 @@ def choose(tri: Triangle, groups: Groups, *, limit: int = LIMIT) -> Grouped:
     ----------
     tri : Triangle
         Triangular factor of [X y].
-    groups : tuple of tuple of int
-        Result of `group`.
-    limit : int
-        Maximum number of subsets, and of combinations.
-
-    Returns
-    -------
-    Grouped
-
-    Raises
-    ------
-    FitError
-        The search is too large, or there are too few rows.
     """
     chosen = representatives(tri, groups)
     subsets = search_subsets(tri, chosen, limit=limit)
@@ -267,7 +212,6 @@ class Swept:
 
     Parameters
     ----------
-    interval : Interval
     choice : Grouped or None
         None if no set could be chosen.
     spectrum : Spectrum or None
@@ -291,15 +235,6 @@ def sweep(temperatures: FloatArray, tri: Triangle, *, absolute: bool = False, li
         Temperatures to group; none may be constant.
     tri : Triangle
         Triangular factor of [X y], where X are the regressors: the temperatures, or their differences from a reference.
-    absolute : bool
-        As in `group`.
-    limit : int
-        Maximum number of subsets, and of combinations, for each threshold.
-
-    Returns
-    -------
-    tuple of Swept
-        In order of ascending threshold.
     """
     images = uncentre(tri)
     found = []

@@ -22,7 +22,6 @@ class DataSet:
 
     Parameters
     ----------
-    name : str
     temperatures : array-like of shape (n_rows, n_temperatures)
     displacements : array-like of shape (n_rows, n_displacements)
     """
@@ -42,7 +41,6 @@ class MaximalCorrelations:
         Psi; nan for models that were not computed before the work was stopped.
     subsets : tuple of tuple of int
         Indices of the temperatures.
-    tests : tuple of str
     complete : bool
         False if the work was stopped.
     """
@@ -90,35 +88,12 @@ def maximal_correlations(
 
     Parameters
     ----------
-    tests : sequence of DataSet
     subsets : sequence of sequence of int, optional
         Indices of the temperatures; default: all subsets of up to three.
-    half_window : int
-        N: the boxcar contains 2N + 1 ranks.
-    converged : bool
-        True: sweep until the functions converge. False: use the paper's boxcar until the error fails to decrease.
     tolerance : float, optional
         Root mean square change of the functions in a sweep, summed over all, at which sweeps end; the error then
         decreases by about its square per sweep. With 1e-3, the default, Psi is mostly within 1e-4 of its limit. With
         the paper's rule: the decrease of the error that counts as a failure; default 0.
-    max_sweeps : int
-    jobs : int
-        Number of threads; -1 for all cores.
-    share : callable, optional
-        Function that distributes the work, instead of threads.
-    progress : callable
-        Called with a line of text after each displacement of each test.
-
-    Returns
-    -------
-    MaximalCorrelations
-
-    Raises
-    ------
-    FitError
-        A test has fewer rows than the boxcar, or contains a non-finite value.
-    InputError
-        Tests differ in their channels, or a setting is out of its range.
     """
     if not tests:
         raise InputError("maximal correlation: no test given")

@@ -51,21 +51,7 @@ class Order:
 
 
 def final_prediction_error(sse: float, n: int, d: int) -> float:
-    """Return Akaike's FPE = (SSE/N) (N + d) / (N - d) (P-02).
-
-    Parameters
-    ----------
-    sse : float
-        Sum of squared one-step errors.
-    n : int
-        Number of rows, N.
-    d : int
-        Number of parameters; the result is inf unless d < N.
-
-    Returns
-    -------
-    float
-    """
+    """Return Akaike's FPE = (SSE/N) (N + d) / (N - d) (P-02)."""
     return sse / n * (n + d) / (n - d) if d < n else math.inf
 
 
@@ -76,20 +62,6 @@ def compute_orders(
 
     For each m, the small triangular factor is recomputed with the inputs first; its last column then gives the SSE of
     every k.
-
-    Parameters
-    ----------
-    tri : Triangle
-        Triangular factor of dz(t-1) .. dz(t-K), all inputs at t, all inputs at t-1, .. at t-M, and dz(t).
-    n_inputs : int
-    ks, ms : sequence of int
-        Orders requested; K and M are their maxima.
-    largest_root : float
-        Orders are admissible if all roots are smaller than this.
-
-    Returns
-    -------
-    tuple of Order
     """
     K, n = max(ks), tri.n_rows
     floor = float(tri.noise[-1] ** 2)
@@ -128,15 +100,9 @@ def compute_orders(
 def coefficients(tri: Triangle, columns: Sequence[int]) -> tuple[FloatArray, float]:
     """Solve for selected columns; dependent columns get the coefficient 0.
 
-    Parameters
-    ----------
-    tri : Triangle
-    columns : sequence of int
-
     Returns
     -------
     weights : ndarray of shape (n_columns,)
-    intercept : float
     """
     part = tri.part(columns)
     kept = part.find_independent()

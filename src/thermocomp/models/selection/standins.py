@@ -123,20 +123,8 @@ def reduce_sensors(
 
     Parameters
     ----------
-    features : PacedFeatures
-    moments : Moments
-        Moments of all targets.
     noise : float
         Standard deviation of the temperature noise in use [degC].
-    most : int
-        Size of the largest set, in addition to the set of all.
-    structures : int
-        Number of structures of the model with all temperatures.
-    random_state : int
-
-    Returns
-    -------
-    SensorSets
     """
     everything = list(range(len(features.temperatures)))
     weights, _ = average(moments, features.draw(structures, random_state))
@@ -173,15 +161,8 @@ def make_up(gram: FloatArray, kept: Sequence[int], noise: float) -> FloatArray:
     ----------
     gram : ndarray of shape (n_temperatures, n_temperatures)
         Mean products of the temperatures [degC^2].
-    kept : sequence of int
-        Known temperatures.
     noise : float
         Standard deviation of the noise of their readings in use [degC].
-
-    Returns
-    -------
-    ndarray
-        Column j contains the weights for temperature j; a known temperature has weight 1 for itself.
     """
     known = list(kept)
     made = np.zeros_like(gram)

@@ -22,10 +22,8 @@ class SearchResult:
 
     Parameters
     ----------
-    problem : Problem
     limit : ndarray of shape (p + 1,)
         See `Search`.
-    n_best : int
     """
 
     def __init__(self, problem: Problem, limit: FloatArray, n_best: int) -> None:
@@ -82,20 +80,8 @@ def run(
 
     Parameters
     ----------
-    problem : Problem
-    route : {'dropping', 'adding'}
-    sizes, n_best, jobs : int
-        Largest size, number of sets requested of each size, number of threads.
-    nodes : int or None
-        Stop after about this number of sets.
     seconds : float or None
         Time limit, approximate [s].
-    progress : callable or None
-        Called about once a second with a line of text.
-
-    Returns
-    -------
-    SearchResult
     """
     p = problem.triangle.shape[1] - 1
     limit = np.full(p + 1, -np.inf)

@@ -54,8 +54,6 @@ class Subsets:
         Sum of squares of y, about its mean if there is an intercept.
     full_rss : float
         Residual sum of squares on all columns.
-    n_rows : int
-    intercept : bool
     route : {'dropping', 'adding'}
         Search method.
     nodes : int
@@ -131,33 +129,10 @@ def best_subsets(
     ----------
     X : ndarray of shape (n_rows, n_columns)
     y : ndarray of shape (n_rows,)
-    intercept : bool
-    max_size : int, optional
-        Largest size that is searched.
-    n_best : int
-        Number of sets to find for each size.
-    jobs : int
-        Number of threads.
-    nodes : int, optional
-        Stop after about this number of sets.
     seconds : float, optional
         Time limit, approximate [s].
     route : {'dropping', 'adding'}, optional
         Search method; default: the cheaper one.
-    progress : callable, optional
-        Called about once a second with a line of text.
-
-    Returns
-    -------
-    Subsets
-        After a stop (also by KeyboardInterrupt): the best sets so far, each proven or not.
-
-    Raises
-    ------
-    FitError
-        No column remains to be searched.
-    InputError
-        A setting is out of range, or the method is not applicable to the columns.
     """
     if n_best < 1 or jobs < 1 or (max_size is not None and max_size < 1):
         raise InputError(f"n_best {n_best}, jobs {jobs}, max_size {max_size}: expected at least 1")

@@ -27,7 +27,6 @@ class Problem:
         Triangular factor of the columns, scaled to norm 1, and of y.
     least : ndarray of shape (p,)
         Norm of the remainder of each column that rounding alone may cause.
-    rank : int
     full_rss : float
         Residual sum of squares on all columns.
     margin : ndarray of shape (4,)
@@ -85,7 +84,6 @@ class Search:
 
     Parameters
     ----------
-    problem : Problem
     sizes : int
         Largest size searched.
     n_best : int

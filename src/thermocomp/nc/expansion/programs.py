@@ -33,20 +33,7 @@ class Program:
         self._closing: dict[tuple[int, int], int] = {}
 
     def label(self, number: int, line: int, who: str) -> int:
-        """Return the index of the line with a given N number.
-
-        Parameters
-        ----------
-        number : int
-        line : int
-            Number of the requesting line, and text of the request, for the message.
-        who : str
-
-        Raises
-        ------
-        ProgramError
-            No line, or more than one, has the number.
-        """
+        """Return the index of the line with a given N number."""
         if self._labels is None:
             self._labels = {}
             for i in range(self.start, self.stop):
@@ -61,13 +48,7 @@ class Program:
         return places[0]
 
     def closing(self, begin: int, loop: int) -> int:
-        """Return the index of the END of a loop whose DO is at a given index.
-
-        Raises
-        ------
-        ProgramError
-            The loop has no END.
-        """
+        """Return the index of the END of a loop whose DO is at a given index."""
         if (begin, loop) in self._closing:
             return self._closing[begin, loop]
         for i in range(begin + 1, self.stop):
@@ -81,12 +62,7 @@ class Program:
 
 
 class File:
-    """All programs of a file; the first one is run.
-
-    Parameters
-    ----------
-    texts : sequence of str
-    """
+    """All programs of a file; the first one is run."""
 
     def __init__(self, texts: Sequence[str]) -> None:
         self.texts = texts
@@ -103,13 +79,7 @@ class File:
             self._programs.setdefault(number, []).append(own)
 
     def find(self, number: int, line: int, who: str) -> Program:
-        """Return the program with a given number.
-
-        Raises
-        ------
-        ProgramError
-            The program is missing in the file, or present twice.
-        """
+        """Return the program with a given number."""
         found = self._programs.get(number, [])
         if len(found) == 1:
             return found[0]
@@ -123,21 +93,7 @@ class File:
         )
 
     def called(self, number: int, line: int, *, told: bool) -> tuple[Program, int]:
-        """Return the program called by M98 P and the number of repeats, which the P of some controls contains.
-
-        Parameters
-        ----------
-        number : int
-            Value of P.
-        line : int
-        told : bool
-            L or K gives the number of repeats.
-
-        Raises
-        ------
-        ProgramError
-            As for `find`; or P is ambiguous.
-        """
+        """Return the program called by M98 P and the number of repeats, which the P of some controls contains."""
         times, last = divmod(number, FOUR)
         who = f"M98 P{number}"
         if number < FOUR or told or number in self._programs:

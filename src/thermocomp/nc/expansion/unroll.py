@@ -51,24 +51,6 @@ def unroll(lines: Iterable[str], setup: Setup) -> Iterator[tuple[str, int]]:
 
     Expanded are M98 and M97 with the called programs of the same file, M99, G65 with arguments, variables, ``IF``,
     ``GOTO`` and ``WHILE``. Lines without these, and whole programs without these, are unchanged.
-
-    Parameters
-    ----------
-    lines : iterable of str
-        Lines with their endings; the first program of the file is run.
-    setup : Setup
-
-    Yields
-    ------
-    str
-        Plain line with its ending.
-    int
-        Number of its source line (1-based).
-
-    Raises
-    ------
-    ProgramError
-        A program or line is missing in the file, a value is uncertain, or a loop never ends.
     """
     return _Unroller(list(lines), setup).lines()
 

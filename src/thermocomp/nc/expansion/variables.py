@@ -52,13 +52,7 @@ class Variables:
         return {key: self._parameters[key] for key in _COMMON if key in self._parameters}
 
     def assign(self, line: int, assignment: Assignment) -> None:
-        """Carry out one assignment.
-
-        Raises
-        ------
-        ProgramError
-            The value is uncertain, or the variable is stored in the control after the end of the program.
-        """
+        """Carry out one assignment."""
         try:
             key = self._parameters.key(assignment.target)
             if key not in _LOCAL and key not in _COMMON:
@@ -76,23 +70,7 @@ class Variables:
             raise ProgramError(line, f"a variable: {error}") from None
 
     def value(self, line: int, text: str, what: str, *, word: bool = True) -> float:
-        """Return the value of an expression.
-
-        Parameters
-        ----------
-        line : int
-            Line that contains the expression.
-        text : str
-        what : str
-            Description of the value, for the error message.
-        word : bool
-            See `thermocomp.nc.parser.expressions.evaluate`.
-
-        Raises
-        ------
-        ProgramError
-            The value is uncertain.
-        """
+        """Return the value of an expression."""
         try:
             return evaluate(text, self._parameters, word=word)
         except InputError as error:
@@ -127,18 +105,8 @@ def arguments(
 
     Parameters
     ----------
-    line : Line
-    variables : Variables
-        Variables of the calling level.
     integers : {'whole', 'least', 'refuse'}
         Meaning of a length without a decimal point.
-    least : float
-        Least input increment, in the unit in force.
-
-    Raises
-    ------
-    ProgramError
-        A letter is not an argument, I J K are in another order, or a length has no decimal point.
     """
     found: dict[Key, float] = {}
     order = [word.letter for word in line.words if word.letter in "IJK"]

@@ -31,12 +31,6 @@ def check_centre(start: Flat, end: Flat, centre: Flat, inch: bool) -> None:
     ----------
     start, end, centre : tuple of float
         In the plane of the arc [mm].
-    inch : bool
-        Units are inches, for which the tolerance differs.
-
-    Raises
-    ------
-    ArcError
     """
     first, last = math.dist(start, centre), math.dist(end, centre)
     if min(first, last) < _SMALLEST:
@@ -57,11 +51,6 @@ def centre_of_radius(start: Flat, end: Flat, radius: float, clockwise: bool) -> 
         In the plane of the arc [mm].
     radius : float
         Radius; negative for the longer arc [mm].
-    clockwise : bool
-
-    Raises
-    ------
-    ArcError
     """
     chord = math.dist(start, end)
     if not chord:

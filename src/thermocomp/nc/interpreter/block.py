@@ -33,7 +33,6 @@ class Modal:
         G90 is in force; False in G91.
     arc_absolute : bool
         G90.1: centres of arcs are absolute.
-    feed_mode : {93, 94, 95}
     cutter : bool
         G41 or G42: cutter radius compensation is on.
     diameter : bool
@@ -52,7 +51,6 @@ class Modal:
         Number of the tool whose length is in force but not given by program or setup; -1: the tool is unknown, too.
     turned : bool
         G68 is in force.
-    retract : {98, 99}
     retract_stated : bool
         The program specifies G98 or G99; otherwise the current mode of the controller applies.
     blend : float or None
@@ -104,10 +102,8 @@ class Move:
 
     Parameters
     ----------
-    rapid : bool
     start, end : tuple of float
         Machine coordinates [mm], including work and tool offsets if known.
-    arc : Arc or None
     feed : float
         Feed rate along the path [mm/min]; 0 for rapids and inverse time; degrees per minute if only rotary axes move.
     seconds : float or None
@@ -131,8 +127,6 @@ class Block:
 
     Parameters
     ----------
-    line : Line
-    modal : Modal
     kind : str
         See `Kind`.
     codes : tuple of str
@@ -148,7 +142,6 @@ class Block:
         `end` would not move it. False at the start of the program, after G53, G28, G30, M6 and stops, after a change
         of the coordinate system or of the tool length with values not in the file, and after an optional line that
         moved the axis.
-    moves : list of Move
     feed : float
         F in force, in mm per minute, mm per turn or 1/min, according to ``modal.feed_mode``.
     speed : float

@@ -269,15 +269,7 @@ REFUSED_LETTERS: Final[dict[str, str]] = {
 
 
 def find_code(letter: str, number: float, controller: Controller) -> Code | None:
-    """Return the code of a G or M word; None if it is unknown.
-
-    Parameters
-    ----------
-    letter : {'G', 'M'}
-    number : float
-        Number as written in the program, such as 38.2.
-    controller : {'linuxcnc', 'fanuc'}
-    """
+    """Return the code of a G or M word; None if it is unknown."""
     table = (G_CODES if letter == "G" else M_CODES)[controller]
     return table.get(round(number, 3))
 
@@ -288,18 +280,7 @@ _USERS_OF_P: Final = (
 
 
 def find_owner_of_p(words: Iterable[tuple[str, float]]) -> str:
-    """Return the code that a P belongs to: the last preceding one that can have a P, else the first following one.
-
-    Parameters
-    ----------
-    words : iterable of tuple
-        Letters and numbers of the words of a line, in order.
-
-    Returns
-    -------
-    str
-        Code; empty if the line has no P, or no code that can have one.
-    """
+    """Return the code that a P belongs to: the last preceding one that can have a P, else the first following one."""
     owner, there = "", False
     for letter, number in words:
         there = there or letter == "P"

@@ -52,7 +52,6 @@ class CannedCycle:
         R, Q, P, I, J, K and the depth (by its axis) in force, including the words of the line.
     level : float
         Position of the tool perpendicular to the plane at the start of the cycle, to which G98 returns.
-    repeats : int
     direct : bool
         The tool moves from R to the next hole at level R, also in G98 (Fanuc).
     """
@@ -66,12 +65,7 @@ class CannedCycle:
     direct: bool = False
 
     def steps(self) -> Iterator[CycleMove]:
-        """Yield the moves; their number does not change if the whole cycle is slightly shifted.
-
-        Raises
-        ------
-        CycleError
-        """
+        """Yield the moves; their number does not change if the whole cycle is slightly shifted."""
         modal = self.modal
         first, second, across = PLANES[modal.plane]
         r, bottom = self.sticky["R"], self.sticky["XYZ"[across]]

@@ -103,23 +103,7 @@ class Judgement:
 
 
 def check_dialect(lines: Iterable[str], *, whole: bool = False, startup: str = "") -> None:
-    """Raise an error if the dialect of a program is not specified and may be other than LinuxCNC.
-
-    Parameters
-    ----------
-    lines : iterable of str
-        The whole program.
-    whole : bool
-        The meaning of a length without a decimal point is specified.
-    startup : str
-        Codes specified to be in force at the start.
-
-    Raises
-    ------
-    ProgramError
-        The program is for a Fanuc; or has signs of both Fanuc and LinuxCNC; or has words that the two interpret
-        differently: the message gives the lines, words and interpretations.
-    """
+    """Raise an error if the dialect of a program is not specified and may be other than LinuxCNC."""
     found = judge_dialect(lines, whole=whole, startup=startup)
     mine, other = found.linuxcnc, found.fanuc
     if mine and other:

@@ -17,13 +17,7 @@ _SAME: Final = 1e-6
 
 
 def motion_beside_g80(state: InterpreterState, words: BlockWords) -> str:
-    """Return the motion for axis words on a line with G80 only: the motion in force before the cycle.
-
-    Raises
-    ------
-    ProgramError
-        That motion is not linear, or the controller is LinuxCNC.
-    """
+    """Return the motion for axis words on a line with G80 only: the motion in force before the cycle."""
     if not state.fanuc:
         raise words.error("axis words with G80; write the motion code they are for")
     modal = state.modal.motion
@@ -42,19 +36,7 @@ def put_in_force(state: InterpreterState, motion: str) -> None:
 
 
 def check_codes(state: InterpreterState, words: BlockWords, code: str) -> None:
-    """Refuse codes that Fanuc controls interpret differently, before any part of the line takes effect.
-
-    Parameters
-    ----------
-    state : InterpreterState
-    words : BlockWords
-    code : str
-        Motion code of the line.
-
-    Raises
-    ------
-    ProgramError
-    """
+    """Refuse codes that Fanuc controls interpret differently, before any part of the line takes effect."""
     modal, groups = state.modal, words.groups
     if "distance" in groups and modal.motion in CYCLES and (groups["distance"] == "G90") != modal.absolute:
         told = groups.get("motion")
@@ -82,14 +64,7 @@ def check_codes(state: InterpreterState, words: BlockWords, code: str) -> None:
 
 
 def rotate(state: InterpreterState, words: BlockWords) -> None:
-    """Run G68 X Y R or G69: rotate X and Y of the program about a point in program coordinates.
-
-    Raises
-    ------
-    ProgramError
-        The plane is not XY; centre or angle are missing, or specified in G91, where they depend on the position of the
-        tool or on settings of the control.
-    """
+    """Run G68 X Y R or G69: rotate X and Y of the program about a point in program coordinates."""
     modal, offsets = state.modal, state.offsets
     if words.groups["rotation"] == "G69":
         if modal.turned:
@@ -126,20 +101,7 @@ def _turned(state: InterpreterState, code: str) -> None:
 
 
 def check_place(state: InterpreterState, words: BlockWords, code: str) -> None:
-    """Refuse the first X or Y move after G68 or G69 unless it names both axes: its start point is uncertain.
-
-    Parameters
-    ----------
-    state : InterpreterState
-        A rotation has been changed, and X and Y have not been named since.
-    words : BlockWords
-    code : str
-        Motion code of the line.
-
-    Raises
-    ------
-    ProgramError
-    """
+    """Refuse the first X or Y move after G68 or G69 unless it names both axes: its start point is uncertain."""
     if not code or words.groups.get("once") == "G53":
         return
     named = _PLANE_LETTERS & words.values.keys()
@@ -166,13 +128,7 @@ def check_dwell(words: BlockWords) -> None:
 
 
 def dwell_of_x(state: InterpreterState, words: BlockWords) -> float:
-    """Return the dwell time of G4 X [s].
-
-    Raises
-    ------
-    ProgramError
-        X has no decimal point, and the meaning of such a number is not specified.
-    """
+    """Return the dwell time of G4 X [s]."""
     word = words.words["X"]
     if word.number is None or "." in word.value or not word.number:
         return words.values["X"]
@@ -185,13 +141,7 @@ def dwell_of_x(state: InterpreterState, words: BlockWords) -> float:
 
 
 def drills(state: InterpreterState, words: BlockWords) -> bool:
-    """Return whether a line of a cycle drills: with K0 or L0 it only stores its words.
-
-    Raises
-    ------
-    ProgramError
-        K0 or L0 with an X or Y of another position, to which some controls move; R above the initial level.
-    """
+    """Return whether a line of a cycle drills: with K0 or L0 it only stores its words."""
     _check_level(state, words)
     if not any(words.values.get(letter) == 0.0 for letter in "KL"):
         return True

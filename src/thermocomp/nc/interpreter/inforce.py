@@ -59,7 +59,6 @@ class InForce:
         G code of the motion in force; -1 before the first one.
     begins : bool
         The motion was put in force by the current line.
-    absolute : bool
     across : bool
         Holes are drilled in a plane other than XY (G18, G19).
     kept : bool or None

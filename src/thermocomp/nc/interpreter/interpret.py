@@ -25,36 +25,14 @@ _CURVES: Final = frozenset({"G5", "G5.1"})
 
 
 def follow_program(lines: Iterable[Line], setup: Setup) -> Iterator[Block]:
-    """Interpret a program.
-
-    Parameters
-    ----------
-    lines : iterable of Line
-    setup : Setup
-        Settings of the controller that are not in the program.
-
-    Yields
-    ------
-    Block
-        One for every line.
-
-    Raises
-    ------
-    ProgramError
-        A line cannot be interpreted with certainty; the message states what was found and what to do.
-    """
+    """Interpret a program."""
     step = Follower(setup).step
     for line in lines:
         yield step(line)
 
 
 class Follower:
-    """Controller model that runs a program.
-
-    Parameters
-    ----------
-    setup : Setup
-    """
+    """Controller model that runs a program."""
 
     def __init__(self, setup: Setup) -> None:
         self.state = InterpreterState(setup)
@@ -67,13 +45,7 @@ class Follower:
         self._if_skipped: str | None = None  # motion in force if the optional lines are not run
 
     def step(self, line: Line) -> Block:
-        """Run one line.
-
-        Raises
-        ------
-        ProgramError
-            See `follow_program`.
-        """
+        """Run one line."""
         if self._ended:
             return self._idle(line)
         if line.demarcation:

@@ -198,17 +198,7 @@ def curve(state: InterpreterState, words: BlockWords, block: Block) -> None:
 
 
 def cycle(state: InterpreterState, words: BlockWords, block: Block, again: bool) -> None:
-    """Run a canned cycle, G73 to G89.
-
-    Parameters
-    ----------
-    state : InterpreterState
-    words : BlockWords
-    block : Block
-        Receives the moves.
-    again : bool
-        The same cycle was in force before this line.
-    """
+    """Run a canned cycle, G73 to G89."""
     modal, values = state.modal, words.values
     code, scale = modal.motion, state.scale
     _may_drill(state, words)

@@ -40,10 +40,6 @@ class Offsets:
     Offsets in force before the program starts are uncertain, even if given in the setup; offsets set by the program
     are certain. After a change, a program coordinate is only known if the offset was certain both before and after the
     change.
-
-    Parameters
-    ----------
-    setup : Setup
     """
 
     def __init__(self, setup: Setup) -> None:
@@ -143,13 +139,10 @@ class Offsets:
 
         Parameters
         ----------
-        system : int
         values : mapping of int to float
             By axis [mm].
         rotation : float or None
             Rotation [deg]; None: unchanged.
-        add : bool
-            Add the values to the present origin.
         """
         old = self.origins.get(system, _ZERO)
         if add:
@@ -169,13 +162,10 @@ class Offsets:
 
         Parameters
         ----------
-        system : int
         point : tuple of float
             Machine coordinates [mm].
         values : mapping of int to float
             Program coordinates, by axis [mm].
-        known : tuple of bool
-            Whether `point` is certain, per axis.
         """
         own = self.system
         certain = combine_known(known, self.certain)

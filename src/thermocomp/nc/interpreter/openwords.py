@@ -80,14 +80,7 @@ class OpenWord(NamedTuple):
 
 
 def list_open_words(line: LineWords, force: InForce) -> Iterator[OpenWord]:
-    """Yield the ambiguous words of a line.
-
-    Parameters
-    ----------
-    line : LineWords
-    force : InForce
-        Modal state, including the codes of the line.
-    """
+    """Yield the ambiguous words of a line."""
     codes, values = set(line.g), line.values
     if 4.0 in codes:
         yield from _open_dwell(values)

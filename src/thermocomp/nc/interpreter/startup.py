@@ -12,13 +12,7 @@ _RETRACTS: Final = {98.0: "G98", 99.0: "G99"}
 
 
 def tidy(text: str, controller: Controller) -> str:
-    """Return startup codes as in a `Setup`, such as ``G64 P0.01 G98``.
-
-    Raises
-    ------
-    InputError
-        The text contains other codes, or two that exclude each other.
-    """
+    """Return startup codes as in a `Setup`, such as ``G64 P0.01 G98``."""
     line = read_line(text, 1, controller)
     rest = line.assignments or line.comment or line.label or line.flow or line.demarcation or line.optional
     if line.error or rest or any(w.number is None for w in line.words):

@@ -16,12 +16,7 @@ _TRUE: Known = (True, True, True)
 
 
 class InterpreterState:
-    """Position of the tool, and state set by words and codes.
-
-    Parameters
-    ----------
-    setup : Setup
-    """
+    """Position of the tool, and state set by words and codes."""
 
     def __init__(self, setup: Setup) -> None:
         self.setup = setup
@@ -160,17 +155,10 @@ class InterpreterState:
 
         Parameters
         ----------
-        words : BlockWords
         start, end : tuple of float
             Machine coordinates [mm].
-        arc : Arc or None
         rotary : float
             Travel of the rotary axes [deg].
-
-        Raises
-        ------
-        ProgramError
-            No feed is set; G93 without F on the line; G95 while the spindle is stopped.
         """
         mode, feed = self.modal.feed_mode, self.feed
         if mode == 93:
@@ -192,12 +180,10 @@ class InterpreterState:
 
         Parameters
         ----------
-        words : BlockWords
         start, end : tuple of float
             Machine coordinates [mm].
         pitch : float
             Travel per revolution [mm], or degrees.
-        arc : Arc or None
         rotary : float
             Travel of the rotary axes [deg].
         """

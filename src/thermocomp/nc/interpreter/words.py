@@ -18,12 +18,10 @@ class BlockWords:
 
     Parameters
     ----------
-    line : Line
     codes : tuple of str
         Codes in the order of the line.
     groups : dict of str to str
         Code of each modal group, without G80 if another motion code is present.
-    words : dict of str to Word
     values : dict of str to float
         Values in program units.
     """
@@ -54,7 +52,6 @@ class Reader:
 
     Parameters
     ----------
-    setup : Setup
     parameters : Parameters
         Parameters that the program sets and uses.
     """
@@ -67,14 +64,7 @@ class Reader:
         self._codes: dict[tuple[str, float], Code] = {}
 
     def read(self, line: Line) -> BlockWords:
-        """Read a line; words are evaluated before its assignments take effect, as LinuxCNC does.
-
-        Raises
-        ------
-        ProgramError
-            The line has unknown or refused codes, two codes of one group, repeated letters, or values that cannot be
-            evaluated.
-        """
+        """Read a line; words are evaluated before its assignments take effect, as LinuxCNC does."""
         words: dict[str, Word] = {}
         values: dict[str, float] = {}
         codes: tuple[str, ...] = ()

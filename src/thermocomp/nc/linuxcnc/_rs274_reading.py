@@ -38,7 +38,6 @@ class ProgramReading:
 
     Parameters
     ----------
-    program : str
     home : str
         Folder of the runs: all files in it may be read and written.
     folders : iterable of str

@@ -18,7 +18,6 @@ class Ini:
 
     Parameters
     ----------
-    path : Path
     sections : dict of str to dict of str to list of str
         Values by section and key.
     """
@@ -27,18 +26,7 @@ class Ini:
     sections: dict[str, dict[str, list[str]]]
 
     def get(self, section: str, key: str, default: str | None = None) -> str:
-        """Return a value.
-
-        Parameters
-        ----------
-        section, key : str
-        default : str, optional
-
-        Raises
-        ------
-        InputError
-            The key does not exist, and there is no default.
-        """
+        """Return a value."""
         found = self.sections.get(section, {}).get(key)
         if found:
             return found[0]
@@ -47,18 +35,7 @@ class Ini:
         return default
 
     def number(self, section: str, key: str, default: float | None = None) -> float:
-        """Return a numeric value.
-
-        Parameters
-        ----------
-        section, key : str
-        default : float, optional
-
-        Raises
-        ------
-        InputError
-            The key does not exist, or its value is not a number.
-        """
+        """Return a numeric value."""
         text = self.get(section, key, None if default is None else str(default))
         try:
             found = float(text)
@@ -98,17 +75,7 @@ class HalFiles:
 
 
 def read_ini(path: Path) -> Ini:
-    """Read an INI file of LinuxCNC.
-
-    Parameters
-    ----------
-    path : Path
-
-    Raises
-    ------
-    InputError
-        The file cannot be read.
-    """
+    """Read an INI file of LinuxCNC."""
     sections: dict[str, dict[str, list[str]]] = {}
     keys: dict[str, list[str]] = {}
     whole = ""
@@ -128,19 +95,7 @@ def read_ini(path: Path) -> Ini:
 
 
 def read_hal(ini: Ini, leave: str) -> HalFiles:
-    """Read the HAL files named in an INI file.
-
-    Parameters
-    ----------
-    ini : Ini
-    leave : str
-        Name of the HAL file of thermocomp, which is skipped.
-
-    Raises
-    ------
-    InputError
-        A file cannot be read.
-    """
+    """Read the HAL files named in an INI file."""
     found, later = HalFiles(), HalFiles()
     for key, into in (("HALFILE", found), ("POSTGUI_HALFILE", later)):
         for name in ini.sections.get("HAL", {}).get(key, []):

@@ -172,28 +172,8 @@ def read(
 
     Parameters
     ----------
-    path : Path
     stored : Stored, optional
         Values stored in the controller. Default: none.
-    left : dict, optional
-        Filled at the end with the parameters that the controller would store after the program.
-    opened : set, optional
-        Filled at the end with the files opened by the interpreter: the program and its subprograms.
-    **settings
-        Other fields of `InterpreterJob`, such as ``inch=True``.
-
-    Yields
-    ------
-    Canonical
-        Calls before the first line (offsets in force at the start) have line 0. Close the generator if it is not read
-        to its end: this terminates the interpreter.
-
-    Raises
-    ------
-    ProgramError
-        The interpreter refuses the program: line and message of the interpreter.
-    InputError
-        The file does not exist, or the interpreter crashed.
     """
     with InterpreterRun(InterpreterJob(path, stored or Stored(), **settings)) as run:
         yield from calls(run)

@@ -108,13 +108,6 @@ class Stored:
 def draw_controller(seed: int, startup: str = "") -> Stored:
     """Return a random controller; different seeds share only the codes in `startup`.
 
-    Parameters
-    ----------
-    seed : int
-        Random seed; selects G98 (even) or G99 (odd) unless `startup` specifies it.
-    startup : str
-        Specified codes in force at the start.
-
     Returns
     -------
     Stored
@@ -157,8 +150,6 @@ class InterpreterJob:
 
     Parameters
     ----------
-    path : Path
-    stored : Stored
     inch : bool
         G20 is in force when the program starts.
     block_delete : bool
@@ -234,15 +225,7 @@ class InterpreterRun:
         self._home.close()
 
     def blocks(self) -> Iterator[CallBlock]:
-        """Yield the records of the interpreter for the next job; the last record is ``done``.
-
-        Raises
-        ------
-        ProgramError
-            The interpreter refuses the program: line and message of the interpreter.
-        InputError
-            The interpreter crashed.
-        """
+        """Yield the records of the interpreter for the next job; the last record is ``done``."""
         pipe = self.process.stdout
         assert pipe is not None
         self._number += 1

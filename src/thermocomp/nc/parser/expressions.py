@@ -59,13 +59,7 @@ class Parameters:
         raise InputError(f"{_written(key)} is unknown: {self._lost.get(key) or explain_unset(key, self.controller)}")
 
     def assign(self, assignments: Iterable[Assignment]) -> None:
-        """Run the assignments of one line; all use the values before the line, as in LinuxCNC.
-
-        Raises
-        ------
-        InputError
-            A value cannot be evaluated, or the target is a parameter of the machine; no parameter is changed.
-        """
+        """Run the assignments of one line; all use the values before the line, as in LinuxCNC."""
         known: dict[Key, float] = {}
         for target, value, _, _ in assignments:
             key = self.key(target)
@@ -99,14 +93,6 @@ def evaluate(text: str, parameters: Parameters, *, word: bool = True) -> float:
     ----------
     text : str
         As written, such as ``[#1 + 2]``, ``-#<depth>``, ``sin[30]``, ``12.5``; for Fanuc also ``#1 + 2``.
-    parameters : Parameters
-    word : bool
-        The text is the value of a word, in which a Fanuc's ROUND does not round to a whole number.
-
-    Raises
-    ------
-    InputError
-        The expression is invalid, has no value (1 / 0), or needs an unknown parameter.
     """
     simple = _read_simple(text, parameters.controller)
     try:

@@ -39,7 +39,6 @@ class Line:
         The whole line with its ending: the joined texts of all lines are the file.
     words : list of Word
         Words in the order of the line, without the line number ``N``.
-    assignments : list of Assignment
     optional : bool
         The line begins with ``/``: block delete may skip it.
     flow : str

@@ -97,18 +97,7 @@ _NAME = re.compile(r"<[^<>]*>")  # o<trans> call, #<rot>
 
 
 def recognise(first_lines: Sequence[str]) -> str:
-    """Return ``"iso"``, unless the lines are certainly something else.
-
-    Parameters
-    ----------
-    first_lines : sequence of str
-        First several hundred lines, read as latin-1.
-
-    Raises
-    ------
-    InputError
-        The file is empty or binary, or in the language of another control; the message gives the line and a remedy.
-    """
+    """Return ``"iso"``, unless the lines are certainly something else."""
     if not any(line.strip() for line in first_lines):
         raise InputError("the file is empty: give an NC program")
     _refuse_binary(first_lines)

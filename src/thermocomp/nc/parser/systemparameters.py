@@ -48,14 +48,7 @@ _NAMED = {
 
 
 def machine_meaning(key: int | str, controller: Controller = "linuxcnc") -> str:
-    """Return the meaning of a parameter of the machine; empty if it belongs to the program.
-
-    Parameters
-    ----------
-    key : int or str
-        Number, or name without ``#<`` and ``>``.
-    controller : {'linuxcnc', 'fanuc'}
-    """
+    """Return the meaning of a parameter of the machine; empty if it belongs to the program."""
     if isinstance(key, str):
         if key.startswith(("_ini[", "_hal[")):
             return "a setting or signal of the machine"

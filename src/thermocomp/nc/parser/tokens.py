@@ -50,19 +50,7 @@ _new_word = tuple.__new__  # takes half the time of Word(...)
 
 
 def program_lines(stream: TextIO) -> Iterator[str]:
-    r"""Yield the lines of a program, with their endings: the joined lines are the file.
-
-    Parameters
-    ----------
-    stream : text stream
-        Opened with ``newline=""`` and ``encoding="latin-1"``: then lines end at ``\n``, ``\r\n`` and a lone ``\r``, and
-        all bytes are preserved.
-
-    Raises
-    ------
-    InputError
-        A line has more than a million characters.
-    """
+    r"""Yield the lines of a program, with their endings: the joined lines are the file."""
     while text := stream.readline(LONGEST):
         if len(text) == LONGEST:
             raise InputError(
@@ -88,18 +76,9 @@ def read_line(text: str, number: int, controller: Controller = "linuxcnc") -> Li
 
     Parameters
     ----------
-    text : str
-        The line with its ending.
-    number : int
-        Line number (1-based).
     controller : {'linuxcnc', 'fanuc'}
         Control whose syntax the program uses. LinuxCNC: O-words, several assignments on a line, comments after ``;``.
         Fanuc: program numbers, ``IF [..] GOTO``, ``/2``, assignments without brackets, ``;`` ends the line.
-
-    Returns
-    -------
-    Line
-        If it has an error, its words are those before the error.
     """
     found = _WORDS(text)
     if found is not None and len(text) < _ORDINARY and (few := _few_words(found)) is not None:

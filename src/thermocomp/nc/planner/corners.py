@@ -36,15 +36,8 @@ class Corners:
 
         Parameters
         ----------
-        before, after : Segment
-            Segments, changed in place.
         tolerance : float or None
             Maximum deviation of the path from the corner [mm]; 0: limited by the moves only; None: no deviation.
-
-        Returns
-        -------
-        Segment or None
-            Arc in the corner.
         """
         if before.rapid != after.rapid:
             return None
@@ -152,16 +145,10 @@ def find_overlap_speeds(
 
     Parameters
     ----------
-    overlap : tuple of float
-        See `Segment`.
-    before : Segment
     a : float
         Acceleration of `before` [mm/s2].
-    after : Segment
     b : float
         Acceleration of `after` [mm/s2].
-    share : float
-        Fraction of the lengths that is certainly available.
     """
     tolerance, cos = overlap
     first = min(math.sqrt(a * before.length * share), before.speed)
@@ -205,7 +192,6 @@ class Bent:
 
     Parameters
     ----------
-    before, after : Segment
     b : tuple of float
         Normal of the plane, oriented so that the corner turns in the right-hand sense.
     turn : float

@@ -30,7 +30,6 @@ class Segment:
         Speed allowed by the axes, and programmed speed [mm/s].
     acceleration : float
         Acceleration [mm/s2].
-    rapid, rotary : bool
     radius : float
         Radius of an arc; 0 for a line [mm].
     bend : float
@@ -73,8 +72,6 @@ class Segment:
         ----------
         cycle : float
             Interpolation cycle [s].
-        last : bool
-            Nothing follows: LinuxCNC reserves half of the acceleration for a possible next move.
         """
         self.top = min(self.top, self.length / (LEAST * cycle))
         a = self.acceleration * (1.0 - self.gives)

@@ -86,15 +86,7 @@ class MotionLimits:
 
     @classmethod
     def of(cls, machine: Machine, **others: float) -> "MotionLimits":
-        """Return the limits from a machine file.
-
-        Parameters
-        ----------
-        machine : Machine
-            Machine; axes that are missing or have no data are those of a medium machining centre.
-        **others : float
-            Values that do not belong to an axis, such as ``tool_change``.
-        """
+        """Return the limits from a machine file."""
         axes = {a.name: a for a in machine.axes}
 
         def told(key: str, otherwise: float) -> Vector:
@@ -116,21 +108,6 @@ def time_blocks(blocks: Iterable[Block], kinematics: MotionLimits) -> Iterator[T
 
     A rounded corner counts to the block after it, as in LinuxCNC, and if lines are merged under ``G64 P``, the last one
     takes the time. Memory is bounded: the look-ahead is several hundred moves.
-
-    Parameters
-    ----------
-    blocks : iterable of Block
-    kinematics : MotionLimits
-
-    Yields
-    ------
-    Timed
-        One for each block, in order.
-
-    Raises
-    ------
-    ProgramError
-        A feed move has no feed, or an arc has no radius.
     """
     plan = _Plan(kinematics)
     done = plan.done

@@ -28,16 +28,8 @@ def draw(run: Run, bounds: Sequence[Bound], tool_changes: Sequence[float], title
 
     Parameters
     ----------
-    run : Run
-    bounds : sequence of Bound
-        Bounds of the axes that have a model.
     tool_changes : sequence of float
         Times of the tool changes [s].
-    title : str
-
-    Returns
-    -------
-    Figure
     """
     unit, name = (3600.0, "h") if run.time[-1] > LONG else (60.0, "min")
     time = run.time / unit
@@ -66,17 +58,7 @@ def draw(run: Run, bounds: Sequence[Bound], tool_changes: Sequence[float], title
 
 
 def render(run: Run, bounds: Sequence[Bound], tool_changes: Sequence[float], title: str) -> bytes:
-    """Return the figure as PNG.
-
-    Parameters
-    ----------
-    run, bounds, tool_changes, title
-        See `draw`.
-
-    Returns
-    -------
-    bytes
-    """
+    """Return the figure as PNG."""
     return png(draw(run, bounds, tool_changes, title))
 
 

@@ -42,20 +42,6 @@ def read(path: str | Path) -> Forecast:
     Headings specify the unit as in a recording: ``time_min``, ``t3_C``, ``room [degF]``. Lines that begin with ``#``
     are comments. Columns are separated by comma, semicolon or tab; a decimal comma is accepted unless commas separate
     columns.
-
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    Forecast
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, has no time column or no other column, a time is missing or does not increase, or a
-        cell is not a number; the message names line and column.
     """
     source = Path(path)
     try:

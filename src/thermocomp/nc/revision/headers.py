@@ -18,21 +18,7 @@ _ALWAYS = 7
 
 
 def count_lines(models: Sequence[str], taken: Sequence[str], states: str, *, by_position: bool) -> int:
-    """Return the number of lines of a header, before their content is known.
-
-    Parameters
-    ----------
-    models, taken : sequence of str
-        Descriptions of the models, and of the persons who approved unproven ones.
-    states : str
-        Description of the controller states for the proof; empty if there will be no proof.
-    by_position : bool
-        The drift depends on the position.
-
-    Returns
-    -------
-    int
-    """
+    """Return the number of lines of a header, before their content is known."""
     told = min(len(models), _MODELS) + len(told_taken(taken))
     # plus one line: the settings without which the original does not run are only known later
     proof = len(wrap_text(f"proved {states}")) + 1 if states else 1

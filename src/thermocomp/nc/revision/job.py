@@ -72,17 +72,12 @@ class Job:
 
     Parameters
     ----------
-    program : Path
-    paths : Paths
-    revision : Revision
     drift : Drift
         Drift of the revision.
-    models : sequence of str
     taken : sequence of str
         Persons who approved unproven models, with reasons.
     start, zero, method : str
         Header texts: initial thermal state, zero of the drift, and method.
-    when : date
     unproved : bool
         The program is written without verification by an interpreter.
     diameters : dict of int to float, optional
@@ -129,23 +124,7 @@ class Done(NamedTuple):
 
 
 def revise(job: Job, phase: Phase) -> Done:
-    """Revise a program and write all files, or none in case of an error or if there is nothing to correct.
-
-    Parameters
-    ----------
-    job : Job
-    phase : callable
-        Returns, for the name of a phase, a context that provides the progress callback.
-
-    Returns
-    -------
-    Done
-
-    Raises
-    ------
-    InputError
-        The program cannot be revised or proved, or the interpreter disagrees; the message begins with its path.
-    """
+    """Revise a program and write all files, or none in case of an error or if there is nothing to correct."""
     try:
         return _revise(job, phase)
     except InputError as e:

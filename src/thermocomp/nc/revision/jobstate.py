@@ -21,7 +21,6 @@ class SavedJob:
     ----------
     written : datetime
         End of the job, in UTC.
-    state : JobState
     """
 
     written: AwareDatetime
@@ -29,13 +28,7 @@ class SavedJob:
 
 
 def dumps(state: JobState, written: datetime) -> str:
-    """Return the text of a state file, with floats that can be read back bit by bit.
-
-    Raises
-    ------
-    InputError
-        `written` has no time zone.
-    """
+    """Return the text of a state file, with floats that can be read back bit by bit."""
     if written.tzinfo is None:
         raise InputError(f"state of a job: {written} has no time zone")
     entry = {"written": written.astimezone(UTC).isoformat(), "state": asdict(state)}
@@ -43,19 +36,7 @@ def dumps(state: JobState, written: datetime) -> str:
 
 
 def loads(text: str, source: str = "state of a job") -> SavedJob:
-    """Read the text of a state file.
-
-    Parameters
-    ----------
-    text : str
-    source : str
-        Name of the source, for error messages.
-
-    Raises
-    ------
-    ModelFileError
-        The text is not JSON, not a state file, of a newer version, altered or incomplete.
-    """
+    """Read the text of a state file."""
     jobs: list[SavedJob] = jsonfile.unpack(KIND, SavedJob, text, source).models
     if len(jobs) > 1:
         raise ModelFileError(f"{source}: holds the states of {len(jobs)} jobs: expected one")
@@ -64,30 +45,10 @@ def loads(text: str, source: str = "state of a job") -> SavedJob:
 
 
 def write(state: JobState, written: datetime, path: str | Path, *, overwrite: bool = False) -> None:
-    """Write the state at the end of a job.
-
-    Parameters
-    ----------
-    state : JobState
-    written : datetime
-        End of the job, with its time zone.
-    path : str or Path
-    overwrite : bool
-
-    Raises
-    ------
-    InputError
-        The file exists and `overwrite` is False.
-    """
+    """Write the state at the end of a job."""
     jsonfile.write(dumps(state, written), path, overwrite=overwrite)
 
 
 def read(path: str | Path) -> SavedJob:
-    """Read the state at the end of a job.
-
-    Raises
-    ------
-    ModelFileError
-        The file does not exist, or cannot be used; see `loads`.
-    """
+    """Read the state at the end of a job."""
     return loads(*jsonfile.read(KIND, path))

@@ -9,13 +9,7 @@ from thermocomp.core.exceptions import InputError
 
 
 def open_to_read(path: Path) -> TextIO:
-    """Open a program for reading; lines include their endings.
-
-    Raises
-    ------
-    InputError
-        The file does not exist.
-    """
+    """Open a program for reading; lines include their endings."""
     if path.is_dir():
         raise InputError(f"{path}: is a directory; give an NC program")
     try:
@@ -30,19 +24,7 @@ def open_to_write(path: Path) -> TextIO:
 
 
 def replace_lines(draft: Path, target: Path, lines: Mapping[str, str]) -> None:
-    """Copy a program, or its diff, with some lines replaced.
-
-    Parameters
-    ----------
-    draft, target : Path
-    lines : mapping of str to str
-        New lines by old ones, with their endings. Each old line occurs once, in this order.
-
-    Raises
-    ------
-    ValueError
-        An old line is missing.
-    """
+    """Copy a program, or its diff, with some lines replaced."""
     waiting = [(old.encode("latin-1"), new.encode("latin-1")) for old, new in lines.items()]
     with draft.open("rb") as source, target.open("wb") as written:
         while waiting and (line := source.readline()):

@@ -37,26 +37,8 @@ def prepare_job(
 
     Parameters
     ----------
-    program, output : Path
-    drifting : Drifting
-    starting : Starting
-    way : Way
-    controller : Controller
-    timing : Timing
     when : str or None
         Date for the header. Default: today.
-    overwrite : bool
-        Existing files are replaced.
-
-    Returns
-    -------
-    job : Job
-    notes : list of str
-
-    Raises
-    ------
-    InputError
-        The job is impossible, which is detected before any work.
     """
     if controller.controller is None:
         _check_dialect(program, controller)
@@ -154,13 +136,7 @@ def _check_interpreter(way: Way, setup: Setup, *, diameters: bool) -> None:
 
 
 def _moment(text: str | None) -> datetime:
-    """Return the date given by the user, or the present time.
-
-    Raises
-    ------
-    InputError
-        The text is not a date.
-    """
+    """Return the date given by the user, or the present time."""
     if text is None:
         return datetime.now().astimezone()
     try:

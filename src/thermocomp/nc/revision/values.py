@@ -15,30 +15,7 @@ _SYSTEM = re.compile(r"G?5([4-9])(?:\.([1-3]))?(?:\s*P(\d+))?", re.IGNORECASE)
 
 
 def read_value(text: str, quantity: str, option: str, example: str, *, positive: bool = False) -> float:
-    """Return the value of an option in internal units.
-
-    Parameters
-    ----------
-    text : str
-        Text of the option.
-    quantity : str
-        Quantity, such as ``time``.
-    option : str
-        Name of the option.
-    example : str
-        Example of a valid value.
-    positive : bool
-        Refuse 0 and less.
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    InputError
-        The text is not a value with a unit of the quantity, or not positive.
-    """
+    """Return the value of an option in internal units."""
     try:
         number = with_unit(text, quantity)
     except UnitError as e:
@@ -51,44 +28,14 @@ def read_value(text: str, quantity: str, option: str, example: str, *, positive:
 
 
 def origin_of(text: str) -> tuple[int, Point]:
-    """Return number and origin [mm] of a work coordinate system.
-
-    Parameters
-    ----------
-    text : str
-        Text of the option.
-
-    Returns
-    -------
-    tuple of int and tuple of float
-
-    Raises
-    ------
-    InputError
-        The text is not an origin.
-    """
+    """Return number and origin [mm] of a work coordinate system."""
     name, _, place = text.partition("=")
     said = f"--origin {text!r}"
     return _system(name, said, "G54=100 mm, 50 mm, 0 mm"), point_of(place, said)
 
 
 def rotations_of(texts: Sequence[str]) -> dict[int, float]:
-    """Return the stored rotations of work coordinate systems [deg].
-
-    Parameters
-    ----------
-    texts : sequence of str
-        Texts of the options.
-
-    Returns
-    -------
-    dict of int to float
-
-    Raises
-    ------
-    InputError
-        A text is not a rotation.
-    """
+    """Return the stored rotations of work coordinate systems [deg]."""
     if [text.strip().lower() for text in texts] == ["none"]:
         return dict.fromkeys(range(1, 10), 0.0)
     found = {}
@@ -116,24 +63,7 @@ def _system(name: str, said: str, example: str) -> int:
 
 
 def point_of(text: str, said: str) -> Point:
-    """Return a point [mm].
-
-    Parameters
-    ----------
-    text : str
-        Text of the option.
-    said : str
-        Beginning of the error message.
-
-    Returns
-    -------
-    tuple of float
-
-    Raises
-    ------
-    InputError
-        The text is not a point.
-    """
+    """Return a point [mm]."""
     parts = [part.strip() for part in text.split(",")]
     if len(parts) != 3:
         raise InputError(f"{said}: expected X, Y and Z, such as 100 mm, 50 mm, 0 mm")
@@ -141,25 +71,7 @@ def point_of(text: str, said: str) -> Point:
 
 
 def startup_of(text: str, controller: Controller) -> str:
-    """Return codes in force at the start of a program.
-
-    Parameters
-    ----------
-    text : str
-        Text of the option.
-    controller : str
-        Name of the controller.
-
-    Returns
-    -------
-    str
-        Normalised codes.
-
-    Raises
-    ------
-    InputError
-        The text does not consist of permitted startup codes.
-    """
+    """Return codes in force at the start of a program."""
     try:
         return startup.tidy(text, controller)
     except InputError as e:
@@ -167,24 +79,7 @@ def startup_of(text: str, controller: Controller) -> str:
 
 
 def m_code_of(text: str, controller: Controller) -> int:
-    """Return the number of an M code whose meaning is unknown.
-
-    Parameters
-    ----------
-    text : str
-        Text of the option.
-    controller : str
-        Name of the controller.
-
-    Returns
-    -------
-    int
-
-    Raises
-    ------
-    InputError
-        The text is not an M code, or its meaning is known.
-    """
+    """Return the number of an M code whose meaning is unknown."""
     number = text.upper().removeprefix("M")
     if not number.isdecimal():
         raise InputError(f"--harmless {text!r}: expected an M code, such as M{101 if controller == 'linuxcnc' else 88}")
@@ -198,26 +93,7 @@ def m_code_of(text: str, controller: Controller) -> int:
 
 
 def tool_of(text: str, option: str, example: str) -> tuple[int, float]:
-    """Return number and length, or diameter, of a tool [mm].
-
-    Parameters
-    ----------
-    text : str
-        Text of the option.
-    option : str
-        Name of the option.
-    example : str
-        Example of a valid value.
-
-    Returns
-    -------
-    tuple of int and float
-
-    Raises
-    ------
-    InputError
-        The text is not a tool number with a length or diameter.
-    """
+    """Return number and length, or diameter, of a tool [mm]."""
     name, _, length = (part.strip() for part in text.partition("="))
     number = name.upper().removeprefix("T")
     if not number.isdecimal():

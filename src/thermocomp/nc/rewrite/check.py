@@ -32,18 +32,7 @@ class Check:
             yield self._texts.popleft()
 
     def check(self, block: Block, change: Change) -> None:
-        """Compare a block with its revision.
-
-        Parameters
-        ----------
-        block : Block
-        change : Change
-
-        Raises
-        ------
-        ProgramError
-            A move does not have its required end. This is an error in thermocomp, detected before the program is run.
-        """
+        """Compare a block with its revision."""
         longest = max(map(len, change.texts))
         if longest > max(LONGEST, len(block.line.text)):
             raise block.error(f"would become a line of {longest} characters; divide it")

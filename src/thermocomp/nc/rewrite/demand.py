@@ -69,8 +69,6 @@ class Demand:
         ----------
         time : float
             Time since the start of the program [s].
-        drift : DriftSource
-            Drift at that time.
         point : tuple of float
             Machine coordinates [mm].
 
@@ -78,11 +76,6 @@ class Demand:
         -------
         tuple of float
             Correction, minus the deviation [um, machine axes] (E-P4).
-
-        Raises
-        ------
-        InputError
-            The correction is larger than any thermal drift, or not a number.
         """
         renewed = False
         now: Field = drift.deviation
@@ -142,14 +135,8 @@ class Left:
 
         Parameters
         ----------
-        line : int
         samples : iterable of (tuple of float, tuple of float)
             Deviation and correction [um], at both ends and at points in between.
-
-        Returns
-        -------
-        CutErrors
-            Lowest and highest values in this cut.
         """
         drifts, lefts = [], []
         for deviation, carried in samples:

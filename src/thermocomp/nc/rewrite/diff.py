@@ -10,19 +10,7 @@ LONGEST = 4000
 
 
 def unified(pairs: Iterable[tuple[str, tuple[str, ...]]], name: str, revised: str) -> Iterator[str]:
-    """Yield the lines of a unified diff.
-
-    Parameters
-    ----------
-    pairs : iterable of (str, tuple of str)
-        Lines of the original in order, each with its revised lines; an empty text denotes no line.
-    name, revised : str
-        Names of the two programs.
-
-    Yields
-    ------
-    str
-    """
+    """Yield the lines of a unified diff."""
     head = [f"--- {name}\n", f"+++ {revised}\n"]
     waiting: deque[tuple[str, str]] = deque(maxlen=CONTEXT)  # unchanged lines that may precede a hunk
     hunk: list[tuple[str, str]] = []

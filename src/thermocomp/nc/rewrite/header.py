@@ -26,23 +26,7 @@ def make_blank(ending: str, lines: int = LINES) -> tuple[str, ...]:
 
 
 def fill(facts: Sequence[str], ending: str, lines: int = LINES, *, upper: bool = False) -> tuple[str, ...]:
-    """Return the header.
-
-    Parameters
-    ----------
-    facts : sequence of str
-        At most ``lines - 1`` texts; those too long for a comment are truncated, invalid characters replaced.
-    ending : str
-        Line ending.
-    lines : int
-        Number of lines.
-    upper : bool
-        Use capitals: old controls have no lower case letters.
-
-    Returns
-    -------
-    tuple of str
-    """
+    """Return the header."""
     said = ["REVISED FOR THERMAL DRIFT: DO NOT REVISE AGAIN", *facts]
     said += ["-"] * (lines - len(said))
     texts = (clean_comment(text)[:ROOM] for text in said[:lines])

@@ -15,13 +15,7 @@ class SpindleState:
     _told: bool = False
 
     def speed(self, block: Block) -> float:
-        """Return the speed in a block [1/min].
-
-        Raises
-        ------
-        ProgramError
-            The program cuts while the spindle speed is unknown.
-        """
+        """Return the speed in a block [1/min]."""
         if not self._told:
             self._told = any(code in ("M3", "M4", "M5") for code in block.codes)
             if not self._told and self.setup.speed:
@@ -35,20 +29,7 @@ class SpindleState:
 
 
 def refuse_unknown(block: Block, setup: Setup, *, by_position: bool) -> None:
-    """Refuse a block in which the drift would be unknown.
-
-    Parameters
-    ----------
-    block : Block
-    setup : Setup
-    by_position : bool
-        The drift depends on the position.
-
-    Raises
-    ------
-    ProgramError
-        The drift depends on the position, and origin or tool length are unknown; or a rotary axis may tilt the spindle.
-    """
+    """Refuse a block in which the drift would be unknown."""
     if by_position:
         _refuse_unknown_place(block)
     if block.turned:

@@ -31,7 +31,6 @@ class CorrectionMethod(ABC):
 
     Parameters
     ----------
-    digits : Digits
     step : float
         Maximum change of the correction in a cut per 10 mm of path [um].
     safe_z : float or None
@@ -62,18 +61,8 @@ class CorrectionMethod(ABC):
 
         Parameters
         ----------
-        block : Block
         demand : tuple of float
             Demanded corrections of the axes at the end of the block [um, machine axes].
-
-        Returns
-        -------
-        Change
-
-        Raises
-        ------
-        ProgramError
-            The block cannot be shifted safely.
         """
         before, self.inner = self.carried, None
         refuse_probing(block)
@@ -128,11 +117,6 @@ class CorrectionMethod(ABC):
         """Return whether a block moves no linear axis, and so must not move one after revision either.
 
         This includes cuts, and rapids with a rotary axis, after a stop, if the axes have not been moved by hand since.
-
-        Raises
-        ------
-        ProgramError
-            The block moves rotary axes at feed rate, and the meaning of F depends on unknown motion of linear axes.
         """
         if block.kind != "line":
             return False
@@ -159,13 +143,7 @@ class CorrectionMethod(ABC):
         return [i for i, letter in enumerate(AXES) if letter in block.words]
 
     def names_place(self, block: Block) -> bool:
-        """Return whether a block redefines the coordinates of the present position.
-
-        Raises
-        ------
-        ProgramError
-            The block does so in an unsupported way.
-        """
+        """Return whether a block redefines the coordinates of the present position."""
         if "G92" in block.codes:
             return True
         if "G10" not in block.codes or block.values.get("L") not in (10.0, 11.0, 20.0):

@@ -58,12 +58,8 @@ class Revision:
 
     Parameters
     ----------
-    setup : Setup
-    kinematics : MotionLimits
     drift : DriftSource
         Drift in its initial state.
-    method : CorrectionMethod
-    demand : Demand
     header_lines : int
         Number of header lines.
     split : bool
@@ -119,23 +115,7 @@ class Revision:
     _why: str = field(default="", init=False)  # reason that held the correction in the previous cut
 
     def rehearse(self, texts: Iterable[str]) -> Iterator[Block]:
-        """Run through a program without corrections, to refuse it early for reasons that do not depend on the drift.
-
-        Parameters
-        ----------
-        texts : iterable of str
-            Lines of the program, with their endings.
-
-        Yields
-        ------
-        Block
-            One for each line.
-
-        Raises
-        ------
-        ProgramError
-            A line cannot be read, interpreted or shifted safely.
-        """
+        """Run through a program without corrections, to refuse it early for reasons that do not depend on the drift."""
         method, steered = copy.deepcopy(self.method), known.SpindleState(self.setup)
         nothing: Vector = (0.0, 0.0, 0.0)
         modal, seen = None, set[tuple[str, ...]]()
@@ -157,25 +137,7 @@ class Revision:
             yield block
 
     def revise(self, texts: Iterable[str]) -> Iterator[Revised]:
-        """Revise a program.
-
-        Parameters
-        ----------
-        texts : iterable of str
-            Lines of the program, with their endings.
-
-        Yields
-        ------
-        Revised
-            One for each line in order, and one for an empty header (`thermocomp.nc.rewrite.header`).
-
-        Raises
-        ------
-        ProgramError
-            The program cannot be revised safely; all previous output is invalid.
-        InputError
-            The program is not an ISO program.
-        """
+        """Revise a program."""
         check = Check(self.setup)
         steered = known.SpindleState(self.setup)
         point: Point = (0.0, 0.0, 0.0)

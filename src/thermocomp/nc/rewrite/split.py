@@ -36,14 +36,7 @@ class Sample(NamedTuple):
 
 
 def may_split(block: Block, before: Known) -> bool:
-    """Return whether a block is a plain cut with known positions.
-
-    Parameters
-    ----------
-    block : Block
-    before : tuple of bool
-        Axes whose position was known before the block.
-    """
+    """Return whether a block is a plain cut with known positions."""
     modal, words = block.modal, block.words
     ends = block.line.text.endswith(("\r", "\n"))  # not the last line of a file
     if len(block.moves) != 1 or block.kind not in ("line", "arc") or block.line.optional or not ends:
@@ -68,12 +61,8 @@ def shares(samples: Sequence[Sample], carried: Vector, axes: Sequence[int], step
 
     Parameters
     ----------
-    samples : sequence of Sample
-        Samples from the start to the end.
     carried : tuple of float
         Corrections of the axes at the start [um].
-    axes : sequence of int
-        Axes whose correction can change within the cut.
     step : float
         Allowed residual inside a piece [um].
     way : float
@@ -120,18 +109,7 @@ def axes_to_split(block: Block, before: Known) -> list[int]:
 
 
 def pieces(block: Block, parts: Sequence[float], before: Known, controller: Controller) -> Iterator[Block]:
-    """Yield the pieces of a block, as if each were a line of the program.
-
-    Parameters
-    ----------
-    block : Block
-        A block for which `may_split` is True.
-    parts : sequence of float
-        Ends of the parts, as fractions of its path; the last is 1.
-    before : tuple of bool
-        Axes whose position was known before the block.
-    controller : {'linuxcnc', 'fanuc'}
-    """
+    """Yield the pieces of a block, as if each were a line of the program."""
     move, modal = block.moves[0], block.modal
     unit = 25.4 if modal.inch else 1.0
     shift = [p - m for p, m in zip(block.start, move.start, strict=True)]

@@ -99,22 +99,7 @@ def format_number(value: float, digits: int) -> str:
 
 
 def shift_words(block: Block, shifts: Shifts, added: Mapping[str, float], digits: int) -> str:
-    """Return the line of a block with shifted words.
-
-    Parameters
-    ----------
-    block : Block
-    shifts : mapping of str to float
-        Shift by letter of a word on the line; a word with a shift of 0 is unchanged.
-    added : mapping of str to float
-        Words to be appended after the last word of the line, in this order.
-    digits : int
-        Decimals of shifts and added words.
-
-    Returns
-    -------
-    str
-    """
+    """Return the line of a block with shifted words."""
     text = block.line.text
     if added:
         insert = "".join(f" {letter}{format_number(value, digits)}" for letter, value in added.items())
@@ -139,16 +124,7 @@ def part_comments(text: str) -> tuple[str, ...]:
 
 
 def format_shifted(word: Word, value: float, shift: float, digits: int) -> str:
-    """Return the text of a shifted value.
-
-    Parameters
-    ----------
-    word : Word
-    value, shift : float
-        Value and shift, in the program's units.
-    digits : int
-        Minimum number of decimals; a word with more keeps them.
-    """
+    """Return the text of a shifted value."""
     if word.number is None:
         return f"[{word.value.strip()}{'+' if shift > 0 else ''}{format_number(shift, digits)}]"
     point = word.value.find(".")

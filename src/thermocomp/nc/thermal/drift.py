@@ -130,11 +130,6 @@ class Drift:
             Time step [s].
         speed : float
             Spindle speed [1/min]; the direction of rotation does not matter.
-
-        Raises
-        ------
-        InputError
-            A number is not finite, or `dt` is negative.
         """
         speed = abs(speed)
         if not (0.0 <= dt < math.inf and speed < math.inf):

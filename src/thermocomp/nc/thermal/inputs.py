@@ -99,7 +99,6 @@ class Wiring:
 
     Parameters
     ----------
-    model : ErrorModel
     others : mapping of str to InputSignal
         Inputs that do not follow from the program.
 
@@ -139,17 +138,6 @@ def constants(texts: Sequence[str], models: Sequence[ErrorModel]) -> dict[str, I
     ----------
     texts : sequence of str
         Input name, with or without its unit at the end (``t3_C``), and value with a unit, such as ``t3=21.5degC``.
-    models : sequence of ErrorModel
-        Models that have these inputs.
-
-    Returns
-    -------
-    dict of str to InputSignal
-
-    Raises
-    ------
-    InputError
-        No model has the input, it is the spindle speed, it is given twice, or its value has no suitable unit.
     """
     inputs = {i.name: i for m in models for i in m.inputs}
     found: dict[str, InputSignal] = {}

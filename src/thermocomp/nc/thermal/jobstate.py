@@ -20,7 +20,6 @@ class StationState:
         Hash of the parameters of the model.
     reference : tuple of float
         Zero of each input.
-    memory : tuple of float
     deviation : float
         Last output deviation [um].
     zero : float
@@ -53,7 +52,6 @@ class JobState:
 
     Parameters
     ----------
-    stations : tuple of StationState
     zero_known : bool
         The deviation that counts as zero is not a prediction: the machine was cold at that time, or measured.
 

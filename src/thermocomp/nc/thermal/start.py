@@ -39,23 +39,7 @@ class ThermalStart(NamedTuple):
 
 
 def begin_cold(stations: Sequence[Station], others: Inputs) -> ThermalStart:
-    """Return the state of a machine at rest: the spindle has been stopped for a long time.
-
-    Parameters
-    ----------
-    stations : sequence of Station
-    others : mapping of str to Signal
-        Inputs that do not follow from the program.
-
-    Returns
-    -------
-    ThermalStart
-
-    Raises
-    ------
-    InputError
-        A model requires an input that is not given.
-    """
+    """Return the state of a machine at rest: the spindle has been stopped for a long time."""
     return ThermalStart(tuple(_resting(s.model, Wiring(s.model, others), 0.0) for s in stations), known=True)
 
 
@@ -64,19 +48,8 @@ def carry_over(stations: Sequence[Station], left: JobState, pause: float = 0.0) 
 
     Parameters
     ----------
-    stations : sequence of Station
-    left : JobState
     pause : float
         Time from the end of the last job to the start of this one [s].
-
-    Returns
-    -------
-    ThermalStart
-
-    Raises
-    ------
-    InputError
-        The state belongs to other models, or the pause is negative.
     """
     if not 0 <= pause < math.inf:
         raise InputError(f"pause since the last job: {pause} s must be finite and not negative")
@@ -107,21 +80,8 @@ def begin_measured(stations: Sequence[Station], deviations: Mapping[str, float],
 
     Parameters
     ----------
-    stations : sequence of Station
     deviations : mapping of str to float
         Measured deviation by axis, or by target (one or all stations of an axis), relative to the cold machine [um].
-    others : mapping of str to Signal
-        Inputs that do not follow from the program.
-
-    Returns
-    -------
-    ThermalStart
-
-    Raises
-    ------
-    InputError
-        A deviation is missing, or belongs to no station or to one that already has another; a model has no memory, or
-        no speed in its trained range causes the measured deviation.
     """
     by_axis = {a: [s for s in stations if s.axis == a] for a in dict.fromkeys(s.axis for s in stations)}
     known = [n for a, mine in by_axis.items() for n in (a, *(_names(s)[0] for s in mine if len(mine) > 1))]
@@ -159,20 +119,10 @@ def begin_measured(stations: Sequence[Station], deviations: Mapping[str, float],
 def deviations(texts: Sequence[str]) -> dict[str, float]:
     """Parse the deviations measured by the user.
 
-    Parameters
-    ----------
-    texts : sequence of str
-        Measurements, such as ``Z=12um``, ``z_at_200=0.012mm``.
-
     Returns
     -------
     dict of str to float
         Deviation by axis (upper case) or target [um].
-
-    Raises
-    ------
-    InputError
-        A text does not have this form, or a name occurs twice.
     """
     found: dict[str, float] = {}
     for text in texts:
@@ -194,15 +144,8 @@ def hand_over_state(station: Station, state: State, zero: float, doubt: float) -
 
     Parameters
     ----------
-    station : Station
-    state : State
-        Present state of its model.
     zero, doubt : float
         See `StationState` [um].
-
-    Returns
-    -------
-    StationState
     """
     memory = np.empty(0) if state.memory is None else state.memory
     return StationState(

@@ -70,22 +70,10 @@ def stations(models: Sequence[ErrorModel], texts: Sequence[str] = ()) -> list[St
 
     Parameters
     ----------
-    models : sequence of ErrorModel
-        Models from one or more model files.
     texts : sequence of str
         Assignments by the user: ``ch3=Z``, ``zz=X at Z 200 mm``, or only a target whose name specifies the axis. Models
         without a text are ignored. Without any text all are used, and the names of their targets must specify the axis:
         ``x``, ``y_um``, ``z_at_200``, ``x_at_z200`` (positions in mm).
-
-    Returns
-    -------
-    list of Station
-        Stations by axis and position.
-
-    Raises
-    ------
-    InputError
-        A target is unknown, occurs twice, or does not specify its axis; or the stations are inconsistent.
     """
     targets = [m.target for m in models]
     if len(set(targets)) != len(targets):
@@ -105,14 +93,7 @@ def stations(models: Sequence[ErrorModel], texts: Sequence[str] = ()) -> list[St
 
 
 def check_stations(found: Sequence[Station]) -> list[Station]:
-    """Return stations ordered by axis and position.
-
-    Raises
-    ------
-    InputError
-        There is no station, or an axis has neither a single one valid everywhere nor several along one axis, each at a
-        different position.
-    """
+    """Return stations ordered by axis and position."""
     if not found:
         raise InputError("no model was given to correct a program with; give at least one")
     ordered = sorted(found, key=lambda s: (s.axis, s.at))

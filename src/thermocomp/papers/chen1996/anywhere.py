@@ -50,7 +50,6 @@ class Volume:
 
     Parameters
     ----------
-    learned : LearnedVolume
     errors : mapping of str to ndarray of shape (n, 3)
         Errors by type of compensation [um].
     causes : mapping of str to ndarray of shape (n, 3)
@@ -104,18 +103,7 @@ class _Points(NamedTuple):
 
 
 def judge(learned: LearnedVolume, seed: int) -> Volume:
-    """Judge compensation in experiment ``volumetric-new`` at random points of the volume and in random rows.
-
-    Parameters
-    ----------
-    learned : LearnedVolume
-    seed : int
-        Random seed of weather, noise, points and rows; different from that of the training data.
-
-    Returns
-    -------
-    Volume
-    """
+    """Judge compensation in experiment ``volumetric-new`` at random points of the volume and in random rows."""
     rng = np.random.default_rng(seed)
     tests = list(simulate(virtual.find_experiment("volumetric-new"), seed=seed, whole=True))
     share = -(-POINTS // len(tests))
@@ -182,7 +170,6 @@ def as_measured(truth: VolumetricTruth, now: FloatArray, start: FloatArray, poin
 
     Parameters
     ----------
-    truth : VolumetricTruth
     now, start : ndarray of shape (n, n_observables)
         Observables of the machine at the time of the row, and when the nest was zeroed.
     points : ndarray of shape (n, 3)

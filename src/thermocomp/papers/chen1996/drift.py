@@ -45,7 +45,6 @@ class LearnedNet:
 
     Parameters
     ----------
-    net : SigmoidNet
     models : mapping of str to ErrorModel
         Model of each drift.
     mae : mapping of str to float
@@ -68,7 +67,6 @@ class LearnedDrift:
 
     Parameters
     ----------
-    samples : Samples
     regressions : mapping of str to SecondOrderRegression
         Regression of each drift.
     models : mapping of str to ErrorModel
@@ -144,19 +142,7 @@ class LearnedDrift:
 
 
 def learn(seed: int, told: Callable[[float], None]) -> LearnedDrift:
-    """Run the five tests and fit the models of the paper.
-
-    Parameters
-    ----------
-    seed : int
-        Random seed of weather and noise; the starting weights of the nets are the same for each seed.
-    told : callable
-        Called with the completed fraction (0..1).
-
-    Returns
-    -------
-    LearnedDrift
-    """
+    """Run the five tests and fit the models of the paper."""
     samples = drift_samples(recordings("chen1996", seed))
     heat = samples.only(TEMPERATURES)
     regressions = {

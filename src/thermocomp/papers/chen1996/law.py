@@ -52,7 +52,6 @@ class Design:
 
     Parameters
     ----------
-    name : str
     experiment : str
         Experiment that supplies the temperatures.
     runs : int
@@ -136,7 +135,6 @@ class Recovery:
 
     Parameters
     ----------
-    design : Design
     found : sequence of mapping of str to float
         Coefficients by term name, one mapping per draw [um/m per degC, degC2].
     """
@@ -167,14 +165,7 @@ class Recovery:
 
 
 def temperatures(experiment: str, seed: int) -> list[FloatArray]:
-    """Return T1 to T9 of each test, without noise, (n_rows, 9) [degC].
-
-    Parameters
-    ----------
-    experiment : str
-    seed : int
-        Random seed of the weather.
-    """
+    """Return T1 to T9 of each test, without noise, (n_rows, 9) [degC]."""
     return [test.values([test.channel(t) for t in TEMPERATURES]) for test in recordings(experiment, seed, 0.0)]
 
 
@@ -185,14 +176,6 @@ def plant(day: Sequence[FloatArray], design: Design, rng: np.random.Generator) -
     ----------
     day : sequence of ndarray of shape (n_runs, 9)
         From `temperatures`, one row per laser run; the first is the cold machine.
-    design : Design
-    rng : Generator
-        Generator of the noise.
-
-    Returns
-    -------
-    list of Measured
-        One per test.
     """
     made = []
     for true in day:
@@ -222,18 +205,7 @@ def slope(change: FloatArray) -> FloatArray:
 
 
 def recover(design: Design, days: Sequence[Sequence[FloatArray]], n_draws: int, seed: int) -> Recovery:
-    """Return the recovery of the law over many draws.
-
-    Parameters
-    ----------
-    design : Design
-    days : sequence of sequence of ndarray
-        Temperatures of days with different weather, used in turn; see `plant`.
-    n_draws : int
-    seed : int
-        Random seed of the noise.
-
-    """
+    """Return the recovery of the law over many draws."""
     rng = np.random.default_rng(seed)
     found = []
     for draw in range(n_draws):
@@ -250,7 +222,6 @@ class Law:
 
     Parameters
     ----------
-    recoveries : mapping of Design to Recovery
     fit : PositionFit
         Fit of the first draw of `OURS`.
     net : SigmoidNet
@@ -273,17 +244,7 @@ class Law:
 
 
 def seek(seed: int) -> Law:
-    """Simulate measurements that obey the law and recover it, for all designs.
-
-    Parameters
-    ----------
-    seed : int
-        Random seed of weather and noise.
-
-    Returns
-    -------
-    Law
-    """
+    """Simulate measurements that obey the law and recover it, for all designs."""
     days = {e: [temperatures(e, seed + k) for k in range(DAYS)] for e in {d.experiment for d in DESIGNS}}
     recoveries = {d: recover(d, days[d.experiment], DRAWS if d is OURS else FEWER, seed) for d in DESIGNS}
     # the first draw again, whatever its outcome

@@ -12,20 +12,7 @@ TITLE = "J. S. Chen, J. Yuan, J. Ni (1996): Thermal Error Modelling for Real-Tim
 
 
 def run(seed: int, progress: Progress) -> Study:
-    """Reproduce the study.
-
-    Parameters
-    ----------
-    seed : int
-        Random seed of weather and noise. New tests get other seeds, since the same seed would repeat the training
-        weather.
-    progress : callable
-        Called with the completed fraction and the next step.
-
-    Returns
-    -------
-    Study
-    """
+    """Reproduce the study."""
     new, first_laser, second_laser, first_week, second_week = ((seed + 1) * 1000 + k for k in range(5))
     progress(0.0, "five tests, regressions and nets")
     learned = drift.learn(seed, lambda share: progress(0.5 * share, "nets"))

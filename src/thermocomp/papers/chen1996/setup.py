@@ -61,14 +61,8 @@ def recordings(experiment: str, seed: int, sensor_noise: float | None = None) ->
 
     Parameters
     ----------
-    experiment : str
-    seed : int
     sensor_noise : float, optional
         Noise of the temperatures [degC]. Default: as defined for each sensor.
-
-    Returns
-    -------
-    list of Recording
     """
     found = []
     for recording in record(experiment, seed=seed, sensor_noise=sensor_noise):
@@ -82,17 +76,7 @@ def recordings(experiment: str, seed: int, sensor_noise: float | None = None) ->
 
 
 def with_differences(recording: Recording) -> Recording:
-    """Return the recording with additional channels: the temperature differences for the slope (C-23).
-
-    Parameters
-    ----------
-    recording : Recording
-        Result of `recordings`.
-
-    Returns
-    -------
-    Recording
-    """
+    """Return the recording with additional channels: the temperature differences for the slope (C-23)."""
     for plus, minus in DIFFERENCES:
         if f"{plus}-{minus}" in SLOPE_VARIABLES:
             channel = Channel(f"{plus}-{minus}", "temperature", "degC")

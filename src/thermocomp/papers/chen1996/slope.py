@@ -103,17 +103,7 @@ class LearnedPositioning:
 
 
 def learn(seed: int, other_seed: int) -> LearnedPositioning:
-    """Run the test on two days and fit the models of the paper to the first.
-
-    Parameters
-    ----------
-    seed, other_seed : int
-        Random seeds of weather and noise on the two days.
-
-    Returns
-    -------
-    LearnedPositioning
-    """
+    """Run the test on two days and fit the models of the paper to the first."""
     (first,), (second,) = (map(with_differences, recordings("chen1996-slope", s)) for s in (seed, other_seed))
     learned, other = (from_recording(day, "EYY") for day in (first, second))
     paper = PositionOptions(order=EQ6.degree(), inputs=setup.TEMPERATURES, support=PAPERS_SUPPORT)

@@ -35,7 +35,6 @@ class Unseen:
     ----------
     tests : sequence of Samples
         Tests at 1250 1/min and at random speeds.
-    learned : LearnedDrift
     dynamic : mapping of str to ErrorModel
         Our `dynamic` models, trained on the same 810 rows, including the spindle speed.
     """
@@ -91,18 +90,7 @@ def rms(model: ErrorModel, samples: Samples) -> float:
 
 
 def observe(learned: LearnedDrift, seed: int) -> Unseen:
-    """Run the two tests and train our own method.
-
-    Parameters
-    ----------
-    learned : LearnedDrift
-    seed : int
-        Random seed other than that of the five tests, so that the weather is unseen.
-
-    Returns
-    -------
-    Unseen
-    """
+    """Run the two tests and train our own method."""
     ours = {t: trained("dynamic", learned.samples, k) for k, t in enumerate(DRIFTS)}
     return Unseen([drift_samples([test]) for test in recordings("chen1996-new", seed)], learned, ours)
 
@@ -195,18 +183,7 @@ def _depth(found: Unseen) -> Facts:
 
 
 def noise(found: Unseen, law: Literal["uniform", "normal"]) -> dict[str, float]:
-    """Return the RMS residual of each method for z at 1250 1/min with noise, mean over the draws [um].
-
-    Parameters
-    ----------
-    found : Unseen
-    law : {'uniform', 'normal'}
-
-    Returns
-    -------
-    dict of str to float
-        RMS by method; the median for the nets.
-    """
+    """Return the RMS residual of each method for z at 1250 1/min with noise, mean over the draws [um]."""
     noisy = [found.left("z", common.with_noise(found.tests[0], NOISE, law, k)) for k in range(DRAWS)]
     return {m: float(np.mean([left[m] for left in noisy])) for m in found.models}
 

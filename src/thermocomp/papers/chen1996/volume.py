@@ -48,17 +48,7 @@ class LearnedVolume:
 
 
 def learn(seed: int) -> LearnedVolume:
-    """Measure the machine in experiment ``volumetric`` and learn its components.
-
-    Parameters
-    ----------
-    seed : int
-        Random seed of weather and noise.
-
-    Returns
-    -------
-    LearnedVolume
-    """
+    """Measure the machine in experiment ``volumetric`` and learn its components."""
     tests = virtual.record("volumetric", seed=seed)
     inputs = [c.name for c in tests[0].temperatures] + ["spindle_rpm"]
     rounds = [every(test, ROUND) for test in tests]

@@ -18,17 +18,7 @@ TITLE = "Hwang, Lee, Yang: Optimal variable selection in a thermal error model f
 
 
 def run(seed: int, progress: Progress) -> Study:
-    """Reproduce the study.
-
-    Parameters
-    ----------
-    seed : int
-    progress : callable
-
-    Returns
-    -------
-    Study
-    """
+    """Reproduce the study."""
     c = setup.compute(seed, progress)
     numbers = exhibits.numbers("redo", c, models=sum(c.grouped.searched_), shaken=c.shaken["uniform", 0.4])
     return Study.of("hwang", TITLE, Part(claims(c), _tables(c), _figures(c), numbers))

@@ -57,7 +57,6 @@ class PaperFit:
 
     Parameters
     ----------
-    model : ErrorModel
     r_squared, error : float
         R2 about the mean and standard error of estimate [um] in the training rows.
     """
@@ -79,20 +78,7 @@ def nearest(found: Sequence[Interval], groups: int) -> Interval:
 
 
 def polynomial(samples: Samples, names: Sequence[str], degree: int) -> PaperFit:
-    """Fit powers of differences from the reference; degree 2 gives the engineering judgement model (H-13).
-
-    Parameters
-    ----------
-    samples : Samples
-    names : sequence of str
-        Names of the temperatures.
-    degree : int
-        Highest power; there are no products.
-
-    Returns
-    -------
-    PaperFit
-    """
+    """Fit powers of differences from the reference; degree 2 gives the engineering judgement model (H-13)."""
     used = [n for n in NAMES if n in (*names, REFERENCE)]
     variables = tuple(Variable.difference(used, n, REFERENCE) for n in names)
     terms = tuple((k,) * power for power in range(1, degree + 1) for k in range(len(names)))
@@ -179,17 +165,7 @@ class Computed:
 
 
 def compute(seed: int, progress: Progress) -> Computed:
-    """Run the tests and the computations of the paper.
-
-    Parameters
-    ----------
-    seed : int
-    progress : callable
-
-    Returns
-    -------
-    Computed
-    """
+    """Run the tests and the computations of the paper."""
     progress(0.0, "the test, and new ones")
     tests = [record("hwang", seed=seed + k)[0] for k in range(1 + NEW)]
     tests[1:] = [replace(r, name=f"new order {k}") for k, r in enumerate(tests[1:], start=1)]

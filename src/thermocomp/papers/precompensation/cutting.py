@@ -79,8 +79,6 @@ class Changing(Climate):
             Start of the first step, since the start of the test [s].
         step : float
             [s]
-        n_steps : int
-        rng : Generator
 
         Returns
         -------
@@ -160,17 +158,7 @@ class Milled:
 
 
 def house_models(learn: Samples) -> dict[str, list[ErrorModel]]:
-    """Fit the default methods of thermocomp for machines without sensors to the identification data.
-
-    Parameters
-    ----------
-    learn : Samples
-
-    Returns
-    -------
-    dict of str to list of ErrorModel
-        Models by method, one per position.
-    """
+    """Fit the default methods of thermocomp for machines without sensors to the identification data."""
     timed: dict[str, Any] = {"dt": learn.dt(), "cycle": learn.cycle}
     targets = [c.name for c in learn.targets]
     return {
@@ -180,20 +168,7 @@ def house_models(learn: Samples) -> dict[str, list[ErrorModel]]:
 
 
 def compute(models: Mapping[str, Sequence[ErrorModel]], seed: int, progress: Progress) -> Milled:
-    """Write, revise and mill the programs of all cutting tests.
-
-    Parameters
-    ----------
-    models : mapping of str to sequence of ErrorModel
-        Models by name, one per position.
-    seed : int
-        Random seed of the first test; the following tests have consecutive seeds.
-    progress : callable
-
-    Returns
-    -------
-    Milled
-    """
+    """Write, revise and mill the programs of all cutting tests."""
     drifts: dict[str, list[Recording]] = {}
     for what in (COLD, WARM, WARMER, COLDER):
         progress(0.2 * len(drifts) / 4, f"cutting tests, {what}")

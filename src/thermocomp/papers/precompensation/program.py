@@ -60,23 +60,7 @@ WAYS = (EVERY, NEEDED, SAFE)
 
 
 def write_program(test: Recording) -> list[str]:
-    """Return the NC program of a cutting test.
-
-    Parameters
-    ----------
-    test : Recording
-        Recording with the spindle speed.
-
-    Returns
-    -------
-    list of str
-        Lines. The spindle speed follows the recording from its start; time not needed for movements is spent in dwells.
-
-    Raises
-    ------
-    ValueError
-        The movements of a period take longer than in the test.
-    """
+    """Return the NC program of a cutting test."""
     lines = [f"(CUTTING TEST {test.name.upper()})", "G21 G90 G17 G94 G40 G54", "T1 M6", "G43 H1", f"G0 Z{UP:g}"]
     due: list[tuple[int, float]] = []
     first, last = milling(test)
@@ -184,19 +168,9 @@ def revise_program(
 
     Parameters
     ----------
-    lines : iterable of str
-    models : sequence of ErrorModel
-        Model of each position.
-    way : str
-        Revision method, one of `WAYS`.
     start : ThermalStart, optional
         State of the machine at the start of the program. Default: cold. The drift is relative to this time, at which
         the work is set up.
-
-    Returns
-    -------
-    list of str
-        Lines.
     """
     there = stations(models)
     drift = Drift(there, start or begin_cold(there, {}))
@@ -234,13 +208,7 @@ class FacedSurface:
     z: FloatArray
 
     def surface(self, drift: Recording) -> FloatArray:
-        """Return the position of the surface, actual minus drawing, (n,) [um].
-
-        Parameters
-        ----------
-        drift : Recording
-            Deviation of the machine at each of `POSITIONS`.
-        """
+        """Return the position of the surface, actual minus drawing, (n,) [um]."""
         columns = [drift.table[f"z_at_{p}_um"].to_numpy(dtype=np.float64) for p in POSITIONS]
         there = np.column_stack([np.interp(self.time, drift.time, column) for column in columns])
         at = self.position + self.z / 1e3
@@ -254,17 +222,7 @@ def run(lines: Iterable[str]) -> Iterator[Timed]:
 
 
 def faces(lines: Iterable[str]) -> list[FacedSurface]:
-    """Return the faces cut by a program; comments in the program mark the start of each face.
-
-    Parameters
-    ----------
-    lines : iterable of str
-
-    Returns
-    -------
-    list of FacedSurface
-        In the order of milling.
-    """
+    """Return the faces cut by a program; comments in the program mark the start of each face."""
     begins = {_comment(n, z).strip("()"): (n, float(z)) for n in (1, 2) for z in POSITIONS}
     found: dict[tuple[int, float], list[FloatArray]] = {}
     face: tuple[int, float] | None = None

@@ -26,17 +26,7 @@ BEYOND = 0.02
 
 
 def run(seed: int, progress: Progress) -> Study:
-    """Reproduce the study.
-
-    Parameters
-    ----------
-    seed : int
-    progress : callable
-
-    Returns
-    -------
-    Study
-    """
+    """Reproduce the study."""
     c = setup.compute(seed, lambda share, what: progress(share / 2, what))
     models = c.models | cutting.house_models(c.learn)
     m = cutting.compute(models, seed, lambda share, what: progress((1 + share) / 2, what))

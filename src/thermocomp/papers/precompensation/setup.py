@@ -97,8 +97,6 @@ class Computed:
         One-step-ahead RMS of least squares with k = 1, m = 0 over all positions [um].
     clocks : dict of float to (tuple of int, float, float)
         By interval [s], at the first position: orders by FPE, free-run RMS with these, and with k = 1, m = 0 [um].
-    cuts : list of CuttingTest
-    warm : Warm
     room : float
         Peak-to-peak drift of Z of a machine at rest for a day [um]: no part of it can be predicted from the speed
         (E-P6).
@@ -167,17 +165,7 @@ class Computed:
 
 
 def compute(seed: int, progress: Progress) -> Computed:
-    """Run the tests and the computations of the paper.
-
-    Parameters
-    ----------
-    seed : int
-    progress : callable
-
-    Returns
-    -------
-    Computed
-    """
+    """Run the tests and the computations of the paper."""
     progress(0.0, "identification and verification")
     learn, judge = (samples_of(r) for r in record("precompensation", seed=seed))
     targets = [c.name for c in learn.targets]

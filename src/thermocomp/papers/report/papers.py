@@ -47,13 +47,8 @@ def text(study: Study, *ids: str) -> str:
 
     Parameters
     ----------
-    study : Study
     *ids : str
         Select the claims with these ids. Default: all, under the title of the study.
-
-    Returns
-    -------
-    str
     """
     told = [c for c in study.claims if not ids or set(ids) & set(c.ids)]
     lines = [] if ids else [study.title, f"{headline(study)}.", ""]
@@ -92,14 +87,7 @@ def rows(table: StudyTable) -> list[list[str]]:
 
 
 def paint(figure: Figure, canvas: Canvas) -> None:
-    """Draw a figure of a study.
-
-    Parameters
-    ----------
-    figure : thermocomp.papers.study.Figure
-    canvas : matplotlib.figure.Figure
-        Empty; see `size` for its dimensions.
-    """
+    """Draw a figure of a study."""
     columns = figure.columns
     axes = canvas.subplots(-(-len(figure.panels) // columns), columns, squeeze=False).ravel()
     for ax in axes[len(figure.panels) :]:
@@ -124,16 +112,7 @@ def size(figure: Figure) -> tuple[float, float]:
 
 
 def draw(figure: Figure) -> str:
-    """Return a study's figure as SVG text.
-
-    Parameters
-    ----------
-    figure : thermocomp.papers.study.Figure
-
-    Returns
-    -------
-    str
-    """
+    """Return a study's figure as SVG text."""
     with drawing(figure.key):
         canvas = Canvas(figsize=size(figure), layout="constrained")
         paint(figure, canvas)
@@ -141,18 +120,7 @@ def draw(figure: Figure) -> str:
 
 
 def render(studies: Sequence[Study], *, seed: int) -> str:
-    """Return studies as a self-contained HTML page.
-
-    Parameters
-    ----------
-    studies : sequence of Study
-    seed : int
-        Random seed of the (first) run.
-
-    Returns
-    -------
-    str
-    """
+    """Return studies as a self-contained HTML page."""
     return (
         environment()
         .get_template("papers.html")
@@ -169,17 +137,7 @@ def render(studies: Sequence[Study], *, seed: int) -> str:
 
 
 def write(studies: Sequence[Study], path: Path, *, seed: int, overwrite: bool = False) -> None:
-    """Write studies as a page.
-
-    Parameters
-    ----------
-    studies : sequence of Study
-    path : Path
-    seed : int
-        See `render`.
-    overwrite : bool
-        See `thermocomp.files.draft.drafts`.
-    """
+    """Write studies as a page."""
     write_text(render(studies, seed=seed), path, overwrite=overwrite)
 
 

@@ -19,17 +19,7 @@ FIGURE_2 = (3, 11, 14)
 
 
 def run(seed: int, progress: Progress) -> Study:
-    """Reproduce the study.
-
-    Parameters
-    ----------
-    seed : int
-    progress : callable
-
-    Returns
-    -------
-    Study
-    """
+    """Reproduce the study."""
     c = setup.compute(seed, progress)
     numbers = exhibits.numbers("redo", c, temperatures=len(c.fit.inputs) - 1, fewest=c.thinned[-1].names)
     return Study.of("stepwise2017", TITLE, Part(claims(c), _tables(c), _figures(c), numbers))

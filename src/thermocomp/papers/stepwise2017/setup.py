@@ -47,7 +47,6 @@ class Thinned:
 
     Parameters
     ----------
-    rows : int
     effective : float
         Number of independent rows equivalent to the residual.
     first : float
@@ -73,10 +72,8 @@ class Computed:
     ----------
     fit, online : Samples
         Training test, and test on another day.
-    selection : PartialF
     models : dict of str to ErrorModel
         Models by the names of `METHODS`.
-    thinned : tuple of Thinned
     absolute : float
         RMS of the stepwise model with absolute temperatures in the on-line test [um].
     shaken : dict of str to Robustness
@@ -123,17 +120,7 @@ class Computed:
 
 
 def compute(seed: int, progress: Progress) -> Computed:
-    """Run the tests and the computations of the paper.
-
-    Parameters
-    ----------
-    seed : int
-    progress : callable
-
-    Returns
-    -------
-    Computed
-    """
+    """Run the tests and the computations of the paper."""
     progress(0.0, "the two tests")
     test, online = record("stepwise2017", seed=seed)[0], record("stepwise2017-online", seed=seed)[0]
     learn, judge = (common.stacked([t], [TARGET]) for t in (test, online))
@@ -172,16 +159,6 @@ def sliced_inverse(samples: Samples) -> ErrorModel:
     Rows are sorted by deviation and divided into slices; the deviation depends on the directions in which the whitened
     mean temperatures of the slices differ most. Principal directions that consist of noise are removed first, because
     whitening would scale them up to the size of the others.
-
-    Parameters
-    ----------
-    samples : Samples
-        Samples with temperatures as inputs.
-
-    Returns
-    -------
-    ErrorModel
-        Linear model.
     """
     X, y = samples.change(), samples.deviations[:, 0]
     centred = X - X.mean(axis=0)

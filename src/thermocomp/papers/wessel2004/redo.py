@@ -20,16 +20,8 @@ def run(seed: int, progress: Progress, physics: Physics | None = None) -> Study:
 
     Parameters
     ----------
-    seed : int
-        Random seed of weather and noise.
-    progress : callable
-        Called with the completed fraction and the next step.
     physics : {'linear', 'nonlinear'}, optional
         Physics of the virtual machines. Default: as defined by the experiments.
-
-    Returns
-    -------
-    Study
     """
 
     def within(begin: float, end: float) -> Progress:

@@ -83,18 +83,7 @@ class Selection:
 
 
 def appendix_b(seed: int, progress: Progress, physics: Physics | None = None) -> Selection:
-    """Reproduce Appendix B (W-10 to W-12).
-
-    Parameters
-    ----------
-    seed : int
-    progress : callable
-    physics : {'linear', 'nonlinear'}, optional
-
-    Returns
-    -------
-    Selection
-    """
+    """Reproduce Appendix B (W-10 to W-12)."""
     progress(0.0, "23 data sets on the resting tool")
     recordings = record("wessel-sets", physics=physics, seed=seed)
     data = [DataSet(r.name, r.values(r.temperatures), r.values(r.displacements)) for r in recordings]

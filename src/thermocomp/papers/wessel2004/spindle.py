@@ -45,7 +45,6 @@ class Spindle:
     ----------
     recordings : sequence of Recording
         Learned and estimated recording.
-    found : MillingTrial
     peaked : MillingTrial
         Trial with the wider series as the estimated one: `found`, or with the two series exchanged.
     """
@@ -76,18 +75,7 @@ class Spindle:
 
 
 def spindle(seed: int, progress: Progress, physics: Physics | None = None) -> Part:
-    """Reproduce section III (W-01 to W-07).
-
-    Parameters
-    ----------
-    seed : int
-    progress : callable
-    physics : {'linear', 'nonlinear'}, optional
-
-    Returns
-    -------
-    Part
-    """
+    """Reproduce section III (W-01 to W-07)."""
     progress(0.0, "finite-element spindle")
     recordings = record("wessel-fem", physics=physics, seed=seed)
     target = len(recordings[0].displacements) - 1  # S4, at the front tip of the tool

@@ -73,20 +73,7 @@ class Resting:
 
 
 def resting_tool(seed: int, progress: Progress, selection: Selection, physics: Physics | None = None) -> Part:
-    """Reproduce section IV (W-08).
-
-    Parameters
-    ----------
-    seed : int
-    progress : callable
-    selection : Selection
-        Selection of Appendix B; the paper's set is shown next to it.
-    physics : {'linear', 'nonlinear'}, optional
-
-    Returns
-    -------
-    Part
-    """
+    """Reproduce section IV (W-08)."""
     progress(0.0, "resting tool")
     recordings = record("wessel-tool", physics=physics, seed=seed)
     paper, own = (trial(recordings, 0, chosen) for chosen in (PAPERS_OWN, selection.chosen))
@@ -105,18 +92,7 @@ def resting_tool(seed: int, progress: Progress, selection: Selection, physics: P
 
 
 def milling_machine(seed: int, progress: Progress, physics: Physics | None = None) -> Part:
-    """Reproduce section V (W-09): four days are learned, the fifth is estimated.
-
-    Parameters
-    ----------
-    seed : int
-    progress : callable
-    physics : {'linear', 'nonlinear'}, optional
-
-    Returns
-    -------
-    Part
-    """
+    """Reproduce section V (W-09): four days are learned, the fifth is estimated."""
     progress(0.0, "milling machine, five days")
     recordings = record("wessel-milling", physics=physics, seed=seed)
     found = trial(recordings, 0, range(len(recordings[0].temperatures)))

@@ -79,11 +79,6 @@ class MillingTrial:
     def residual(self, method: str) -> FloatArray:
         """Return measured minus estimated in the unseen test [um].
 
-        Parameters
-        ----------
-        method : str
-            Key of `estimates`.
-
         Returns
         -------
         ndarray of shape (n_unseen,)
@@ -114,12 +109,7 @@ class MillingTrial:
         return {f"{prefix}_{key}_rms_um": self.rms(method) for key, method in short.items()}
 
     def table(self, caption: str) -> StudyTable:
-        """Return a table of the errors of all methods in the unseen test.
-
-        Parameters
-        ----------
-        caption : str
-        """
+        """Return a table of the errors of all methods in the unseen test."""
         name = f"{self.target}, {self.unseen.test_names[0]}"
         residuals = {(name, m): self.residual(m) for m in self.estimates}
         return errors_table(caption, {(name, NONE_NAME): self.measured} | residuals)
@@ -161,22 +151,7 @@ class MillingTrial:
 def stacked(
     recordings: Sequence[Recording], displacement: int, temperatures: Sequence[int], *, rezero: bool = False
 ) -> Samples:
-    """Stack recordings with one displacement and some temperatures, given by their indices.
-
-    Parameters
-    ----------
-    recordings : sequence of Recording
-    displacement : int
-        Index among the displacements.
-    temperatures : sequence of int
-        Indices among the temperatures.
-    rezero : bool
-        Whether temperatures are relative to the start of each test; False: as read.
-
-    Returns
-    -------
-    Samples
-    """
+    """Stack recordings with one displacement and some temperatures, given by their indices."""
     first = recordings[0]
     inputs = [first.temperatures[j].name for j in temperatures]
     return common.stacked(recordings, [first.displacements[displacement].name], inputs, rezero=rezero)
@@ -189,21 +164,6 @@ def trial(
 
     Absolute temperatures are used, as in the paper, whose laptop receives temperatures. If the tests do not start at
     equal temperatures, both methods are repeated with temperatures relative to each start, like the displacements.
-
-    Parameters
-    ----------
-    recordings : sequence of Recording
-        At least two.
-    displacement : int
-        Index among the displacements.
-    temperatures : sequence of int
-        Indices among the temperatures.
-    beside : bool
-        Whether to add our own methods, with the same temperatures.
-
-    Returns
-    -------
-    MillingTrial
     """
     parts = (recordings[:-1], recordings[-1:])
     learned, unseen = (stacked(r, displacement, temperatures) for r in parts)
@@ -238,14 +198,6 @@ def loop_width(samples: Samples) -> float:
 
     The span of each temperature is divided into equal intervals; the width is the largest range of the displacement in
     an interval after subtraction of a straight line. For several temperatures the narrowest loop is used.
-
-    Parameters
-    ----------
-    samples : Samples
-
-    Returns
-    -------
-    float
     """
     y = samples.deviations[:, 0]
     widths = []
@@ -267,19 +219,7 @@ def named(samples: Samples) -> dict[str, FloatArray]:
 
 
 def recorded(recordings: Sequence[Recording], temperatures: Sequence[int]) -> list[Panel]:
-    """Return panels of the measured data as in the paper: temperatures above, displacements below, by point.
-
-    Parameters
-    ----------
-    recordings : sequence of Recording
-        Recordings, shown in sequence.
-    temperatures : sequence of int
-        Indices of the temperatures shown; all displacements are shown.
-
-    Returns
-    -------
-    list of Panel
-    """
+    """Return panels of the measured data as in the paper: temperatures above, displacements below, by point."""
     first = recordings[0]
     names = [c.name for c in first.displacements], [first.temperatures[j].name for j in temperatures]
     shown = common.stacked(recordings, *names, rezero=False)

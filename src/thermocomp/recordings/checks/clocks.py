@@ -58,8 +58,6 @@ def clocks(signals: Sequence[Signal], time: FloatArray, speed: FloatArray | None
 
     Parameters
     ----------
-    signals : sequence of Signal
-        Channels without spikes.
     time : ndarray of shape (n_rows,)
         [s]
     speed : ndarray of shape (n_rows,) or None

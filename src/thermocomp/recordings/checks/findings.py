@@ -53,7 +53,6 @@ class Signal:
 
     Parameters
     ----------
-    channel : Channel
     values : ndarray of shape (n_rows,)
         Values in the unit of the channel.
     good : ndarray of bool of shape (n_rows,)
@@ -107,12 +106,8 @@ def cut(name: str, rows: IntArray, time: FloatArray, reason: str) -> Remedy:
 
     Parameters
     ----------
-    name : str
-        Name of the channel.
-    rows : ndarray of int
     time : ndarray of shape (n_rows,)
         [s]
-    reason : str
     """
     ordered = np.unique(rows)
     parts = np.split(ordered, np.flatnonzero(np.diff(ordered) > 1) + 1)
@@ -125,8 +120,6 @@ def cut_out(severity: Severity, channel: Channel, kind: str, text: str, rows: In
 
     Parameters
     ----------
-    severity, channel, kind, text, rows
-        See `Finding`.
     time : ndarray of shape (n_rows,)
         Times of all rows [s].
     """

@@ -27,7 +27,6 @@ class Edges:
 
     Parameters
     ----------
-    signal : Signal
     before, after : ndarray of int of shape (n_jumps,)
         Last row of the old level and first row of the new one in the recording; one row may lie between them.
     height : ndarray of shape (n_jumps,)
@@ -100,8 +99,6 @@ def jumps(signals: Sequence[Signal], time: FloatArray, moved: BoolArray) -> Iter
 
     Parameters
     ----------
-    signals : sequence of Signal
-        Channels without spikes.
     time : ndarray of shape (n_rows,)
         [s]
     moved : ndarray of bool of shape (n_rows - 1,)

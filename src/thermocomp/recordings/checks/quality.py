@@ -42,15 +42,6 @@ _SENSED = ("temperature", "displacement", "angle")
 def check(recording: Recording) -> tuple[Finding, ...]:
     """Check a recording for problems that make it unsuitable for a model.
 
-    Parameters
-    ----------
-    recording : Recording
-
-    Returns
-    -------
-    tuple of Finding
-        Sorted by severity, worst first; empty if there are none.
-
     Notes
     -----
     Thresholds are set such that a sound recording of a real machine causes no trouble; the docstring of each check
@@ -81,7 +72,6 @@ def troubled_rows(recording: Recording, findings: Sequence[Finding] | None = Non
 
     Parameters
     ----------
-    recording : Recording
     findings : sequence of Finding, optional
         Result of `check`. Default: `check` is called.
 

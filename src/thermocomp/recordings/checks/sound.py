@@ -11,19 +11,7 @@ from thermocomp.recordings.samples import Samples
 
 
 def drop_unsound(samples: Samples, recordings: Sequence[Recording]) -> Samples:
-    """Return samples without the values in trouble.
-
-    Parameters
-    ----------
-    samples : Samples
-    recordings : sequence of Recording
-        Recordings from which the samples were stacked, in order; the files that they continue are checked as well.
-
-    Returns
-    -------
-    Samples
-        Values in trouble are missing (NaN); trouble of a whole channel or recording is listed in ``trouble``.
-    """
+    """Return samples without the values in trouble."""
     values, deviations = samples.values.copy(), samples.deviations.copy()
     trouble: list[tuple[str, str]] = []
     for k, recording in enumerate(recordings):

@@ -24,8 +24,6 @@ def spikes(signal: Signal, time: FloatArray, moved: BoolArray) -> Iterator[Findi
 
     Parameters
     ----------
-    signal : Signal
-        Signal with 5 good rows or more.
     time : ndarray of shape (n_rows,)
         [s]
     moved : ndarray of bool of shape (n_rows,)

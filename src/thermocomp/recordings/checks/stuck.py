@@ -25,8 +25,6 @@ def stuck(signal: Signal, time: FloatArray) -> Iterator[Finding]:
 
     Parameters
     ----------
-    signal : Signal
-        Signal with 5 good rows or more, not constant.
     time : ndarray of shape (n_rows,)
         [s]
     """

@@ -23,11 +23,6 @@ def temperature_units(signals: Sequence[Signal]) -> Iterator[Finding]:
     colder hall. A single sensor is reported if it is always warmer than all others ever are, if as degF it lies between
     the lowest value of the others less 3 degC and their highest plus 5 degC, and if it moves with one of them (rank
     correlation over 0.7), unlike a part that is kept hot.
-
-    Parameters
-    ----------
-    signals : sequence of Signal
-        Temperatures, without spikes.
     """
     ranges = {s.channel.name: np.quantile(s.x, (0.01, 0.99)) for s in signals if len(s.x) >= 5}
     known = [s for s in signals if s.channel.name in ranges]
@@ -79,11 +74,6 @@ def displacement_units(signals: Sequence[Signal], temperatures: Sequence[Signal]
     drift of any machine. If the probe with the largest range moves by less than 0.05 um per degC of the sensor with the
     largest range, all probes are reported: 100 mm of steel grow by 1.1 um per degC. This is only a warning where no
     temperature changes by 1 degC, because a machine at rest may move as little.
-
-    Parameters
-    ----------
-    signals, temperatures : sequence of Signal
-        Channels without spikes.
     """
     spans = {s.channel.name: s.span for s in signals if len(s.x) >= 5}
     moving = {s.channel.name: width for s in signals if s.channel.name in spans and (width := float(np.ptp(s.x))) > 0}
@@ -123,8 +113,6 @@ def time_unit(time: FloatArray, temperatures: Sequence[Signal]) -> Iterator[Find
     ----------
     time : ndarray of shape (n_rows,)
         [s]
-    temperatures : sequence of Signal
-        Temperatures, without spikes.
     """
     if len(time) < 10:
         return
@@ -170,8 +158,6 @@ def zeros(signals: Sequence[Signal], time: FloatArray) -> Iterator[Finding]:
 
     Parameters
     ----------
-    signals : sequence of Signal
-        Displacements and angles, without spikes.
     time : ndarray of shape (n_rows,)
         [s]
     """

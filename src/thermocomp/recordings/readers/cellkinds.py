@@ -31,19 +31,7 @@ Kinds = Callable[[int], Kind]
 
 
 def find_kind(cells: Sequence[str]) -> Kind:
-    """Return the kind of contents of cells.
-
-    Parameters
-    ----------
-    cells : sequence of str
-        The first non-empty cells of a column.
-
-    Returns
-    -------
-    Kind
-        The kind of most cells; ``date`` also applies to dates that a spreadsheet extended by midnight. Timestamps that
-        are all equal are not the times of the rows, and count as words.
-    """
+    """Return the kind of contents of cells."""
     if not cells:
         return ""
     texts = [_FIRST_DAY.sub("", cell.strip().lstrip("'")) for cell in cells]

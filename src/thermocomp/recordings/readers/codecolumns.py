@@ -27,18 +27,10 @@ def columns_of(recording: Recording, code: str) -> tuple[dict[str, float], tuple
     Columns with the position of another axis in their name, ``EYX_z0_100_um``, are left out if there are columns
     without it: their values include the angles of the axes multiplied by that distance.
 
-    Parameters
-    ----------
-    recording : Recording
-    code : str
-        Code of the component.
-
     Returns
     -------
     found : dict of str to float
         Position by column [mm]; empty if none is named after the component.
-    left_out : tuple of str
-        Columns with positions of other axes.
     """
     matches = [match for c in recording.channels if (match := _NAME.fullmatch(c.name)) and match["code"] == code]
     found = {match[0]: float(match["own"]) for match in matches if not match["others"]}

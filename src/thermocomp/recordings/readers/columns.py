@@ -34,7 +34,6 @@ class PlannedColumn:
     ----------
     index : int
         Position in the file.
-    channel : Channel
     unit : Unit
         Unit of the scaled value.
     rule : ColumnMap
@@ -119,7 +118,6 @@ class ColumnPlan:
         Positions of the columns that neither their heading nor the mapping defines.
     aliases : dict of str to str
         Channel names by heading and by name without unit.
-    notes : tuple of str
     """
 
     times: TimePlan
@@ -133,16 +131,7 @@ class ColumnPlan:
 
 
 def plan(table: FileTable, mapping: Mapping) -> ColumnPlan:
-    """Determine the columns to be read, and their meaning.
-
-    Raises
-    ------
-    RecordingError
-        A heading or channel name is duplicate; there is no time column or no channel; a mapped column does not exist,
-        or is mapped twice.
-    UnitError
-        A unit is unknown, or the unit in the heading contradicts the quantity in the mapping.
-    """
+    """Determine the columns to be read, and their meaning."""
     headings, source = table.headings, str(table.path)
     kinds = cache(partial(find_column_kind, table))
     meanings = _understand_all(headings, mapping, source)

@@ -40,14 +40,7 @@ def holds_date(text: str) -> bool:
 
 
 def holds_own_date(table: FileTable, number: int) -> bool:
-    """Return whether a row contains a date where other rows have none, such as a separator between daily tests.
-
-    Parameters
-    ----------
-    table : FileTable
-    number : int
-        Number of the row in the file, as given by `FileTable.place`.
-    """
+    """Return whether a row contains a date where other rows have none, such as a separator between daily tests."""
     columns = [k for k in range(len(table.headings)) if find_kind(table.head(k)) not in ("date", "stamp")]
     cells = table.load([], columns)[0]
     row = next((k for k in range(len(cells)) if int(table.place(k).split()[-1]) == number), None)
@@ -61,20 +54,6 @@ def check_dates(time: FloatArray, file: FileCells, others: Sequence[int] = ()) -
     ----------
     time : ndarray of shape (n_rows,)
         Time since the first row [s].
-    file : FileCells
-        Cells, including the columns of dates that were not used.
-    others : sequence of int
-        Further columns of dates, in forms other than timestamps (`thermocomp.recordings.readers.dayforms`).
-
-    Returns
-    -------
-    tuple of str
-        Notes on dates that are ignored by the mapping.
-
-    Raises
-    ------
-    TwoReadingsError
-        Tests on several days would be merged.
     """
     notes = []
     heading, table, is_stamp, form = file.heading, file.table, file.is_stamp, file.mapping.time.format

@@ -56,16 +56,7 @@ _WEEKDAYS = frozenset(day for names in _DAYS for day in names)
 
 
 def find_day_columns(table: FileTable, columns: Sequence[int], *, beside_clock: bool = False) -> list[int]:
-    """Find the columns whose first cells are dates in a form other than timestamps.
-
-    Parameters
-    ----------
-    table : FileTable
-    columns : sequence of int
-        Columns to be examined.
-    beside_clock : bool
-        The times of the rows are not numbers: then values that change under a date heading may be dates in any form.
-    """
+    """Find the columns whose first cells are dates in a form other than timestamps."""
     found, typed = [], []
     for k in columns:
         head = table.head(k)
@@ -111,15 +102,7 @@ def _may_be_day(first: str) -> bool:
 
 
 def read_other_days(cells: "pd.Series[Any]", heading: str, *, beside_clock: bool = False) -> list[IntArray]:
-    """Return the possible days of cells, relative to any origin, in each form that applies to all of them.
-
-    Parameters
-    ----------
-    cells : Series of str
-    heading : str
-    beside_clock : bool
-        See `find_day_columns`.
-    """
+    """Return the possible days of cells, relative to any origin, in each form that applies to all of them."""
     texts = cells.str.strip().str.lstrip("'")
     named = names_day(heading)
     numbers = pd.to_numeric(texts.str.replace(",", ".", regex=False), errors="coerce").to_numpy(dtype=np.float64)

@@ -32,14 +32,7 @@ def _plain(cell: object) -> str:
 
 
 def are_halves(cells: Sequence[str], heading: str) -> bool:
-    """Return whether cells specify the half of the day.
-
-    Parameters
-    ----------
-    cells : sequence of str
-        The first non-empty cells of a column.
-    heading : str
-    """
+    """Return whether cells specify the half of the day."""
     words = {_plain(cell) for cell in cells}
     known = (*_CERTAIN[0], *_CERTAIN[1], *_MAYBE[0], *_MAYBE[1])
     if words.issubset(known) or says_halves(heading):
@@ -55,26 +48,7 @@ def says_halves(heading: str) -> bool:
 def join_halves(
     clocks: "pd.Series[Any]", halves: "pd.Series[Any]", form: str, table: FileTable, names: tuple[str, str]
 ) -> "tuple[pd.Series[Any], tuple[str, ...]]":
-    """Return times of day with AM or PM from their column appended, and notes on how they were read.
-
-    Parameters
-    ----------
-    clocks : Series
-        Times of day, or dates with a time of day.
-    halves : Series
-        AM or PM, or words for them.
-    form : str
-        Format of the times in the mapping; empty if not specified.
-    table : FileTable
-        Source of the cells.
-    names : tuple of str
-        Headings of both columns.
-
-    Raises
-    ------
-    RecordingError
-        A cell does not specify the half of the day, or it contradicts the time.
-    """
+    """Return times of day with AM or PM from their column appended, and notes on how they were read."""
     time, half = names
     there = clocks.notna()
     words = halves.map(_plain, na_action="ignore")

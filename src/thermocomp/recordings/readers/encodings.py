@@ -25,12 +25,6 @@ def bring_to_utf8(path: Path, limits: FileLimits) -> tuple[bytes | None, tuple[s
     -------
     data : bytes or None
         None: the file can be read directly, line by line.
-    notes : tuple of str
-
-    Raises
-    ------
-    RecordingError
-        The file is too large for conversion, or contains no text.
     """
     with path.open("rb") as f:
         head = f.read(_HEAD)
@@ -56,13 +50,7 @@ def bring_to_utf8(path: Path, limits: FileLimits) -> tuple[bytes | None, tuple[s
 
 
 def find_encoding(lines: Iterable[bytes]) -> str:
-    """Return the encoding under which lines that are not UTF-8 are most meaningful.
-
-    Returns
-    -------
-    str
-        Encoding for headings and labels; numbers are the same in all candidates.
-    """
+    """Return the encoding under which lines that are not UTF-8 are most meaningful."""
     text = b"".join(lines)
     found = {}
     for encoding in _ENCODINGS:

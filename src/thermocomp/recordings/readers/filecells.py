@@ -20,10 +20,8 @@ class FileCells:
     ----------
     source : Path
         Path of the file.
-    mapping : Mapping
     table : FileTable
         Source of the cells.
-    columns : ColumnPlan
     cells : DataFrame
         Columns named by their position in the file.
     is_stamp : bool
@@ -63,12 +61,7 @@ class FileCells:
 
         Parameters
         ----------
-        row : int
-        text : str
-            Fault, and what to do.
         column : int, optional
             Column of the cell. Default: the time column.
-        skip : bool
-            Skipping the row is a possible remedy.
         """
         return RecordingError(f"{self.at(row, column)}: {text}", [skip_row(self.table, row)] if skip else ())

@@ -41,19 +41,7 @@ _ROLES = ("temperature", "displacement", "spindle_speed", "position")
 
 
 def guess(table: FileTable, mapping: Mapping) -> tuple[Remedy, ...]:
-    """Guess the time, and the meaning of columns that neither heading nor mapping defines.
-
-    Parameters
-    ----------
-    table : FileTable
-    mapping : Mapping
-        Known part of the mapping.
-
-    Returns
-    -------
-    tuple of Remedy
-        Mappings with all guesses, one for each possible unit of the time; empty if there are none.
-    """
+    """Guess the time, and the meaning of columns that neither heading nor mapping defines."""
     if find_parts(table.headings):
         return ()  # no single column contains the time
     columns: dict[str, Any] = {}
@@ -67,13 +55,7 @@ def guess(table: FileTable, mapping: Mapping) -> tuple[Remedy, ...]:
 
 
 def guess_columns(table: FileTable, mapping: Mapping) -> list[tuple[str, list[Remedy]]]:
-    """Guess the meaning of numeric columns that neither heading nor mapping defines.
-
-    Returns
-    -------
-    list of (str, list of Remedy)
-        Heading with some values, and possible mapping entries for the column, most likely first.
-    """
+    """Guess the meaning of numeric columns that neither heading nor mapping defines."""
     known = {rule.column or name for name, rule in mapping.columns.items()}
     known |= {mapping.time.column, mapping.time.date, mapping.cycles.column}
     unknown = [

@@ -45,11 +45,6 @@ def find_layout(rows: Sequence[Sequence[str]]) -> FileLayout | None:
     Above the first row of numbers there are rows of text. The headings are the first of those that name the largest
     number of numeric columns; a row of units is recognised by its units.
 
-    Parameters
-    ----------
-    rows : sequence of sequence of str
-        Cells of the first rows of a file.
-
     Returns
     -------
     FileLayout or None
@@ -97,18 +92,7 @@ def find_layout(rows: Sequence[Sequence[str]]) -> FileLayout | None:
 
 
 def find_end(first: Sequence[Sequence[str]], last: Sequence[Sequence[str]]) -> int:
-    """Count the rows at the end of a file that are not part of its table: remarks and statistics.
-
-    Parameters
-    ----------
-    first, last : sequence of sequence of str
-        Cells of the first and the last rows below the headings.
-
-    Returns
-    -------
-    int
-        Number of rows. A truncated row, or one without a time, is not counted: it starts like a row of the table.
-    """
+    """Count the rows at the end of a file that are not part of its table: remarks and statistics."""
     if len(last) < 2:
         return 0
     width, columns = find_columns(first[: (len(first) + 1) // 2])
@@ -121,16 +105,7 @@ def find_end(first: Sequence[Sequence[str]], last: Sequence[Sequence[str]]) -> i
 
 
 def tell_layout(numbers: Sequence[int], layout: FileLayout, word: str) -> tuple[str, ...]:
-    """Return notes on the lines that were skipped and the lines that were read as units.
-
-    Parameters
-    ----------
-    numbers : sequence of int
-        Row numbers in the file (1-based).
-    layout : FileLayout
-    word : str
-        Word for a row in messages.
-    """
+    """Return notes on the lines that were skipped and the lines that were read as units."""
     found = []
     above = [numbers[k] for k in range(layout.heading) if k != layout.units]
     between = [numbers[k] for k in range(layout.heading + 1, layout.begin) if k != layout.units]
@@ -169,12 +144,6 @@ def join_units(headings: Sequence[str], units: Sequence[str], rows: Sequence[Seq
 
     The contents of a column decide: dates, times of day and words have no unit, whatever the row contains (``Unit``,
     ``hh:mm:ss``), but the order of a date (``mm/dd/yyyy``) is kept. The first column may contain a label of the row.
-
-    Parameters
-    ----------
-    headings, units : sequence of str
-    rows : sequence of sequence of str
-        Cells of the first rows of the table.
     """
     said = [_bare(unit) for unit in units]
     found = []

@@ -9,19 +9,7 @@ from thermocomp.recordings.headings import BRACKETS, HOUSE_SUFFIX, SUFFIXES, fin
 
 
 def refuse_nameless(headings: Sequence[str], source: str) -> None:
-    """Reject numeric columns whose names suggest a temperature, a displacement or a speed but have no unit.
-
-    Parameters
-    ----------
-    headings : sequence of str
-        Headings of numeric columns that would be left out.
-    source : str
-
-    Raises
-    ------
-    RecordingError
-        There is such a column.
-    """
+    """Reject numeric columns whose names suggest a temperature, a displacement or a speed but have no unit."""
     asked = {h: q for h in headings if not _says_unit(h) and (q := find_named_quantity(h))}
     if not asked:
         return

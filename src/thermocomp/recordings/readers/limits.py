@@ -76,22 +76,7 @@ class FileLimits:
                 raise InputError(f"[limits]: {f.name} = {getattr(self, f.name)}: must be at least 1")
 
     def check(self, name: str, found: int, where: object) -> None:
-        """Reject a value that exceeds a limit.
-
-        Parameters
-        ----------
-        name : str
-            Name of the limit.
-        found : int
-            Value found, or the count at which the limit was exceeded.
-        where : object
-            File and location, for the message.
-
-        Raises
-        ------
-        RecordingError
-            The limit is exceeded.
-        """
+        """Reject a value that exceeds a limit."""
         most = getattr(self, name)
         if found > most:
             counts = next(f.metadata["counts"] for f in fields(self) if f.name == name)
@@ -101,19 +86,7 @@ class FileLimits:
             )
 
     def check_table(self, rows: int, columns: int, where: object) -> None:
-        """Reject a table that is too large.
-
-        Parameters
-        ----------
-        rows, columns : int
-        where : object
-            File and location, for the message.
-
-        Raises
-        ------
-        RecordingError
-            See `check`.
-        """
+        """Reject a table that is too large."""
         self.check("columns", columns, where)
         self.check("rows", rows, where)
         self.check("cells", rows * columns, where)
@@ -125,12 +98,6 @@ class FileLimits:
         ----------
         unpacked : int
             Unpacked size so far [byte].
-        path : Path
-
-        Raises
-        ------
-        RecordingError
-            See `check`.
         """
         size = max(path.stat().st_size, 1)
         if unpacked > _UNPACKED_FREE:
@@ -138,15 +105,7 @@ class FileLimits:
 
 
 def check_file(path: Path, limits: FileLimits) -> None:
-    """Reject a path that is not a regular file, such as a pipe or a device (also through a link), or a large file.
-
-    Raises
-    ------
-    RecordingError
-        See `FileLimits.check`.
-    OSError
-        The path does not exist.
-    """
+    """Reject a path that is not a regular file, such as a pipe or a device (also through a link), or a large file."""
     found = path.stat()
     if not (stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)):  # opening a folder raises a clear error
         raise RecordingError(f"{path}: is a pipe or a device, not a file; save its output to a file")

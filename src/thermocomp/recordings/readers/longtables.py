@@ -20,26 +20,7 @@ _STATES = ("state", "State", "profile", "Profile")
 
 
 def read_long(path: str | Path, mapping: Mapping | None, options: ProfileOptions) -> Profiles:
-    """Read profiles from a table with one row per position.
-
-    Parameters
-    ----------
-    path : str or Path
-    mapping : Mapping or None
-        Roles and units of columns whose headings do not give them.
-    options : ProfileOptions
-        Contents of the table; without a column of the error: the only one of its quantity.
-
-    Returns
-    -------
-    Profiles
-        Profiles with the means of the other channels over the rows of each state.
-
-    Raises
-    ------
-    RecordingError
-        A column does not exist, or rows are not in order; the message names the line.
-    """
+    """Read profiles from a table with one row per position."""
     axis, unit = options.about
     rows = read_rows(path, mapping, rising=False, extra=(options.state,) if options.state else _STATES)
     owner = f"{rows.source}: {options.target}"

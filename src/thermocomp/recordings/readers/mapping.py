@@ -120,7 +120,6 @@ class ReadOptions:
     ----------
     delimiter : str
         One character; a space denotes any white space.
-    decimal : {'', '.', ','}
     encoding : str
         Encoding, such as ``cp1252``; empty: UTF-8, or Latin-1 if it is not UTF-8.
     comment : str
@@ -175,14 +174,10 @@ class Mapping:
 
     Parameters
     ----------
-    time : TimeColumn
     columns : mapping of str to ColumnMap
         By channel name.
-    read : ReadOptions
-    cycles : CycleRule
     clean : tuple of Step
         Changes of the values read, in this order; see `thermocomp.recordings.cleaning`.
-    limits : FileLimits
     compensation : {'', 'off', 'known', 'unknown'}
         Whether a correction was in force at the machine; see `thermocomp.recordings.compensated`.
     """
@@ -239,21 +234,6 @@ _TABLES: dict[str, type] = {
 def read_mapping(path: str | Path) -> Mapping:
     """Read a mapping file (TOML).
 
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    Mapping
-
-    Raises
-    ------
-    InputError
-        The file does not exist, is not TOML, or has an invalid key or value; the message names file, table and key.
-    UnitError
-        A unit is unknown or does not belong to the role.
-
     Examples
     --------
     A stepper's counts as a displacement, and a sensor that reports -180 if it is not connected::
@@ -278,19 +258,7 @@ def read_mapping(path: str | Path) -> Mapping:
 
 
 def check_content(content: dict[str, Any], owner: str) -> Mapping:
-    """Return the mapping defined by TOML content.
-
-    Parameters
-    ----------
-    content : dict
-    owner : str
-        Name of the file, for messages.
-
-    Raises
-    ------
-    InputError, UnitError
-        See `read_mapping`.
-    """
+    """Return the mapping defined by TOML content."""
     try:
         return ADAPTER.validate_json(as_json(content))
     except ValidationError as e:

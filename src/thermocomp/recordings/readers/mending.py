@@ -100,13 +100,7 @@ class Draft:
         return f"{re.sub(_TIGHT, _APART, written)}\n" if written else ""
 
     def mapping(self, owner: str) -> Mapping:
-        """Return the resulting mapping.
-
-        Raises
-        ------
-        InputError
-            Values are inconsistent.
-        """
+        """Return the resulting mapping."""
         return check_content(self.document.unwrap(), owner)
 
     def add(self, remedy: Remedy) -> bool:
@@ -141,8 +135,6 @@ class Mended:
     ----------
     text : str
         TOML of the mapping.
-    recording : Recording
-    decided : tuple of (Question, Remedy or None)
     """
 
     text: str
@@ -163,21 +155,7 @@ def read_draft(mapping: str | Path | None) -> str:
 
 
 def mend(path: str | Path, text: str, decide: Decide) -> Mended:
-    """Create a mapping with which a file can be read and is cleaned.
-
-    Parameters
-    ----------
-    path : str or Path
-    text : str
-        Initial TOML.
-    decide : callable
-        Function that answers a `Question`.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read with any mapping.
-    """
+    """Create a mapping with which a file can be read and is cleaned."""
     owner = str(path)
     dialogue = _Dialogue(Draft(text), decide, path)
     table = dialogue.until(lambda: open_table(path, dialogue.draft.mapping(owner)))[0]
@@ -199,13 +177,7 @@ def mend(path: str | Path, text: str, decide: Decide) -> Mended:
 
 
 def read_or_offer(path: str | Path, mapping: Mapping | None = None) -> Recording:
-    """Read one test from a file; on an error, a note on the exception suggests a filled-in mapping.
-
-    Raises
-    ------
-    RecordingError, UnitError
-        See `thermocomp.recordings.readers.recordings.read`.
-    """
+    """Read one test from a file; on an error, a note on the exception suggests a filled-in mapping."""
     try:
         return read(path, mapping)
     except (RecordingError, UnitError) as e:
@@ -215,24 +187,7 @@ def read_or_offer(path: str | Path, mapping: Mapping | None = None) -> Recording
 
 
 def located(finding: Finding, recording: Recording, mapping: Mapping, headings: Sequence[str]) -> Remedy:
-    """Return the remedy of a finding in the form required by a mapping of the file.
-
-    Parameters
-    ----------
-    finding : Finding
-        Finding with a remedy.
-    recording : Recording
-        Recording of the finding.
-    mapping : Mapping
-        Mapping with which the recording was read.
-    headings : sequence of str
-        Headings of the file.
-
-    Returns
-    -------
-    Remedy
-        Remedy with columns by heading, and times since the first row of the file.
-    """
+    """Return the remedy of a finding in the form required by a mapping of the file."""
     remedy: dict[str, Any] = copy.deepcopy(dict(finding.remedy or {}))
     for step in remedy.get("clean", ()):
         if "times" in step:
@@ -271,8 +226,6 @@ class _Dialogue:
 
     Parameters
     ----------
-    draft : Draft
-    decide : callable
     path : str or Path
         Path of the file.
     """

@@ -74,20 +74,7 @@ class Signs:
         return self.proven.most_common(1)[0][0] if self.proven else ""
 
     def decide(self, stated: str, delimiter: str) -> Notation | None:
-        """Return the number format; None if the cells do not determine it.
-
-        Parameters
-        ----------
-        stated : str
-            Decimal sign, if it is known beforehand.
-        delimiter : str
-            Column delimiter; if it is a comma, the decimal sign is a point unless a cell proves the opposite.
-
-        Raises
-        ------
-        RecordingError
-            The numbers can be read in two ways.
-        """
+        """Return the number format; None if the cells do not determine it."""
         decimal = stated or self.proven_sign()
         if not decimal and self.open:
             if delimiter != "," or "," in self.open:

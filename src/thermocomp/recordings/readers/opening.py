@@ -21,19 +21,7 @@ _OPEN = {**dict.fromkeys(_TEXTS, open_csv), ".xlsx": open_workbook, ".ods": open
 
 
 def open_table(path: str | Path, mapping: Mapping) -> tuple[FileTable, str]:
-    """Open a file as a table without interpreting its columns.
-
-    Returns
-    -------
-    FileTable
-    str
-        SHA-256 of the file.
-
-    Raises
-    ------
-    RecordingError
-        The file cannot be read as a table.
-    """
+    """Open a file as a table without interpreting its columns."""
     path = Path(path)
     ending = path.suffix.lower()
     if ending not in _OPEN:

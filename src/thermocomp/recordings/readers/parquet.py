@@ -53,8 +53,6 @@ class ParquetTable(FileTable):
         Names of the text columns.
     others : tuple of int
         Positions of the columns without a numeric type.
-    n_rows : int
-    limits : FileLimits
     embedded, decimal, notes
         See `thermocomp.recordings.readers.tables.FileTable`.
     """
@@ -143,13 +141,7 @@ def _translated(path: Path) -> Iterator[None]:
 
 
 def open_parquet(path: Path, options: ReadOptions, limits: FileLimits) -> FileTable:
-    """Open a Parquet file.
-
-    Raises
-    ------
-    RecordingError
-        The file is not a Parquet file, contains no recording, or exceeds a limit.
-    """
+    """Open a Parquet file."""
     try:
         from pyarrow.parquet import ParquetFile
     except ImportError as e:

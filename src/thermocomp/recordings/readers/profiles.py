@@ -42,21 +42,8 @@ def read(
 
     Parameters
     ----------
-    path : str or Path
-        See `thermocomp.recordings.readers.recordings.read`.
-    options : ProfileOptions or str
-        Options of the profiles; a text is the code of the component.
-    mapping : Mapping, optional
-        Roles and units of columns whose headings do not give them.
     layout : {'wide', 'long'}, optional
         A row per thermal state and a column per position, or a row per position. Default: detected automatically.
-
-    Raises
-    ------
-    RecordingError
-        The file cannot be read, or contains no profile of this kind; the message names line and column.
-    InputError
-        A named column does not exist, or its quantity differs from that of the component.
     """
     wanted = ProfileOptions(target=options) if isinstance(options, str) else options
     wanted.about  # noqa: B018 - raises an error before a long file is read
@@ -76,29 +63,7 @@ def read_components(
     components: Sequence[str] = (),
     mapping: Mapping | None = None,
 ) -> dict[str, tuple[Profiles, ...]]:
-    """Read the profiles of several components from wide tables whose columns are named after them.
-
-    Parameters
-    ----------
-    paths : sequence of str or Path
-        One file per test.
-    components : sequence of str
-        Codes of the components; empty: all that have columns.
-    mapping : Mapping, optional
-        See `read`.
-
-    Returns
-    -------
-    dict of str to tuple of Profiles
-        By code, one per test.
-
-    Raises
-    ------
-    RecordingError
-        A file cannot be read, or has no column named after a component.
-    InputError
-        A component does not exist, or the quantity of a column differs from that of the component.
-    """
+    """Read the profiles of several components from wide tables whose columns are named after them."""
     recordings = [read_recording(path, mapping) for path in paths]
     wanted = components or list(dict.fromkeys(code for r in recordings for code in codes(r)))
     for r in recordings:
@@ -113,26 +78,7 @@ def read_components(
 
 
 def from_recording(recording: Recording, options: ProfileOptions | str) -> Profiles:
-    """Extract profiles from a recording with one column per position.
-
-    Parameters
-    ----------
-    recording : Recording
-        Recording with one row per thermal state.
-    options : ProfileOptions or str
-        Options of the profiles; a text is the code of the component.
-
-    Returns
-    -------
-    Profiles
-        Profiles whose states contain the other channels, except profiles of other components. Unspecified coordinates
-        are 0.
-
-    Raises
-    ------
-    RecordingError, InputError
-        See `read`.
-    """
+    """Extract profiles from a recording with one column per position."""
     wanted = ProfileOptions(target=options) if isinstance(options, str) else options
     axis, unit = wanted.about
     owner = f"{recording.source or recording.name}: {wanted.target}"
@@ -178,16 +124,6 @@ def from_recording(recording: Recording, options: ProfileOptions | str) -> Profi
 
 def read_places(path: str | Path) -> dict[str, Place]:
     """Read a TOML file with the measuring position of each column of a wide table.
-
-    Returns
-    -------
-    dict of str to Place
-        Positions by column.
-
-    Raises
-    ------
-    InputError
-        The file does not exist, is not TOML, or has a position without a length unit; the message names file and key.
 
     Examples
     --------

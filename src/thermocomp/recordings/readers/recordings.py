@@ -41,25 +41,6 @@ def read(path: str | Path, mapping: Mapping | None = None) -> Recording:
 
     Columns are interpreted by the unit in their heading (``time_s``, ``t1_C``, ``drift_um``, ``spindle_rpm``,
     ``T1 [degC]``) or by `mapping`. Thermal cycles come from a column ``cycle``, else from the spindle speed.
-
-    Parameters
-    ----------
-    path : str or Path
-        A file ending in .csv, .tsv, .txt, .dat, .asc, .xlsx, .ods or .parquet.
-    mapping : Mapping, optional
-        Roles and units of columns without clear headings; see `thermocomp.recordings.readers.mapping.read_mapping`.
-
-    Returns
-    -------
-    Recording
-        Recording in house units; `notes` lists omitted columns and replaced values.
-
-    Raises
-    ------
-    RecordingError
-        The file cannot be read, or is not a recording; the message names line and column.
-    UnitError
-        A unit is unknown, or the unit in the heading contradicts the quantity in the mapping.
     """
     rows = read_rows(path, mapping)
     return make_recording(rows, rows.time, rows.table, rows.labels)
@@ -68,22 +49,7 @@ def read(path: str | Path, mapping: Mapping | None = None) -> Recording:
 def read_rows(
     path: str | Path, mapping: Mapping | None = None, *, rising: bool = True, extra: Sequence[str] = ()
 ) -> Rows:
-    """Read the rows of a file.
-
-    Parameters
-    ----------
-    path : str or Path
-    mapping : Mapping, optional
-    rising : bool
-        False: several rows may have the same time, as in a table with a row per position.
-    extra : sequence of str
-        Headings of columns that are also read if they exist, whatever they contain.
-
-    Raises
-    ------
-    RecordingError, UnitError
-        See `read`.
-    """
+    """Read the rows of a file."""
     source = Path(path)
     try:
         return _read_rows(source, mapping or Mapping(), rising=rising, extra=extra)
@@ -180,14 +146,10 @@ def make_recording(rows: Rows, time: FloatArray, table: pd.DataFrame, labels: Se
 
     Parameters
     ----------
-    rows : Rows
-        Rows as read.
     time : ndarray of shape (n,)
         [s]
     table : DataFrame of shape (n, n_kept)
         Selected channels.
-    labels : sequence of object, optional
-        Thermal cycle of each row.
     """
     origin = float(time[0])
     recording = Recording(
@@ -213,18 +175,6 @@ def write(recording: Recording, path: str | Path, *, overwrite: bool = False) ->
 
     Channels whose name does not contain their unit are described in the file itself: in a comment line of a CSV file,
     in an attribute of a Parquet file.
-
-    Parameters
-    ----------
-    recording : Recording
-    path : str or Path
-        A file ending in .csv or .parquet.
-    overwrite : bool
-
-    Raises
-    ------
-    InputError
-        The extension is not supported, or the file cannot be written: see `thermocomp.files.draft.drafts`.
     """
     target = Path(path)
     if target.suffix not in (".csv", ".parquet"):

@@ -75,22 +75,10 @@ class AmbiguousDatesError(ValueError):
 def parse_stamps(text: "pd.Series[Any]", heading: str) -> Parsed | None:
     """Read timestamps in an unknown form.
 
-    Parameters
-    ----------
-    text : Series of str
-    heading : str
-        Heading, which may specify the order of day, month and year.
-
     Returns
     -------
     Parsed or None
         None: the form of the first cell is unknown.
-
-    Raises
-    ------
-    AmbiguousDatesError
-        The order of day, month and year is determined neither by their values nor by the continuity of the rows
-        (`thermocomp.recordings.readers.dateorder.find_order`).
     """
     first = text.iloc[0].strip()
     shape = _STAMP.fullmatch(first)

@@ -11,13 +11,7 @@ from thermocomp.recordings.readers.limits import FileLimits
 
 @contextmanager
 def spooled(stream: BinaryIO, owner: str) -> Iterator[Path]:
-    """Provide a CSV file with the content of a stream; it is removed at the end.
-
-    Raises
-    ------
-    RecordingError
-        The content exceeds the maximum size of a file.
-    """
+    """Provide a CSV file with the content of a stream; it is removed at the end."""
     with scratch() as folder:
         path = folder / "stdin.csv"
         with path.open("wb") as file:

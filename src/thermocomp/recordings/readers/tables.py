@@ -67,11 +67,6 @@ class FileTable(ABC):
         """Read columns as float64 and as text, and return notes on the conversions.
 
         The columns of the returned table are named by position.
-
-        Raises
-        ------
-        RecordingError
-            A cell of `numbers` contains text.
         """
 
     @abstractmethod
@@ -121,14 +116,7 @@ class FrameTable(FileTable):
 
 
 def first_is_number(cells: "pd.Series[Any]", *, empty: bool) -> bool:
-    """Return whether the first non-empty cell is a number.
-
-    Parameters
-    ----------
-    cells : Series
-    empty : bool
-        Value to return if there is none.
-    """
+    """Return whether the first non-empty cell is a number."""
     filled = (str(cell) for cell in cells.dropna())
     first = next((cell for cell in filled if not is_filler(cell)), None)
     return empty if first is None else is_number_like(first)
@@ -161,42 +149,17 @@ def defuse(text: str) -> str:
 
     An apostrophe is put before ``=``, ``+``, ``-``, ``@``, a tab or a line end; line ends are replaced by visible
     symbols. `restore` reverses this.
-
-    Parameters
-    ----------
-    text : str
-        A heading or a label.
     """
     return f"'{text}".translate(_LINE_ENDS) if _FORMULA.match(text) else text.translate(_LINE_ENDS)
 
 
 def restore(text: str) -> str:
-    """Reverse the changes of `defuse`.
-
-    Parameters
-    ----------
-    text : str
-        A heading or a label of a file.
-    """
+    """Reverse the changes of `defuse`."""
     return (text[1:] if text.startswith("'") and _FORMULA.match(text) else text).translate(_LINE_SIGNS)
 
 
 def check_headings(path: Path, headings: Sequence[str], n_rows: int, limits: FileLimits) -> None:
-    """Reject a table that cannot be a recording, whatever the meaning of its columns.
-
-    Parameters
-    ----------
-    path : Path
-    headings : sequence of str
-    n_rows : int
-        Number of rows without the headings.
-    limits : FileLimits
-
-    Raises
-    ------
-    RecordingError
-        No headings, numbers in place of headings, one column, no rows, or a limit is exceeded.
-    """
+    """Reject a table that cannot be a recording, whatever the meaning of its columns."""
     limits.check_table(n_rows, len(headings), path)
     limits.check("heading_characters", max(map(len, headings), default=0), path)
     filled = [h for h in headings if h.strip()]
@@ -217,21 +180,7 @@ def check_headings(path: Path, headings: Sequence[str], n_rows: int, limits: Fil
 
 
 def refuse_cell(table: FileTable, row: int, column: int, cell: object) -> NoReturn:
-    """Raise the error for a cell that contains text where a number is expected.
-
-    Parameters
-    ----------
-    table : FileTable
-    row, column : int
-        Position of the cell in `table`.
-    cell : object
-        Content of the cell.
-
-    Raises
-    ------
-    RecordingError
-        Always.
-    """
+    """Raise the error for a cell that contains text where a number is expected."""
     heading = table.headings[column]
     raise RecordingError(
         f"{table.path}: {table.place(row)}, column {heading!r}: {str(cell)!r} is not a number; correct the cell, leave "
@@ -246,20 +195,7 @@ def skip_row(table: FileTable, row: int) -> Remedy:
 
 
 def decide(signs: Signs, stated: str, delimiter: str, path: Path) -> Notation:
-    """Return the number format of a file; see `thermocomp.recordings.readers.numbers.Signs.decide`.
-
-    Parameters
-    ----------
-    signs : Signs
-    stated, delimiter : str
-    path : Path
-        Path of the file, for the message.
-
-    Raises
-    ------
-    RecordingError
-        The numbers can be read in two ways.
-    """
+    """Return the number format of a file; see `thermocomp.recordings.readers.numbers.Signs.decide`."""
     try:
         return signs.decide(stated, delimiter) or Notation(".")
     except RecordingError as e:
@@ -269,16 +205,7 @@ def decide(signs: Signs, stated: str, delimiter: str, path: Path) -> Notation:
 def convert_all(
     table: FileTable, columns: Mapping[int, "pd.Series[Any]"], decimal: str
 ) -> tuple[dict[int, FloatArray], tuple[str, ...]]:
-    """Read the numbers of text columns, all in one notation; see `convert`.
-
-    Parameters
-    ----------
-    table : FileTable
-    columns : mapping of int to Series
-        Cells by position of the column in `table`.
-    decimal : str
-        Decimal sign, if it is known beforehand.
-    """
+    """Read the numbers of text columns, all in one notation; see `convert`."""
     signs = Signs()
     for cells in columns.values():
         signs.add(cell for cell in cells if isinstance(cell, str))
@@ -305,24 +232,13 @@ def convert(
 
     Parameters
     ----------
-    table : FileTable
-    column : int
-        Position of the column in `table`.
     cells : Series
         Numbers, texts, and None in empty cells.
-    notation : Notation
 
     Returns
     -------
     values : ndarray of shape (n_rows,)
         NaN where a word denotes a missing number.
-    notes : tuple of str
-        Words found, and their locations.
-
-    Raises
-    ------
-    RecordingError
-        A cell contains any other text; the message names it.
     """
     values, odd = read_plain(cells, notation.decimal)
     words: dict[str, list[int]] = {}

@@ -59,12 +59,10 @@ class CsvTable(FileTable):
         Cells of the first rows.
     delimiter : str
         One character; a space denotes any white space.
-    encoding : str
     errors : {'strict', 'replace'}
         Handling of bytes that are invalid in the encoding.
     skipped : tuple of int
         Line numbers (0-based) of lines that are not rows: headings, comments, blank lines.
-    n_rows : int
     data : bytes or None
         Content of the whole file in UTF-8, if conversion was necessary.
     embedded, decimal, notes
@@ -167,20 +165,7 @@ class CsvTable(FileTable):
 
 
 def open_csv(path: Path, options: ReadOptions, limits: FileLimits) -> CsvTable:
-    """Detect the format of a text file in a single pass over its lines, without storing them.
-
-    Parameters
-    ----------
-    path : Path
-    options : ReadOptions
-        Options known beforehand.
-    limits : FileLimits
-
-    Raises
-    ------
-    RecordingError
-        Empty, binary, no heading line, no rows, one column, rows of unequal length, or a limit is exceeded.
-    """
+    """Detect the format of a text file in a single pass over its lines, without storing them."""
     data, told = bring_to_utf8(path, limits)
     lines = open_lines(path, data, options, limits)
     head = _read_head(lines)

@@ -30,11 +30,8 @@ class Lines:
 
     Parameters
     ----------
-    path : Path
     data : bytes or None
         Content of the whole file in UTF-8, if conversion was necessary.
-    options : ReadOptions
-    limits : FileLimits
     returns : bool
         The file contains carriage returns that do not end a line.
     """
@@ -50,18 +47,7 @@ class Lines:
         return self.path.open("rb") if self.data is None else BytesIO(self.data)
 
     def content(self, skipped: list[int]) -> Iterator[tuple[int, bytes]]:
-        """Yield line number (0-based) and text of each line that is neither blank nor a comment.
-
-        Parameters
-        ----------
-        skipped : list of int
-            List to which the numbers of the other lines are appended.
-
-        Raises
-        ------
-        RecordingError
-            A line is longer than the limit, or contains a carriage return.
-        """
+        """Yield line number (0-based) and text of each line that is neither blank nor a comment."""
         options, limits = self.options, self.limits
         comment, most = options.comment.encode(), limits.line_bytes
         with self.open() as f:
@@ -110,15 +96,7 @@ class Lines:
         return text.partition(": ")[2].strip()
 
     def read_tail(self, n_lines: int, skipped: list[int]) -> list[tuple[int, bytes]]:
-        """Return the last rows of the file with their line numbers, without another pass over the file.
-
-        Parameters
-        ----------
-        n_lines : int
-            Number of lines of the file.
-        skipped : list of int
-            Line numbers of lines that are not rows.
-        """
+        """Return the last rows of the file with their line numbers, without another pass over the file."""
         with self.open() as f:
             size = f.seek(0, SEEK_END)
             f.seek(max(0, size - _TAIL))
@@ -135,21 +113,7 @@ class Lines:
 
 
 def open_lines(path: Path, data: bytes | None, options: ReadOptions, limits: FileLimits) -> Lines:
-    """Check that a file is text.
-
-    Parameters
-    ----------
-    path : Path
-    data : bytes or None
-        See `Lines`.
-    options : ReadOptions
-    limits : FileLimits
-
-    Raises
-    ------
-    RecordingError
-        The file is not text.
-    """
+    """Check that a file is text."""
     returns, last = 0, b""
     with path.open("rb") if data is None else BytesIO(data) as f:
         while block := f.read(1 << 20):
@@ -182,18 +146,7 @@ def count_cells(line: bytes, delimiter: str) -> int:
 
 
 def describe_ragged(path: Path, number: int, cells: int, width: int, line: bytes, delimiter: str) -> str:
-    """Return the fault of a line that is too short or too long, and the required action.
-
-    Parameters
-    ----------
-    path : Path
-    number : int
-        Line number (1-based).
-    cells, width : int
-        Number of cells of the line, and number of headings.
-    line : bytes
-    delimiter : str
-    """
+    """Return the fault of a line that is too short or too long, and the required action."""
     start = line[:60].decode("latin-1").strip()
     text = f"{path}: line {number} has {cells} cells where the heading has {width}: {start!r}"
     if delimiter == "," and cells > width:

@@ -43,22 +43,7 @@ class TimePlan(NamedTuple):
 
 
 def find_time(table: FileTable, meanings: Sequence[Meaning | None], mapping: Mapping, kinds: Kinds) -> TimePlan:
-    """Find the time column, and the column of dates if the time column contains only a time of day.
-
-    Parameters
-    ----------
-    table : FileTable
-    meanings : sequence of Meaning or None
-        Meanings of the headings.
-    mapping : Mapping
-    kinds : callable
-        Returns the kind of contents of a column.
-
-    Raises
-    ------
-    RecordingError
-        There is no time column, or the mapping names a column that does not exist.
-    """
+    """Find the time column, and the column of dates if the time column contains only a time of day."""
     notes: list[str] = []
     headings, source = table.headings, str(table.path)
     if mapping.time.column:
@@ -83,23 +68,7 @@ def find_time(table: FileTable, meanings: Sequence[Meaning | None], mapping: Map
 
 
 def find_position(place: Place, headings: Sequence[str], table: str, source: str) -> int:
-    """Return the position of a column named in a mapping.
-
-    Parameters
-    ----------
-    place : str or int
-        Heading or 1-based number.
-    headings : sequence of str
-    table : str
-        Table of the mapping, for messages.
-    source : str
-        Name of the file, for messages.
-
-    Raises
-    ------
-    RecordingError
-        The column does not exist.
-    """
+    """Return the position of a column named in a mapping."""
     if isinstance(place, int):
         if 1 <= place <= len(headings):
             return place - 1

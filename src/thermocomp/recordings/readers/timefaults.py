@@ -22,20 +22,8 @@ def refuse_falling(wrong: IntArray, time: FloatArray, shown: "pd.Series[Any]", s
 
     Parameters
     ----------
-    wrong : ndarray of int
-        Rows that are not later than the previous row.
     time : ndarray of shape (n_rows,)
         [s]
-    shown : Series
-        Times as written in the file.
-    start : str
-        Date and time of the first row; empty if there is none.
-    file : FileCells
-
-    Raises
-    ------
-    RecordingError
-        Always; the message names the first row.
     """
     is_stamp, table = file.is_stamp, file.table
     row, local = int(wrong[0]), is_stamp and pd.Timestamp(start).tzinfo is None
@@ -83,14 +71,6 @@ def refuse_passed(time: FloatArray, start: str, file: FileCells) -> None:
     ----------
     time : ndarray of shape (n_rows,)
         [s]
-    start : str
-        Date and time of the first row; empty if there is none.
-    file : FileCells
-
-    Raises
-    ------
-    TwoReadingsError
-        The times are elapsed times.
     """
     if file.times.date is None or file.mapping.time.format or not start:
         return
@@ -118,14 +98,6 @@ def refuse_set_forward(time: FloatArray, start: str, file: FileCells) -> None:
     ----------
     time : ndarray of shape (n_rows,)
         [s]
-    start : str
-        Date and time of the first row; empty if there is none.
-    file : FileCells
-
-    Raises
-    ------
-    TwoReadingsError
-        There is such a gap.
     """
     steps = np.diff(time)
     usual = float(np.median(steps)) if steps.size else np.inf

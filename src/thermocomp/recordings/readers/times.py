@@ -26,25 +26,10 @@ _DAY = 86_400_000_000_000  # [ns]
 def read_times(file: FileCells, *, rising: bool) -> tuple[FloatArray, str, tuple[str, ...]]:
     """Read the times of the rows of a recording.
 
-    Parameters
-    ----------
-    file : FileCells
-    rising : bool
-        Each time must be later than the previous one; otherwise it must not be earlier.
-
     Returns
     -------
     time : ndarray of shape (n_rows,)
         Seconds since the first row [s].
-    start : str
-        ISO timestamp of the first row; empty if unknown.
-    notes : tuple of str
-        Notes on the interpretation, if it is not obvious.
-
-    Raises
-    ------
-    RecordingError
-        A time is missing, cannot be read, can be read in two ways, or does not increase.
     """
     times, beside, table, source = file.times, file.columns.beside, file.table, file.source
     shown, zone = file.cells[times.time], file.mapping.time.zone
@@ -236,11 +221,6 @@ def find_likely_units(raw: FloatArray) -> tuple[str, ...]:
     Parameters
     ----------
     raw : ndarray of shape (n_rows,)
-
-    Returns
-    -------
-    tuple of str
-        Possible units, most likely first; empty if the numbers are not times of a test.
     """
     if len(raw) < 2 or not (np.diff(raw) > 0).all():
         return ()

@@ -20,13 +20,6 @@ def check_unzipped(path: Path, limits: FileLimits) -> None:
     """Reject a zip bomb, and XML that would take much more memory or time than its size suggests.
 
     Sizes stated in the zip file are not trusted. Parts of a valid workbook never define entities.
-
-    Raises
-    ------
-    RecordingError
-        See `FileLimits.check`; or a part contains a document type definition.
-    zipfile.BadZipFile
-        The file is not a zip file.
     """
     unpacked = 0
     with zipfile.ZipFile(path) as parts:

@@ -50,20 +50,7 @@ Sheets = dict[str, Callable[[], Generator[Row]]]
 
 
 def open_workbook(path: Path, options: ReadOptions, limits: FileLimits) -> FrameTable:
-    """Open the sheet of a workbook that contains a recording.
-
-    Parameters
-    ----------
-    path : Path
-        Path with extension .xlsx or .ods.
-    options : ReadOptions
-    limits : FileLimits
-
-    Raises
-    ------
-    RecordingError
-        The file is not a workbook, exceeds a limit, contains no recording, or several sheets may be the recording.
-    """
+    """Open the sheet of a workbook that contains a recording."""
     try:
         check_unzipped(path, limits)
         with ExitStack() as stack:

@@ -41,24 +41,6 @@ def read(path: str | Path) -> tuple[Positioning, ...]:
     Columns: ``position_mm`` (or ``target_mm``), ``deviation_um`` (or ``error_um``; actual minus target; ``urad`` for an
     angle), ``direction`` (+ or -), ``run``, and if there are several ``state`` (thermal state) and ``axis``. Other
     columns are ignored. Other units of length are converted; the unit is given in the heading.
-
-    Parameters
-    ----------
-    path : str or Path
-        A file ending in .csv, .tsv or .txt.
-
-    Returns
-    -------
-    tuple of Positioning
-        One per axis and thermal state, in the order of the file.
-
-    Raises
-    ------
-    RecordingError
-        File missing, a column missing or present twice in different units, an invalid cell, targets of a run that are
-        neither increasing nor decreasing, a target missing in a run, or too few targets.
-    UnitError
-        A unit is not a unit of length (or angle).
     """
     source = Path(path)
     if source.suffix.lower() not in ENDINGS:

@@ -34,7 +34,6 @@ class PositionStudy:
         The fit; the models of its factors carry the honest error.
     options : PositionOptions
         Options, with open settings filled in.
-    assessment : PositionAssessment
     dropped : str
         Reason why the thermal part was dropped, i.e. its own verdict; empty if it was not.
     """
@@ -62,30 +61,10 @@ def study(
 
     Parameters
     ----------
-    profiles : Profiles or sequence of Profiles
-        Profiles of one component, one per test.
-    options : PositionOptions
     left_open : sequence of {'slopes', 'offset', 'reference_position'}
         Settings to be determined from the profiles instead of from `options`; see
         `thermocomp.volumetric.models.positionoptions.fill_options`. If the number of slopes is open and the thermal
         part is refused, the cold profile alone is judged and used.
-    judging : callable
-        Function that splits the states, such as those of `thermocomp.judging.splits`.
-    jobs : int
-        Number of parallel processes; -1: one per core.
-    progress : callable
-        Called with a line of text after each fit.
-
-    Returns
-    -------
-    PositionStudy
-
-    Raises
-    ------
-    InputError
-        There is nothing to leave out, or an option is invalid.
-    FitError
-        The fit fails for all states or for those of a split, or nothing is left to judge on.
     """
     tests = (profiles,) if isinstance(profiles, Profiles) else profiles
     (found,) = study_all([tests], options, left_open=left_open, judging=judging, jobs=jobs, progress=progress)
@@ -101,20 +80,7 @@ def study_all(
     jobs: int = 1,
     progress: Callable[[str], None] = lambda _: None,
 ) -> tuple[PositionStudy, ...]:
-    """Apply `study` to several components together.
-
-    Parameters
-    ----------
-    components : sequence of sequence of Profiles
-        Tests of each component.
-    options, left_open, judging, jobs, progress
-        See `study`; `n_pieces` gives the number of calls of `progress`.
-
-    Returns
-    -------
-    tuple of PositionStudy
-        One per component.
-    """
+    """Apply `study` to several components together."""
     whole = [ComponentStates(tuple(tests), *_splits(tests, options, judging)) for tests in components]
     found = _studies(whole, options, left_open, jobs, progress)
     if "slopes" not in left_open:

@@ -40,7 +40,6 @@ class CycleErrors:
 
     Parameters
     ----------
-    cycle : str
     n_states : int
         Number of judged profiles.
     none, geometric, model : float
@@ -66,7 +65,6 @@ class PositionAssessment:
     ----------
     protocol : str
         Method of choosing the unseen cycles.
-    cycles : tuple of CycleErrors
     overall : CycleErrors
         Errors over all cycles together.
     verdict : Verdict
@@ -74,7 +72,6 @@ class PositionAssessment:
         profile alone; by cycles or, if files were left out, by files.
     factors : tuple of HonestError
         Errors of the model of each factor on the same states [unit/m^i]; verdict and reason are those of the whole.
-    unit : {'um', 'urad'}
     """
 
     protocol: str
@@ -105,16 +102,7 @@ class JudgedSplit:
 
 
 def judge_split(tests: Sequence[Profiles], fit: PositionFit, options: PositionOptions, split: Split) -> JudgedSplit:
-    """Return the errors in the judged rows of a split, except those of cold profiles that are zeros.
-
-    Parameters
-    ----------
-    tests : sequence of Profiles
-    fit : PositionFit
-        Fit to the other rows.
-    options : PositionOptions
-    split : Split
-    """
+    """Return the errors in the judged rows of a split, except those of cold profiles that are zeros."""
     samples, model = fit.samples, fit.model
     rows = split.judge.copy()
     for k, test in enumerate(tests):
@@ -153,15 +141,7 @@ def _factors(
 
 
 def assess_together(one: ComponentStates, parts: Sequence[JudgedSplit], options: PositionOptions) -> PositionAssessment:
-    """Return the assessment of a component over all of its splits.
-
-    Parameters
-    ----------
-    one : ComponentStates
-    parts : sequence of JudgedSplit
-        One per split, in their order.
-    options : PositionOptions
-    """
+    """Return the assessment of a component over all of its splits."""
     samples, tests, protocol = one.samples, one.tests, one.judging.name
     unit = tests[0].unit
     rows = np.concatenate([p.state for p in parts])

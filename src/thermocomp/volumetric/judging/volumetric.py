@@ -81,7 +81,6 @@ class Moment:
         Row of the course.
     time : float
         Time since the first row of the recording [s].
-    field : ErrorField
     straight : StraightLines
         Best straight line of each axis through the point of the course, as accepted by controllers.
     tool : tuple of float
@@ -147,11 +146,8 @@ class Volumetric:
 
     Parameters
     ----------
-    machine : Machine
     recording : Recording or None
         Replayed recording; None: the reference state.
-    course : PointCourse
-    moments : tuple of Moment
     missing : int
         Number of rows with a missing input: the previous state is held there, as in live operation.
     """
@@ -191,28 +187,15 @@ def study(
 
     Parameters
     ----------
-    machine : Machine
     recording : Recording, optional
         Recording to replay. Default: none, the machine is in its reference state: constants and profiles.
     at : tuple of float, optional
         Point followed over time [mm]. Default: the middle of the travels; the search for the largest error then
         includes the corners.
-    grid : int
-        Number of points along each axis.
     tool : tuple of float, optional
         Vector from the gauge point to the tip [mm]. Default: the tool of the machine.
     hours : sequence of float, optional
         Times to evaluate [h]. Default: start, largest error and end.
-    progress : callable, optional
-
-    Returns
-    -------
-    Volumetric
-
-    Raises
-    ------
-    InputError
-        A point or a time is out of range, or a channel of the recording is missing or of another quantity.
     """
     tip = machine.tool if tool is None else tool
     if grid > FINEST:

@@ -34,7 +34,6 @@ class Tried:
     ----------
     order : (int, int)
         Polynomial: degree in the axis' own coordinate and in the others. Spline: number of inner knots, and 0.
-    n_terms : int
     left_out : float
         RMS error at points left out in turn [unit]; inf if the remaining points do not determine the profile.
     margin : float
@@ -60,7 +59,6 @@ class ProfileFit:
 
     Parameters
     ----------
-    profile : Profile
     order : (int, int)
         See `Tried`.
     tried : tuple of Tried
@@ -133,21 +131,8 @@ def fit_profile(
         Axis of the error component (own coordinate).
     kind : {'polynomial', 'spline'}
         Polynomial in all coordinates, or cubic spline along the own coordinate.
-    order : int, (int, int) or 'auto'
-        Degree in the own coordinate, or a pair with the degree in the others; or the number of inner knots of a spline.
     coordinates : str, optional
         Axes that the profile may depend on, such as ``YX``. Default: all axes whose position varies.
-
-    Returns
-    -------
-    ProfileFit
-
-    Raises
-    ------
-    InputError
-        Kind, order or coordinates are invalid.
-    FitError
-        There are too few points.
     """
     there = np.isfinite(values)
     points, values = points[there], values[there]

@@ -101,23 +101,9 @@ def fit_position(
 
     Parameters
     ----------
-    profiles : Profiles or sequence of Profiles
-        Profiles of one component, one per test.
-    options : PositionOptions
     learn : ndarray of bool of shape (n_states,), optional
         Training states, over all tests. Default: all. The reference states of a test are used if any of its states is
         used.
-
-    Returns
-    -------
-    PositionFit
-
-    Raises
-    ------
-    InputError
-        The tests are not of one component, or an option is invalid.
-    FitError
-        There are too few data to fit.
     """
     tests = set_cold_profiles((profiles,) if isinstance(profiles, Profiles) else tuple(profiles), options, learn)
     samples, slopes = slope_samples(tests, options, learn)
@@ -169,22 +155,8 @@ def slope_samples(
 
     Parameters
     ----------
-    tests : sequence of Profiles
-    options : PositionOptions
     learn : ndarray of bool of shape (n_states,), optional
         Training states; see `fit_position`.
-
-    Returns
-    -------
-    samples : Samples
-        Samples relative to the reference states. Units of the targets are those of the error, not per metre.
-    slopes : tuple of Slopes
-        One per test.
-
-    Raises
-    ------
-    InputError
-        The tests are not of one component, or there are no inputs.
     """
     first = tests[0]
     for test in tests[1:]:

@@ -38,7 +38,6 @@ class PositionOptions:
         Highest power m of the position; 1 is enough according to Chen (C-05). 0 without an offset: cold profile only.
     offset : bool
         Whether to model k_0(t); without it the thermal part is zero at the reference position, as in Chen's model.
-    profile : {'polynomial', 'spline'}
     order : int, (int, int) or 'auto'
         Order of the profile; see `thermocomp.volumetric.models.geometric.fit_profile`.
     coordinates : str, optional
@@ -93,22 +92,8 @@ def fill_options(
 
     Parameters
     ----------
-    profiles : Profiles or sequence of Profiles
-        Profiles of one component, one per test.
-    options : PositionOptions
-        Options; settings that are not open stay unchanged.
-    left_open : sequence of {'slopes', 'offset', 'reference_position'}
     learn : ndarray of bool of shape (n_states,), optional
         States that may be used; see `thermocomp.volumetric.models.position.fit_position`.
-
-    Returns
-    -------
-    PositionOptions
-
-    Raises
-    ------
-    FitError
-        No state may be used.
     """
     tests = set_cold_profiles((profiles,) if isinstance(profiles, Profiles) else tuple(profiles), options, learn)
     tests = blank_unlearned(tests, options, learn)
@@ -130,13 +115,7 @@ def fill_options(
 
 
 def reference_position(tests: Sequence[Profiles], options: PositionOptions) -> float:
-    """Return the reference position, at which q is zero [mm]: see `PositionOptions`.
-
-    Parameters
-    ----------
-    tests : sequence of Profiles
-    options : PositionOptions
-    """
+    """Return the reference position, at which q is zero [mm]: see `PositionOptions`."""
     if options.reference_position is not None:
         return options.reference_position
     low, high = min(t.position.min() for t in tests), max(t.position.max() for t in tests)
@@ -150,15 +129,8 @@ def set_cold_profiles(
 
     Parameters
     ----------
-    tests : sequence of Profiles
-    options : PositionOptions
     learn : ndarray of bool of shape (n_states,), optional
         Training states: the mean is taken over tests with at least one; see `blank_unlearned`.
-
-    Raises
-    ------
-    InputError
-        One cold profile is required for tests that were not measured at the same points.
     """
     if options.rezero:
         return tuple(tests)
@@ -178,20 +150,8 @@ def blank_unlearned(
 
     Parameters
     ----------
-    tests : sequence of Profiles
-    options : PositionOptions
-        Reference states are kept if any state of their test is used for training.
     learn : ndarray of bool of shape (n_states,), optional
         Training states over all tests. Default: all.
-
-    Returns
-    -------
-    tuple of Profiles
-
-    Raises
-    ------
-    FitError
-        No test is left.
     """
     if learn is None:
         return tuple(tests)
@@ -208,14 +168,6 @@ def blank_unlearned(
 
 def remainder(tests: Sequence[Profiles], options: PositionOptions, m: int) -> float:
     """Return the residual of the thermal part after powers up to m, RMS per degree of freedom, no reference states.
-
-    Parameters
-    ----------
-    tests : sequence of Profiles
-    options : PositionOptions
-        Defines whether there is an offset, and where q is zero.
-    m : int
-        0 without an offset: no fit, the thermal part itself is used.
 
     Returns
     -------

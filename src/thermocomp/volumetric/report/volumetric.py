@@ -9,16 +9,7 @@ from thermocomp.volumetric.report import volumetric_tables as tables
 
 
 def render(study: Volumetric) -> str:
-    """Return the page as a self-contained HTML text.
-
-    Parameters
-    ----------
-    study : Volumetric
-
-    Returns
-    -------
-    str
-    """
+    """Return the page as a self-contained HTML text."""
     machine, recording, course = study.machine, study.recording, study.course
     known = machine.components
     n_axes, over_time = len(machine.structure.axes), len(course.time) > 1

@@ -41,7 +41,6 @@ class Expansion:
 
     Parameters
     ----------
-    path : Path
     sources : array of int
         For each line of the output file: number of its line in the program; 0 if it has none.
     acts : int
@@ -101,36 +100,12 @@ def expand(
 
     Parameters
     ----------
-    path, out : Path
-        `out` must not exist.
-    inch : bool, optional
-        Unit in force at the start; if not given, the program must specify it.
     startup : str, optional
         Codes in force at the start that the end of a program does not reset, such as ``G64 P0.01 G98`` [mm]. Canned
         cycles need them; the program must specify those not given (G61, G61.1 or G64; G98 or G99).
     diameters : dict of int to float, optional
         Tool diameters [mm], used to compute G41 and G42. A program that uses a different diameter, stored in the
         controller, is refused.
-    block_delete : bool
-        Omit the lines that begin with ``/``.
-    subroutines : sequence of Path
-        Folders of subprograms, at most 8; the folder of the program is always searched first.
-    user_codes : bool
-        Keep M100 to M199; otherwise they are refused, because their effect is unknown.
-    progress : callable, optional
-        Called with the number of lines written.
-
-    Returns
-    -------
-    Expansion
-
-    Raises
-    ------
-    ProgramError
-        The program depends on data stored in the machine, or has an operation without equivalent plain codes; or a file
-        that was run contains M19.
-    InputError
-        `out` already exists or cannot be written, or the program does not exist.
     """
     if not path.is_file():
         raise InputError(f"{path} is not a file")

@@ -62,7 +62,6 @@ class Side:
     ----------
     program, machine : tuple of float
         Position [mm, deg].
-    frame : ProgramFrame
     origins, rotations : dict by work coordinate system
         Present values in the controller [mm, deg].
     """
@@ -117,12 +116,8 @@ class OriginWriter:
 
         Parameters
         ----------
-        a, b : Canonical
-            Calls ``g5x`` of both runs.
         angles : tuple of float or None
             Rotations reported with these calls [deg].
-        source : str
-            Line of the program.
         """
         index, chosen = int(a.values[0]), self.sides[0].frame.system
         if index != int(b.values[0]):
@@ -160,13 +155,7 @@ class OriginWriter:
         return result
 
     def plain_g10(self, source: str) -> str:
-        """Return the line that sets the origin of a system not in force: only the source line specifies which.
-
-        Parameters
-        ----------
-        source : str
-            Line of the program.
-        """
+        """Return the line that sets the origin of a system not in force: only the source line specifies which."""
         text = _bare(source)
         if not PLAIN_G10.fullmatch(text):
             raise self.refuse(
@@ -186,15 +175,7 @@ class OriginWriter:
         return re.sub(r"(?<=[\d.])(?=[A-Z])", " ", re.sub(r"^N\d+", "", text))
 
     def shift(self, old: tuple[Place, Place], source: str) -> str:
-        """Return the line for a new G92 offset: a named position (G92), a fixed shift (G52), or cancellation.
-
-        Parameters
-        ----------
-        old : tuple
-            Previous offsets of both runs.
-        source : str
-            Line of the program.
-        """
+        """Return the line for a new G92 offset: a named position (G92), a fixed shift (G52), or cancellation."""
         first, second = self.sides
         now = first.frame.shift, second.frame.shift
         if not (any(now[0]) or any(now[1])):

@@ -112,15 +112,7 @@ class Writer(OriginWriter):
     def release(  # noqa: PLR0911
         self, held: Canonical, other: Canonical, a: Canonical, b: Canonical
     ) -> tuple[list[tuple[str, str]], bool]:
-        """Return (kind, text) of a pair held back, and whether the next pair belongs to it.
-
-        Parameters
-        ----------
-        held, other : Canonical
-            Pair held back.
-        a, b : Canonical
-            Next pair.
-        """
+        """Return (kind, text) of a pair held back, and whether the next pair belongs to it."""
         kind, close = held.kind, a.line == held.line
         if kind == "g5x":
             if a.kind == "g92" and close and self.unshifted(a, b):

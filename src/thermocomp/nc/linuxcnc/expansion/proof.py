@@ -43,20 +43,10 @@ class Act(NamedTuple):
 def compare(asked: Iterator[Canonical], done: Iterator[Canonical]) -> int:
     """Compare the actions of two programs in the same controller.
 
-    Parameters
-    ----------
-    asked, done : iterator of Canonical
-        Calls of the program, and of the program that must have the same effect.
-
     Returns
     -------
     int
         Number of actions, all equal: moves within 1e-6 mm, their feeds, spindle, coolant, tools, stops, dwells.
-
-    Raises
-    ------
-    ProgramError
-        The actions differ; the message gives the line of the program and the difference.
     """
     count, line = 0, 1
     for first, second in zip_longest(trace_acts(asked), trace_acts(done)):

@@ -77,7 +77,6 @@ class Side:
 
     Parameters
     ----------
-    run : InterpreterRun
     original : callable
         Maps lines of the program that is run to lines of the original.
     drop : callable

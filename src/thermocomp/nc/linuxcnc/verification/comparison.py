@@ -53,29 +53,7 @@ def compare(
     origin: LineOrigins,
     progress: Callable[[int], object],
 ) -> Found:
-    """Run the next job of both programs in parallel, and compare their calls.
-
-    Parameters
-    ----------
-    first, second : InterpreterRun
-        Runs of the original and of the revised program.
-    ledger : Ledger
-        Expected shifts of the lines of the original.
-    origin : LineOrigins
-    progress : callable
-        Called with line numbers of the original.
-
-    Returns
-    -------
-    Found
-
-    Raises
-    ------
-    ProgramError
-        The calls differ, with line of the original and difference; or the interpreter refuses the revised program.
-    RefusedError
-        The interpreter refuses the original.
-    """
+    """Run the next job of both programs in parallel, and compare their calls."""
 
     def drop(lines: Integers) -> Mask:
         return ledger.of(lines).inverse

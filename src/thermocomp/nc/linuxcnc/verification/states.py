@@ -60,19 +60,7 @@ def list_unstated(setup: Setup) -> tuple[str, ...]:
 
 
 def state(setup: Setup, number: int, what: frozenset[str] | set[str], program: Path) -> InterpreterJob:
-    """Return the job of running a program in a state of the controller.
-
-    Parameters
-    ----------
-    setup : Setup
-        Given settings.
-    number : int
-        Bits select G98 or G99, a rotation, and a G92 shift, so that eight states cover all combinations.
-    what : set of str
-        Random settings in this state, see `REMEDIES`; all others are 0, but the machine never starts at a position
-        that the program could contain.
-    program : Path
-    """
+    """Return the job of running a program in a state of the controller."""
     base = replace(build_stored(setup), start=draw_controller(ELSEWHERE).start)
     one, two, four = number & 1, number >> 1 & 1, number >> 2 & 1
     other = draw_controller(number)

@@ -48,7 +48,6 @@ class UntranslatableError(InputError):
     ----------
     line : int
         Line number (1-based).
-    reason : str
     """
 
     def __init__(self, line: int, reason: str) -> None:
@@ -82,27 +81,7 @@ class Translator:
         self._length: int | None = None
 
     def translate(self, lines: Iterable[str]) -> Iterator[tuple[str, int]]:
-        """Translate a program.
-
-        Parameters
-        ----------
-        lines : iterable of str
-            Plain lines, see `thermocomp.nc.expansion.unroll`.
-
-        Yields
-        ------
-        str
-            Line of the translation, with its ending.
-        int
-            Number of its line in the program (1-based).
-
-        Raises
-        ------
-        UntranslatableError
-            LinuxCNC does this differently, or not at all.
-        ProgramError
-            The program cannot be interpreted.
-        """
+        """Translate a program."""
         for line in read_lines(lines, "fanuc"):
             block = self._follower.step(line)
             if line.optional and self._setup.skip_optional:

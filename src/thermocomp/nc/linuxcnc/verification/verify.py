@@ -100,29 +100,6 @@ def prove(
     same duration within 2 % or 5 ms; if no linear axis of the original moves, none may move. All other calls (feeds,
     speeds, tools, dwells ...) must be equal. A move may be divided, with its pieces on the original path. Fanuc
     programs are first translated for LinuxCNC.
-
-    Parameters
-    ----------
-    original, revised : Path
-        Original and revised program.
-    ledger : Ledger
-        Expected shifts of the lines of the original.
-    setup : Setup
-        Setup of the revision.
-    progress : callable, optional
-        Called with the line of the original, as if all states were one run.
-
-    Returns
-    -------
-    Proof
-
-    Raises
-    ------
-    ProgramError
-        A move is not at the required position, or the interpreter refuses the revised program: an error in thermocomp,
-        or a dependence on settings stored in the controller that are not given.
-    Unprovable
-        The interpreter refuses the original, or is not installed; or a Fanuc function has no equivalent in LinuxCNC.
     """
     if (reason := rs274.find_obstacle()) is not None:
         raise Unprovable(reason)
