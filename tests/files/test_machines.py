@@ -369,7 +369,7 @@ def test_numbers_in_another_unit_are_seen(tmp_path: Path) -> None:
         ('C0Y = "-11 mrad"', "components.C0Y: -11000 urad is more than 10 mrad: check the unit"),
         (
             'EXX = {profile = [["1 m", "0 um"], ["2 m", "1 um"]]}',
-            "components.EXX: positioning of X: its profile is known from X 1000 to 2000 mm, the axis goes from 0",
+            "components.EXX: positioning of X: its profile is known for X = 1000 to 2000 mm, but the axis travels",
         ),
     ):
         with pytest.raises(InputError, match=re.escape(message)):

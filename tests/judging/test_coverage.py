@@ -121,7 +121,7 @@ def test_constant_inputs_and_no_units_are_no_trouble() -> None:
     samples = stack([plain], ["z_um"])
     nothing = coverage.find_validity(samples, splits.Judging("none", ()))
     assert (nothing.units, nothing.independent, nothing.hours) == (0, 0, 0.0)
-    with pytest.raises(InputError, match="5 independent of 4"):
+    with pytest.raises(InputError, match="5 of 4 units are independent"):
         replace(found, independent=5)
 
 

@@ -89,10 +89,10 @@ def test_what_is_known_of_a_part_of_the_travel_is_held() -> None:
     )
     machine = mill({"EXX": whole, "EYX": part, "EYY": slope, "EZZ": 3.0, "ECX": 20.0})
     assert note_short_profiles(machine) == (
-        "EYX: its profile is known from X 100 to 600 mm, the axis goes from 0 to 600 mm: beyond, the value at the end "
-        "is held",
-        "EYY: its slope is known from Y 0 to 450 mm, the axis goes from 0 to 500 mm: beyond, the value at the end is "
-        "held",
+        "EYX: its profile is known for X = 100 to 600 mm, but the axis travels from 0 to 600 mm: beyond, the value at "
+        "the end is held",
+        "EYY: its slope is known for Y = 0 to 450 mm, but the axis travels from 0 to 500 mm: beyond, the value at "
+        "the end is held",
     )
     assert notes(machine) == (*note_counted_twice(machine), *note_short_profiles(machine))
     assert len(notes(machine)) == 3

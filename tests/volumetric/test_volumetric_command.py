@@ -155,7 +155,7 @@ def test_notes_on_the_machine(mill: tuple[str, str], tmp_path: Path, capsys: pyt
     assert twice.startswith(
         "ECX is 20 urad at X 0 mm, where X stood while Y was measured: over the travel of Y it moves"
     )
-    assert held.startswith("EYX: its profile is known from X 0 to 300 mm, the axis goes from 0 to 600 mm")
+    assert held.startswith("EYX: its profile is known for X = 0 to 300 mm, but the axis travels from 0 to 600 mm")
     page = tmp_path / "noted.html"
     assert run(["volumetric", mill[0], "-o", str(page)]) == 0
     said, written = capsys.readouterr().out, page.read_text(encoding="utf-8")

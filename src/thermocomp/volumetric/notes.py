@@ -88,8 +88,8 @@ def note_short_profiles(machine: Machine) -> tuple[str, ...]:
             first, last = machine.axis(name).travel
             if low > first + _NEAR or high < last - _NEAR:
                 found.append(
-                    f"{code}: its {what} is known from {name} {low:g} to {high:g} mm, the axis goes from {first:g} to "
-                    f"{last:g} mm: beyond, the value at the end is held"
+                    f"{code}: its {what} is known for {name} = {low:g} to {high:g} mm, but the axis travels "
+                    f"from {first:g} to {last:g} mm: beyond, the value at the end is held"
                 )
     return tuple(found)
 
