@@ -211,7 +211,7 @@ def test_a_source(thermocomp: Thermocomp, tmp_path: Path) -> None:
     thermocomp("serve", "live.toml", "--check")
     (tmp_path / "live.toml").write_text(CONFIG.format("to = 2.0"), encoding="utf-8")
     _, err = thermocomp("serve", "live.toml", "--check", code=2)
-    assert "sources.1.to is no key that is known" in err
+    assert "sources.1.to is not a known key" in err
     for kind, why in (
         ("broken", "of the package tinyplug cannot be loaded"),
         ("plain", "tinyplug:Counting is not a dataclass with a method open"),
