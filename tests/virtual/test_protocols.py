@@ -203,7 +203,7 @@ BODY = HEAD + 'segments = [{duration = "1 min"}]\n'
         (HEAD + 'segments = [{duration = "10000000 h"}]', "make 3.6e+09 rows; at most 10,000,000"),
         (BODY + "copies = 1000000", "key 'copies' = 1000000: must be from 1 to 10000"),
         (HEAD + 'duration = "1 min"\nrepeat = 1000000\nsegments = [{}]', "must be from 1 to 10000"),
-        (HEAD + 'segments = [{duration = "1 min", speed = {between = [0, 3000], step = 1e-6}}]', "take a larger step"),
+        (HEAD + 'segments = [{duration = "1 min", speed = {between = [0, 3000], step = 1e-6}}]', "use a larger step"),
         (HEAD + 'segments = [{duration = "1 min", powered = "no"}]', "must be true or false, without quotes"),
         (BODY + "perfect = 1", "key 'perfect' = 1: must be true or false"),
         (HEAD + 'segments = [{duration = "1 min", speed = true}]', "must not be true or false"),

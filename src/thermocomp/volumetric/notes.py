@@ -70,10 +70,12 @@ def note_counted_twice(machine: Machine) -> tuple[str, ...]:
                     continue
                 straightness, square = f"E{towards}{other}", _squareness(letter, other)
                 found.append(
-                    f"{code} is {turn:.3g} urad at {axis} {stood['XYZ'.index(axis)]:g} mm, where {axis} stood while "
+                    f"{code} is {turn:.3g} urad at {axis} {stood['XYZ'.index(axis)]:g} mm, its position while "
                     f"{other} was measured: over the travel of {other} it moves the tip by {effect:.3g} um along "
-                    f"{towards}. {' or '.join((straightness, *square))} holds that already if it was read between "
-                    f"table and spindle: then count {code} from {axis} {stood['XYZ'.index(axis)]:g} mm"
+                    f"{towards}. {' or '.join((straightness, *square))} already contains this if it was measured "
+                    "between "
+                    f"table and spindle: then make {code} relative to its value at {axis} {stood['XYZ'.index(axis)]:g} "
+                    "mm"
                 )
     return tuple(found)
 

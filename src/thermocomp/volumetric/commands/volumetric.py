@@ -61,7 +61,7 @@ def _show(found: VolumetricErrors, page: Path | None) -> None:
         if codes:
             console.print(f"[yellow]but[/] {what}: {words(', '.join(codes))}", soft_wrap=True)
     if study.missing:
-        console.print(f"[yellow]but[/] in {study.missing} rows an input is missing: the state before is held there")
+        console.print(f"[yellow]but[/] in {study.missing} rows an input is missing: the previous state is held there")
     for note in study.notes:
         console.print(f"[yellow]note[/] {words(note)}", soft_wrap=True)
     if volume:
