@@ -257,7 +257,7 @@ def test_a_block_without_the_target_is_left_out(crowd: Samples) -> None:
     assert len(found.blocks) == len(judging.splits) - 1
     assert np.isfinite(found.rms).all()
     gone[:, 0] = np.nan
-    with pytest.raises(FitError, match="x_um has no value in any of the blocks"):
+    with pytest.raises(FitError, match="x_um has no value in any validation block"):
         budget.budget(replace(crowd, deviations=gone), judging, ["ols"], max_sensors=2)
 
 
@@ -293,19 +293,17 @@ def test_targets_that_are_never_measured_together(crowd: Samples) -> None:
     judging = splits.leave_one_cycle_out(crowd)
     turns = crowd.deviations.copy()
     turns[::2, 0] = turns[1::2, 1] = np.nan
-    with pytest.raises(
-        FitError, match=r"^0 rows have a number in each of x_um, z_um and of the 7 inputs.*fewer targets"
-    ):
+    with pytest.raises(FitError, match=r"^0 rows have values of all of x_um, z_um and of all 7 inputs.*fewer targets"):
         budget.budget(replace(crowd, deviations=turns), judging, ["ols"])
     blocks = crowd.deviations.copy()
     blocks[crowd.cycle < 2, 0] = blocks[crowd.cycle >= 2, 1] = np.nan
-    with pytest.raises(FitError, match="no block to judge by has a value for each of x_um, z_um"):
+    with pytest.raises(FitError, match="no validation block has values of all of x_um, z_um"):
         budget.budget(replace(crowd, deviations=blocks), judging, ["ols"])
     alone = replace(crowd, targets=crowd.targets[:1], deviations=turns[:, :1])
     assert np.isfinite(budget.budget(alone, judging, ["ols"], max_sensors=1).rms).all()
     few = turns.copy()
     few[:30] = crowd.deviations[:30]  # 30 rows of the first cycle are complete
-    with pytest.raises(FitError, match=r"^0 rows have a number"):  # but none without that cycle
+    with pytest.raises(FitError, match=r"^0 rows have values"):  # but none without that cycle
         budget.budget(replace(crowd, deviations=few), judging, ["ols"])
 
 

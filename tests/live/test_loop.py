@@ -480,7 +480,7 @@ def test_a_new_zero_forgets_what_counted_from_the_one_before() -> None:
     service.measure(Measurement(time.time(), "z_um", 3.1, left=False, keys=("id 2",)))  # waits
     service.rezero("z_um", "homing")
     service.measure(Measurement(early, "z_um", 3.2, left=False, keys=("id 3",)))
-    assert "made before the zero" in service.events[-1].text
+    assert "made before the present zero" in service.events[-1].text
     service.take(Reading(time.time(), {"t": 21.0}))
     assert not service.state.learned
     assert service.roll_back("z_um")  # of the zero before

@@ -45,8 +45,12 @@ def section(judged: Judged, recordings: Sequence[Recording]) -> Section:
     logs = find_faults(judged, recordings)
     if not logs:
         known = any(m.watch is not None for m in judged.models)
-        why = "the recordings have not got what it needs" if known else "the model file holds none; fit it again"
-        return Section(TITLE, [f"No watch over the temperatures was asked: {why}."])
+        why = (
+            "the recordings do not contain what the watch needs"
+            if known
+            else "the model file contains no watch; fit the model again"
+        )
+        return Section(TITLE, [f"The temperatures were not watched: {why}."])
     if not any(log.faults for log in logs):
         watched = list(dict.fromkeys(name for log in logs for name in log.watch.names))
         return Section(TITLE, [f"None of the {len(watched)} temperatures failed: {', '.join(watched)}."])
@@ -114,7 +118,7 @@ def describe_held(judged: Judged, logs: Sequence[FaultLog]) -> Iterator[str]:
 
 def _held_words(target: str, unit: str, cost: Cost) -> str:
     return (
-        f"{target}: with {', '.join(cost.failed)} failed its correction is held, then fades at the machine: "
+        f"{target}: while {', '.join(cost.failed)} failed, the correction is held, then fades at the machine: "
         f"{cost.rms:.2f} {unit} RMS in {cost.hours:.1f} h."
     )
 

@@ -112,9 +112,7 @@ def _disturbed(target: str, found: Robustness) -> Iterator[PrintedLine]:
     if found.harm:
         yield PrintedLine(f" {target}: {found.harm}", Toned("harmful when disturbed", "bad"))
     if found.outside > 0.1:
-        yield PrintedLine(
-            f" {100 * found.outside:.0f} % of the rows are outside the range {target} was trained in", BUT
-        )
+        yield PrintedLine(f" {100 * found.outside:.0f} % of the rows are outside the trained range of {target}", BUT)
     if found.unlike > 0.1:
         yield PrintedLine(f" {target}: {describe_unlike(found)}", BUT)
 
