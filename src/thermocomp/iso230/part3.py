@@ -322,8 +322,7 @@ def _stations_words(stations: dict[str, str]) -> str:
     shown = ", ".join(codes[:3]) + (" ..." if len(codes) > 3 else "")
     return (
         f"{len(stations)} channels are stations of error profiles ({shown}): they are not reported here; use "
-        "thermocomp "
-        "position and thermocomp volumetric for them"
+        "thermocomp position and thermocomp volumetric for them"
     )
 
 
@@ -365,9 +364,8 @@ def _about_rows(recording: Recording, kind: Kind, rows: tuple[int, int, int], nu
     if kind != "etve" and lead < 2:
         readings = "a single reading" if lead == 0 else "the first two readings"
         notes.append(
-            f"almost no rest is recorded before the drives start: all values are relative to {readings} and "
-            "contain the noise of this reference; "
-            f"record {WINDOW / 60:.0f} min of rest"
+            f"almost no rest is recorded before the drives start: all values are relative to {readings} and contain "
+            f"the noise of this reference; record {WINDOW / 60:.0f} min of rest"
         )
     if number > 1:
         notes.append("the machine had run before: it does not start from rest")

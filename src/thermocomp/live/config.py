@@ -190,8 +190,7 @@ class Config:
                 if isinstance(source, MqttIn | MqttProbing) and source.hears(sink):
                     yield (
                         f"topic = {source.topic!r}: receives the corrections published to {sink.topic!r}; publish them "
-                        "to a "
-                        "topic to which no source and no probe subscribes"
+                        "to a topic to which no source and no probe subscribes"
                     )
         machine = any(isinstance(s, SimulatedIn) for s in self.sources)
         if not machine and any(isinstance(p, SimulatedProbing) for p in self.probes):

@@ -49,6 +49,5 @@ def describe_losses(models: Sequence[ErrorModel]) -> Iterator[str]:
     if blind:
         yield (
             f"Slow drift of {', '.join(blind)} is detected only beyond these values: the other temperatures and the "
-            "speed do "
-            "not predict it better; a spare sensor would"
+            "speed do not predict it better; a spare sensor would"
         )

@@ -32,8 +32,7 @@ def describe_running(assessments: Sequence[Assessment]) -> list[str]:
         alone_words = f"{', '.join(shown)}{more}" if shown else "the same to 0.01 um"
         lines.append(
             "The judged corrections are those that would run, behind the gate and with limits "
-            f"({limited[0].limits.in_words()}). RMS of "
-            f"the models alone: {alone_words}."
+            f"({limited[0].limits.in_words()}). RMS of the models alone: {alone_words}."
         )
     if without := list(dict.fromkeys(a.target for a in judged if a.limits is None)):
         lines.append(f"No limits for {', '.join(without)}: limits apply to micrometres only.")

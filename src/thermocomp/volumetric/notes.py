@@ -70,12 +70,10 @@ def note_counted_twice(machine: Machine) -> tuple[str, ...]:
                     continue
                 straightness, square = f"E{towards}{other}", _squareness(letter, other)
                 found.append(
-                    f"{code} is {turn:.3g} urad at {axis} {stood['XYZ'.index(axis)]:g} mm, its position while "
-                    f"{other} was measured: over the travel of {other} it moves the tip by {effect:.3g} um along "
-                    f"{towards}. {' or '.join((straightness, *square))} already contains this if it was measured "
-                    "between "
-                    f"table and spindle: then make {code} relative to its value at {axis} {stood['XYZ'.index(axis)]:g} "
-                    "mm"
+                    f"{code} is {turn:.3g} urad at {axis} {stood['XYZ'.index(axis)]:g} mm, its position while {other} "
+                    f"was measured: over the travel of {other} it moves the tip by {effect:.3g} um along {towards}. "
+                    f"{' or '.join((straightness, *square))} already contains this if it was measured between table "
+                    f"and spindle: then make {code} relative to its value at {axis} {stood['XYZ'.index(axis)]:g} mm"
                 )
     return tuple(found)
 

@@ -220,8 +220,7 @@ def _refuse_unreached(position: FloatArray, cold: FloatArray, test: Profiles) ->
         if end not in there:
             raise FitError(
                 f"{test.target}: the cold profile has no value at {end:g} mm, where other profiles have one: name more "
-                "reference "
-                "states, or omit that position"
+                "reference states, or omit that position"
             )
 
 

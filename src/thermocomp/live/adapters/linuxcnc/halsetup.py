@@ -155,8 +155,7 @@ def _axis(ini: Ini, letter: str, pattern: Pattern) -> HalAxis:
         if not 0.0 < ini.number(section, "OFFSET_AV_RATIO", 0.0) <= 0.9:
             raise InputError(
                 f"{ini.path}: [{section}] has no OFFSET_AV_RATIO from 0 to 0.9, and without it LinuxCNC accepts "
-                "external "
-                f"offsets but does not apply them; add OFFSET_AV_RATIO = 0.1 to [{section}] (the share of the "
+                f"external offsets but does not apply them; add OFFSET_AV_RATIO = 0.1 to [{section}] (the share of the "
                 "axis' speed and acceleration for the correction; the rest is for programs), or use --pattern drive"
             )
     else:
