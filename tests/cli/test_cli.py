@@ -135,8 +135,8 @@ def test_fit_assess_and_their_exit_codes(drift: Path, tmp_path: Path, capsys: py
     assert "no honest test: fitted to drift" in said
     assert "│ averaged, │" in said
     assert "│ in-sample │" in said
-    assert "in-sample: on the rows it has learned from" in said
-    assert "% of the judged rows, which the model has learned from, with a mean half-width" in said
+    assert "in-sample: on the rows used for training" in said
+    assert "% of the judged rows, which were used for training, with a mean half-width" in said
     copy = drift.with_name("copy.csv")
     copy.write_text(drift.read_text(encoding="utf-8") + "\n", encoding="utf-8")
     assert run(["assess", str(model), str(copy)]) == 1  # the same test in another file

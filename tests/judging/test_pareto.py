@@ -141,7 +141,7 @@ def test_what_the_next_sensor_gains_and_whether_it_is_worth_it() -> None:
     )
     assert pareto.next_to_buy(one, "ols", 1) == (
         "Next to buy: c would gain 0.70 um (0.70 to 0.70 um from block to block), which is less than the blocks differ "
-        "by: more thermal cycles would tell."
+        "by: more thermal cycles would decide."
     )
     assert pareto.next_to_buy(one, "ols", 2) == (
         "Next to buy: none is worth it. d would gain -0.50 um (-0.90 to -0.10 um from block to block); 0.50 um is what "
@@ -163,7 +163,7 @@ def test_two_sensors_that_are_worth_it_together_are_named() -> None:
     assert pareto.next_to_buy(one, "ols", 0) == (
         "Next to buy: no single one is worth it. b would gain 0.10 um (0.10 to 0.10 um from block to block); 0.50 um "
         "is what a further sensor has to gain. b and c together would gain 1.50 um, which is less than the blocks "
-        "differ by: more thermal cycles would tell."
+        "differ by: more thermal cycles would decide."
     )
     little = replace(one, rms=one.rms + np.array([0.0, 0.0, 0.6, 0.6])[:, None, None])
     assert pareto.next_to_buy(little, "ols", 0).startswith("Next to buy: none is worth it. b would gain 0.10 um")

@@ -219,7 +219,7 @@ def next_to_buy(found: Budget, model: str, place: int) -> str:
         new = [s for s in found.sensors[k] if s not in found.sensors[place]]
         if gain > len(new) * least:
             surely = (
-                "." if gain > margin else ", which is less than the blocks differ by: more thermal cycles would tell."
+                "." if gain > margin else ", which is less than the blocks differ by: more thermal cycles would decide."
             )
             if k == place + 1:
                 return f"Next to buy: {would}{surely}"

@@ -102,7 +102,8 @@ def by_time(samples: Samples, train_s: float, test_s: float) -> Judging:
     first, stop = (int(np.searchsorted(elapsed, t)) for t in (train_s, train_s + test_s))
     if not 0 < first < stop:
         raise InputError(
-            f"split {train_s / 3600:g} h/{test_s / 3600:g} h: but the recordings last {elapsed[-1] / 3600:.2f} h in all"
+            f"split {train_s / 3600:g} h/{test_s / 3600:g} h: the recordings last only {elapsed[-1] / 3600:.2f} h in "
+            "all"
         )
     name = f"first {train_s / 3600:g} h to learn, next {test_s / 3600:g} h unseen"
     return _consecutive(name, len(samples), first, stop)

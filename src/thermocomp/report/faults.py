@@ -55,8 +55,8 @@ def section(judged: Judged, recordings: Sequence[Recording]) -> Section:
         watched = list(dict.fromkeys(name for log in logs for name in log.watch.names))
         return Section(TITLE, [f"None of the {len(watched)} temperatures failed: {', '.join(watched)}."])
     parts: list[str | Layout | Shown] = [
-        "The recordings were gone through as the machine would have read them: nothing is known before it is found. "
-        "What check finds afterwards is left out of the verdict above, not here."
+        "The recordings were replayed as the machine would have read them: a fault is known only once it is detected. "
+        "Rows in which check finds a fault afterwards are left out of the verdict above, but not here."
     ]
     for log in (log for log in logs if log.faults):
         recording = recordings[log.recording]
@@ -94,7 +94,9 @@ def describe_faults(logs: Sequence[FaultLog], recordings: Sequence[Recording]) -
         for f in log.faults[:TOLD]:
             recording = recordings[log.recording]
             until = f"to {_when(f.end, recording)}" if f.returned else "to the end"
-            beside = f"; it read {f.beside:+.1f} degC beside what stood in" if math.isfinite(f.beside) else ""
+            beside = (
+                f"; it read {f.beside:+.1f} degC relative to its substitute value" if math.isfinite(f.beside) else ""
+            )
             yield f"{log.name}: {f.sensor} {f.word} from {_when(f.begin, recording)} {until}{beside}"
         if len(log.faults) > TOLD:
             yield f"{log.name}: {len(log.faults) - TOLD} more failures, on the page that -o writes"

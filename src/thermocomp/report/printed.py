@@ -175,7 +175,7 @@ def _assessment_table(assessments: Sequence[Assessment]) -> Layout:
         columns,
         rows,
         caption="residual in um where it was judged"
-        + ("; in-sample: on the rows it has learned from" if any(a.caveat for a in assessments) else "")
+        + ("; in-sample: on the rows used for training" if any(a.caveat for a in assessments) else "")
         + _band_words(assessments),
         tones=dict.fromkeys(sections, "none"),
         sections=frozenset(sections),

@@ -47,7 +47,7 @@ def _show(found: VolumetricErrors, page: Path | None) -> None:
         print_table(known, console)
     others = [c["code"] for c in components if c["source"] == "nothing"]
     console.print(
-        f"{len(known.rows)} of {len(components)} components are known" + "; taken as zero: " * bool(others), end=""
+        f"{len(known.rows)} of {len(components)} components are known" + "; assumed to be zero: " * bool(others), end=""
     )
     console.print(", ".join(others), soft_wrap=True)
     if point:
