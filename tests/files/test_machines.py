@@ -292,7 +292,10 @@ def test_model_files_that_do_not_fit(tmp_path: Path) -> None:
             'Y0C = {model = "eyy.json", target = "EYY"}',
             "components.Y0C: spindle drift in Y does not depend on a position",
         ),
-        ('EXX = {model = "wrong_axis.json"}', "components.EXX: positioning of X: the model is along Y"),
+        (
+            'EXX = {model = "wrong_axis.json"}',
+            "components.EXX: positioning of X: expected a model along X, found one along Y",
+        ),
         ('Z0C = {model = "refused.json"}', "components.Z0C.model: "),
         (
             'Z0C = {model = "refused.json"}',

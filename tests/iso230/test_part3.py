@@ -422,10 +422,10 @@ def test_rows_that_a_model_has_learned_from_are_counted() -> None:
     assert learned.provenance is not None
     learned = replace(learned, provenance=replace(learned.provenance, data_sha256=("another file",)))
     told = [note for test in assess(recording, models=[learned]) for note in test.notes]
-    wanted = "the model of z_um: 500 of 800 rows were learned from: what it leaves there is no honest test"
-    assert {n for n in told if "learned" in n} == {wanted}
+    wanted = "the model of z_um: 500 of 800 rows were used for training: its residual there is not an honest test"
+    assert {n for n in told if "used for training" in n} == {wanted}
     told = [note for test in assess(other, models=[learned]) for note in test.notes]
-    assert not [n for n in told if "learned" in n]
+    assert not [n for n in told if "used for training" in n]
 
 
 # -- the virtual machine ------------------------------------------------------------------------------------------

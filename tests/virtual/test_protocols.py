@@ -224,7 +224,7 @@ BODY = HEAD + 'segments = [{duration = "1 min"}]\n'
         ),
         (BODY + '[[tests]]\nname = "a"\n[[tests]]\nname = "a"', "two tests are named 'mine-a'"),
         (BODY + "tests = 3", "key 'tests' = 3: must be tables"),
-        (BODY + "tests = []", "key 'tests' = []: an experiment needs a test"),
+        (BODY + "tests = []", "key 'tests' = []: an experiment needs at least one test"),
     ],
 )
 def test_what_cannot_be_used_is_told_to_the_key(text: str, message: str, tmp_path: Path) -> None:
