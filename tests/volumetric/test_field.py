@@ -249,7 +249,9 @@ def test_missing_channels_are_named() -> None:
         model.replay(time[::-1], dict.fromkeys(model.inputs, time))
     two = {"EXX": line("EXX", "um", {"T1": 1.0}), "EYY": line("EYY", "um", {"T1": 1.0})}
     odd = replace(two["EYY"], inputs=(replace(temperature("T1"), quantity="spindle_speed", unit="1/min"),))
-    with pytest.raises(InputError, match="input T1: temperature in degC for one model, spindle_speed in 1/min"):
+    with pytest.raises(
+        InputError, match="input T1: one model needs temperature in degC, another needs spindle_speed in 1/min"
+    ):
         VolumetricModel(by_hand("XYZ", {**two, "EYY": odd}))
 
 
