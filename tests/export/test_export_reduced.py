@@ -55,7 +55,7 @@ def test_a_loss_beyond_the_limit_is_refused(tmp_path: Path, capsys: pytest.Captu
     assert exported(tmp_path, small_machine(), "klipper", targets="z_um x_um", method="dynamic") == 1
     said = capsys.readouterr().out
     assert "refused z_um is left out: loses too much: RMS 3.54 um on unseen cycles" in said
-    assert "x_um is left out: it is of X, and klipper corrects Z alone" in said
+    assert "x_um is left out: its axis is X, but klipper corrects Z only" in said
     assert not (tmp_path / "out").exists()
     line = ["export", str(tmp_path / "model.json"), str(tmp_path / "drift.csv"), "--to", "klipper", *DATE, "--json"]
     assert run([*line, "-o", str(tmp_path / "out"), "--most-loss", "10"]) == 0  # x_um was not judged badly

@@ -360,5 +360,5 @@ def test_no_temperature_is_predicted_by_itself(watch: Watch) -> None:
     first = watch.sensors[0]
     for place in (0, len(SIX)):
         own = tuple(0.1 if k == place else w for k, w in enumerate(first.weights))
-        with pytest.raises(SettingError, match="by itself"):
+        with pytest.raises(SettingError, match="from itself"):
             replace(watch, sensors=(replace(first, weights=own), *watch.sensors[1:]))
