@@ -229,7 +229,7 @@ def _lay_out(folder: Path, settings: HalSettings, ratio: str, programs: Mapping[
         (folder / name).write_text(text, encoding="ascii")
     for todo in set_up(folder / "test.ini", folder, settings).todo:
         if "already loads sum2" in todo:  # done as it says
-            hal = hal.replace("loadrt sum2 count=1", todo.partition("make it: ")[2])
+            hal = hal.replace("loadrt sum2 count=1", todo.partition("change it to: ")[2])
     (folder / "test.hal").write_text(hal, encoding="ascii")
     ini = ini.replace("HALFILE = test.hal\n", "HALFILE = test.hal\nHALFILE = thermocomp.hal\nHALFILE = trace.hal\n")
     (folder / "test.ini").write_text(ini.replace(right, ratio), encoding="ascii")
