@@ -188,7 +188,7 @@ def test_how_a_recording_begins(recording: Recording) -> None:
         tc.select(warm, "z_um", "partial-f")
     assert tc.select(warm, "z_um", "partial-f", starts=rezeroed).sensors["z_um"]
     for wrong, message in (
-        ([rezeroed], r"starts: 1 for 2 recording\(s\): give one each, or one for all"),
+        ([rezeroed], r"starts: 1 given for 2 recording\(s\): give one for each, or one for all"),
         (went_on, "starts: 2 recordings cannot all continue from the same files"),
         ([tc.Start(), tc.Start("continued", earlier=(after,))], "small cannot continue from itself"),
     ):
@@ -204,7 +204,7 @@ def test_report_of_a_handed_in_estimator(recording: Recording, tmp_path: Path) -
 def test_fitted_models(results: dict[str, Result], tmp_path: Path) -> None:
     found, test = results["fit"], small_machine(dt=200.0)
     assert isinstance(found, FittedModels)
-    with pytest.raises(InputError, match=r"models of z_um, x_um: use one of \.models"):
+    with pytest.raises(InputError, match=r"there are several models, of z_um, x_um: use one of \.models"):
         found.model  # noqa: B018
     predicted = found.predict(test.to_frame())
     assert list(predicted) == ["z_um", "x_um"]
@@ -290,7 +290,7 @@ def test_of_two_spindle_speeds_the_first_is_taken_and_the_other_named(recording:
     table = recording.to_frame().assign(second_rpm=lambda t: t["spindle_rpm"] / 2)
     found = tc.fit(table, "z_um", "ols")
     assert "second_rpm" not in found.model.sensors
-    said = "table: second_rpm left out: of several spindle speeds the first, spindle_rpm, is an input; name the inputs"
+    said = "table: second_rpm left out: of several spindle speeds only the first, spindle_rpm, is an input; name"
     assert any(line.startswith(said) for line in found.trouble)
     named = tc.fit(table, "z_um", "ols", inputs=["t1_C", "second_rpm"])
     assert not any("second_rpm" in line for line in named.trouble)

@@ -128,7 +128,7 @@ def test_nothing_is_overwritten_and_both_files_come_or_none(tmp_path: Path) -> N
 
 @pytest.mark.parametrize("every", [-60.0, 30.0, 7200.0, float("nan")])
 def test_a_measurement_that_cannot_be_is_refused(every: float) -> None:
-    with pytest.raises(InputError, match="expected 1 to 30, or 0 for a logger"):
+    with pytest.raises(InputError, match="expected 1 to 30 min, or 0 if a logger measures"):
         write_program(GRID[0], "linuxcnc", every)
 
 

@@ -85,7 +85,7 @@ def test_the_rest_is_judged_and_what_failed_is_named(board: tuple[dict[str, Any]
     why = {name: m["tests"]["stepwise2017"].get("error", "") for name, m in results.items()}
     assert why["broken"] == "RuntimeError: no licence"
     assert "nameless.py has no estimator" in why["nameless"]
-    assert "process died" in why["deadly"]
+    assert "process ended" in why["deadly"]
     assert why["endless"] == "> 3 s"
     assert "name of a method" in why["ols (file)"]
     assert all(results[n]["score"] is None for n in ("broken", "nameless", "deadly", "endless", "ols (file)"))

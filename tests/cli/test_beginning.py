@@ -159,7 +159,7 @@ def test_cold_is_said(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
         (["--zero", "t9_C=20"], "no channel is named 't9_C'"),
         (["--continues", "b.csv"], "is the recording itself"),
         (["--continues", "a.csv", "--gap", "-5"], "a gap of -5 s between two files"),
-        (["a.csv", "--continues", "a.csv"], "2 recordings are given; name the one that continues"),
+        (["a.csv", "--continues", "a.csv"], "2 recordings are given; give only the one that continues"),
         (["--magnitude", "0"], "limit magnitude = 0.0: must be positive"),
     ],
 )

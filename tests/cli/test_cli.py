@@ -87,7 +87,7 @@ def test_compare_as_json(drift: Path, capsys: pytest.CaptureFixture[str]) -> Non
         assert set(r) >= RESULT_KEYS
         assert r["block"] == "rows 180-239"
         assert r["verdict"] == "unproven"
-        assert r["reason"].startswith("judged on one stretch that continues from what was learned; ")
+        assert r["reason"].startswith("judged on one section that continues the training data; ")
         assert r["n_sensors"] == len(r["sensors"])
         assert not {"z_um", "x_um"} & set(r["sensors"])
         assert r["mae_um"] <= r["rms_um"] <= r["max_um"]
@@ -135,8 +135,8 @@ def test_fit_assess_and_their_exit_codes(drift: Path, tmp_path: Path, capsys: py
     assert "no honest test: fitted to drift" in said
     assert "│ averaged, │" in said
     assert "│ in-sample │" in said
-    assert "in-sample: on the rows it has learned from" in said
-    assert "% of the judged rows, which the model has learned from, with a mean half-width" in said
+    assert "in-sample: on the rows used for training" in said
+    assert "% of the judged rows, which were used for training, with a mean half-width" in said
     copy = drift.with_name("copy.csv")
     copy.write_text(drift.read_text(encoding="utf-8") + "\n", encoding="utf-8")
     assert run(["assess", str(model), str(copy)]) == 1  # the same test in another file
@@ -155,7 +155,7 @@ def test_assess_leaves_out_what_was_learned_from(
     found = printed(capsys)
     assert found["seen_in_training"] == []
     assert found["results"][-1]["verdict"] == "refused"
-    reason = "no honest test: 239 of 239 rows were learned from; judge it on another recording"
+    reason = "no honest test: 239 of 239 rows were used for training; judge the model on another recording"
     assert found["results"][-1]["reason"] == reason
     first, day = small_machine(dt=200.0), small_machine((2200.0, 1200.0), seed=3, dt=200.0)
     table = pd.concat([first.table.drop(index=119), day.table], ignore_index=True)
@@ -166,7 +166,7 @@ def test_assess_leaves_out_what_was_learned_from(
     found = printed(capsys)["results"][-1]
     assert (found["n_rows"], found["n_rows_learned_from"]) == (120, 239)
     run(["assess", str(model), str(copy)])
-    assert "239 of 359 rows were learned from: left out" in " ".join(capsys.readouterr().out.split())
+    assert "239 of 359 rows were used for training: left out" in " ".join(capsys.readouterr().out.split())
 
 
 def test_what_fit_has_refused_assess_does_not_pass(

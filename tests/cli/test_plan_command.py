@@ -89,6 +89,6 @@ def test_in_python_it_is_a_table_a_figure_and_a_sentence(tmp_path: Path) -> None
 
 
 def test_one_running_test_is_judged(tmp_path: Path) -> None:
-    with pytest.raises(tc.ThermocompError, match="2 recordings: give the one of the running test"):
+    with pytest.raises(tc.ThermocompError, match="2 recordings given: expected one, that of the running test"):
         tc.may_stop([small_machine(), small_machine()])
     assert [name for name, _ in tc.may_stop(small_machine()).states] == ["z_um", "x_um"]

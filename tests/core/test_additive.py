@@ -108,10 +108,10 @@ def test_file_round_trip_is_bit_exact() -> None:
         ((0.0, 0.0), (1.0, 2.0), "linear", "must increase strictly"),
         ((0.0, np.nan), (1.0, 2.0), "linear", "must be finite"),
         ((0.0, 1.0), (1.0, np.inf), "linear", "must be finite"),
-        ((0.0, 1.0), (1.0,), "linear", "equally many"),
-        ((0.0, 1.0), (1.0, 2.0), "step", "one y more than x"),
-        ((), (), "linear", "at least one y"),
-        ((0.0, 5e-324), (0.0, 1.0), "linear", "so close"),
+        ((0.0, 1.0), (1.0,), "linear", "as many as x values"),
+        ((0.0, 1.0), (1.0, 2.0), "step", "one more than x values"),
+        ((), (), "linear", "at least one y value"),
+        ((0.0, 5e-324), (0.0, 1.0), "linear", "too close"),
     ],
 )
 def test_bad_curves_are_refused(x: Any, y: Any, kind: Any, message: str) -> None:
@@ -137,7 +137,7 @@ def test_numbers_that_do_not_fit_are_refused(change: dict[str, Any], message: st
     [
         ("a", ((0, float("inf")),), "variable a: weights must be finite"),
         ("none", (), "variable none: has no input"),
-        ("two\nlines", ((0, 1.0),), r"variable: 'two\\nlines' is not a name"),
+        ("two\nlines", ((0, 1.0),), r"variable: 'two\\nlines' is not a valid name"),
     ],
 )
 def test_what_is_no_variable_is_refused(name: str, weights: Any, message: str) -> None:

@@ -266,9 +266,9 @@ def test_a_batch_of_known_starts() -> None:
 @pytest.mark.parametrize(
     ("start", "message"),
     [
-        ({"deviation": np.nan}, "not finite"),
+        ({"deviation": np.nan}, "must be finite"),
         ({"deviation": 1.0, "inputs": [1.0]}, "expected 2 inputs"),
-        ({"deviation": 1.0, "inputs": [1.0, np.inf]}, "not finite"),
+        ({"deviation": 1.0, "inputs": [1.0, np.inf]}, "must be finite"),
         ({"deviation": 1.0, "reference": [1.0, 2.0, 3.0]}, "expected 2 inputs"),
     ],
 )
@@ -299,7 +299,7 @@ def test_numbers_that_are_none() -> None:
     [
         ({"interval": 0.0}, "interval must be from 0.001 to"),
         ({"interval": np.inf}, "interval must be from 0.001 to"),
-        ({"b": ((1.0,),)}, "the same number for each of 2 inputs"),
+        ({"b": ((1.0,),)}, "for each of 2 inputs, at least one and the same number for each"),
         ({"b": ((1.0,), (1.0, 2.0))}, "the same number"),
         ({"b": ((), ())}, "the same number"),
         ({"inputs": (), "b": ()}, "at least one"),
@@ -319,7 +319,7 @@ def test_linear_numbers_that_do_not_fit(change: dict[str, object], message: str)
         ({"interval": -1.0}, "interval must be from 0.001 to"),
         ({"input_scaling": Affine((1.0,), (0.0,))}, "scaling of 1"),
         ({"output_scaling": Affine((1.0, 1.0), (0.0, 0.0))}, "expected one output"),
-        ({"net": replace(network().net, output="identity")}, "no bounds"),
+        ({"net": replace(network().net, output="identity")}, "not bounded"),
     ],
 )
 def test_net_numbers_that_do_not_fit(change: dict[str, object], message: str) -> None:

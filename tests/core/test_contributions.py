@@ -105,10 +105,10 @@ def test_only_paced_models_have_parts_and_a_step_is_positive() -> None:
         lagged=(),
     )
     for asked in (lambda: contributions(other, table()), lambda: gains(other, 60.0)):
-        with pytest.raises(InputError, match=r"z_um has a model of the family linear-dynamic.* averaged makes"):
+        with pytest.raises(InputError, match=r"z_um has a model of the family linear-dynamic.* averaged produces"):
             asked()
     for step in (0.0, -5.0, np.nan):
-        with pytest.raises(InputError, match=f"^step {step}: expected the time between two rows"):
+        with pytest.raises(InputError, match=f"^step {step}: the time between two rows must be"):
             gains(MODEL, step)
     assert gains(MODEL, np.inf)[0].settled == gains(MODEL, np.inf)[0].instantaneous
 

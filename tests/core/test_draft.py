@@ -160,7 +160,7 @@ def test_a_disk_without_links(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
         return replace(self, target)
 
     monkeypatch.setattr(Path, "replace", broken)
-    with pytest.raises(InputError, match="b: cannot be written: Input/output error; what was there is as it was"):
+    with pytest.raises(InputError, match="b: cannot be written: Input/output error; an existing file is unchanged"):
         put({first: "newest", last: "newest"})
     assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {"a": "new", "b": "precious"}
     last.unlink()
@@ -190,7 +190,7 @@ def test_a_disk_that_fails_leaves_all_as_it_was(
             raise OSError(errno.EIO, "Input/output error")
 
     monkeypatch.setattr(os, "fsync", flush)
-    with pytest.raises(InputError, match="2: cannot be written: Input/output error; what was there is as it was"):
+    with pytest.raises(InputError, match="2: cannot be written: Input/output error; an existing file is unchanged"):
         put(dict.fromkeys(targets, "new"))
     assert count == when + 1
     assert [(t.exists() and t.read_text()) for t in targets] == ["old" if there else False] * 2
@@ -286,7 +286,9 @@ def test_a_folder_where_nothing_may_be_made(tmp_path: Path, monkeypatch: pytest.
         raise PermissionError(errno.EACCES, "Permission denied", str(self))
 
     monkeypatch.setattr(Path, "mkdir", refused)
-    with pytest.raises(InputError, match=r"a: cannot be written: Permission denied; a file must be allowed beside it"):
+    with pytest.raises(
+        InputError, match=r"a: cannot be written: Permission denied; you need permission to create files in its folder"
+    ):
         put({tmp_path / "a": "x"})
 
 

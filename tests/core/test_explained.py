@@ -67,13 +67,13 @@ def test_a_dozen_lines_say_it(model: ErrorModel) -> None:
     assert "Honest error: 1.25 um RMS, largest 2.00, on unseen cycles; without compensation 5.00 RMS." in lines
     assert "Verdict: accepted, worse than none on cycle 3." in lines
     assert f"Band: {band.tell('um')}." in lines
-    assert "13.3 h, 4 cycles or tests, 3 of them not alike; 2 spindle speeds of 0 to 3000 1/min" in text
+    assert "13.3 h, 4 cycles or tests, 3 of them distinct; 2 spindle speeds of 0 to 3000 1/min" in text
     assert "1.50 um without it" in next(line for line in lines if line.startswith("  t1_C"))
     third = next(line for line in lines if line.startswith("  t3_C"))
     left, _, spare = third.partition("; spare recommended: ")
     assert left.endswith("9.00 um without it: held, then fades")
     assert spare == "without it the correction is held, then fades"
-    assert "Two lost at once: judged for 2 pairs, 1 of which it may lose." in lines
+    assert "Two sensors lost at once: judged for 2 pairs; the model continues without 1 of them." in lines
 
 
 def test_a_drift_that_is_found_late_wants_a_spare(model: ErrorModel) -> None:
@@ -83,7 +83,7 @@ def test_a_drift_that_is_found_late_wants_a_spare(model: ErrorModel) -> None:
     late = explain(replace(model, watch=replace(watched(model), sensors=sensors)))
     spare = {s.name: s.spare for s in late.sensors}
     assert spare["t1_C"] == ""
-    assert spare["t2_C"] == "its slow drift is found only from 3.1 degC on"
+    assert spare["t2_C"] == "its slow drift is detected only from 3.1 degC on"
     assert spare["spindle_rpm"] == ""
     assert all(s.still is None for s in late.sensors)
     assert "min" not in str(late).split("stuck while")[1].split("\n")[0]
@@ -95,12 +95,12 @@ def test_what_is_not_known_is_not_made_up(model: ErrorModel) -> None:
     assert told.word == "unjudged"
     assert told.rms is None
     assert not any(s.watched or s.runs_on for s in told.sensors)
-    assert {s.spare for s in told.sensors if s.quantity == "temperature"} == {"nothing predicts it"}
+    assert {s.spare for s in told.sensors if s.quantity == "temperature"} == {"no other sensor predicts it"}
     text = str(told)
-    assert "never judged on cycles that it has not seen; it will not run" in text
+    assert "never judged on unseen cycles; the model will not run" in text
     assert "Band: none." in text
     assert "Judged over: not known." in text
-    assert "nothing finds one that is wrong" in text
+    assert "a wrong value is not detected" in text
     assert "None" not in text
     assert "nan" not in text
     # judged without a sensor, but with no watch to say what stands in: nothing runs on

@@ -109,9 +109,9 @@ def test_what_it_is_made_of_has_names() -> None:
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        ({"temperatures": (LaggedInput(0, 0.5, ()),)}, "expected 1 lagged"),
+        ({"temperatures": (LaggedInput(0, 0.5, ()),)}, "expected 1 coefficients in lagged"),
         ({"temperatures": (LaggedInput(2, 0.5, (1.0,)),)}, "beyond the 2 inputs"),
-        ({"states": (SpeedState(1, 2.0, 600.0, 1200.0, 1.0),)}, "must not be the slower"),
+        ({"states": (SpeedState(1, 2.0, 600.0, 1200.0, 1.0),)}, "the first must not be longer"),
         ({"states": (SpeedState(1, 20.0, 3600.0, 1200.0, 1.0),)}, "power"),
         ({"states": (SpeedState(1, 2.0, float("nan"), 1200.0, 1.0),)}, "stopped"),
         ({"states": (SpeedState(1, 2.0, 3600.0, 1200.0, float("inf")),)}, "weight"),

@@ -180,8 +180,11 @@ def thermocomp(orders: subprocess.Popen[str], tmp_path: Path) -> Thermocomp:
 def test_a_command(thermocomp: Thermocomp) -> None:
     out, err = thermocomp("greet", "shop")
     assert out == "hello shop\n"
-    assert "plug-in absent (thermocomp.commands) of the package tinyplug is skipped: there is no nowhere.at_all" in err
-    assert "plug-in fit (thermocomp.commands) of the package tinyplug is skipped: fit is there already" in err
+    assert (
+        "plug-in absent (thermocomp.commands) of the package tinyplug is skipped: nowhere.at_all:run does not exist"
+        in err
+    )
+    assert "plug-in fit (thermocomp.commands) of the package tinyplug is skipped: the name fit is already used" in err
     out, _ = thermocomp("--help")
     assert "Greet somebody." in out
     assert "Fit a model" in out
@@ -208,7 +211,7 @@ def test_a_source(thermocomp: Thermocomp, tmp_path: Path) -> None:
     thermocomp("serve", "live.toml", "--check")
     (tmp_path / "live.toml").write_text(CONFIG.format("to = 2.0"), encoding="utf-8")
     _, err = thermocomp("serve", "live.toml", "--check", code=2)
-    assert "sources.1.to is no key that is known" in err
+    assert "sources.1.to is not a known key" in err
     for kind, why in (
         ("broken", "of the package tinyplug cannot be loaded"),
         ("plain", "tinyplug:Counting is not a dataclass with a method open"),

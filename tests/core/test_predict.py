@@ -88,19 +88,19 @@ def test_without_memory_no_time_is_needed() -> None:
 
 
 def test_what_is_refused() -> None:
-    with pytest.raises(InputError, match=r"has a memory: give the time of the rows \[s\]"):
+    with pytest.raises(InputError, match=r"has a memory and needs the time of the rows \[s\]"):
         LAG.predict({"t": [1.0]})
     with pytest.raises(InputError, match="the table has no column 't'"):
         PLANE.predict(pd.DataFrame({"T": [1.0]}))
     with pytest.raises(InputError, match="the table has no column 'clock'"):
         LAG.predict({"t": [1.0]}, "clock")
-    with pytest.raises(InputError, match=r"the time has shape \(2,\), and there are 1 rows"):
+    with pytest.raises(InputError, match=r"the time has shape \(2,\); expected one value for each of 1 rows"):
         LAG.predict({"t": [1.0]}, [0.0, 1.0])
     with pytest.raises(InputError, match="time must be finite"):
         LAG.predict({"t": [1.0]}, [np.nan])
     with pytest.raises(InputError, match=r"model of z: column 't' contains a non-numeric value: .*'warm'"):
         LAG.predict({"t": ["warm"]}, [0.0])
-    with pytest.raises(InputError, match="column 't' contains a non-numeric value: found times"):
+    with pytest.raises(InputError, match="column 't' contains a non-numeric value: found dates and times"):
         LAG.predict({"t": [np.datetime64("2026-01-01")]}, [0.0])
     with pytest.raises(InputError, match=r"the time in column 'clock' must be numbers .* or datetimes: .*'noon'"):
         LAG.predict({"t": [1.0], "clock": ["noon"]}, "clock")

@@ -120,9 +120,11 @@ def test_each_target_has_its_own_verdict_and_what_is_left_out_is_said_in_the_fil
     assert run(["export", str(model), "--to", "c99", "-o", str(tmp_path / "out"), *taken]) == 1
     for name in ("tc_thermal.h", "tc_thermal.md"):
         text = (tmp_path / "out" / name).read_text()
-        assert text.split("\n")[0].strip("/* ") == ("z_um: accepted on unseen cycles; y_um: UNPROVEN, taken anyway")
+        assert text.split("\n")[0].strip("/* ") == (
+            "z_um: accepted on unseen cycles; y_um: UNPROVEN, approved nevertheless"
+        )
         assert "Left out: x_um: worse than nothing" in text
-        assert "Left out: B0C: it predicts urad, and a correction is in um" in text
+        assert "Left out: B0C: it predicts urad, but a correction is in um" in text
 
 
 @needs_compiler
@@ -222,7 +224,7 @@ def test_only_what_may_run_moves_anything(tmp_path: Path, capsys: pytest.Capture
     assert (tmp_path / "shadow" / "tc_thermal.md").read_text().startswith("SHADOW ONLY, y_um: not proven")
     line = ["export", str(alone), "--to", "c99", "-o", str(tmp_path / "taken"), "--accept-unproven", "M. Weber, trial"]
     assert run(line) == 0
-    assert (tmp_path / "taken" / "tc_thermal.md").read_text().startswith("y_um: UNPROVEN, taken anyway")
+    assert (tmp_path / "taken" / "tc_thermal.md").read_text().startswith("y_um: UNPROVEN, approved nevertheless")
 
     (tmp_path / "no").mkdir()
     capsys.readouterr()
@@ -255,7 +257,7 @@ def test_models_that_average_their_zero_in_different_ways(tmp_path: Path, capsys
     other = replace(judged("y_um", ACCEPTED), zeroing=watched_model("z_um").zeroing)
     model = written(tmp_path, judged("x_um", ACCEPTED), other)
     assert run(["export", str(model), "--to", "c99", "-o", str(tmp_path / "out")]) == 2
-    assert "export each file alone" in capsys.readouterr().err
+    assert "export each file separately" in capsys.readouterr().err
 
 
 def prove_graph(folder: Path) -> subprocess.CompletedProcess[str]:

@@ -27,7 +27,7 @@ def test_targets_go_along_axes_and_others_are_left_out(tmp_path: Path, capsys: p
     models = (growing("z_um", 2.0), growing("bed_um", 3.0), replace(growing("x_um", 1.0), honest_error=None))
     assert exported(tmp_path, models=models) == 0
     said = capsys.readouterr().out
-    assert "bed_um is left out: its axis is not known: --axes bed_um=X, =Y or =Z names it" in said
+    assert "bed_um is left out: its axis is not known: give it with --axes bed_um=X, =Y or =Z" in said
     first = "z_um: accepted on unseen cycles; SHADOW ONLY, x_um: corrections stay zero"
     assert first in said
     out = tmp_path / "out"
@@ -49,7 +49,10 @@ def test_what_no_axis_takes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     assert exported(tmp_path, models=(growing("bed_um", 3.0),)) == 2
     assert "nothing to write: bed_um: its axis is not known" in capsys.readouterr().err
     assert exported(tmp_path / "two", models=(growing("z_um", 3.0), growing("z2_um", 3.0))) == 2
-    assert "z_um, z2_um are all of Z: name one of each axis, such as --axes z_um=Z" in capsys.readouterr().err
+    assert (
+        "z_um, z2_um are all for axis Z: name one target for each axis, such as --axes z_um=Z"
+        in capsys.readouterr().err
+    )
     assert exported(tmp_path / "long", "--name", "a" * 40, models=(growing("z_um", 3.0),)) == 2
     assert "15 characters too long" in capsys.readouterr().err
 

@@ -55,7 +55,7 @@ def test_a_loss_beyond_the_limit_is_refused(tmp_path: Path, capsys: pytest.Captu
     assert exported(tmp_path, small_machine(), "klipper", targets="z_um x_um", method="dynamic") == 1
     said = capsys.readouterr().out
     assert "refused z_um is left out: loses too much: RMS 3.54 um on unseen cycles" in said
-    assert "x_um is left out: it is of X, and klipper corrects Z alone" in said
+    assert "x_um is left out: its axis is X, but klipper corrects Z only" in said
     assert not (tmp_path / "out").exists()
     line = ["export", str(tmp_path / "model.json"), str(tmp_path / "drift.csv"), "--to", "klipper", *DATE, "--json"]
     assert run([*line, "-o", str(tmp_path / "out"), "--most-loss", "10"]) == 0  # x_um was not judged badly
@@ -81,8 +81,8 @@ def test_what_is_unproven_wants_somebody_who_takes_it(tmp_path: Path, capsys: py
     line = ["export", str(tmp_path / "model.json"), str(tmp_path / "drift.csv"), "--to", "klipper", *DATE]
     assert run([*line, "-o", str(tmp_path / "out"), "--accept-unproven", "M. Weber, trial"]) == 0
     lines = (tmp_path / "out" / "tc_thermal.cfg").read_text().splitlines()
-    assert lines[0] == "# z_um: UNPROVEN, taken anyway; reduced to what the controller holds"
-    assert lines[1] == "# z_um: unproven, taken by M. Weber, trial"
+    assert lines[0] == "# z_um: UNPROVEN, approved nevertheless; reduced to what the controller holds"
+    assert lines[1] == "# z_um: unproven, approved by M. Weber, trial"
 
 
 @pytest.mark.parametrize("to", MAIN)
@@ -106,8 +106,8 @@ def test_recordings_where_they_are_needed(tmp_path: Path, capsys: pytest.Capture
         assert run(["export", model, *words, "-o", out]) == 2
         return " ".join(capsys.readouterr().err.split())
 
-    assert "name recordings to reduce it on" in told("--to", "klipper")
-    assert "c99 holds the whole model and takes no recordings" in told(drift, "--to", "c99")
+    assert "name recordings for its reduction" in told("--to", "klipper")
+    assert "c99 exports the whole model and accepts no recordings" in told(drift, "--to", "c99")
     assert "no such temperature" in told(drift, "--to", "klipper", "--sensors", "t9_C")
     assert "--axes z_um: expected a target and X, Y or Z" in told(drift, "--to", "klipper", "--axes", "z_um")
     assert "no such target" in told(drift, "--to", "klipper", "--axes", "ch5_um=Z")
@@ -126,7 +126,7 @@ def test_axes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "\nZ formula: <L>+0.003*(W<t>-20)" in text
     assert "ch1_um" not in text
     assert run([*line, "--axes", "ch5_um=z", "ch1_um=Z", "--overwrite"]) == 2
-    assert "are all of Z: name one of each axis, such as --axes " in capsys.readouterr().err
+    assert "are all for axis Z: name one target for each axis, such as --axes " in capsys.readouterr().err
 
 
 def test_a_limit_that_would_be_run_into(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -200,5 +200,7 @@ def test_every_number_has_eight_digits_and_no_limit_gets_larger(
 
 @pytest.mark.parametrize("limits", [Limits(rate=1.5e-6), Limits(magnitude=9e-5)])
 def test_a_limit_that_is_nothing_in_eight_digits_is_refused(limits: Limits) -> None:
-    with pytest.raises(InputError, match=r"takes eight digits, and this is 0 in them: give at least --(rate|magn)"):
+    with pytest.raises(
+        InputError, match=r"accepts eight digits, in which this value is 0: give at least --(rate|magn)"
+    ):
         macro(limits=limits)

@@ -323,7 +323,7 @@ def test_it_is_installed_as_halcompile_wants_it(tmp_path: Path) -> None:
 
 def test_what_cannot_be_an_export() -> None:
     one = Compensator.of([growing("z_um", 2.0)])
-    with pytest.raises(InputError, match="too long: a name in HAL has 47"):
+    with pytest.raises(InputError, match="too long: a name in HAL has at most 47"):
         write_package(one, "a" * 40, FACTS)
     with pytest.raises(InputError, match="expected a separate axis for each target"):
         write_package(Compensator.of([growing("bed_um", 2.0)]), "mill", FACTS)

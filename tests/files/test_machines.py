@@ -292,7 +292,10 @@ def test_model_files_that_do_not_fit(tmp_path: Path) -> None:
             'Y0C = {model = "eyy.json", target = "EYY"}',
             "components.Y0C: spindle drift in Y does not depend on a position",
         ),
-        ('EXX = {model = "wrong_axis.json"}', "components.EXX: positioning of X: the model is along Y"),
+        (
+            'EXX = {model = "wrong_axis.json"}',
+            "components.EXX: positioning of X: expected a model along X, found one along Y",
+        ),
         ('Z0C = {model = "refused.json"}', "components.Z0C.model: "),
         (
             'Z0C = {model = "refused.json"}',
@@ -369,7 +372,7 @@ def test_numbers_in_another_unit_are_seen(tmp_path: Path) -> None:
         ('C0Y = "-11 mrad"', "components.C0Y: -11000 urad is more than 10 mrad: check the unit"),
         (
             'EXX = {profile = [["1 m", "0 um"], ["2 m", "1 um"]]}',
-            "components.EXX: positioning of X: its profile is known from X 1000 to 2000 mm, the axis goes from 0",
+            "components.EXX: positioning of X: its profile is known for X = 1000 to 2000 mm, but the axis travels",
         ),
     ):
         with pytest.raises(InputError, match=re.escape(message)):

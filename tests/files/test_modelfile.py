@@ -175,17 +175,21 @@ def with_prints(change: dict[str, Any], run: dict[str, Any]) -> str:
         ({}, {"rows": "AA*="}, "not base64"),
         ({}, {"rows": "Äöü="}, "not base64"),
         ({}, {"rows": "AAAA"}, "3 bytes are not a whole number of 32-bit numbers"),
-        ({}, {"rows": pack_marks(np.array([5, 4, 6], dtype=np.uint32))}, "their rows do not increase"),
-        ({}, {"rows": pack_marks(np.array([5, 6, 810], dtype=np.uint32))}, "of row 810, where 810 rows were recorded"),
-        ({}, {"moving": "AAAAAA=="}, "1 of moving for 3 rows"),
-        ({}, {"marks": {}}, "expected those of at least one target"),
-        ({}, {"marks": {"z_um": "", "t1_C": ""}}, "0 of z_um for 3 rows"),
-        ({"steps": {"z_um": 0.3, "t2_C": 0.1}}, {}, "of z_um, t1_C: expected those of z_um, t2_C"),
+        ({}, {"rows": pack_marks(np.array([5, 4, 6], dtype=np.uint32))}, "their rows must increase"),
+        (
+            {},
+            {"rows": pack_marks(np.array([5, 6, 810], dtype=np.uint32))},
+            "one begins at row 810, but only 810 rows were recorded",
+        ),
+        ({}, {"moving": "AAAAAA=="}, "1 values of moving for 3 rows"),
+        ({}, {"marks": {}}, "expected fingerprints of at least one target"),
+        ({}, {"marks": {"z_um": "", "t1_C": ""}}, "0 values of z_um for 3 rows"),
+        ({"steps": {"z_um": 0.3, "t2_C": 0.1}}, {}, "of z_um, t1_C: expected fingerprints of z_um, t2_C"),
         ({"steps": {"z_um": 0.0, "t1_C": 0.1}}, {}, "fingerprints of z_um: a resolution of 0.0"),
         ({}, {"stride": 0}, "a stride of 0 rows"),
         ({"interval": -1.0}, {}, "an interval of -1.0 s"),
-        ({"learned": [[0, 700], [600, 810]]}, {}, "not consecutive stretches of rows"),
-        ({"learned": []}, {}, "not consecutive stretches of rows"),
+        ({"learned": [[0, 700], [600, 810]]}, {}, "not consecutive sections of rows"),
+        ({"learned": []}, {}, "not consecutive sections of rows"),
         ({"surprise": 1}, {}, r"prints\.surprise"),
         ({"steps": None}, {}, r"prints\.steps"),
     ],
@@ -245,7 +249,7 @@ def test_an_unproven_model_that_is_taken_says_so_for_ever() -> None:
     read.check_may_run()
     assert not read.accepted
     assert read.honest_error is not None
-    assert read.honest_error.why == "judged on 2 units. Taken by M. Weber, trial on machine 7"
+    assert read.honest_error.why == "judged on 2 units. Approved by M. Weber, trial on machine 7"
     refused = replace(mine, honest_error=replace(honest, verdict="refused")).taken("M. Weber, trial")
     with pytest.raises(InputError, match="was refused and will not run"):
         refused.check_may_run()

@@ -104,7 +104,7 @@ def test_a_verdict_that_rests_on_nothing_is_refused() -> None:
 def test_a_model_without_an_honest_error_is_read_and_does_not_run() -> None:
     (model,) = modelfile.loads(signed(put(None, "honest_error")))
     assert model.predict({"time_s": [0.0, 60.0], "spindle_rpm": [0.0, 6000.0], "t3_C": [20.0, 20.0]})[1] != 0
-    with pytest.raises(InputError, match="model of z_um was never judged on cycles it has not seen and will not run"):
+    with pytest.raises(InputError, match="model of z_um was never judged on unseen cycles and will not run"):
         Compensator.of([model])
 
 

@@ -228,8 +228,8 @@ def _lay_out(folder: Path, settings: HalSettings, ratio: str, programs: Mapping[
     for name, text in (("test.ini", ini), ("test.hal", hal), ("test.var", ""), ("test.tbl", "T1 P1 D6 Z0\n")):
         (folder / name).write_text(text, encoding="ascii")
     for todo in set_up(folder / "test.ini", folder, settings).todo:
-        if "loads sum2 already" in todo:  # done as it says
-            hal = hal.replace("loadrt sum2 count=1", todo.partition("make it: ")[2])
+        if "already loads sum2" in todo:  # done as it says
+            hal = hal.replace("loadrt sum2 count=1", todo.partition("change it to: ")[2])
     (folder / "test.hal").write_text(hal, encoding="ascii")
     ini = ini.replace("HALFILE = test.hal\n", "HALFILE = test.hal\nHALFILE = thermocomp.hal\nHALFILE = trace.hal\n")
     (folder / "test.ini").write_text(ini.replace(right, ratio), encoding="ascii")

@@ -98,7 +98,7 @@ def test_with_a_model(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["iso230", str(folder / "spindle-1.csv"), "--model", str(model)]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "z_um, with model" in said
-    assert "fitted to this very recording" in said
+    assert "fitted to this recording" in said
 
 
 def test_positioning(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -118,7 +118,7 @@ def test_refusals(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[st
     spindle, axis = str(folder / "spindle-1.csv"), str(folder / "axis-1.csv")
     model = tmp_path / "no.json"
     for arguments, told in (
-        ([], "nothing given"),
+        ([], "no input given"),
         (["--positioning", str(POSITIONING), "--distance", "100 mm"], "--distance applies to recordings"),
         ([spindle, "--distance", "100"], "--distance '100': write a number and its unit, such as \"100 mm\""),
         ([spindle, "--distance", "100 kg"], "--distance '100 kg': unknown unit"),

@@ -105,7 +105,8 @@ def test_tilt_has_the_sign_of_the_house() -> None:
     assert Pair("x1_um", "x2_um", 100.0).angle(np.array([1.0]), np.array([3.0])).tolist() == [20.0]
     assert Pair("y1_um", "y2_um", 100.0).angle(np.array([1.0]), np.array([3.0])).tolist() == [-20.0]
     assert (
-        "no tilt is given: the distance between the probes y1_um and y2_um was not given" in assess(recording)[0].notes
+        "no tilt is reported: the distance between the probes y1_um and y2_um was not given"
+        in assess(recording)[0].notes
     )
 
 
@@ -155,8 +156,8 @@ def test_the_last_hour_against_the_first() -> None:
     assert f.range_last == pytest.approx(50 * (np.exp(-6.0) - np.exp(-8.0)), abs=2e-3)
     (said,) = (n for n in test.notes if n.startswith("range of the last 60 min"))
     assert said == (
-        "range of the last 60 min to that of the first: y1_um 0 %, y2_um 0 %, z_um 0 %; all are within the 15 % by "
-        "which ISO 230-3 lets a spindle test end before 4 h (from memory)"
+        "range of the last 60 min to that of the first: y1_um 0 %, y2_um 0 %, z_um 0 %; all are within the 15 % at "
+        "which ISO 230-3 permits a spindle test to end before 4 h (from memory)"
     )
     (slow,) = assess(spindle_test(180 * MIN))
     share = 100 * np.exp(-1.0)
@@ -250,7 +251,7 @@ def test_noise_alone_stands_still(memory: float) -> None:
             table = thermal_tables(test)[-1]
             assert table.rows[0][-1] == "still"
             assert "its averages do not move beyond their noise" in table.caption
-            assert any(n.startswith("y1_um, y2_um, z_um, A: its averages do not move") for n in test.notes)
+            assert any(n.startswith("y1_um, y2_um, z_um, A: the averages do not change") for n in test.notes)
     assert (still >= 95).all(), still
 
 
@@ -284,7 +285,7 @@ def test_a_single_row_neither_decides_the_zero_nor_the_end() -> None:
     assert f.at_60 == pytest.approx(a.at_60, abs=0.3)
     assert f.range_rows > 40 > f.range_all
     bare = told(noisy(3, 1.0, rest=0))
-    assert any("all is counted from that one reading" in n for n in bare.notes)
+    assert any("all values are relative to a single reading" in n for n in bare.notes)
     assert of(bare, "z_um").figures.U_end > 0.3 > a.U_end * 1.1
 
 
@@ -326,14 +327,14 @@ def test_detection_and_ambient() -> None:
 def test_what_falls_short_is_said() -> None:
     (test,) = assess(recorded({"z_um": np.arange(30.0), "s_rpm": np.full(30, 100.0)}), "etve")
     notes = " | ".join(test.notes)
-    assert "it ran for 29 min only" in notes
+    assert "the test ran for 29 min only" in notes
     assert "the spindle or an axis moves" in notes
-    assert "it is 0.5 h long" in notes
+    assert "the test is 0.5 h long" in notes
     assert "no temperature is known to be that of the surroundings" in notes
     (unrecorded,) = assess(recorded({"z_um": np.arange(90.0)}), "axis")
     notes = " | ".join(unrecorded.notes)
     assert "the whole recording counts as warm-up; record the feed rate" in notes
-    assert "no channel is a target of an axis" in notes
+    assert "no channel is a target position of an axis" in notes
     assert "the cool-down was not recorded" in notes
     assert unrecorded.load == "feed rate not recorded"
 
@@ -405,11 +406,11 @@ def test_what_must_be_said_of_a_model() -> None:
     worse = model("z_um", 4.0, provenance=learned, honest=refused)
     (test,) = assess(recording, models=[worse, model("nothing_um", 1.0)])
     notes = " | ".join(test.notes)
-    assert "was fitted to this very recording" in notes
+    assert "was fitted to this recording" in notes
     assert "refused when it was fitted: worse than none" in notes
     assert "z_um: with the model its range grows, from 50 to 90 um" in notes
-    assert "the model of nothing_um has nothing to do here" in notes
-    with pytest.raises(InputError, match="and no such channel is recorded here"):
+    assert "the model of nothing_um is not used: the recording has no channel" in notes
+    with pytest.raises(InputError, match="but the recording has no such channel"):
         assess(recording, models=[model("nothing_um", 1.0)])
 
 
@@ -421,10 +422,10 @@ def test_rows_that_a_model_has_learned_from_are_counted() -> None:
     assert learned.provenance is not None
     learned = replace(learned, provenance=replace(learned.provenance, data_sha256=("another file",)))
     told = [note for test in assess(recording, models=[learned]) for note in test.notes]
-    wanted = "the model of z_um: 500 of 800 rows were learned from: what it leaves there is no honest test"
-    assert {n for n in told if "learned" in n} == {wanted}
+    wanted = "the model of z_um: 500 of 800 rows were used for training: its residual there is not an honest test"
+    assert {n for n in told if "used for training" in n} == {wanted}
     told = [note for test in assess(other, models=[learned]) for note in test.notes]
-    assert not [n for n in told if "learned" in n]
+    assert not [n for n in told if "used for training" in n]
 
 
 # -- the virtual machine ------------------------------------------------------------------------------------------

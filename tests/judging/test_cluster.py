@@ -136,7 +136,8 @@ def test_what_fails_costs_its_method_alone(samples: Samples, running: DaskCluste
     for k in range(2):
         first, deadly, last, unsendable = found.overall()[4 * k : 4 * k + 4]
         assert deadly.reason == (
-            "could not be judged: its process died: it crashed, or was killed, as the system does if the memory is full"
+            "could not be judged: its process ended: it crashed, or was killed by the system, for example "
+            "because the memory is full"
         )
         assert "it cannot be sent to another process: TypeError: cannot pickle it" in unsendable.reason
         for mine, its in zip((first, last), alone.overall()[2 * k : 2 * k + 2], strict=True):
@@ -258,7 +259,7 @@ def test_a_lost_scheduler(
             assert next(going) == 0
             cluster.scheduler.send_signal(how)
             begun = time.monotonic()
-            with pytest.raises(InputError, match=f"{cluster.address}: the scheduler was lost"):
+            with pytest.raises(InputError, match=f"{cluster.address}: the connection to the scheduler was lost"):
                 list(going)
             assert time.monotonic() - begun < 5
     assert "Traceback" not in capfd.readouterr().err  # of Dask's loggers

@@ -275,7 +275,7 @@ def test_what_makes_a_model_worse_than_none_is_named() -> None:
     assert found(2.9, 3.1).worse_than_none == ("loss of b",)
     both = found(3.1, 4.5)
     assert both.worse_than_none == ("noise of 0.4 degC", "loss of b")
-    assert both.harm == "worse than none (3.00 um RMS) with noise of 0.4 degC (3.10 um), loss of b (4.50 um)"
+    assert both.harm == "worse than no compensation (3.00 um RMS) with noise of 0.4 degC (3.10 um), loss of b (4.50 um)"
     sensors = replace(both, lost_rms={"a": 3.5, "b": 4.5, "c": 9.0})
     assert sensors.harm.endswith("loss of c (9.00 um), loss of b (4.50 um), loss of a (3.50 um)")
     assert sensors.worse_than_none[1:] == ("loss of c", "loss of b", "loss of a")

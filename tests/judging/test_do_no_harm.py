@@ -119,7 +119,7 @@ def test_what_does_not_move_is_unproven_not_accepted() -> None:
     plateau = [20 + 0.1 * np.random.default_rng(k).normal(size=200) for k in range(6)]
     verdict = Verdict(tuple(measure(str(k), y, 0.99 * y, Learned(5.0, 10.0, 0.1, 20.0)) for k, y in enumerate(plateau)))
     assert verdict.word == "unproven"
-    assert "does not move" in verdict.reason
+    assert "no significant drift" in verdict.reason
 
 
 def test_a_stretch_is_also_held_against_re_zeroing() -> None:
@@ -128,11 +128,11 @@ def test_a_stretch_is_also_held_against_re_zeroing() -> None:
     assert found.rezeroed is not None
     assert found.rezeroed[0] == pytest.approx(found.rezeroed[1])
     assert len(found.log_ratios) == 4
-    verdict = Verdict((found,), caps=("one stretch",))
+    verdict = Verdict((found,), caps=("one section",))
     assert verdict.word == "refused"
     assert "re-zeroed" in verdict.reason
     better = measure("rows", y, y - 0.1 * drift(5.0), LEARNED, stretch=True)
-    assert Verdict((better,), caps=("one stretch",)).word == "unproven"
+    assert Verdict((better,), caps=("one section",)).word == "unproven"
 
 
 def test_a_cap_keeps_the_best_model_unproven() -> None:

@@ -232,7 +232,7 @@ def test_what_is_held_is_told_and_has_no_band(model: ErrorModel) -> None:
     recording = failing(t3_C=(4.0, None))
     judged = assessing.assess([model], [recording], starts=Start())
     (line,) = describe_held(judged, find_faults(judged, [recording]))
-    assert line.startswith("z_um: with t3_C failed its correction is held, then fades at the machine: ")
+    assert line.startswith("z_um: while t3_C failed, the correction is held, then fades at the machine: ")
     (told,) = describe_bands(judged.models, judged.overall())
     assert "of the judged rows that have one (" in told
     (whole,) = judged.overall()

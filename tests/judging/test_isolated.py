@@ -116,7 +116,8 @@ def test_a_killed_process_costs_its_method_alone(one: Samples, monkeypatch: pyte
     assert len(told) == 4
     first, deadly, last, unsendable = found.overall()
     assert deadly.reason == (
-        "could not be judged: its process died: it crashed, or was killed, as the system does if the memory is full"
+        "could not be judged: its process ended: it crashed, or was killed by the system, for example "
+        "because the memory is full"
     )
     assert "Could not pickle the task" in unsendable.reason
     for mine, theirs in zip((first, last), alone.overall(), strict=True):
@@ -154,10 +155,10 @@ def test_a_target_without_a_choice_leaves_the_others(method: str, samples: Sampl
     settings = Settings(models=["ols"], max_sensors=2) if method == "pareto" else Settings()
     failed, chosen = selecting.select(method, still, judging, settings)
     assert (failed.target, failed.sensors) == ("z_um", ())
-    assert failed.reason == "could not be chosen: z_um does not move: there is nothing to choose sensors by"
+    assert failed.reason == "no sensors could be selected: z_um does not change: sensors cannot be selected by it"
     assert chosen.sensors
     assert not chosen.failure
-    with pytest.raises(FitError, match="z_um does not move"):
+    with pytest.raises(FitError, match="z_um does not change"):
         selecting.select(method, replace(samples, deviations=samples.deviations * 0.0), judging, settings)
 
 

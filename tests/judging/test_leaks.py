@@ -56,7 +56,8 @@ def test_minus_a_row_minus_a_column_is_no_test(recording: Recording, models: tup
         (overall,) = judged.overall()
         assert not overall.accepted
         assert overall.reason == (
-            f"no honest test: {len(copy)} of {len(copy)} rows were learned from; judge it on another recording"
+            f"no honest test: {len(copy)} of {len(copy)} rows were used for training; judge the model on "
+            "another recording"
         )
         assert overall.learned == len(overall.measured) == len(copy)
         assert np.isfinite(overall.metric("rms"))
@@ -69,8 +70,8 @@ def test_plus_a_day_only_the_day_is_judged(recording: Recording, models: tuple[E
     assert overall.learned == 800
     assert overall.row.tolist() == list(range(800, 1600))
     assert overall.word == "unproven"  # its level is that of the rows that were learned
-    assert overall.reason.startswith("judged on one stretch that continues from what was learned")
-    assert overall.reason.endswith("; 800 of 1,600 rows were learned from: left out")
+    assert overall.reason.startswith("judged on one section that continues the training data")
+    assert overall.reason.endswith("; 800 of 1,600 rows were used for training: left out")
     # a piece of it in the middle of two days, in a file of its own beside a whole one
     both = [after(day, of(recording.table.iloc[100:500], recording)), small_machine(DAY, seed=6)]
     (overall,) = assessing.assess(models, [replace(r, name=f"{k}") for k, r in enumerate(both)]).overall()
@@ -88,7 +89,7 @@ def test_the_file_itself_is_left_out_beside_another(recording: Recording, models
     assert set(overall.test) == {1}
     assert overall.accepted
     alone = assessing.assess(models, [recording]).overall()[0]
-    assert alone.reason == "no honest test: fitted to small; judge it on another recording"
+    assert alone.reason == "no honest test: fitted to small; judge the model on another recording"
     # a model from before there were fingerprints knows the file, and no copy
     (model,) = models
     assert model.provenance is not None
@@ -142,7 +143,7 @@ def samples_of(*recordings: Recording) -> Samples:
 
 def test_a_cycle_that_comes_twice_is_refused_with_its_rows(recording: Recording) -> None:
     samples = samples_of(repeated(recording, 200, 400))
-    wanted = r"small: rows 800-999 repeat rows 200-399 of it, about: with cycle 2 .* left out they would be learned"
+    wanted = r"small: rows 800-999 repeat rows 200-399 of the same recording, approximately: with cycle 2 .* left out"
     with pytest.raises(InputError, match=wanted):
         compare(samples, ["ols"], splits.leave_one_cycle_out(samples))
     with pytest.raises(InputError, match=wanted):
@@ -162,7 +163,7 @@ def test_two_files_that_share_rows_are_refused_with_both_names(recording: Record
     other = replace(after(small_machine(DAY, seed=5), of(recording.table.iloc[300:500], recording)), name="other")
     tests = [replace(r, cycles=make_single_cycle(len(r))) for r in (recording, other)]
     samples = samples_of(*tests)
-    with pytest.raises(InputError, match=r"other: rows 800-999 repeat rows 300-499 of small, about"):
+    with pytest.raises(InputError, match=r"other: rows 800-999 repeat rows 300-499 of small, approximately"):
         compare(samples, ["ols"], splits.leave_one_file_out(samples))
     apart = samples_of(recording, replace(small_machine(DAY, seed=5), name="other"))
     assert compare(apart, ["ols"], splits.leave_one_file_out(apart), robustness=False).overall()
@@ -176,7 +177,7 @@ def test_what_goes_on_from_a_file_that_was_learned_is_a_stretch(models: tuple[Er
         models, [day], starts=Start("continued", "stated", (small_machine(),), 60.0)
     ).overall()
     assert not goes_on.accepted
-    assert "stretch" in " ".join(goes_on.verdict.caps)
+    assert "one section" in " ".join(goes_on.verdict.caps)
 
 
 def test_copies_of_one_cycle_are_one_unit(models: tuple[ErrorModel, ...]) -> None:
@@ -185,5 +186,5 @@ def test_copies_of_one_cycle_are_one_unit(models: tuple[ErrorModel, ...]) -> Non
     (overall,) = assessing.assess(models, copies, starts=COLD).overall()
     assert overall.word == "unproven"
     assert overall.reason == (
-        "only 1 of 3 units are not alike, at least 3 are needed; record cycles at other speeds or on other days"
+        "only 1 of 3 units are distinct, at least 3 are needed; record cycles at other speeds or on other days"
     )

@@ -141,7 +141,7 @@ def test_what_the_next_sensor_gains_and_whether_it_is_worth_it() -> None:
     )
     assert pareto.next_to_buy(one, "ols", 1) == (
         "Next to buy: c would gain 0.70 um (0.70 to 0.70 um from block to block), which is less than the blocks differ "
-        "by: more thermal cycles would tell."
+        "by: more thermal cycles would decide."
     )
     assert pareto.next_to_buy(one, "ols", 2) == (
         "Next to buy: none is worth it. d would gain -0.50 um (-0.90 to -0.10 um from block to block); 0.50 um is what "
@@ -163,7 +163,7 @@ def test_two_sensors_that_are_worth_it_together_are_named() -> None:
     assert pareto.next_to_buy(one, "ols", 0) == (
         "Next to buy: no single one is worth it. b would gain 0.10 um (0.10 to 0.10 um from block to block); 0.50 um "
         "is what a further sensor has to gain. b and c together would gain 1.50 um, which is less than the blocks "
-        "differ by: more thermal cycles would tell."
+        "differ by: more thermal cycles would decide."
     )
     little = replace(one, rms=one.rms + np.array([0.0, 0.0, 0.6, 0.6])[:, None, None])
     assert pareto.next_to_buy(little, "ols", 0).startswith("Next to buy: none is worth it. b would gain 0.10 um")
@@ -257,7 +257,7 @@ def test_a_block_without_the_target_is_left_out(crowd: Samples) -> None:
     assert len(found.blocks) == len(judging.splits) - 1
     assert np.isfinite(found.rms).all()
     gone[:, 0] = np.nan
-    with pytest.raises(FitError, match="x_um has no value in any of the blocks"):
+    with pytest.raises(FitError, match="x_um has no value in any validation block"):
         budget.budget(replace(crowd, deviations=gone), judging, ["ols"], max_sensors=2)
 
 
@@ -293,19 +293,17 @@ def test_targets_that_are_never_measured_together(crowd: Samples) -> None:
     judging = splits.leave_one_cycle_out(crowd)
     turns = crowd.deviations.copy()
     turns[::2, 0] = turns[1::2, 1] = np.nan
-    with pytest.raises(
-        FitError, match=r"^0 rows have a number in each of x_um, z_um and of the 7 inputs.*fewer targets"
-    ):
+    with pytest.raises(FitError, match=r"^0 rows have values of all of x_um, z_um and of all 7 inputs.*fewer targets"):
         budget.budget(replace(crowd, deviations=turns), judging, ["ols"])
     blocks = crowd.deviations.copy()
     blocks[crowd.cycle < 2, 0] = blocks[crowd.cycle >= 2, 1] = np.nan
-    with pytest.raises(FitError, match="no block to judge by has a value for each of x_um, z_um"):
+    with pytest.raises(FitError, match="no validation block has values of all of x_um, z_um"):
         budget.budget(replace(crowd, deviations=blocks), judging, ["ols"])
     alone = replace(crowd, targets=crowd.targets[:1], deviations=turns[:, :1])
     assert np.isfinite(budget.budget(alone, judging, ["ols"], max_sensors=1).rms).all()
     few = turns.copy()
     few[:30] = crowd.deviations[:30]  # 30 rows of the first cycle are complete
-    with pytest.raises(FitError, match=r"^0 rows have a number"):  # but none without that cycle
+    with pytest.raises(FitError, match=r"^0 rows have values"):  # but none without that cycle
         budget.budget(replace(crowd, deviations=few), judging, ["ols"])
 
 

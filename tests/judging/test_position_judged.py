@@ -100,7 +100,7 @@ def test_too_few_states_prove_nothing() -> None:
     with pytest.raises(InputError, match="only one thermal cycle"):
         study(profiles(n_cycles=1), OLS)
     values[24:] = np.nan
-    with pytest.raises(FitError, match=r"no profile is left to judge on"):
+    with pytest.raises(FitError, match=r"no profile is left for validation"):
         study(replace(made, values=values), OLS, judging=partial(by_rows, train=0.5, test=0.5))
 
 

@@ -55,7 +55,7 @@ def test_the_recommended_method_is_judged_with_its_choosing() -> None:
     best = result.best("z_um")
     assert best is not None
     assert best.model == "dynamic"
-    assert "3 methods tried, chosen again without each unit" in best.reason
+    assert "3 methods tried, selected again without each unit" in best.reason
 
 
 def test_one_that_is_named_beforehand_is_not_corrected() -> None:
@@ -108,7 +108,7 @@ def test_a_plateau_is_never_accepted() -> None:
     samples = of(changed(recording, z_um=z, **warm))
     result = compare(samples, ["ols", "mra", "dynamic"], splits.parse("0.75/0.25", samples), robustness=False)
     assert {a.word for a in result.overall()} == {"unproven"}
-    assert all("does not move" in a.reason for a in result.overall())
+    assert all("no significant drift" in a.reason for a in result.overall())
 
 
 @pytest.mark.parametrize("methods", [("arx", "ols", "dynamic"), ("dynamic", "ols", "arx")])

@@ -169,7 +169,7 @@ def test_what_has_the_shape_already_is_taken_as_it_is() -> None:
     said = r.deviation([warm[i.name][row] for i, _ in r.terms]) - r.deviation([zero[i.name] for i, _ in r.terms])
     for exact, within in ((r.model, 1e-9), (model, 1e-4)):  # five digits
         assert said == pytest.approx(exact.predict(recording.table, recording.time)[row] - exact.intercept, abs=within)
-    assert as_it_is(full(recording), "Z").why_not(2.0) == "it was never judged on cycles it has not seen"
+    assert as_it_is(full(recording), "Z").why_not(2.0) == "it was never judged on unseen cycles"
 
 
 def test_names_and_digits() -> None:

@@ -77,7 +77,7 @@ def test_what_leans_on_a_sensor_when_it_is_written_is_unproven(
     monkeypatch.setattr("thermocomp.judging.refit.train", leaning)
     (after,) = compare(samples, ["ols"], judging).overall()
     assert after.word == "unproven"
-    assert "worse than none" in after.reason
+    assert "worse than no compensation" in after.reason
 
 
 def test_what_cannot_be_fitted_to_all_rows_is_unproven(samples: Samples, judging: Judging) -> None:

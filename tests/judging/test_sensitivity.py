@@ -135,14 +135,14 @@ def test_a_linear_model_is_more_robust_than_a_quadratic_one(seed: int) -> None:
 
 def test_bad_input(samples: Samples) -> None:
     rows, model = everything(samples), ols_of(samples)
-    with pytest.raises(InputError, match="found those of x_um, z_um"):
+    with pytest.raises(InputError, match="found models of x_um, z_um"):
         sensitivity({"a": model, "b": replace(model, target="x_um")}, samples, rows)
-    with pytest.raises(InputError, match="found those of none"):
+    with pytest.raises(InputError, match="found models of none"):
         sensitivity({}, samples, rows)
     with pytest.raises(InputError, match="y_um was not recorded; there are z_um, x_um"):
         sensitivity({"a": replace(model, target="y_um")}, samples, rows)
     for settings in ({"size": -0.1}, {"size": np.nan}, {"draws": 1}, {"law": "cauchy"}):
-        with pytest.raises(InputError, match="expected uniform or normal, >= 0, >= 2 draws"):
+        with pytest.raises(InputError, match="expected uniform or normal, a size >= 0 and >= 2 draws"):
             sensitivity({"a": model}, samples, rows, **settings)
     with pytest.raises(FitError, match="z_um does not change in the 0 rows"):
         sensitivity({"a": model}, samples, ~rows)

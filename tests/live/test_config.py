@@ -57,21 +57,21 @@ def test_what_it_says(tmp_path: Path) -> None:
         ('models = ["model.json"]', "models = []", "name at least one model file"),
         ('models = ["model.json"]', 'models = "model.json"', "models must be a list"),
         ('models = ["model.json"]', "models = [7]", "models.1: Input should be a valid string, found 7"),
-        ('state = "state.json"', 'stat = "state.json"', "stat is no key that is known"),
+        ('state = "state.json"', 'stat = "state.json"', "stat is not a known key"),
         ("magnitude = 80.0", "magnitude = -1.0", "limits: limit magnitude = -1.0: must be positive"),
         ("magnitude = 80.0", 'magnitude = "80 um"', "limits.magnitude: Input should be a valid number"),
-        ("rate = 0.05", "rates = 0.05", "limits.rates is no key that is known"),
+        ("rate = 0.05", "rates = 0.05", "limits.rates is not a known key"),
         ('kind = "mqtt"', 'kind = "mqqt"', "sources.1: kind = 'mqqt' is not one of 'mqtt', 'replay', 'simulated'"),
         ('kind = "mqtt"', "", 'sources.1 has no kind: write kind = "..."'),
         ('topic = "machine/7/temperatures"', "", "sources.1.topic is missing"),
         ('topic = "machine/7/temperatures"', "topic = 7", "sources.1.topic: Input should be a valid string"),
-        ('topic = "machine/7/temperatures"', 'topic = ""', "topic = '': name one"),
+        ('topic = "machine/7/temperatures"', 'topic = ""', "topic = '': name a topic"),
         ('topic = "machine/7/temperatures"', 'topic = "a"\nport = 0', "port = 0: expected a port from 1 to 65535"),
         ('names = {motor = "t_motor_C"}', 'names = ["t_motor_C"]', "sources.1.names must be a table"),
         ('kind = "file"', 'kind = "linux"', "sinks.1: kind = 'linux' is not one of"),
         ("port = 8080", "port = 80800", "page: port = 80800: expected a port from 0"),
         ("port = 8080", 'port = "8080"', "page.port: Input should be a valid integer, found '8080'"),
-        ("[page]", "[pages]", "pages is no key that is known"),
+        ("[page]", "[pages]", "pages is not a known key"),
         ('state = "state.json"', "speed = 60.0", "a machine that is read by MQTT runs in real time"),
         ('state = "state.json"', "speed = 0.0", "speed: Input should be greater than 0, found 0.0"),
         ('state = "state.json"', 'state = "state.json', "not valid TOML"),
@@ -89,7 +89,7 @@ def test_what_it_says(tmp_path: Path) -> None:
         ("[page]", '[[probes]]\nkind = "simulated"\nevery = 0.0\n[page]', "probes.1: every = 0"),
         ('kind = "file"\nfile = "corrections.json"', 'kind = "file"', "sinks.1.file is missing"),
         ("[page]", "[journal]\n[page]", "journal.file is missing"),
-        ('kind = "file"\nfile = "corrections.json"', 'kind = "mqtt"\ntopic = "m/#"', "has no wildcards"),
+        ('kind = "file"\nfile = "corrections.json"', 'kind = "mqtt"\ntopic = "m/#"', "must not contain wildcards"),
         ("port = 8080", "settled = 0.0", "page: settled = 0: expected more than 0 um"),
         ('kind = "file"\nfile = "corrections.json"', 'kind = "linuxcnc"\nsocket = "s"', "sinks.1.axes is missing"),
         (
@@ -111,7 +111,7 @@ def test_all_that_is_wrong_is_said_at_once(tmp_path: Path) -> None:
     with pytest.raises(InputError) as caught:
         read_config(written(tmp_path, text))
     lines = str(caught.value).splitlines()
-    assert lines[0].endswith("4 to mend:")
+    assert lines[0].endswith("4 to correct:")
     for word in ("limits.rates", "page.port", "sinks.1.fil ", "sinks.1.file"):
         assert any(word in line for line in lines)
     assert len(lines) == 5
@@ -130,7 +130,7 @@ def test_a_key_of_a_wrong_type_hides_nothing(tmp_path: Path) -> None:
         "page.port: Input should be a valid integer",
         "page: settled = 0: expected more than 0 um",
         "sources.1.port: Input should be a valid integer",
-        "sources.1: topic = ' ': name one",
+        "sources.1: topic = ' ': name a topic, such as",
     )
     for line, start in zip(found, sorted(said), strict=True):
         assert line.startswith(start)
@@ -143,7 +143,7 @@ def test_a_key_that_is_called_as_a_kind_is_a_key(tmp_path: Path) -> None:
     found = [line.strip() for line in str(caught.value).splitlines()[1:]]
     assert found == [
         "sources.1.names.motor: Input should be a valid string, found 1",
-        "sources.1.mqtt is no key that is known",
+        "sources.1.mqtt is not a known key",
     ]
 
 
@@ -185,7 +185,7 @@ def test_whatever_is_written_there_is_told_not_a_traceback(monkeypatch: pytest.M
             read_config("serve.toml")
         except InputError as e:
             first, *rest = str(e).splitlines()
-            assert first == f"serve.toml: {len(rest)} to mend:"
+            assert first == f"serve.toml: {len(rest)} to correct:"
             refused += 1
     assert refused > 1500
 
@@ -193,7 +193,7 @@ def test_whatever_is_written_there_is_told_not_a_traceback(monkeypatch: pytest.M
 def test_all_that_does_not_fit_together_is_said_at_once(tmp_path: Path) -> None:
     with pytest.raises(InputError) as caught:
         read_config(written(tmp_path, 'models = []\nsources = []\nown_compensation = "on"\n'))
-    assert str(caught.value).splitlines()[0].endswith("3 to mend:")
+    assert str(caught.value).splitlines()[0].endswith("3 to correct:")
 
 
 def test_there_is_none(tmp_path: Path) -> None:

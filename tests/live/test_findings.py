@@ -91,27 +91,35 @@ def test_what_is_good_passes_and_nothing_is_written(tmp_path: Path) -> None:
                 ("a+/b", "a wildcard must be a whole level"),
                 ("##", "a wildcard must be a whole level"),
                 ("#/", "put it at the end"),
-                ("", "name one"),
-                ("  ", "name one"),
+                ("", "name a topic"),
+                ("  ", "name a topic"),
                 ("a\\u0000b", "cannot be printed"),
                 ("$share/g", "$share/GROUP/TOPIC"),
                 ("$share/+/t", "$share/GROUP/TOPIC"),
                 ("é" * 40_000, "longer than 65,535 bytes"),
-                ("machine/7/+", "hears the corrections"),
-                ("#", "hears the corrections"),
-                ("machine/7/corrections/#", "hears the corrections"),
+                ("machine/7/+", "receives the corrections"),
+                ("#", "receives the corrections"),
+                ("machine/7/corrections/#", "receives the corrections"),
             )
         ),
         *(
             ('"machine/7/corrections"', f'"{topic}"', says)
-            for topic, says in (("a/+", "no wildcards"), ("a#b", "no wildcards"), ("$SYS/a", "the broker's own"))
+            for topic, says in (
+                ("a/+", "must not contain wildcards"),
+                ("a#b", "must not contain wildcards"),
+                ("$SYS/a", "reserved for the broker"),
+            )
         ),
         *(
             ('topic = "machine/7/temperatures"', f'topic = "a"\nhost = "{host}"', "sources.1: host = ")
             for host in ("", " ", "a b", "mqtt://broker", "broker:1883", "a..b", ".", "x" * 64, "256.1.1.1", "1.2.3")
         ),
         ('topic = "machine/7/temperatures"', 'topic = "a"\nport = 70000', "port = 70000"),
-        ('topic = "machine/7/temperatures"', 'topic = "a"\nnames = {a = "t", b = "t"}', "several values for t"),
+        (
+            'topic = "machine/7/temperatures"',
+            'topic = "a"\nnames = {a = "t", b = "t"}',
+            "several entries name the channel t",
+        ),
         ('kind = "replay"\nfile = "day.csv"', 'kind = "simulated"\nseed = -1', "seed = -1"),
         (
             'kind = "replay"\nfile = "day.csv"',
@@ -170,7 +178,11 @@ def faults(path: Path) -> list[str]:
         ("port = 0", 'host = "203.0.113.7"', "page on 203.0.113.7"),
         ("port = 0", 'host = "nowhere.invalid"', "page on nowhere.invalid"),
         ('kind = "file"\nfile = "out.json"', 'kind = "linuxcnc"\nsocket = "s.sock"\naxes = {z_um = "Z"}', "not set up"),
-        ('kind = "file"\nfile = "out.json"', 'kind = "linuxcnc"\nsocket = "day.csv"\naxes = {z_um = "Z"}', "no socket"),
+        (
+            'kind = "file"\nfile = "out.json"',
+            'kind = "linuxcnc"\nsocket = "day.csv"\naxes = {z_um = "Z"}',
+            "not a socket",
+        ),
         (
             'kind = "file"\nfile = "out.json"',
             f'kind = "linuxcnc"\nsocket = "{"s" * 120}"\naxes = {{z_um = "Z"}}',

@@ -203,7 +203,7 @@ def test_names_without_end_are_counted_and_cost_nothing(tmp_path: Path) -> None:
         assert next(s for s in state["sensors"] if s["name"] == "t")["value"] > 20.0
         assert len(shop.service.latest) == 65
         told = [e.text for e in shop.service.events]
-        assert any("names that nothing uses" in t for t in told)
+        assert any("names that no model uses" in t for t in told)
         assert len(told) < 15
 
 

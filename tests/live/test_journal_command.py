@@ -85,7 +85,7 @@ def test_export_and_fit(live: Journal, capsys: pytest.CaptureFixture[str]) -> No
     out = capsys.readouterr().out
     assert "week.csv: 800 rows, compensation: known" in out
     assert "z_um: measured in 800 rows, deviation known in 800" in out
-    assert "2 probings are not in it" in " ".join(out.split())
+    assert "2 probings are not exported" in " ".join(out.split())
     assert (recordings.read("week.csv").table["z_um"] - small_machine().table["z_um"]).abs().max() < 1e-9
     assert "compensation" in Path("week.csv").read_text(encoding="utf-8").splitlines()[0]
     assert run(["fit", "week.csv", "--target", "z_um", "--model", "ols", "--jobs", "1", "-o", "model.json"]) == 0

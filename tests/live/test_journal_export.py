@@ -194,7 +194,7 @@ def test_probings_by_either_frame_say_the_same(
     start = StartRow(BEGIN, (TargetRow("Z"),), (HEAT,), "off", 15.0)
     found = export(journal_of(tmp_path / "live.db", start, rows))
     assert found.targets == (("Z", 1, 1),)
-    assert any("2 work offsets and tool lengths are not in it" in n for n in found.notes)
+    assert any("2 work offsets and tool lengths are not exported" in n for n in found.notes)
     table = saved(found, tmp_path).table
     for name, value in (("Z", deviation), ("Z_residual_um", deviation + c)):
         assert np.flatnonzero(table[name].notna()).tolist() == [50]
@@ -239,7 +239,7 @@ def test_a_probing_far_from_any_reading_is_told(tmp_path: Path) -> None:
     rows: list[Row] = [ReadingRow(BEGIN, {"t1_C": 20.0}), MeasurementRow(BEGIN + 61.0, "z_um", 3.0, "probing", True)]
     start = StartRow(BEGIN, (TargetRow("z_um"),), (HEAT,), "off", 15.0)
     found = export(journal_of(tmp_path / "live.db", start, rows))
-    assert found.notes == ("z_um: 1 probings are not in it: there is no reading within 60 s",)
+    assert found.notes == ("z_um: 1 probings are not exported: there is no reading within 60 s",)
 
 
 # -- odd journals ------------------------------------------------------------------------------------------------------
@@ -342,4 +342,4 @@ def test_a_clock_that_is_set_back_mixes_no_times(again: bool, tmp_path: Path) ->
     assert table["z_um"][first].tolist() == [100.0] * 180
     assert table["z_um"][~first].tolist() == [200.0] * 360
     assert table["t1_C"][~first].tolist() == [22.0] * 360
-    assert any("361 rows are not in it: a clock was set back" in note for note in found.notes)
+    assert any("361 rows are not exported: the clock was set back" in note for note in found.notes)

@@ -23,7 +23,7 @@ def test_it_is_written_beside_the_ini_and_what_is_to_do_is_told(
     assert {Path(f).name for f in said["files"]} == {HAL_NAME, COMPONENT_NAME}
     assert "HALFILE = thermocomp.hal" in said["todo"][0]
     # LinuxCNC loads a module once: names go into the lines that are there
-    assert "line 4 loads sum2" in said["todo"][2]
+    assert "line 4 already loads sum2" in said["todo"][2]
     assert "names=sum2.0,sum2.1,tc.x.away" in said["todo"][2]
     assert "names=a,b,tc.x.from0" in said["todo"][1]
     text = (tmp_path / HAL_NAME).read_text(encoding="ascii")

@@ -339,8 +339,8 @@ def test_a_stop_before_the_first_reading_leaves_what_is_in_force(tmp_path: Path)
 @pytest.mark.parametrize(
     ("order", "stays"),
     [
-        (Status("holding", "by hand, at the page"), True),
-        (Status("shadow", "by hand, at the page"), True),
+        (Status("holding", "by hand, on the page"), True),
+        (Status("shadow", "by hand, on the page"), True),
         (Status("suspended", "the controller is not homed"), False),  # it will say so again, if it is there
         (None, False),
     ],
@@ -480,7 +480,7 @@ def test_a_new_zero_forgets_what_counted_from_the_one_before() -> None:
     service.measure(Measurement(time.time(), "z_um", 3.1, left=False, keys=("id 2",)))  # waits
     service.rezero("z_um", "homing")
     service.measure(Measurement(early, "z_um", 3.2, left=False, keys=("id 3",)))
-    assert "made before the zero" in service.events[-1].text
+    assert "made before the present zero" in service.events[-1].text
     service.take(Reading(time.time(), {"t": 21.0}))
     assert not service.state.learned
     assert service.roll_back("z_um")  # of the zero before
@@ -502,8 +502,8 @@ def test_two_probings_before_a_reading_and_one_of_tomorrow() -> None:
         at = time.time() + ahead
         service.measure(Measurement(at, "z_um", measured, left=False, keys=(f"time {at}",)))
     assert [e.text for e in service.events if e.kind == "probing"] == [
-        "z_um refused: another one waits for the next reading",
-        "z_um refused: its time is 3600 s ahead of the clock",
+        "z_um refused: another measurement is waiting for the next reading",
+        "z_um refused: the time of the measurement is 3600 s ahead of the clock",
     ]
 
 
@@ -515,8 +515,8 @@ def test_an_alarm_is_told_and_suspends_nothing() -> None:
         say(source, 20.0)
         say(source, 23.0)
         await until(lambda: service.counts["readings"] == 2)
-        controller.told, controller.offset = {"z_um": "the controller stands still"}, None
-        await until(lambda: any("stands still" in e.text for e in service.events))
+        controller.told, controller.offset = {"z_um": "the controller does not respond"}, None
+        await until(lambda: any("does not respond" in e.text for e in service.events))
         assert service.state.corrections["z_um"].offset == -6.0
         assert service.state.orders == {}
         controller.told, controller.offset, controller.away = {}, 0.0, {"z_um": "the controller is off"}
@@ -527,6 +527,6 @@ def test_an_alarm_is_told_and_suspends_nothing() -> None:
 
     asyncio.run(running(service, work))
     assert [e.text for e in service.events if e.kind == "link" and e.text.startswith("z_um")] == [
-        "z_um: the controller stands still",
+        "z_um: the controller does not respond",
         "z_um: is in force as it shall be again",
     ]

@@ -102,7 +102,7 @@ def test_orders_want_the_token() -> None:
             assert (await client.post("/api/order", json=order | {"do": "rezero"}, headers=RIGHT)).status_code == 200
             fed(service, 25.0)
             assert service.state.corrections["z_um"].offset == -10.0
-            assert service.state.references["z_um"].why == "by hand, at the page"
+            assert service.state.references["z_um"].why == "by hand, on the page"
 
     run(work)
 
@@ -250,7 +250,7 @@ def test_in_a_browser(tmp_path: Path) -> None:
             await playwright.expect(card.locator(".answer")).to_have_text("done: hold")
             await feed(range(260, 265))
             await playwright.expect(card.locator(".word")).to_have_text("holding", timeout=5_000)
-            await playwright.expect(card.locator(".reason")).to_have_text("by hand, at the page")
+            await playwright.expect(card.locator(".reason")).to_have_text("by hand, on the page")
             await card.get_by_role("button", name="Run").click()
             await playwright.expect(card.locator(".answer")).to_have_text("done: run")
             await feed(range(265, 270))

@@ -115,7 +115,7 @@ def test_a_file_of_before_probings_were_told_apart(machine: Compensator, samples
 def test_the_state_of_other_models_is_refused(machine: Compensator, samples: Samples) -> None:
     text = statefile.dumps(run(machine, samples, 5), machine, NOW)
     other = Compensator.of([replace(m, intercept=1e-9) for m in machine.models])
-    with pytest.raises(ModelFileError, match=r"here\.json: the state of other models"):
+    with pytest.raises(ModelFileError, match=r"here\.json: this state belongs to other models"):
         statefile.loads(text, other, "here.json")
     with pytest.raises(InputError, match="time zone"):
         statefile.dumps(machine.start(), machine, datetime(2026, 1, 1))

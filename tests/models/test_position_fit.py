@@ -94,7 +94,7 @@ def test_a_profile_of_two_coordinates() -> None:
     assert alone.order[1] == 0
     assert off(alone.profile.at(points), truth(points)) > 0.7
     assert off(found.profile.at(points), truth(points)) < 0.1
-    with pytest.raises(InputError, match="a spline is one along Y alone: for YX choose a polynomial"):
+    with pytest.raises(InputError, match="a spline depends on Y only: for the coordinates YX choose a polynomial"):
         fit_profile(points, values, "Y", kind="spline", coordinates="YX")
 
 
@@ -291,7 +291,9 @@ def test_missed_points_do_no_harm() -> None:
         assert holed.model.slopes[0].coefficients_by_name()[name] == pytest.approx(value, abs=0.15)
     assert off(holed.model.profile.at(GRID), whole.model.profile.at(GRID)) < 0.3  # type: ignore[union-attr]
     values[0, -1] = np.nan
-    with pytest.raises(FitError, match="the cold profile has no value at 550 mm, where others have: name more"):
+    with pytest.raises(
+        FitError, match="the cold profile has no value at 550 mm, where other profiles have one: name more"
+    ):
         fit_position(replace(made, values=values), method)
     assert fit_position(replace(made, values=values), replace(method, reference=(0, 1))).model.profile
 
@@ -344,7 +346,7 @@ def test_only_what_may_be_learned_from_is_learned() -> None:
     clean, dirty = (fit_position([tests[0], other], method, learn=learn) for other in (tests[1], spoiled))
     assert clean.model.profile == dirty.model.profile
     assert clean.model.slopes[0].coefficients_by_name() == dirty.model.slopes[0].coefficients_by_name()
-    with pytest.raises(FitError, match="no state is left to learn from"):
+    with pytest.raises(FitError, match="no state is left for training"):
         fit_position(tests, method, learn=np.zeros(48, dtype=np.bool_))
 
 

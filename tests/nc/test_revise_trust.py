@@ -41,7 +41,7 @@ def test_a_speed_outside_the_trained_range_widens_the_bound(
 def test_a_model_that_was_never_judged_does_not_run(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_models([lags("z_um")], "unjudged.json")
     assert revise("--model", "unjudged.json") == 2
-    assert "model of z_um was never judged on cycles it has not seen and will not run" in said(capsys)
+    assert "model of z_um was never judged on unseen cycles and will not run" in said(capsys)
     assert not Path("out.ngc").exists()
 
 
@@ -99,7 +99,7 @@ def test_who_takes_an_unproven_model_stands_in_the_program(
     assert revise(*given, "--accept-unproven", "M. Weber, trial on machine 7", "--json") == 0
     assert f"({MARK} unproven, taken by M. Weber, trial on machine 7)" in Path("out.ngc").read_text(encoding="ascii")
     warnings = json.loads(capsys.readouterr().out)["warnings"]
-    assert any("Taken by M. Weber, trial on machine 7" in w for w in warnings)
+    assert any("Approved by M. Weber, trial on machine 7" in w for w in warnings)
     assert "the model of Z was judged with a stated harm margin of 20 um" in warnings
 
 

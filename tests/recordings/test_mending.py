@@ -318,7 +318,7 @@ def test_without_an_answer_nothing_is_written(
     monkeypatch.setattr("builtins.input", nobody)
     path = written(tmp_path / "drift.csv", spikes)
     assert run(["map", str(path), "-o", str(tmp_path / "drift.toml")]) == 2
-    assert "--yes takes the best guess" in capsys.readouterr().err
+    assert "use --yes to accept the best guess" in capsys.readouterr().err
     assert not (tmp_path / "drift.toml").exists()
 
 

@@ -73,7 +73,7 @@ def test_what_failed_and_what_it_cost(judged: Judged, log: FaultLog, page: str) 
     for c in find_costs(watched_model(), judged.overall()[0], [log]):
         row = [", ".join(c.failed) or "none", f"{c.hours:.1f}", in_um(c.rms), in_um(c.none_rms), in_um(c.honest)]
         assert " ".join([*row, "runs on" if c.runs_on else "held, then fades"]) in told
-    harm = f"But: z_um: with t1_C, t3_C failed its correction is held, then fades at the machine: {c.rms:.2f} um RMS"
+    harm = f"But: z_um: while t1_C, t3_C failed, the correction is held, then fades at the machine: {c.rms:.2f} um RMS"
     assert harm in told
     assert "The correction stays for 30 min, then goes to zero with a time constant of 1 h" in told
 
@@ -129,7 +129,7 @@ def test_without_a_failure_there_is_a_sentence() -> None:
     assert "fades" not in words(page)
     bare = replace(judged, models=(replace(watched_model(), watch=None),))
     (why,) = faults.section(bare, [day]).parts
-    assert why == "No watch over the temperatures was asked: the model file holds none; fit it again."
+    assert why == "The temperatures were not watched: the model file contains no watch; fit the model again."
 
 
 def test_the_verdict_stands_out_by_what_it_is(judged: Judged, recording: Recording) -> None:
@@ -151,7 +151,7 @@ def test_what_was_bad_when_it_was_fitted_is_told_first(judged: Judged, recording
     told = words(assessed.render(replace(judged, models=(bad,)), [recording]))
     assert "But: z_um: refused when it was fitted: does harm in 3." in told
     never = replace(judged, models=(replace(bad, honest_error=None),))
-    assert "But: z_um: never judged on cycles it had not seen" in words(assessed.render(never, [recording]))
+    assert "But: z_um: never judged on unseen cycles" in words(assessed.render(never, [recording]))
 
 
 def test_two_recordings_are_told_apart(recording: Recording) -> None:

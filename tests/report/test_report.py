@@ -100,12 +100,12 @@ def test_what_disturbances_do_is_told_beside_the_verdict(
     low = replace(best.robustness, none_rms=min(noise, *best.robustness.lost_rms.values()) / 2)
     spoiled = tuple(replace(a, robustness=low) if a.overall else a for a in comparison.assessments)
     bad = replace(comparison, assessments=spoiled)
-    told = [a.reason for a in bad.overall() if a.word == "unproven" and "worse than none (" in a.reason]
+    told = [a.reason for a in bad.overall() if a.word == "unproven" and "worse than no compensation (" in a.reason]
     assert told
-    assert not [c for c in cautions(bad) if "worse than none" in c]  # it is said once
+    assert not [c for c in cautions(bad) if "worse than no compensation" in c]  # it is said once
     assert all("loss of spindle_rpm" in c for c in told)
     assert re.search(r"noise of 0.4 degC, (loss of \w+, )*loss of spindle_rpm", html.render(bad, [recording]))
-    assert "worse than none with" in page
+    assert "worse than no compensation with" in page
     print_items(printed.comparison(bad), Console(width=400))
     assert all(c in capsys.readouterr().out for c in told[:1])
     results = [r for r in Compared(bad, (recording,)).to_dict()["results"] if "robustness" in r]
@@ -121,7 +121,11 @@ def test_harm_within_the_margin_is_a_caution(comparison: Comparison) -> None:
         replace(a, robustness=replace(best.robustness, none_rms=worst - 0.01)) if a is best else a
         for a in comparison.assessments
     )
-    assert [c for c in cautions(replace(comparison, assessments=spoiled)) if "dynamic for z_um is worse than none" in c]
+    assert [
+        c
+        for c in cautions(replace(comparison, assessments=spoiled))
+        if "dynamic for z_um is worse than no compensation" in c
+    ]
 
 
 def test_the_page_needs_no_network(page: str) -> None:

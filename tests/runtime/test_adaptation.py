@@ -82,7 +82,7 @@ def test_what_is_implausible_moves_nothing(error: float) -> None:
 
 def test_two_that_agree_and_are_apart_are_taken_and_a_third_that_does_not_is_not() -> None:
     before, why = adaptation.take(adaptation.begin(2.0, 1), np.ones(1), 0.0, 40.0, 0.5)
-    assert "+40.0 um from what is expected, where 9.3 um are plausible: measure again after 10 min" in why
+    assert "+40.0 um from the expected value, where at most 9.3 um are plausible: measure again after 10 min" in why
     other, why = adaptation.take(before, np.ones(1), APART, -40.0, 0.5)
     assert why
     assert other.shift(APART, np.ones(1)) == 0.0
@@ -137,7 +137,7 @@ def test_in_the_same_chip_ten_are_one() -> None:
     once = found.shift(60.0, NOTHING)
     for k in range(1, 10):
         found, why = adaptation.take(found, NOTHING, 60.0 + 5.0 * k, 7.0 + 0.1 * k, 0.0)
-        assert "as suspect as the one before" in why
+        assert "as implausible as the previous probing" in why
     assert found.shift(60.0, NOTHING) == once < 5.0
     found, why = adaptation.take(found, NOTHING, 60.0 + APART, 7.0, 0.0)
     assert not why
@@ -168,7 +168,7 @@ def test_a_creeping_error_ends_at_what_the_model_can_be_wrong_by(step: float) ->
         found, told = adaptation.take(found, directions, k * HOUR, k * step, 0.0)
         assert abs(found.shift(k * HOUR, directions)) <= most
         assert abs(found.shift(k * HOUR, 20.0 * directions)) <= most  # nor later, on a hotter machine
-    assert "can be wrong by 15.0 um at most" in told
+    assert "whose error can be 15.0 um at most" in told
     assert abs(found.mean).max() < most
 
 
@@ -242,10 +242,10 @@ def test_a_probing_counts_from_the_next_reading_on_and_never_faster_than_the_lim
 def test_a_probing_without_a_usable_reading_or_model_is_refused() -> None:
     running = Compensator.of([MODEL])
     state, said = running.step(running.start(), Reading(0.0, {"t": math.nan, "n": 0.0}), 0.0, {"z": Probing(4.0)})
-    assert said.refused["z"].startswith("its reading is rejected: ")
+    assert said.refused["z"].startswith("the reading to which the probing belongs is rejected: ")
     assert not state.learned
     state, said = running.step(state, Reading(1.0, {"t": 20.0, "n": 0.0}), 1.0, {"y": Probing(4.0)})
-    assert said.refused == {"y": "no model drives its correction"}
+    assert said.refused == {"y": "no model drives the correction"}
 
 
 def test_an_axis_of_several_models_learns_an_offset() -> None:

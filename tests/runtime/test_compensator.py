@@ -244,7 +244,7 @@ def test_a_machine_far_from_all_that_was_trained_does_not_start() -> None:
     models = [three_sensors("dimensionless", "1")]
     hot = Reading(0.0, {"t0": 40.0, "t1": 41.0, "t2": 42.0, "q": 1.0})
     _, result = step(models, OPEN, start(models), hot, 0.0)
-    assert result.rejected.endswith("the machine is +20.0 degC from the zero of its training")
+    assert result.rejected.endswith("the machine differs by +20.0 degC from the zero of the training data")
 
 
 @pytest.mark.parametrize(("quantity", "unit"), [("displacement", "um"), ("dimensionless", "1"), ("feed", "mm/min")])

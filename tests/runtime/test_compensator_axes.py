@@ -114,7 +114,7 @@ def test_the_limits_hold_from_end_to_end(wanted: Correction, now: Correction, dt
 
 
 def test_what_is_no_length_is_refused() -> None:
-    with pytest.raises(InputError, match="corrects um"):
+    with pytest.raises(InputError, match="predict um"):
         Compensator.of([growing("EBX", 1.0, "urad")])
     with pytest.raises(InputError, match="two models for the same target"):
         Compensator.of([growing("z", 1.0), growing("z", 2.0)])

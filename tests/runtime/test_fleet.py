@@ -87,7 +87,7 @@ def test_what_a_fleet_cannot_run_is_refused() -> None:
     for odd in (zeros[0], zeros[:, 1:]):
         with pytest.raises(InputError, match=r"zeros: expected finite values of shape \(n_machines, "):
             Fleet(good, odd)
-    with pytest.raises(InputError, match="zeros: contains NaN or infinity"):
+    with pytest.raises(InputError, match="zeros: must be finite; remove NaN and infinity"):
         Fleet(good, np.full((2, CHANNELS), np.nan))
     fleet = Fleet(good, zeros)
     for readings, dt in ((zeros, 1.0), (zeros.T, -1.0), (zeros.T, np.nan), (zeros.T, np.inf)):

@@ -276,7 +276,7 @@ def test_unusable_steps_are_refused(centre: MachiningCentre) -> None:
     for dt in (0.0, -1.0, float("nan"), float("inf")):
         with pytest.raises(InputError, match="must be positive"):
             centre.run(state, [FeedDrive()], air, dt)
-    with pytest.raises(InputError, match="beyond the machine's 3500"):
+    with pytest.raises(InputError, match="exceeds the top speed of the machine, 3500"):
         centre.run(state, [FeedDrive(4000.0)], air, 1.0)
     for drives, given in (([], air), ([FeedDrive()] * 2, air), ([FeedDrive()], air[:, :2])):
         with pytest.raises(InputError, match="three numbers per"):

@@ -137,7 +137,7 @@ def test_a_laser_of_six_degrees_reads_the_components() -> None:
     for wrong, message in (
         ("EYY_600", "Y = 600 mm is beyond"),
         ("EYX_z700_0", "Z = 700 mm is beyond"),
-        ("EYY_z0_100", "only X can"),
+        ("EYY_z0_100", "only the errors of X can"),
         ("EXW_0", "no probe 'EXW_0'"),
     ):
         with pytest.raises(InputError, match=message):

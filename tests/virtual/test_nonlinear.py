@@ -256,7 +256,7 @@ def test_heat_without_a_place_is_refused(tool: NonlinearTool, centre: NonlinearC
     for place in ("on_chuck", "taper_a", "surface"):
         with pytest.raises(InputError, match=f"'{place}', only at heater, tip$"):
             tool.run(tool.init(AIR), [FeedDrive(loads={place: 5.0})], steps(1), 1.0)
-    with pytest.raises(InputError, match="beyond the machine's 3500"):
+    with pytest.raises(InputError, match="exceeds the top speed of the machine, 3500"):
         centre.run(centre.init(AIR), [FeedDrive(4000.0)], steps(1), 1.0)
 
 

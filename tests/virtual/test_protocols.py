@@ -200,10 +200,10 @@ BODY = HEAD + 'segments = [{duration = "1 min"}]\n'
             BODY + '[[faults]]\nchannel = "t_air_C"\nkind = "lost"\nstart = "2 h"',
             "[[faults]] 1, key 'start' = '2 h': 7200 s: must be from 0 to the end of the test, 60 s",
         ),
-        (HEAD + 'segments = [{duration = "10000000 h"}]', "make 3.6e+09 rows; at most 10,000,000"),
+        (HEAD + 'segments = [{duration = "10000000 h"}]', "give 3.6e+09 rows; at most 10,000,000"),
         (BODY + "copies = 1000000", "key 'copies' = 1000000: must be from 1 to 10000"),
         (HEAD + 'duration = "1 min"\nrepeat = 1000000\nsegments = [{}]', "must be from 1 to 10000"),
-        (HEAD + 'segments = [{duration = "1 min", speed = {between = [0, 3000], step = 1e-6}}]', "take a larger step"),
+        (HEAD + 'segments = [{duration = "1 min", speed = {between = [0, 3000], step = 1e-6}}]', "use a larger step"),
         (HEAD + 'segments = [{duration = "1 min", powered = "no"}]', "must be true or false, without quotes"),
         (BODY + "perfect = 1", "key 'perfect' = 1: must be true or false"),
         (HEAD + 'segments = [{duration = "1 min", speed = true}]', "must not be true or false"),
@@ -224,7 +224,7 @@ BODY = HEAD + 'segments = [{duration = "1 min"}]\n'
         ),
         (BODY + '[[tests]]\nname = "a"\n[[tests]]\nname = "a"', "two tests are named 'mine-a'"),
         (BODY + "tests = 3", "key 'tests' = 3: must be tables"),
-        (BODY + "tests = []", "key 'tests' = []: an experiment needs a test"),
+        (BODY + "tests = []", "key 'tests' = []: an experiment needs at least one test"),
     ],
 )
 def test_what_cannot_be_used_is_told_to_the_key(text: str, message: str, tmp_path: Path) -> None:

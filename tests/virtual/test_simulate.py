@@ -75,7 +75,7 @@ def test_a_wrong_protocol_is_told_to_the_key(
     protocol.write_text(PROTOCOL.replace("2000", "20000"), encoding="utf-8")
     assert run(["simulate", str(protocol), "-o", str(tmp_path / "rec.csv")]) == 2
     said = " ".join(capsys.readouterr().err.split())
-    assert f"{protocol}: [[segments]] 2, key 'speed' = 20000: 20000 1/min: the spindle turns at most 3500" in said
+    assert f"{protocol}: [[segments]] 2, key 'speed' = 20000: 20000 1/min: the top speed of the spindle is 3500" in said
 
 
 def test_the_help_names_every_experiment(capsys: pytest.CaptureFixture[str]) -> None:

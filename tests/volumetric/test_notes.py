@@ -34,9 +34,9 @@ def test_a_turn_that_was_there_while_another_axis_was_measured() -> None:
     """20 urad over 500 mm of Y are 10 um."""
     (found,) = note_counted_twice(mill({"ECX": 20.0}))
     assert found == (
-        "ECX is 20 urad at X 300 mm, where X stood while Y was measured: over the travel of Y it moves the tip by 10 "
-        "um along X. EXY or C0Y holds that already if it was read between table and spindle: then count ECX from X 300 "
-        "mm"
+        "ECX is 20 urad at X 300 mm, its position while Y was measured: over the travel of Y it moves the tip by 10 um "
+        "along X. EXY or C0Y already contains this if it was measured between table and spindle: then make ECX "
+        "relative to its value at X 300 mm"
     )
 
 
@@ -78,7 +78,7 @@ def test_a_turn_that_counts_from_there_is_told_once() -> None:
 
 def test_its_own_way_counts_if_the_place_stays_with_the_workpiece() -> None:
     (found,) = note_counted_twice(mill({"ECY": 20.0}, side="workpiece"))
-    assert "ECY is 20 urad at Y 250 mm, where Y stood while Y was measured: over the travel of Y" in found
+    assert "ECY is 20 urad at Y 250 mm, its position while Y was measured: over the travel of Y" in found
     assert note_counted_twice(mill({"ECY": 20.0})) == ()
 
 
@@ -89,10 +89,10 @@ def test_what_is_known_of_a_part_of_the_travel_is_held() -> None:
     )
     machine = mill({"EXX": whole, "EYX": part, "EYY": slope, "EZZ": 3.0, "ECX": 20.0})
     assert note_short_profiles(machine) == (
-        "EYX: its profile is known from X 100 to 600 mm, the axis goes from 0 to 600 mm: beyond, the value at the end "
-        "is held",
-        "EYY: its slope is known from Y 0 to 450 mm, the axis goes from 0 to 500 mm: beyond, the value at the end is "
-        "held",
+        "EYX: its profile is known for X = 100 to 600 mm, but the axis travels from 0 to 600 mm: beyond, the value at "
+        "the end is held",
+        "EYY: its slope is known for Y = 0 to 450 mm, but the axis travels from 0 to 500 mm: beyond, the value at "
+        "the end is held",
     )
     assert notes(machine) == (*note_counted_twice(machine), *note_short_profiles(machine))
     assert len(notes(machine)) == 3

@@ -153,9 +153,9 @@ def test_notes_on_the_machine(mill: tuple[str, str], tmp_path: Path, capsys: pyt
     Path(mill[0]).write_text(text, encoding="utf-8")
     twice, held = asked(capsys, mill[0])["notes"]
     assert twice.startswith(
-        "ECX is 20 urad at X 0 mm, where X stood while Y was measured: over the travel of Y it moves"
+        "ECX is 20 urad at X 0 mm, its position while Y was measured: over the travel of Y it moves"
     )
-    assert held.startswith("EYX: its profile is known from X 0 to 300 mm, the axis goes from 0 to 600 mm")
+    assert held.startswith("EYX: its profile is known for X = 0 to 300 mm, but the axis travels from 0 to 600 mm")
     page = tmp_path / "noted.html"
     assert run(["volumetric", mill[0], "-o", str(page)]) == 0
     said, written = capsys.readouterr().out, page.read_text(encoding="utf-8")
@@ -182,8 +182,8 @@ def test_a_page(mill: tuple[str, str], tmp_path: Path, capsys: pytest.CaptureFix
         (["--at", "nan", "0", "0"], "X nan mm: outside the travel of X"),
         (["--grid", "1"], "a grid of 1 points along an axis has no extent: expected at least 2"),
         (["--tool-length", "-1"], "--tool-length -1: must not be negative"),
-        (["--time", "1"], "without a recording there is no time"),
-        (["--mapping", "a.toml"], "--mapping is for a recording"),
+        (["--time", "1"], "the times refer to a recording, but none is given"),
+        (["--mapping", "a.toml"], "--mapping applies to a recording"),
         (["--recording", "RECORDING", "--time", "14"], "14 h: outside the recording, 0 to 13.32 h"),
         (["--recording", "no.csv"], "no.csv: no such file"),
     ],

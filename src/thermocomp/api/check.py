@@ -65,7 +65,7 @@ class CheckedRecordings(Result, Paged):
         from thermocomp.report import checks
 
         if not 0 <= recording < len(self.recordings):
-            raise InputError(f"recording {recording}: there are {len(self.recordings)}, counted from 0")
+            raise InputError(f"recording {recording}: there are {len(self.recordings)} recordings, numbered from 0")
         return checks.figure(self.recordings[recording], self.findings[recording])
 
     def page(self) -> str:

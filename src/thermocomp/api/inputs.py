@@ -89,7 +89,7 @@ def recordings_of(given: Given, mapping: str | Path | mappings.Mapping | None = 
     """
     several = [given] if isinstance(given, Recording | str | Path | pd.DataFrame) else list(given)
     if not several:
-        raise InputError("no recording given")
+        raise InputError("no recording given: give a Recording, a path or a DataFrame")
     found = []
     for k, one in enumerate(several, start=1):
         if isinstance(one, Recording):
@@ -126,14 +126,16 @@ def starts_of(starts: Starts, recordings: Sequence[Recording]) -> tuple[Start, .
         return None
     each = (starts,) * len(recordings) if isinstance(starts, Start) else tuple(starts)
     if len(each) != len(recordings):
-        raise InputError(f"starts: {len(each)} for {len(recordings)} recording(s): give one each, or one for all")
+        raise InputError(
+            f"starts: {len(each)} given for {len(recordings)} recording(s): give one for each, or one for all"
+        )
     if isinstance(starts, Start) and starts.earlier and len(recordings) > 1:
         raise InputError(
-            f"starts: {len(recordings)} recordings cannot all continue from the same files: give one start each"
+            f"starts: {len(recordings)} recordings cannot all continue from the same files: give one start for each"
         )
     for start, r in zip(each, recordings, strict=True):
         if r.fingerprint in (e.fingerprint for e in start.earlier):
-            raise InputError(f"starts: {r.name} cannot continue from itself: name the file before it in earlier=")
+            raise InputError(f"starts: {r.name} cannot continue from itself: name the previous file in earlier=")
     return each
 
 
@@ -202,7 +204,7 @@ def prepare(
     Prepared
     """
     if jobs == 0:
-        raise InputError("jobs 0: name a number of processes, or -1 for all cores")
+        raise InputError("jobs 0: give a number of processes, or -1 for all cores")
     named = [targets] if isinstance(targets, str) else targets
     if named is None:
         named = [c.name for c in tests[0].displacements]
@@ -220,8 +222,8 @@ def prepare(
     if chosen is None and (others := tests[0].of_quantity("spindle_speed")[1:]):
         left, taken = ", ".join(c.name for c in others), tests[0].of_quantity("spindle_speed")[0].name
         trouble.append(
-            f"{tests[0].name}: {left} left out: of several spindle speeds the first, {taken}, is an input; name the "
-            "inputs to take others"
+            f"{tests[0].name}: {left} left out: of several spindle speeds only the first, {taken}, is an input; "
+            "name the inputs to use others"
         )
     listener.warn(trouble)
     return Prepared(tuple(tests), samples, judging, trouble)

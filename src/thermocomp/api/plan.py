@@ -283,7 +283,7 @@ def may_stop(
     """
     tests = recordings_of(recordings, mapping)
     if len(tests) != 1:
-        raise InputError(f"{len(tests)} recordings: give the one of the running test")
+        raise InputError(f"{len(tests)} recordings given: expected one, that of the running test")
     Listener(progress).warn(trouble_of(tests))
     named = [targets] if isinstance(targets, str) else targets
     return judge_running(tests[0], named or [c.name for c in tests[0].displacements])

@@ -211,7 +211,7 @@ class FittedModels(Result):
             There are several targets.
         """
         if len(self.fitted.models) > 1:
-            raise InputError(f"there are models of {', '.join(self.models)}: use one of .models")
+            raise InputError(f"there are several models, of {', '.join(self.models)}: use one of .models")
         return self.fitted.models[0]
 
     @property

@@ -98,7 +98,7 @@ class Selected(Result, Paged):
             )
         drawn = selections.draw(mine[0])
         if drawn is None:
-            raise InputError(f"{mine[0].method} has no figure: see {mine[0].reason}")
+            raise InputError(f"method {mine[0].method} has no figure; its result: {mine[0].reason}")
         return drawn[0].figure
 
     def __str__(self) -> str:

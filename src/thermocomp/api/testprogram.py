@@ -75,7 +75,9 @@ def write_program(trial: Trial, dialect: Dialect, every: float = 0.0) -> str:
         The time between two measurements is invalid, or the speed is not an integer.
     """
     if every and not _SHORTEST <= every <= LONGEST:
-        raise InputError(f"a measurement every {every / 60:g} min: expected 1 to {LONGEST / 60:g}, or 0 for a logger")
+        raise InputError(
+            f"a measurement every {every / 60:g} min: expected 1 to {LONGEST / 60:g} min, or 0 if a logger measures"
+        )
     if trial.speed != round(trial.speed):
         raise InputError(f"spindle speed {trial.speed:g} 1/min: a program needs a whole number")
     lines = [*_head(trial, dialect, every)]

@@ -36,7 +36,7 @@ def _skip(message: str) -> None:
 COMMANDS = find_plugins("commands", _skip)
 for command, entry in COMMANDS.items():
     if (summary := read_summary(entry)) is None:
-        _skip(f"{describe_plugin(entry)} is skipped: there is no {entry.value}")
+        _skip(f"{describe_plugin(entry)} is skipped: {entry.value} does not exist")
     else:
         app.command(entry.value, name=command, help=summary)
 for flag, summary in loudness.FLAGS.items():  # for the help only: `run` removes them before the command is parsed
@@ -97,7 +97,11 @@ def _fault(error: Exception) -> int:
     if loudness.verbose:
         traceback.print_exception(error)
     message = f"unexpected: {type(error).__name__}: {error}"
-    hint = "" if loudness.verbose else "; this is a fault of thermocomp: --verbose tells where, for a report"
+    hint = (
+        ""
+        if loudness.verbose
+        else "; this is a fault of thermocomp: run it again with --verbose and report the traceback"
+    )
     make_console(stderr=True).print(f"[bold red]error:[/] {words(message + hint)}", soft_wrap=True)
     _tell_programs(message)
     return FAULT

@@ -55,7 +55,7 @@ class Beginning:
         if self.continues and self.start not in (None, "continued", "rezeroed"):
             raise InputError(f"--continues requires --start continued or rezeroed, not {self.start}")
         if self.continues and len(tests) != 1:
-            raise InputError(f"--continues: {len(tests)} recordings are given; name the one that continues")
+            raise InputError(f"--continues: {len(tests)} recordings are given; give only the one that continues")
         word = self.start or ("continued" if self.continues else "known" if self.zero is not None else None)
         if word is None:
             return None
@@ -64,7 +64,9 @@ class Beginning:
         earlier = tuple(read_recordings(self.continues, mapping)) if self.continues else ()
         for e in earlier:
             if e.fingerprint == tests[0].fingerprint:
-                raise InputError(f"--continues {e.source}: is the recording itself")
+                raise InputError(
+                    f"--continues {e.source}: this is the recording itself; name the file recorded before it"
+                )
         from thermocomp.recordings.starts import Start
 
         return Start(

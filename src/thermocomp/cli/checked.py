@@ -25,7 +25,7 @@ def show_check(found: CheckedRecordings, page: Path | None, console: Console) ->
     contents = found.to_dict()["recordings"]
     if len(contents) > MANY:
         print_table(_overview(contents), console)
-        console.print("[dim]name a file alone to see all that was found in it, or write a page with -o[/]")
+        console.print("[dim]check a single file to see all its findings, or write a page with -o[/]")
     else:
         for r, mine, content in zip(found.recordings, found.findings, contents, strict=True):
             _show(r, mine, content, console)

@@ -241,10 +241,10 @@ def command(
             face = CommandFace(**{f: given.pop(f) for f in ("output", "overwrite", "json", "quiet") if f in given})
             asked = next((option for option in instead if extra[option]), "")
             if asked and face.output is not None:
-                raise InputError(f"{face.output}: --{asked.strip('_')} writes no file; leave -o out")
+                raise InputError(f"{face.output}: --{asked.strip('_')} writes no file; omit -o")
             if needs_output and not asked and face.output is None:
                 ways = ", or ".join(f"--{option.strip('_')}" for option in instead)
-                raise InputError(f"there is no file to write: name one with -o, or give {ways}")
+                raise InputError(f"no output file given: name one with -o, or give {ways}")
             face.refuse_existing(writes, given)
             chosen = Verb(instead[asked], forms, reads=reads) if asked else verb
             with show_progress(hidden=face.json or face.quiet, warn=face.warn) as progress:

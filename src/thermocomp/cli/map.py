@@ -115,7 +115,7 @@ def _ask(question: "Question") -> Remedy | None:
         try:
             said = input().strip()
         except EOFError as e:
-            way = "--yes takes the best guess" if question.may_guess else "write it into a mapping"
+            way = "use --yes to accept the best guess" if question.may_guess else "write the answer into a mapping file"
             raise InputError(f"standard input ended before an answer was given; {way}") from e
         said = {"": best, "y": "1", "yes": "1", "n": "0", "no": "0"}.get(said.lower(), said)
         if said.isdigit() and int(said) <= len(question.options):

@@ -44,14 +44,17 @@ class Curve:
     def __post_init__(self) -> None:
         check_finite(f"{self.kind} curve", x=self.x, y=self.y)
         if len(self.y) != len(self.x) + (self.kind == "step") or not self.y:
-            more = ", one y more than x" if self.kind == "step" else ", equally many"
+            more = ", and one more than x values" if self.kind == "step" else ", and as many as x values"
             raise SettingError(
-                f"{self.kind} curve of {len(self.x)} x and {len(self.y)} y: expected at least one y{more}"
+                f"{self.kind} curve has {len(self.x)} x values and {len(self.y)} y values: expected at least one y "
+                f"value{more}"
             )
         if any(not a < b for a, b in pairwise(self.x)):
             raise SettingError(f"{self.kind} curve: x must increase strictly")
         if not np.isfinite(self._pieces[2]).all():
-            raise SettingError(f"{self.kind} curve: two x are so close that the slope between them is not finite")
+            raise SettingError(
+                f"{self.kind} curve: two x values are too close together: the slope between them is not finite"
+            )
 
     @cached_property
     def _pieces(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:

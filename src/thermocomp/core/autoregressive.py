@@ -102,9 +102,14 @@ class Ticking(ErrorModel):
         given = zero if inputs is None else np.asarray(inputs, dtype=np.float64)
         known = np.asarray(deviation, dtype=np.float64)
         if zero.shape != (len(self.inputs),) or given.shape[-1:] != zero.shape:
-            raise InputError(f"start of the model of {self.target}: expected {len(self.inputs)} inputs and references")
+            raise InputError(
+                f"start of the model of {self.target}: expected {len(self.inputs)} inputs and as many references"
+            )
         if not (np.isfinite(zero).all() and np.isfinite(given).all() and np.isfinite(known).all()):
-            raise InputError(f"start of the model of {self.target}: deviation, inputs or reference not finite")
+            raise InputError(
+                f"start of the model of {self.target}: deviation, inputs and reference must be finite; remove NaN and "
+                "infinity"
+            )
         change, _ = self.clip(given - zero)
         k, m = self.orders
         shape = np.broadcast_shapes(known.shape, change.shape[:-1])
@@ -215,7 +220,8 @@ class Autoregressive(Ticking):
         self._check_interval()
         if len(self.b) != len(self.inputs) or not self.b or len({len(b) for b in self.b}) != 1 or not self.b[0]:
             raise SettingError(
-                f"{owner}: expected b_0 .. b_m, the same number for each of {len(self.inputs)} inputs: at least one"
+                f"{owner}: expected coefficients b_0 .. b_m for each of {len(self.inputs)} inputs, at least one and "
+                "the same number for each"
             )
         check_count(owner, ORDER, past_deviations=self.a, past_inputs=self.b[0][1:])
         check_finite(owner, a=self.a, b=self.b, intercept=self.intercept)
@@ -308,7 +314,10 @@ class AutoregressiveNet(Ticking):
         if n_outputs != 1 or len(self.output_scaling.gain) != 1:
             raise SettingError(f"{owner}: expected one output, found {n_outputs}")
         if self.net.output == "identity":
-            raise SettingError(f"{owner}: an identity output has no bounds: its free run could run away")
+            raise SettingError(
+                f"{owner}: an identity output is not bounded, so the free run could diverge; use another output "
+                "function"
+            )
 
     @property
     def orders(self) -> tuple[int, int]:

@@ -127,7 +127,9 @@ def check_between(owner: str, least: float, most: float, **numbers: Any) -> None
 
 def check_count(owner: str, most: int, **entries: Sequence[object]) -> None:
     """Reject sequences that are too long."""
-    wrong = [f"{len(found):,} {name}, at most {most:,}" for name, found in entries.items() if len(found) > most]
+    wrong = [
+        f"{len(found):,} {name}, at most {most:,} are supported" for name, found in entries.items() if len(found) > most
+    ]
     if wrong:
         raise SettingError(f"{owner}: {'; '.join(wrong)}")
 
@@ -139,4 +141,4 @@ def check_name(what: str, name: str, most: int = NAME) -> None:
     for c in name:
         kind = unicodedata.category(c)
         if kind[0] == "C" or kind in ("Zl", "Zp"):
-            raise SettingError(f"{what}: {name[:40]!a} is not a name: it contains the character {c!a}")
+            raise SettingError(f"{what}: {name[:40]!a} is not a valid name: it contains the character {c!a}")

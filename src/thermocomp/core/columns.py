@@ -38,7 +38,7 @@ def read_numbers(table: Columns, name: str, owner: str) -> FloatArray:
     values = read_column(table, name, owner)
     try:
         if values.dtype.kind in "mM":
-            raise TypeError("found times")
+            raise TypeError("found dates and times")
         return values.astype(np.float64)
     except (TypeError, ValueError) as e:
         raise InputError(f"{owner}: column {name!r} contains a non-numeric value: {e}") from e
@@ -62,8 +62,8 @@ def read_clock(table: Columns, time: ArrayLike | str | None, owner: str, *, need
     if time is None:
         if needed:
             raise InputError(
-                f"{owner} has a memory: give the time of the rows [s] by time=, the name of a "
-                "column or an array, or as a column time_s"
+                f"{owner} has a memory and needs the time of the rows [s]: give a column name or an array as time=, "
+                "or add a column time_s"
             )
         return None
     given = read_column(table, time, owner) if isinstance(time, str) else np.asarray(time)

@@ -60,7 +60,7 @@ def gains(model: ErrorModel, step: float) -> list[Gain]:
     """
     model = _paced(model)
     if not step > 0:
-        raise InputError(f"step {step}: expected the time between two rows, more than 0 s")
+        raise InputError(f"step {step}: the time between two rows must be more than 0 s")
     direct, weights = model.read_out
     owners, bank = _owners(model), model.bank
     rates = bank.rates.copy()
@@ -87,8 +87,8 @@ def _paced(model: ErrorModel) -> PacedDynamic:
     if isinstance(model, PacedDynamic):
         return model
     raise InputError(
-        f"{model.target} has a model of the family {model.family}: the contribution of each input is known only for "
-        f"the family {PacedDynamic.family} , which the method averaged makes"
+        f"{model.target} has a model of the family {model.family}: the contribution of each input can be computed "
+        f"only for the family {PacedDynamic.family}, which the method averaged produces"
     )
 
 

@@ -181,7 +181,7 @@ def explain(model: ErrorModel) -> Explanation:
         ),
         zero=_zero(model),
         word=found.word if found else "unjudged",
-        reason=found.why if found else "never judged on cycles that it has not seen; it will not run",
+        reason=found.why if found else "never judged on unseen cycles; the model will not run",
         rms=found.rms if found else None,
         max_abs=found.max_abs if found else None,
         none_rms=found.none_rms if found else None,
@@ -201,12 +201,12 @@ def explain_all(models: Sequence[ErrorModel]) -> Explanations:
 def _spare(model: ErrorModel, name: str, seen: Watched | None) -> str:
     """Return the reason why a spare sensor for a temperature is recommended; empty if none is."""
     if seen is None:
-        return "nothing predicts it"
+        return "no other sensor predicts it"
     if not model.may_lose([name]):
         return "without it the correction is held, then fades"
     if model.widening([name]) > DEAR:
-        return f"what stands in for it leaves {model.widening([name]):.1f} times the error"
-    return f"its slow drift is found only from {seen.off:.1f} degC on" if seen.off > FAR else ""
+        return f"its substitute value leaves {model.widening([name]):.1f} times the error"
+    return f"its slow drift is detected only from {seen.off:.1f} degC on" if seen.off > FAR else ""
 
 
 def _sensor(model: ErrorModel, name: str, settled: float | None, bound: float | None) -> SensorExplanation:
@@ -254,7 +254,7 @@ def _outside(model: ErrorModel) -> str:
     if support.policy == "clip":
         return kept
     more = {"hold": "the last answer from inside is held", "fade": "the answer fades to zero"}[support.policy]
-    together = ", also where the inputs together are unlike the training" if model.joint else ""
+    together = ", also where the combination of inputs is unlike the training data" if model.joint else ""
     return f"{kept}, and {more}{together}"
 
 
@@ -262,7 +262,7 @@ def _covered(model: ErrorModel) -> str:
     v = model.validity
     if v is None:
         return ""
-    parts = [f"{v.hours:.1f} h, {v.units} cycles or tests, {v.independent} of them not alike"]
+    parts = [f"{v.hours:.1f} h, {v.units} cycles or tests, {v.independent} of them distinct"]
     if v.speeds:
         parts.append(f"{len(v.speeds)} spindle speeds of {v.speeds[0]:.0f} to {v.speeds[-1]:.0f} 1/min")
     if v.ambient:
@@ -297,16 +297,21 @@ def _lines(e: Explanation) -> list[str]:
     watched = [s for s in e.sensors if s.watched]
     if watched:
         lines.append(
-            f"A temperature that is missing is found at once, one that jumped, drifted or is stuck {_span(LASTING)} "
-            "after it is beyond its limit; its prediction from the others and the speed stands in:"
+            f"A missing temperature is detected at once; one that jumped, drifted or is stuck, {_span(LASTING)} after "
+            "exceeding its limit. It is replaced by its prediction from the other temperatures and the speed:"
         )
     else:
-        lines.append("No watch: a reading with a value missing is turned away; nothing finds one that is wrong:")
+        lines.append(
+            "Sensors are not watched: a reading with a missing value is rejected; a wrong value is not detected:"
+        )
     lines += [f"  {_sensor_line(s, e.unit)}" for s in e.sensors]
     if e.pairs[0]:
-        lines.append(f"Two lost at once: judged for {e.pairs[0]} pairs, {e.pairs[1]} of which it may lose.")
+        lines.append(
+            f"Two sensors lost at once: judged for {e.pairs[0]} pairs; the model continues without {e.pairs[1]} of "
+            "them."
+        )
     elif len(watched) > 1:
-        lines.append("Two lost at once: not judged for so many; the correction is held, then fades.")
+        lines.append("Two sensors lost at once: not judged for so many sensors; the correction is held, then fades.")
     return lines
 
 

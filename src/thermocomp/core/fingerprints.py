@@ -53,13 +53,15 @@ class Runs:
         if self.stride < 1:
             raise SettingError(f"fingerprints: a stride of {self.stride} rows must be 1 or more")
         if not self.marks:
-            raise SettingError("fingerprints: expected those of at least one target")
+            raise SettingError("fingerprints: expected fingerprints of at least one target")
         rows = unpack_marks(self.rows)
         if not (np.diff(rows.astype(np.int64)) > 0).all():
-            raise SettingError("fingerprints: their rows do not increase")
+            raise SettingError("fingerprints: their rows must increase")
         for name, text in (("moving", self.moving), *self.marks.items()):
             if (n := len(unpack_marks(text))) != len(rows):
-                raise SettingError(f"fingerprints: {n} of {name} for {len(rows)} rows")
+                raise SettingError(
+                    f"fingerprints: {n} values of {name} for {len(rows)} rows; their numbers must be equal"
+                )
 
 
 @dataclass(frozen=True)
@@ -88,12 +90,16 @@ class Prints:
             raise SettingError(f"fingerprints: an interval of {self.interval} s between rows must be a positive number")
         ends = [row for stretch in self.learned for row in stretch]
         if not ends or ends != sorted(ends) or ends[0] < 0 or any(a == b for a, b in self.learned):
-            raise SettingError(f"fingerprints: {self.learned} are not consecutive stretches of rows")
+            raise SettingError(f"fingerprints: {self.learned} are not consecutive sections of rows")
         for name, step in self.steps.items():
             if not 0 < step < np.inf:
                 raise SettingError(f"fingerprints of {name}: a resolution of {step} must be a positive number")
         for run in self.runs:
             if list(run.marks) != list(self.steps):
-                raise SettingError(f"fingerprints of {', '.join(run.marks)}: expected those of {', '.join(self.steps)}")
+                raise SettingError(
+                    f"fingerprints of {', '.join(run.marks)}: expected fingerprints of {', '.join(self.steps)}"
+                )
             if (rows := unpack_marks(run.rows)).size and rows[-1] >= ends[-1]:
-                raise SettingError(f"fingerprints: of row {rows[-1]}, where {ends[-1]} rows were recorded")
+                raise SettingError(
+                    f"fingerprints: one begins at row {rows[-1]}, but only {ends[-1]} rows were recorded"
+                )

@@ -63,9 +63,9 @@ class JointSupport:
         if not len(self.speeds) == len(self.levels) == len(self.tolerances) or not all(self.levels):
             raise SettingError("joint support: expected levels and a tolerance for every speed")
         if self.columns and not self.points:
-            raise SettingError("joint support: no point")
+            raise SettingError("joint support: expected at least one point")
         if min([*self.columns, *self.speeds], default=0) < 0:
-            raise SettingError("joint support: there is no input before the first")
+            raise SettingError("joint support: a column or speed index must not be negative")
 
     @property
     def n_inputs(self) -> int:

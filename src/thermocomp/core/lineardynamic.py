@@ -78,7 +78,7 @@ class LinearDynamic(ErrorModel):
                 f"{len(self.lagged)} lag coefficients; their numbers must be equal"
             )
         if any(not 0 <= i < len(self.signals) for i in self.lag_signals):
-            raise SettingError(f"{owner}: a lag follows a signal beyond the {len(self.signals)} given")
+            raise SettingError(f"{owner}: the signal index of a lag is beyond the {len(self.signals)} signals")
         check_count(owner, ENTRIES, signals=self.signals, lags=self.lagged)
         check_between(owner, LEAST, GAP, time_constants=self.time_constants)
         check_finite(owner, direct=self.direct, lagged=self.lagged, intercept=self.intercept)

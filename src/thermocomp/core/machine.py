@@ -163,7 +163,8 @@ class Machine:
         for name in self.structure.axes:
             if there.count(name) != 1:
                 raise SettingError(
-                    f"axis {name} of the structure {self.structure.code!r} occurs {there.count(name)} times",
+                    f"axis {name} of the structure {self.structure.code!r} occurs {there.count(name)} times, expected "
+                    "once",
                     ("axes", name),
                 )
         for code, source in self.components.items():
@@ -198,15 +199,20 @@ class Machine:
             raise SettingError(f"the model is in {source.unit}; {component.description} is in {component.unit}")
         if isinstance(source, PositionModel):
             if component.is_scalar:
-                raise SettingError(f"{component.description} does not depend on a position; its model does")
+                raise SettingError(f"{component.description} does not depend on a position, but its model does")
             if source.axis != component.depends_on:
-                raise SettingError(f"{component.description}: the model is along {source.axis}")
+                raise SettingError(
+                    f"{component.description}: expected a model along {component.depends_on}, found one along "
+                    f"{source.axis}"
+                )
             self._check_ranges(component, source)
 
     def _check_ranges(self, component: ErrorComponent, source: PositionModel) -> None:
         profile = source.profile
         if isinstance(profile, SplineProfile) and profile.axis != source.axis:
-            raise SettingError(f"{component.description}: its profile is one along {profile.axis}, not {source.axis}")
+            raise SettingError(
+                f"{component.description}: its profile is along {profile.axis}, but its model is along {source.axis}"
+            )
         for what, name, (low, high) in source.ranges():
             if name not in self.structure.axes:
                 raise SettingError(
@@ -216,6 +222,6 @@ class Machine:
             first, last = self.axis(name).travel
             if high < first or low > last:
                 raise SettingError(
-                    f"{component.description}: its {what} is known from {name} {low:g} to {high:g} mm, the axis goes "
-                    f"from {first:g} to {last:g} mm: check the unit and the zero of the positions"
+                    f"{component.description}: its {what} is known for {name} = {low:g} to {high:g} mm, but the axis "
+                    f"travels from {first:g} to {last:g} mm: check the unit and the zero of the positions"
                 )

@@ -163,7 +163,10 @@ class ErrorModel(ModelFamily):
             An input is not finite, or `dt` is negative or not finite.
         """
         if not np.isfinite(inputs).all() or not 0.0 <= dt < np.inf:
-            raise ReadingError(f"model of {self.target}: inputs {inputs} or time step {dt} s not finite")
+            raise ReadingError(
+                f"model of {self.target}: inputs {inputs} and time step {dt} s must be finite, and the time step not "
+                "negative"
+            )
         inputs, dt = _bounded(inputs), min(dt, GAP)
         reference = state.reference
         memory = state.memory
@@ -373,8 +376,8 @@ class ErrorModel(ModelFamily):
         found = self.honest_error
         if found is None:
             raise InputError(
-                f"model of {self.target} was never judged on cycles it has not seen and will not run: "
-                "'thermocomp fit' judges what it fits; what was fitted otherwise can be compared and assessed"
+                f"model of {self.target} was never judged on unseen cycles and will not run: 'thermocomp fit' judges "
+                "the models that it fits; a model fitted in another way can be compared and assessed"
             )
         found.check_may_run(self.target)
 

@@ -96,18 +96,19 @@ class Perceptron:
         if n_hidden == 0 or n_outputs == 0 or n_hidden != len(self.hidden_weights):
             raise SettingError(
                 f"net: weights of {len(self.hidden_weights)} hidden nodes and {len(self.output_weights)} outputs, but "
-                f"thresholds of {n_hidden} and {n_outputs}; both layers need at least one node"
+                f"thresholds of {n_hidden} and {n_outputs}; their numbers must be equal, and both layers need at least "
+                "one node"
             )
         if any(len(w) != n_inputs for w in self.hidden_weights):
             raise SettingError(f"net: every hidden node needs {n_inputs} weights, one per input")
         if len(self.output_weights) != n_outputs or any(len(w) != n_hidden for w in self.output_weights):
-            raise SettingError(f"net: every one of {n_outputs} outputs needs {n_hidden} weights, one per hidden node")
+            raise SettingError(f"net: each of {n_outputs} outputs needs {n_hidden} weights, one per hidden node")
         for layer in (self.hidden, self.output):
             if layer not in _FUNCTIONS:
                 raise SettingError(f"net: unknown activation function {layer!r}; known are {', '.join(_FUNCTIONS)}")
         check_count("net", NODES, hidden_nodes=self.hidden_thresholds, outputs=self.output_thresholds)
         if self.n_parameters > ENTRIES:
-            raise SettingError(f"net: {self.n_parameters:,} weights and thresholds, at most {ENTRIES:,}")
+            raise SettingError(f"net: {self.n_parameters:,} weights and thresholds, at most {ENTRIES:,} are supported")
         check_finite(
             "net",
             hidden_weights=self.hidden_weights,

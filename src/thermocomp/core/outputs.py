@@ -48,6 +48,6 @@ def find_place(target: Path) -> Path:
 
 def cannot_be_written(target: Path, error: OSError) -> InputError:
     """Return the user message for a disk error."""
-    hint = f"; a file must be allowed beside it, in {target.parent}" if error.errno in _NOT_ALLOWED else ""
+    hint = f"; you need permission to create files in its folder {target.parent}" if error.errno in _NOT_ALLOWED else ""
     why = os.strerror(error.errno) if error.errno else error
-    return InputError(f"{target}: cannot be written: {why}{hint}; what was there is as it was")
+    return InputError(f"{target}: cannot be written: {why}{hint}; an existing file is unchanged")

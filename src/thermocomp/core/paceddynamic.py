@@ -109,19 +109,23 @@ class PacedDynamic(ErrorModel):
         owner, temperatures, states = f"model of {self.target}", self.temperatures, self.states
         wrong = [t.input for t in temperatures if len(t.lagged) != len(self.time_constants)]
         if wrong:
-            raise SettingError(f"{owner}: input {wrong[0]}: expected {len(self.time_constants)} lagged, one per lag")
+            raise SettingError(
+                f"{owner}: input {wrong[0]}: expected {len(self.time_constants)} coefficients in lagged, one per lag"
+            )
         if any(not 0 <= k < len(self.inputs) for k in [t.input for t in temperatures] + [s.input for s in states]):
-            raise SettingError(f"{owner}: a temperature or a speed state is beyond the {len(self.inputs)} inputs")
+            raise SettingError(
+                f"{owner}: the input index of a temperature or a speed state is beyond the {len(self.inputs)} inputs"
+            )
         slower = [s for s in states if s.running > s.stopped]
         if slower:
             raise SettingError(
-                f"{owner}: a speed state of {slower[0].running:g} s running and {slower[0].stopped:g} s stopped: "
-                "a turning spindle must not be the slower one"
+                f"{owner}: a speed state has the time constant {slower[0].running:g} s with the spindle running and "
+                f"{slower[0].stopped:g} s with it stopped: the first must not be longer than the second"
             )
         check_count(owner, ENTRIES, lags=range(len(temperatures) * len(self.time_constants)), states=states)
         parts = len(temperatures) * (1 + len(self.time_constants)) + len(states)
         if any(len(row) != parts for row in self.spread):
-            raise SettingError(f"{owner}: expected {parts} numbers in each row of its spread, one per part")
+            raise SettingError(f"{owner}: expected {parts} numbers in each row of spread, one per part")
         check_count(owner, ENTRIES, spread=[w for row in self.spread for w in row])
         check_between(owner, LEAST, RANGE, top_speed=self.top_speed)
         check_between(

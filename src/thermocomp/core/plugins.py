@@ -28,9 +28,12 @@ def find_plugins(group: Group, report: Callable[[str], object] = lambda _: None)
     # entry points of this package first, so that others cannot override their names; installations define no order
     for entry in sorted(entries, key=lambda e: (not e.value.startswith("thermocomp."), e.name)):
         if (first := found.setdefault(entry.name, entry)).value != entry.value:
-            report(f"{describe_plugin(entry)} is skipped: {entry.name} is there already, {first.value}")
+            report(f"{describe_plugin(entry)} is skipped: the name {entry.name} is already used by {first.value}")
     if not any(entry.value.startswith("thermocomp.") for entry in found.values()):
-        report(f"no {group} of thermocomp itself are installed: its installation is older than its code; reinstall it")
+        report(
+            f"no {group} of thermocomp itself are installed: the installation is older than the code; reinstall "
+            "thermocomp"
+        )
     return found
 
 

@@ -66,7 +66,7 @@ class PolynomialProfile:
         _check_range(self.low, self.high)
         corner = np.abs([self.low, self.high] - np.array(self.centre)).max(axis=0) / self.scale
         if any(np.dot(term, np.log10(np.maximum(corner, 1.0))) > POWER_OF_TEN for term in self.exponents):
-            raise SettingError("profile: a term overflows at the border: check centre and scale")
+            raise SettingError("profile: a term overflows at the ends of the range: check centre and scale")
 
     @cached_property
     def _axes(self) -> tuple[int, ...]:
@@ -151,7 +151,10 @@ class SplineProfile:
         if self.axis not in ("X", "Y", "Z"):
             raise SettingError(f"profile: axis {self.axis!r}: expected X, Y or Z")
         if len(self.knots) != len(self.pieces) + 1 or len(self.pieces) < 1:
-            raise SettingError(f"profile: {len(self.knots)} knots for {len(self.pieces)} pieces")
+            raise SettingError(
+                f"profile: {len(self.knots)} knots for {len(self.pieces)} pieces; expected one knot more than pieces, "
+                "and at least one piece"
+            )
         if any(not b > a for a, b in zip(self.knots, self.knots[1:], strict=False)):
             raise SettingError("profile: knots must increase")
         check_finite("profile", POSITION, knots=self.knots)

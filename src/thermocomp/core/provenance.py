@@ -151,7 +151,7 @@ class HonestError:
         """The reason under the current rules."""
         other = "" if self.current or self.word != "unproven" else "older" if self.rules < RULES else "newer"
         why = f"judged by {other} rules: {self.reason}" if other else self.reason
-        return f"{why}. Taken by {self.taken}" if self.taken else why
+        return f"{why}. Approved by {self.taken}" if self.taken else why
 
     def may_lose(self, names: Sequence[str]) -> bool:
         """Return whether the model was judged without these inputs and then leaves less error than no compensation.
@@ -184,5 +184,7 @@ def read_approval(by: str) -> str:
     """Return name and reason of a person who approves an unproven model; raise `InputError` if one is missing."""
     name, _, reason = by.partition(",")
     if not (name.strip() and reason.strip()):
-        raise InputError(f"{by!r} accepts an unproven model: expected a name and a reason, such as 'M. Weber, trial'")
+        raise InputError(
+            f"{by!r}: expected a name and a reason for approving an unproven model, such as 'M. Weber, trial'"
+        )
     return f"{name.strip()}, {reason.strip()}"

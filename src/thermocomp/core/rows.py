@@ -54,7 +54,9 @@ def walk(
     n = len(columns[0]) if columns else len(clock) if clock is not None else count_rows(table)
     for name, values in [*zip((i.name for i in model.inputs), columns, strict=True), ("the time", clock)]:
         if values is not None and values.shape != (n,):
-            raise InputError(f"model of {model.target}: {name} has shape {values.shape}, and there are {n} rows")
+            raise InputError(
+                f"model of {model.target}: {name} has shape {values.shape}; expected one value for each of {n} rows"
+            )
     values = np.column_stack(columns) if columns else np.empty((n, 0))
     steps: FloatArray = np.full(n, 1.0) if clock is None else np.diff(clock, prepend=np.inf)
     starts = (steps <= 0).tolist()

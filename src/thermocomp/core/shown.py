@@ -24,7 +24,7 @@ def escape(text: object, longest: int) -> str:
 def explain_unfit(text: str, longest: int = 200) -> str:
     """Return the reason why an external text cannot be a name; empty if it is valid."""
     if len(text) > longest:
-        return f"{text[:40]!a}... has {len(text):,} characters; at most {longest:,}"
+        return f"{text[:40]!a}... has {len(text):,} characters; at most {longest:,} are allowed"
     if not text.isprintable():
         return f"{text[:40]!a} has characters that cannot be printed"
     return ""

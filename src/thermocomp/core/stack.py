@@ -58,7 +58,7 @@ class Stack:
         for i in (i for m in self.models for i in m.inputs):
             if measured.setdefault(i.name, (i.quantity, i.unit)) != (i.quantity, i.unit):
                 first = " in ".join(measured[i.name])
-                raise InputError(f"input {i.name}: {first} for one model, {i.quantity} in {i.unit} for another")
+                raise InputError(f"input {i.name}: one model needs {first}, another needs {i.quantity} in {i.unit}")
         self.inputs = tuple(measured)
         alike: dict[object, list[int]] = {}
         for k, m in enumerate(self.models):
@@ -161,7 +161,10 @@ class Stack:
             One per model [its unit].
         """
         if not np.isfinite(values).all() or not 0.0 <= dt < np.inf:
-            raise ReadingError(f"inputs {values} of {', '.join(self.inputs)} or time step {dt} s not finite")
+            raise ReadingError(
+                f"inputs {values} of {', '.join(self.inputs)} and time step {dt} s must be finite, and the time step "
+                "not negative"
+            )
         if self._any_linear or not self.models:
             linear = self._step_linear(state, values, dt)
             deviation = linear.deviation

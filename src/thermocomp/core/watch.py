@@ -110,13 +110,13 @@ class Watch:
         if [s.input for s in self.sensors] != heat:
             raise SettingError("watch: expected one sensor per temperature, in the order of the inputs")
         if any(not 0 <= s[0] < len(names) or self.inputs[s[0]].quantity != "spindle_speed" for s in self.states):
-            raise SettingError("watch: a speed state does not follow a spindle speed")
+            raise SettingError("watch: the input of a speed state must be a spindle speed")
         parts = len(heat) * (1 + len(self.time_constants)) + len(self.states)
         if any(len(s.weights) != parts for s in self.sensors):
             raise SettingError(f"watch: expected {parts} weights per sensor, one per part")
         lagged = len(heat) * (1 + len(self.time_constants))
         if any(any(s.weights[k : lagged : len(heat)]) for k, s in enumerate(self.sensors)):
-            raise SettingError("watch: a temperature is predicted by itself")
+            raise SettingError("watch: a temperature must not be predicted from itself")
         check_count("watch", ENTRIES, weights=[w for s in self.sensors for w in s.weights])
         check_finite("watch", weights=[w for s in self.sensors for w in s.weights])
         slow, fast = [s[2] for s in self.states], [s[3] for s in self.states]

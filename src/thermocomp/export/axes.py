@@ -29,7 +29,8 @@ def find_drives(tables: Tables, named: Mapping[str, str]) -> list[Drive]:
         if letter in found:
             other = tables.targets[found[letter].target]
             raise InputError(
-                f"{other} and {target} are both {letter}: state which one drives it, such as --axes {target}={letter}"
+                f"{other} and {target} are both {letter}: state which one drives this axis, such as --axes "
+                f"{target}={letter}"
             )
         if letter:
             values = tables.values
@@ -37,7 +38,7 @@ def find_drives(tables: Tables, named: Mapping[str, str]) -> list[Drive]:
             found[letter] = Drive(letter, k, values["position"][k], travel)
     if not found:
         raise InputError(
-            f"no axis is known of {', '.join(tables.targets)}: give it, such as --axes {tables.targets[0]}=Z"
+            f"the axis of {', '.join(tables.targets)} is not known: give it, such as --axes {tables.targets[0]}=Z"
         )
     return list(found.values())
 
@@ -108,6 +109,6 @@ def _check_whole(drives: list[Drive], taken: Value) -> None:
     for drive in drives:
         if taken.whole and abs(drive.position * taken.factor) >= WHOLE:
             raise InputError(
-                f"{drive.letter}: its slope counts from {drive.position:g} mm, and {taken.about} ends at "
-                f"{WHOLE / taken.factor:.0f} mm: record with positions in machine coordinates [mm]"
+                f"{drive.letter}: the reference position of its slope is {drive.position:g} mm, but {taken.about} "
+                f"is limited to {WHOLE / taken.factor:.0f} mm: record with positions in machine coordinates [mm]"
             )

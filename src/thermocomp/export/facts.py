@@ -43,7 +43,7 @@ class Facts:
         found, limits = [_verdict(compensator)], compensator.limits
         found += [f"{target}: {status.reason}" for target, status in compensator.shadow.items()]
         taken = {m.honest_error.taken for m in compensator.models if m.honest_error and m.honest_error.taken}
-        found += [f"unproven, taken by {who}" for who in sorted(taken)]
+        found += [f"unproven, approved by {who}" for who in sorted(taken)]
         return [
             *found,
             *self.origin(),
@@ -59,10 +59,10 @@ def _verdict(compensator: Compensator) -> str:
     shadow, lines = compensator.shadow, compensator.lines
     if len(shadow) == len(lines):
         return f"SHADOW ONLY, {', '.join(lines)}: not proven on unseen cycles; all corrections stay zero"
-    said = {"accepted on unseen cycles": list[str](), "UNPROVEN, taken anyway": list[str]()}
+    said = {"accepted on unseen cycles": list[str](), "UNPROVEN, approved nevertheless": list[str]()}
     for target, line in lines.items():
         if target not in shadow:
             taken = any(m.honest_error and m.honest_error.taken for m in compensator.models[line.models])
-            said["UNPROVEN, taken anyway" if taken else "accepted on unseen cycles"].append(target)
+            said["UNPROVEN, approved nevertheless" if taken else "accepted on unseen cycles"].append(target)
     words = [f"{', '.join(targets)}: {word}" for word, targets in said.items() if targets]
     return "; ".join([*words, *([f"SHADOW ONLY, {', '.join(shadow)}: corrections stay zero"] if shadow else [])])

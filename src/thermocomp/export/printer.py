@@ -128,11 +128,11 @@ class Printer(ABC):
                 return self.choice(self.value(test), self.value(body, kind or own), self.value(orelse, kind or own))
             case ast.Call(args=args):
                 return self.call(called(node), args)
-        raise TypeError(f"{ast.unparse(node)}: no expression of a block")
+        raise TypeError(f"{ast.unparse(node)}: is not an expression of a block")
 
     def _constant(self, value: object, kind: Kind | None) -> str:
         if not isinstance(value, int | float):
-            raise TypeError(f"{value}: no constant of a block")
+            raise TypeError(f"{value}: is not a constant of a block")
         return self.constant(value, _kind(value) if kind is None else kind)
 
 

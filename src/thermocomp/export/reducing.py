@@ -64,10 +64,10 @@ def export_reduced(
     wanted, axes, elsewhere = along_axes(models, options, to, shape.axes)
     more = [m for m in wanted if not fits(m, shape) or not _has(options, m)]
     if more and not recordings:
-        held = f"{to} holds {_told(shape.sensors)}{', of --sensors' if options.sensors else ''}"
+        held = f"{to} supports only {_told(shape.sensors)}{', of --sensors' if options.sensors else ''}"
         raise InputError(
-            f"{held}, and the model of {', '.join(m.target for m in more)} is more than that: name recordings to "
-            f"reduce it on, such as: thermocomp export {order.facts.source} drift.csv --to {to}"
+            f"{held}, and the model of {', '.join(m.target for m in more)} is more complex: name recordings "
+            f"for its reduction, such as: thermocomp export {order.facts.source} drift.csv --to {to}"
         )
     reductions = _reduce(more, axes, recordings, options, starts, shape, listener) if more else {}
     refused, found = dict[str, str](), list[Reduced]()
@@ -104,12 +104,12 @@ def along_axes(
 
 def _why_elsewhere(model: ErrorModel | PositionModel, axis: str, to: str, corrected: str) -> str:
     if model.unit != "um":
-        return f"it predicts {model.unit}, and a correction is in um"
+        return f"it predicts {model.unit}, but a correction is in um"
     if not axis:
-        return f"its axis is not known: --axes {model.target}=X, =Y or =Z names it"
+        return f"its axis is not known: give it with --axes {model.target}=X, =Y or =Z"
     if isinstance(model, PositionModel) and axis != model.axis:
-        return f"it runs along {model.axis}, and --axes says {axis}"
-    return "" if axis in corrected else f"it is of {axis}, and {to} corrects {corrected} alone"
+        return f"its axis is {model.axis}, but --axes specifies {axis}"
+    return "" if axis in corrected else f"its axis is {axis}, but {to} corrects {corrected} only"
 
 
 def _has(options: ReductionOptions, model: ErrorModel) -> bool:
@@ -121,9 +121,9 @@ def _refuse_twice(wanted: Sequence[tuple[str, str]]) -> None:
     along = {axis: [t for t, other in wanted if other == axis] for _, axis in wanted}
     twice = {axis: targets for axis, targets in along.items() if len(targets) > 1}
     if twice:
-        found = "; ".join(f"{', '.join(targets)} are all of {axis}" for axis, targets in twice.items())
+        found = "; ".join(f"{', '.join(targets)} are all for axis {axis}" for axis, targets in twice.items())
         one = " ".join(f"{targets[0]}={axis}" for axis, targets in along.items())
-        raise InputError(f"{found}: name one of each axis, such as --axes {one}")
+        raise InputError(f"{found}: name one target for each axis, such as --axes {one}")
 
 
 def _check_limit(r: Reduced, limits: Limits, to: str) -> None:
@@ -131,7 +131,8 @@ def _check_limit(r: Reduced, limits: Limits, to: str) -> None:
     if r.most > limits.magnitude:
         raise InputError(
             f"{r.model.target}: the reduced model corrects by up to {r.most:.0f} um in these recordings, and was "
-            f"judged so; {to} would stop at {limits.magnitude:g} um: give --magnitude {1.2 * r.most:.0f}, if it may"
+            f"judged without a limit; {to} would stop at {limits.magnitude:g} um: give --magnitude "
+            f"{1.2 * r.most:.0f} if so large a correction is permitted"
         )
 
 

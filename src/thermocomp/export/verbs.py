@@ -159,7 +159,7 @@ def export(
     refused = {m.target: why for m in models if (why := _refusal(m))}
     elsewhere = {}
     if target.shape is None:
-        elsewhere = {m.target: f"it predicts {m.unit}, and a correction is in um" for m in models if m.unit != "um"}
+        elsewhere = {m.target: f"it predicts {m.unit}, but a correction is in um" for m in models if m.unit != "um"}
     left = [m for m in models if m.target not in refused and m.target not in elsewhere]
     if not left:
         return ExportedCode({}, refused, elsewhere)
@@ -193,7 +193,7 @@ def _read(
     tests = recordings_of(recordings, mapping)
     if target.shape is None:
         raise InputError(
-            f"{to} holds the whole model and takes no recordings, found {tests[0].source or tests[0].name}"
+            f"{to} exports the whole model and accepts no recordings, found {tests[0].source or tests[0].name}"
         )
     listener.warn(trouble_of(tests))
     return tests

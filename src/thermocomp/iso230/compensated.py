@@ -42,7 +42,7 @@ def replay_models(
         notes.append(f"{start.told(recording.name)}; models run behind the gate, {limits.in_words()}")
     for target, model in by_target.items():
         if target not in names:
-            notes.append(f"the model of {model.target} has nothing to do here: there is no such channel")
+            notes.append(f"the model of {model.target} is not used: the recording has no channel of this name")
             continue
         samples = stack_for(model, [recording], start)
         own = samples.cycle >= 0
@@ -54,21 +54,21 @@ def replay_models(
             notes.append(f"{target}: the model alone leaves {left[1]:.2f} {model.unit} RMS, not {left[0]:.2f}")
         known = find_learned_rows(model, samples)[own]
         if known.all():
-            notes.append(f"the model of {target} was fitted to this very recording: what it leaves is no honest test")
+            notes.append(f"the model of {target} was fitted to this recording: its residual is not an honest test")
         elif known.any():
-            rows = f"{known.sum():,} of {len(known):,} rows were learned from"
-            notes.append(f"the model of {target}: {rows}: what it leaves there is no honest test")
+            rows = f"{known.sum():,} of {len(known):,} rows were used for training"
+            notes.append(f"the model of {target}: {rows}: its residual there is not an honest test")
         honest = model.honest_error
         if honest is not None and not model.accepted:
             notes.append(f"the model of {target} was {honest.word} when it was fitted: {honest.why}")
         if ran.rejected.any():
-            notes.append(f"the gate turned {int(ran.rejected.sum())} readings of {target} away; the first: {ran.why}")
+            notes.append(f"the gate rejected {int(ran.rejected.sum())} readings of {target}; the first: {ran.why}")
         if ran.outside.mean() > 0.1:
             share = f"{100 * ran.outside.mean():.0f} % of the rows"
-            notes.append(f"the model of {target}: {share} are outside the range it was trained in")
+            notes.append(f"the model of {target}: {share} are outside its trained range")
     if models and not found:
         raise InputError(
-            f"{recording.name}: the models are of {', '.join(m.target for m in models)}, and no such channel is "
-            "recorded here"
+            f"{recording.name}: the models are of {', '.join(m.target for m in models)}, but the recording has no such "
+            "channel"
         )
     return found, notes

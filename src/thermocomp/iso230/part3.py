@@ -243,7 +243,10 @@ def _about_curves(kind: Kind, curves: Sequence[ThermalCurve], targets: Sequence[
     notes = []
     still = [c.name for c in curves if np.isfinite(c.values).any() and not c.course.noise.moves]
     if still:
-        notes.append(f"{', '.join(still)}: its averages do not move beyond their noise, whose range it is that is told")
+        notes.append(
+            f"{', '.join(still)}: the averages do not change by more than their noise; the range stated is that of the "
+            "noise"
+        )
     if kind == "spindle":
         notes += _about_the_end([c for c in curves if c.name not in still])
     for c in (*curves, *(c for t in targets for c in t.curves)):
@@ -260,7 +263,7 @@ def _about(recording: Recording, kind: Kind, pairs: Sequence[Pair], air: Channel
     if kind == "etve" and not (recording.speed or recording.of_quantity("feed")):
         notes.append("neither a spindle speed nor a feed was recorded: whether the machine was at rest is not known")
     elif runs == "spindle" and kind != "spindle":
-        notes.append("the spindle turned in this test: what it did is in the figures too")
+        notes.append("the spindle turned in this test: its effect is included in the values")
     elif kind == "spindle" and runs != "spindle":
         notes.append("no turning spindle was recorded: the figures are not those of a spindle test")
     elif kind == "etve" and runs == "axis":
@@ -268,14 +271,15 @@ def _about(recording: Recording, kind: Kind, pairs: Sequence[Pair], air: Channel
     named, used = paired_names(recording), {n for p in pairs for n in (p.tip, p.spindle)}
     untold = [f"{named[a, 1]} and {named[a, 2]}" for a in "xy" if {(a, 1), (a, 2)} <= named.keys()]
     if untold and not used:
-        notes.append(f"no tilt is given: the distance between the probes {', '.join(untold)} was not given")
+        notes.append(f"no tilt is reported: the distance between the probes {', '.join(untold)} was not given")
     if stations := find_stations(recording):
         notes.append(_stations_words(stations))
     if air is None:
-        notes.append("no temperature is known to be that of the surroundings: name it")
+        notes.append("no temperature is known to be that of the surroundings: name its channel (ambient)")
     if kind == "axis" and not _target_groups(recording):
         notes.append(
-            "no channel is a target of an axis: name them by axis and position, such as x_laser_0, x_laser_500"
+            "no channel is a target position of an axis: name the channels by axis and position, such as x_laser_0, "
+            "x_laser_500"
         )
     return notes
 
@@ -290,8 +294,8 @@ def _stations_words(stations: dict[str, str]) -> str:
     codes = list(dict.fromkeys(stations.values()))
     shown = ", ".join(codes[:3]) + (" ..." if len(codes) > 3 else "")
     return (
-        f"{len(stations)} channels are stations of error profiles ({shown}): they are not reported here; thermocomp "
-        "position and thermocomp volumetric are for them"
+        f"{len(stations)} channels are stations of error profiles ({shown}): they are not reported here; use "
+        "thermocomp position and thermocomp volumetric for them"
     )
 
 
@@ -305,7 +309,8 @@ def _about_the_end(curves: Sequence[ThermalCurve]) -> list[str]:
     return [
         f"range of the last 60 min to that of the first: {', '.join(told)}; "
         + ("all are" if calm else "not all are")
-        + f" within the {100 * CALM:.0f} % by which ISO 230-3 lets a spindle test end before 4 h (from memory)"
+        + f" within the {100 * CALM:.0f} % at which ISO 230-3 permits a spindle test to end "
+        "before 4 h (from memory)"
     ]
 
 
@@ -321,19 +326,19 @@ def _about_rows(recording: Recording, kind: Kind, rows: tuple[int, int, int], nu
     notes = []
     running = recording.time[stop] - recording.time[start]
     if running < HOUR:
-        notes.append(f"it ran for {running / 60:.0f} min only: nothing is stated about the first 60 min")
+        notes.append(f"the test ran for {running / 60:.0f} min only: no values for the first 60 min are stated")
     if kind == "etve":
         if (on := find_driven_rows(recording)) is not None and on.any():
-            notes.append("the spindle or an axis moves: that is no test of the environment alone")
+            notes.append("the spindle or an axis moves: this is not a test of the environment alone")
         if running < 24 * HOUR * 0.99:
-            notes.append(f"it is {running / HOUR:.1f} h long; the environment has a period of a day")
+            notes.append(f"the test is {running / HOUR:.1f} h long; the environment has a period of a day")
     elif stop == end:
         notes.append("the cool-down was not recorded")
     if kind != "etve" and lead < 2:
-        readings = "that one reading" if lead == 0 else "its first two readings"
+        readings = "a single reading" if lead == 0 else "the first two readings"
         notes.append(
-            f"nearly no rest is recorded before the drives start: all is counted from {readings}, noise and all; "
-            f"record {WINDOW / 60:.0f} min of rest"
+            f"almost no rest is recorded before the drives start: all values are relative to {readings} and contain "
+            f"the noise of this reference; record {WINDOW / 60:.0f} min of rest"
         )
     if number > 1:
         notes.append("the machine had run before: it does not start from rest")
@@ -343,7 +348,7 @@ def _about_rows(recording: Recording, kind: Kind, rows: tuple[int, int, int], nu
 def _load(recording: Recording, kind: Kind, start: int, stop: int) -> str:
     """Return the load of the spindle or the axis during running, as text."""
     if kind == "etve":
-        return "machine at rest" if recording.of_quantity("spindle_speed") else "taken as at rest"
+        return "machine at rest" if recording.of_quantity("spindle_speed") else "regarded as at rest"
     quantity, word = ("spindle_speed", "spindle at") if kind == "spindle" else ("feed", "feed of")
     channels = recording.of_quantity(quantity)
     values = np.abs(recording.values(channels)[start + 1 : stop + 1]) if channels else np.empty((0, 0))

@@ -129,11 +129,11 @@ def iso230(
     ('x1_um', 3.4)
     """
     if recordings is None and not positioning:
-        raise InputError("nothing given: name a recording of a thermal test, or a table by --positioning")
+        raise InputError("no input given: name a recording of a thermal test, or a table with --positioning")
     if recordings is None:
         asked = {"--test": test, "--distance": distance, "--pairs": pairs, "--ambient": ambient, "--model": model}
         for option in (o for o, value in asked.items() if value is not None):
-            raise InputError(f"{option} applies to recordings of thermal tests: name one")
+            raise InputError(f"{option} applies to recordings of thermal tests: name a recording")
     if distance is not None and pairs:
         raise InputError("--distance is for probes named x1, x2, y1, y2; --pairs specifies its own distances")
     models = models_of(model) if model is not None else ()
@@ -191,7 +191,7 @@ def _pairs(recording: Recording, distance: str | None, pairs: Sequence[str] | No
     paired = part3.find_pairs(recording, length(distance, "--distance"))
     if not paired:
         raise InputError(
-            f"--distance: {recording.name} has no probes named x1 and x2, or y1 and y2; name them by --pairs "
+            f"--distance: {recording.name} has no probes named x1 and x2, or y1 and y2; name the probes with --pairs "
             f"TIP:SPINDLE:DISTANCE, of {', '.join(c.name for c in recording.displacements)}"
         )
     return paired

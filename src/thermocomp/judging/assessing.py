@@ -81,8 +81,8 @@ def assess(
         raise InputError("no model given: name a model file, or give at least one model")
     if probings and (unknown := [m.target for m in models if m.honest_error is None]):
         raise InputError(
-            f"model of {', '.join(unknown)} was never judged on cycles it has not seen: how informative a probing is "
-            "next to it is not known; 'thermocomp fit' judges what it fits"
+            f"model of {', '.join(unknown)} was never judged on unseen cycles, so the weight of a probing relative to "
+            "the model is not known; 'thermocomp fit' judges the models that it fits"
         )
     found: list[Assessment] = []
     covered = None
@@ -192,9 +192,9 @@ def _assess(
         why = (
             f"fitted to {', '.join(seen)}"
             if len(seen) == len(samples.test_names)
-            else f"{n:,} of {of:,} rows were learned from"
+            else f"{n:,} of {of:,} rows were used for training"
         )
-        caveat, known = f"no honest test: {why}; judge it on another recording", np.zeros_like(known)
+        caveat, known = f"no honest test: {why}; judge the model on another recording", np.zeros_like(known)
     split = Split("all cycles", np.zeros(len(samples), np.bool_), ~known, stretch=_goes_on(model, samples, known))
     found = judge(
         _name(model), model, samples, split,

@@ -197,8 +197,8 @@ class Cluster:
 
     def _lost(self) -> ClusterError:
         return ClusterError(
-            f"{self._address}: the scheduler was lost, and what had been done with it; "
-            "see that it runs, then start again"
+            f"{self._address}: the connection to the scheduler was lost, and with it all results so far; "
+            "check that the scheduler is running, then start again"
         )
 
     def _workerless(self) -> ClusterError:
@@ -242,5 +242,6 @@ def _check_versions(here: Mapping[str, str | None], there: Mapping[str, str | No
     other = [f"{name} {there[name] or 'is missing'} (here {here[name]})" for name in ALIKE if here[name] != there[name]]
     if other:
         raise ClusterError(
-            f"worker {worker}: {', '.join(other)}; install the same versions there as here, then start the worker again"
+            f"worker {worker}: {', '.join(other)}; install the same versions for the worker as here, then start the "
+            "worker again"
         )

@@ -130,8 +130,8 @@ def table(named: dict[str, Validity]) -> Table:
 def _cells(v: Validity) -> dict[str, str]:
     days = f", {v.days} day{'s' if v.days > 1 else ''}" if v.days else ""
     return {
-        "units judged": f"{v.units}, {v.independent} of them not alike" if v.units > 1 else f"{v.units}",
-        "most alike two": "" if v.nearest is None else f"{v.nearest:.2f} of the inputs' spread apart",
+        "units judged": f"{v.units}, {v.independent} of them distinct" if v.units > 1 else f"{v.units}",
+        "two most similar": "" if v.nearest is None else f"{v.nearest:.2f} of the inputs' spread apart",
         "hours, days": f"{v.hours:.1f} h{days}",
         "spindle speeds [1/min]": _listed(v.speeds) or "not recorded",
         "surroundings [degC]": f"{_range(v.ambient)} ({v.ambient_channel})" if v.ambient else "not named",

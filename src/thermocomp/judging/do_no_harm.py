@@ -184,7 +184,7 @@ class Verdict:
     def reason(self) -> str:
         """Reason for the verdict in one sentence, with the decisive unit or baseline."""
         if self.refusal or not self.units:
-            return self.refusal or f"fewer than {MIN_ROWS} rows of any cycle to judge on"
+            return self.refusal or f"every cycle has fewer than {MIN_ROWS} rows of validation data"
         stated = "" if self.stated is None else f"; the harm margin of {self.stated:g} {self.unit} was stated"
         return self._by_units() + stated
 
@@ -200,18 +200,20 @@ class Verdict:
     def _why_accepted(self) -> str:
         least = max(self.units, key=lambda u: u.harm)
         others = f"better than {self.names[self.worst]} and the other baselines"
-        return f"{others}, {self._tested()}; least in {least.name}: {self._figures(least)}"
+        return f"{others}, {self._tested()}; smallest gain in {least.name}: {self._figures(least)}"
 
     def _why_unproven(self) -> str:
         n, moving = len(self.units), self._moving
         if not moving:
-            return f"the judged part does not move: {self._figures(self.units[0])} in {self.units[0].name}"
+            return (
+                f"no significant drift in the validation data: {self._figures(self.units[0])} in {self.units[0].name}"
+            )
         if self.caps:
             return "; ".join(self.caps)
         if n < MIN_UNITS:
             return f"judged on {_count(n, 'unit')}, at least {MIN_UNITS} are needed"
         if moving < MIN_UNITS - 1:
-            return f"only {moving} of {n} units move"
+            return f"only {moving} of {n} units have a significant drift"
         return f"not shown to be better than {self.names[self.worst]}: {self._pooled(self.worst)}, {self._tested()}"
 
     def _tested(self) -> str:
@@ -228,11 +230,11 @@ class Verdict:
         """Test that would decide an unproven verdict; empty for the other verdicts."""
         if self.word != "unproven" or self.caps == (UNTRIED,):  # the reason already gives the advice
             return ""
-        if any("not alike" in cap for cap in self.caps):
+        if any("are distinct" in cap for cap in self.caps):
             return "record cycles at other speeds or on other days"
         if self.caps:
-            by_stretch = any("one stretch" in cap for cap in self.caps)
-            way = "by leave-one-cycle-out or leave-one-file-out" if by_stretch else "on recordings without that"
+            by_stretch = any("one section" in cap for cap in self.caps)
+            way = "by leave-one-cycle-out or leave-one-file-out" if by_stretch else "on recordings without this problem"
             return f"judge it {way}"
         n = len(self.units)
         if n < MIN_UNITS:
@@ -260,7 +262,7 @@ class Verdict:
     def _pooled(self, k: int) -> str:
         pairs = [(u.rms, u.baselines[k]) if k < len(u.baselines) else u.rezeroed or (0, 0) for u in self.units]
         mine, other = np.sqrt(np.mean(np.square(pairs), axis=0))
-        return f"RMS {mine:.2f} {self.unit} beside {other:.2f} {self.unit} over the units"
+        return f"RMS {mine:.2f} {self.unit} compared with {other:.2f} {self.unit} over all units"
 
 
 def measure(

@@ -65,7 +65,7 @@ def judge(
     target = [c.name for c in samples.targets].index(model.target)
     rows, piece = split.judge & np.isfinite(samples.deviations[:, target]), (target, name, split)
     if not rows.any():
-        return refuse_method(samples, piece, f"{model.target} has no number in {split.block} to judge against")
+        return refuse_method(samples, piece, f"{model.target} has no measured value in {split.block}")
     measured = samples.deviations[rows, target]
     if learned is None and model.provenance is not None:
         learned = model.provenance.learned
@@ -73,7 +73,7 @@ def judge(
     stressed = stress(model, samples, measured, rows, guard=guard) if robustness else None
     predicted = ran.deviation if limits is None else ran.compensated
     if not np.isfinite(metrics.rms(measured, ran.deviation)):
-        return refuse_method(samples, piece, f"the residual of {model.target} is beyond all numbers")
+        return refuse_method(samples, piece, f"the residual of {model.target} is not finite")
     return Assessment(
         model=name,
         target=model.target,
@@ -152,7 +152,7 @@ def cap_alike_units(samples: Samples, judging: Judging) -> tuple[str, ...]:
     needed = do_no_harm.MIN_UNITS
     if covered.independent >= needed or covered.units < needed:
         return ()
-    return (f"only {covered.independent} of {covered.units} units are not alike, at least {needed} are needed",)
+    return (f"only {covered.independent} of {covered.units} units are distinct, at least {needed} are needed",)
 
 
 def _caps(
@@ -165,9 +165,11 @@ def _caps(
     others = {c.name for k, c in enumerate(samples.targets) if k != target} | set(watched)
     found = [text for channel, text in samples.trouble if channel not in others]
     if split.stretch:
-        found.append("judged on one stretch that continues from what was learned")
+        found.append("judged on one section that continues the training data")
     if learned is None:
-        found.append("the model does not say what it learned, so that it cannot be held against that")
+        found.append(
+            "the model does not state the training values, so it cannot be compared with their mean and last value"
+        )
     return tuple(found)
 
 

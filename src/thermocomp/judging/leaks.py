@@ -57,6 +57,7 @@ def _told(samples: Samples, copies: IntArray, origin: IntArray, k: int, block: s
     later, earlier = (samples.test_names[samples.test[rows[k]]] for rows in (copies, origin))
     return (
         f"{later}: rows {samples.row[copies[a]]}-{samples.row[copies[b]]} repeat rows "
-        f"{samples.row[origin[a]]}-{samples.row[origin[b]]} of {'it' if later == earlier else earlier}, about: with "
-        f"{block} left out they would be learned from and judged on at once. Leave them out of one of them"
+        f"{samples.row[origin[a]]}-{samples.row[origin[b]]} of "
+        f"{'the same recording' if later == earlier else earlier}, approximately: with {block} left out, the same data "
+        "would be used for both training and validation. Delete one of the two copies"
     )

@@ -187,7 +187,7 @@ def next_to_buy(found: Budget, model: str, place: int) -> str:
         new = [s for s in found.sensors[k] if s not in found.sensors[place]]
         if gain > len(new) * least:
             surely = (
-                "." if gain > margin else ", which is less than the blocks differ by: more thermal cycles would tell."
+                "." if gain > margin else ", which is less than the blocks differ by: more thermal cycles would decide."
             )
             if k == place + 1:
                 return f"Next to buy: {would}{surely}"
@@ -267,7 +267,7 @@ def _repeats(candidates: Sequence[Candidates], sensors: Sequence[str]) -> Table:
 
 
 def trade_off(found: Budget, model: str, place: int) -> str:
-    """Return the loss of accuracy due to fewer sensors, compared with the best set of the table and with all sensors."""
+    """Return the loss of accuracy due to fewer sensors than those of the best set, and than all sensors."""
     mean = found.mean()
     m, n = found.models.index(model), found.sizes[place]
     best = np.unravel_index(int(np.nanargmin(mean)), mean.shape)

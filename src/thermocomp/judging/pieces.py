@@ -13,7 +13,7 @@ _Piece = TypeVar("_Piece")
 _Found = TypeVar("_Found")
 
 #: reason reported for a task whose process died
-DIED = "its process died: it crashed, or was killed, as the system does if the memory is full"
+DIED = "its process ended: it crashed, or was killed by the system, for example because the memory is full"
 
 #: executor used instead of this machine's processes, if any: called with the arguments of `work_through` except `jobs`
 elsewhere: ContextVar[Callable[[Any, Sequence[Any], Any], Iterator[Any]] | None] = ContextVar("elsewhere", default=None)

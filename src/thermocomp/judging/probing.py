@@ -42,8 +42,8 @@ class Probings:
     def __post_init__(self) -> None:
         if not 0.0 < self.every < np.inf or not 0.0 <= self.repeatability < np.inf:
             raise InputError(
-                f"probings every {self.every:g} s, repeatability {self.repeatability:g} um: expected a time above 0 "
-                "and at least 0 um"
+                f"probings every {self.every:g} s, repeatability {self.repeatability:g} um: expected a time above "
+                "0 s and a repeatability of at least 0 um"
             )
 
     @classmethod

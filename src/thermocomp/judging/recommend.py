@@ -147,6 +147,6 @@ def correct_verdicts(
         mine = after[found.method]
         better = min(found.verdict.p_value, mine.p_value)
         after[found.method] = replace(
-            mine, p=better, about="chosen again without each unit, and judged with the choosing"
+            mine, p=better, about="selected again without each unit, and judged including this selection"
         )
     return after

@@ -33,7 +33,7 @@ def stress_written(judged: Assessment, model: ErrorModel, samples: Samples, guar
 def refit_accepted(
     judged: Sequence[Assessment], samples: Samples, support: Support, *, watch: bool, jobs: int
 ) -> list[Assessment]:
-    """Fit accepted methods to all rows, as in `thermocomp.judging.study.fit`, and test the robustness of these models."""
+    """Fit accepted methods to all rows, as in `thermocomp.judging.study.fit`, and test their robustness."""
     wanted = [a for a in judged if a.overall and a.accepted and a.deployable]
     everything = np.ones(len(samples), dtype=np.bool_)
     guard = find_guard(samples, everything, everything) if watch and wanted else None

@@ -37,7 +37,7 @@ class Rules:
 
     def __post_init__(self) -> None:
         if self.margin is not None and not 0 <= self.margin < np.inf:
-            raise InputError(f"margin {self.margin}: state a finite number that is not negative")
+            raise InputError(f"margin {self.margin}: expected a finite number that is not negative")
 
     def check(self, names: Sequence[str]) -> None:
         """Raise `InputError` if the primary method is not among those compared."""
@@ -204,12 +204,14 @@ class Assessment:
         if self.failure:
             return f"could not be judged: {self.failure}"
         fragile = (
-            f"{self._fragile}; take fewer sensors (thermocomp select) or filter the readings" if self._fragile else ""
+            f"{self._fragile}; use fewer sensors (thermocomp select) or filter the readings" if self._fragile else ""
         )
         told = self.caveat or fragile or self.verdict.told
         if self.caveat or not self.learned:
             return told
-        return f"{told}; {self.learned:,} of {len(self.measured) + self.learned:,} rows were learned from: left out"
+        return (
+            f"{told}; {self.learned:,} of {len(self.measured) + self.learned:,} rows were used for training: left out"
+        )
 
 
 @dataclass(frozen=True)

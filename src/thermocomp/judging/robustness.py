@@ -71,7 +71,9 @@ class Robustness:
         """Return the disturbances that make it worse than no compensation by more than a margin [um], as text."""
         told = [f"{what} ({rms:.2f} um)" for what, rms in self._above(self.none_rms + margin).items()]
         more = f" and {len(told) - 4} more" if len(told) > 4 else ""
-        return f"worse than none ({self.none_rms:.2f} um RMS) with {', '.join(told[:4])}{more}" if told else ""
+        return (
+            f"worse than no compensation ({self.none_rms:.2f} um RMS) with {', '.join(told[:4])}{more}" if told else ""
+        )
 
     def _above(self, limit: float) -> dict[str, float]:
         """Return the disturbances whose RMS exceeds a limit, with the RMS [um]: noise, then losses, the worst first."""

@@ -79,7 +79,7 @@ def select(
                     method=method,
                     target=target.name,
                     sensors=(),
-                    reason=f"could not be chosen: {why}",
+                    reason=f"no sensors could be selected: {why}",
                     tables=(),
                     failure=why,
                 )

@@ -64,10 +64,11 @@ def sensitivity(
     """
     targets = {m.target for m in models.values()}
     if len(targets) != 1:
-        raise InputError(f"expected models of one target, found those of {', '.join(sorted(targets)) or 'none'}")
+        raise InputError(f"expected models of one target, found models of {', '.join(sorted(targets)) or 'none'}")
     if not 0 <= size < np.inf or draws < 2 or law not in ("uniform", "normal"):
         raise InputError(
-            f"sensor error {law!r} of {size} degC, {draws} draws: expected uniform or normal, >= 0, >= 2 draws"
+            f"sensor error {law!r} of {size} degC, {draws} draws: expected uniform or normal, a size >= 0 and >= 2 "
+            "draws"
         )
     (target,) = targets
     names = [c.name for c in samples.targets]

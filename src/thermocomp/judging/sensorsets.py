@@ -47,10 +47,10 @@ def choose_sets(samples: Samples, most: int, learn: BoolArray) -> SensorSets:
     seen = learn & samples.valid & np.isfinite(samples.deviations).all(axis=1)
     if seen.sum() < MIN_ROWS:
         names = ", ".join(c.name for c in samples.targets)
-        several = "; choose for fewer targets at once" if len(samples.targets) > 1 else ""
+        several = "; select sensors for fewer targets at once" if len(samples.targets) > 1 else ""
         raise FitError(
-            f"{int(seen.sum())} rows have a number in each of {names} and of the {len(samples.inputs)} inputs: "
-            f"at least {MIN_ROWS} are needed to choose sensors by{several}"
+            f"{int(seen.sum())} rows have values of all of {names} and of all {len(samples.inputs)} inputs: "
+            f"at least {MIN_ROWS} are needed for selecting sensors{several}"
         )
     _, scales = weigh_targets(samples, seen)
     # a model with memory also receives the rows between its training rows

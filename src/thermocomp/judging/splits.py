@@ -84,7 +84,8 @@ def by_time(samples: Samples, train_s: float, test_s: float) -> Judging:
     first, stop = (int(np.searchsorted(elapsed, t)) for t in (train_s, train_s + test_s))
     if not 0 < first < stop:
         raise InputError(
-            f"split {train_s / 3600:g} h/{test_s / 3600:g} h: the recordings last {elapsed[-1] / 3600:.2f} h in all"
+            f"split {train_s / 3600:g} h/{test_s / 3600:g} h: the recordings last only {elapsed[-1] / 3600:.2f} h in "
+            "all"
         )
     name = f"first {train_s / 3600:g} h to learn, next {test_s / 3600:g} h unseen"
     return _consecutive(name, len(samples), first, stop)
@@ -196,7 +197,7 @@ def parse(text: str, samples: Samples) -> Judging:
 def _consecutive(name: str, n: int, first: int, stop: int) -> Judging:
     rows = np.arange(n)
     if first < 1 or stop <= first:
-        raise InputError(f"{name}: leaves no row to learn from or none to judge on ({n} rows in all)")
+        raise InputError(f"{name}: leaves no row for training or none for validation ({n} rows in all)")
     return Judging(
         name, (Split(f"rows {first}-{stop - 1}", rows < first, (rows >= first) & (rows < stop), stretch=True),)
     )

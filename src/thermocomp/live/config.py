@@ -113,7 +113,7 @@ class JournalOut:
             raise SettingError(f"channels: {', '.join(sorted(unknown))}: expected one of {', '.join(HOUSE_UNITS)}")
         if not 0.1 <= self.size_mb <= 1e6 or not self.files >= 2:
             raise SettingError(
-                f"size_mb = {self.size_mb:g}, files = {self.files}: expected at least 0.1 and at least 2"
+                f"size_mb = {self.size_mb:g}, files = {self.files}: expected at least 0.1 MB and at least 2 files"
             )
 
 
@@ -173,7 +173,7 @@ class Config:
             yield 'no source: add a table [[sources]] with kind = "mqtt", "simulated" or "replay"'
         if self.own_compensation == "on" and not self.shadow:
             yield (
-                'own_compensation = "on": the same error would be corrected twice; switch that of the controller off, '
+                'own_compensation = "on": the same error would be corrected twice; switch off that of the controller, '
                 "or let the models run in shadow (shadow = true)"
             )
         controlled = any(isinstance(s, LinuxCncOut) for s in self.sinks)
@@ -185,21 +185,21 @@ class Config:
         for what, many in (("source", self.sources), ("sink", self.sinks), ("probe", self.probes)):
             for place, count in Counter(map(_place, many)).items():
                 if count > 1:
-                    yield f"{count} {what}s with the same {place}: leave one of them"
+                    yield f"{count} {what}s with the same {place}: keep only one of them"
         for sink in (s for s in self.sinks if isinstance(s, MqttOut)):
             for source in (*self.sources, *self.probes):
                 if isinstance(source, MqttIn | MqttProbing) and source.hears(sink):
                     yield (
-                        f"topic = {source.topic!r}: hears the corrections that go to {sink.topic!r}; let them go to a "
-                        "topic that no source and no probe listens to"
+                        f"topic = {source.topic!r}: receives the corrections published to {sink.topic!r}; publish them "
+                        "to a topic to which no source and no probe subscribes"
                     )
         machine = any(isinstance(s, SimulatedIn) for s in self.sources)
         if not machine and any(isinstance(p, SimulatedProbing) for p in self.probes):
             yield 'a probe of kind = "simulated" needs a source of kind = "simulated"'
         if self.speed != 1.0 and any(isinstance(s, MqttIn) and not s.virtual for s in self.sources):
             yield (
-                f"speed = {self.speed:g}: a machine that is read by MQTT runs in real time, speed = 1, unless it is "
-                "a virtual one (virtual = true)"
+                f"speed = {self.speed:g}: a machine that is read by MQTT runs in real time: set speed = 1, or "
+                "virtual = true if the machine is a virtual one"
             )
 
 
@@ -222,8 +222,8 @@ class ServiceSettings(NamedTuple):
 _KINDS: tuple[Literal["sources", "sinks"], ...] = ("sources", "sinks")
 _PLAIN = {
     "missing": "is missing",
-    "unexpected_keyword_argument": "is no key that is known",
-    "extra_forbidden": "is no key that is known",
+    "unexpected_keyword_argument": "is not a known key",
+    "extra_forbidden": "is not a known key",
     "dataclass_type": "must be a table, such as [limits]",
     "tuple_type": "must be a list: [...]",
     "dict_type": "must be a table",
@@ -235,7 +235,7 @@ def read_config(path: str | Path) -> ServiceSettings:
     """Read a configuration."""
     content = read_toml(path, "configuration of the service")
     if unfit := list(_unfit(content)):
-        raise InputError("\n".join([f"{path}: {len(unfit)} to mend:", *(f"  {line}" for line in unfit)]))
+        raise InputError("\n".join([f"{path}: {len(unfit)} to correct:", *(f"  {line}" for line in unfit)]))
     adapter = _adapter(content)
     try:
         config = adapter.validate_json(as_json(content))
@@ -244,7 +244,7 @@ def read_config(path: str | Path) -> ServiceSettings:
         lines = [
             line for error in [*errors, *_behind(adapter, content, errors)] for line in _tell(dict(error)).splitlines()
         ]
-        raise InputError("\n".join([f"{path}: {len(lines)} to mend:", *(f"  {line}" for line in lines)])) from e
+        raise InputError("\n".join([f"{path}: {len(lines)} to correct:", *(f"  {line}" for line in lines)])) from e
     return ServiceSettings(config, Path(path).resolve().parent)
 
 

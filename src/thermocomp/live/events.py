@@ -52,7 +52,7 @@ class Events(deque[Event]):
                 return None
             lately.append(now)
             if left := self._left_out[kind]:
-                text, self._left_out[kind] = f"{text} (before it {left:,} more of this kind)", 0
+                text, self._left_out[kind] = f"{text} ({left:,} earlier events of this kind are not listed)", 0
         if len(self) == EVENTS and sum(e.kind in LIMITED for e in self) > EVENTS // 2:
             self.remove(next(e for e in self if e.kind in LIMITED))
         self.append(Event(time_of_it, kind, escape(text, LONGEST)))

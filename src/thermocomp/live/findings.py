@@ -47,7 +47,7 @@ def find_faults(settings: ServiceSettings) -> Iterator[str]:
             yield f"{folder / name}: is named more than once and would be overwritten; name another file"
     for one in config.sinks:
         if isinstance(one, LinuxCncOut) and len(os.fsencode(folder / one.socket)) > LONGEST:
-            yield f"{folder / one.socket}: a socket has a path of at most {LONGEST} bytes"
+            yield f"{folder / one.socket}: the path of a socket has at most {LONGEST} bytes; choose a shorter one"
 
 
 def find_faults_now(settings: ServiceSettings, page: Page | None) -> Iterator[str]:
@@ -91,7 +91,7 @@ def _unreadable(path: Path, *, recording: bool) -> str:
     if not path.is_file():
         return "no such file"
     if not os.access(path, os.R_OK):
-        return "this user may not read it"
+        return "this user has no permission to read the file"
     try:
         if recording:
             read_rows(path).close()
@@ -102,7 +102,7 @@ def _unreadable(path: Path, *, recording: bool) -> str:
 
 def _unwritable(path: Path) -> str:
     if len(os.fsencode(path.name)) > _LONG:
-        return f"a name of {len(os.fsencode(path.name))} bytes; at most {_LONG}"
+        return f"the name has {len(os.fsencode(path.name))} bytes; at most {_LONG} are allowed"
     if path.exists() and not path.is_file():
         return f"is {'a folder' if path.is_dir() else 'a pipe or a device'}; name a file"
     if not path.parent.is_dir():
@@ -114,12 +114,14 @@ def _unwritable(path: Path) -> str:
 
 def _faults_of_setup(socket: Path, axes: set[str]) -> Iterator[str]:
     """Yield the faults of a LinuxCNC setup."""
-    hal, do = socket.with_name(HAL_NAME), "see 'thermocomp linuxcnc setup', which says where the service connects"
+    hal = socket.with_name(HAL_NAME)
+    do = "run 'thermocomp linuxcnc setup': its output names the socket to which the service connects"
     if socket.exists() and not socket.is_socket():
-        yield f"{socket}: is no socket; {do}"
+        yield f"{socket}: is not a socket; {do}"
     elif hal.is_file():
         there = set(re.findall(r"--axis (\w),", hal.read_text(encoding="utf-8", errors="replace")))
         if missing := axes - there:
-            yield f"{hal}: does not correct {', '.join(sorted(missing)).upper()}; set it up with --axes"
+            lacking = ", ".join(sorted(missing)).upper()
+            yield f"{hal}: does not correct {lacking}; run 'thermocomp linuxcnc setup' again with --axes"
     elif not socket.exists():
         yield f"{socket}: LinuxCNC is not set up there: there is no {HAL_NAME}; {do}"

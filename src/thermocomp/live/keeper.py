@@ -46,7 +46,9 @@ class StateKeeper:
             saved = statefile.read(self._path, self._compensator)
         except ThermocompError as e:
             if not statefile.is_ours(self._path):
-                raise InputError(f"{self._path}: is not a state file and would be overwritten; name another") from e
+                raise InputError(
+                    f"{self._path}: is not a state file and would be overwritten; name another file"
+                ) from e
             self._say(f"cold start: {e}")
             self._refused = self._path
             return cold
@@ -55,7 +57,7 @@ class StateKeeper:
         # orders by the controller or the configuration are not restored: they are issued again
         own = {t: o for t, o in state.orders.items() if o.word != "suspended" and o.reason != CONFIGURED}
         state = state._replace(orders=cold.orders | own)
-        how = "continues" if state.references else "begins again, with the corrections that are in force"
+        how = "continues" if state.references else "starts again, with the corrections that are in force"
         self._say(f"start after {age:.0f} s: {how}")
         return state
 
@@ -68,7 +70,7 @@ class StateKeeper:
     def save(self, state: CompensatorState) -> None:
         """Write the state; on failure `not_saved` contains the reason."""
         if self._path is None:
-            self.not_saved = "no file is configured for it"
+            self.not_saved = "no state file is configured"
             return
         try:
             old = timedelta(seconds=silence(state, self._clock.tick()) / self._clock.speed)

@@ -62,17 +62,21 @@ class ProbingLedger:
         if target not in self._compensator.lines:
             return f"no target is named {target}"
         if abs(old) > self._compensator.limits.reading_age:
-            return f"it is {old:.0f} s old" if old > 0 else f"its time is {-old:.0f} s ahead of the clock"
+            return (
+                f"the measurement is {old:.0f} s old"
+                if old > 0
+                else f"the time of the measurement is {-old:.0f} s ahead of the clock"
+            )
         counted = state.references.get(target)
         if counted is not None and self._clock.of(found.time) < counted.time:
-            return "it was made before the zero that is counted from now"
+            return "the measurement was made before the present zero was set"
         waiting = self.waiting.get(target)
         if is_known(state, target, probing) or (waiting and set(waiting.identity) & set(probing.identity)):
             return KNOWN
         if waiting:
-            return "another one waits for the next reading"
+            return "another measurement is waiting for the next reading"
         unknown = found.left and in_force is None
-        return "what is in force at the controller is not known" if unknown else ""
+        return "the correction in force at the controller is not known" if unknown else ""
 
     def take(self) -> dict[str, Probing]:
         """Return the pending probings for a reading, and clear them."""
@@ -103,7 +107,7 @@ class ProbingLedger:
             if not found.refused and found.target in self._measured:  # a rejected measurement gives no deviation
                 recorder.measure(found.time, *self._measured[found.target])
         if found.beyond:
-            limit = f"where {found.limit:.1f} um ask for action"
+            limit = f"more than the limit of {found.limit:.1f} um"
             self._say(f"{found.target} was wrong by {found.residual:+.1f} um, {limit}: look for the cause")
 
     def forget(self, target: str) -> None:

@@ -52,7 +52,7 @@ class Link:
             except asyncio.CancelledError:
                 if task is None or task.cancelling():
                     raise
-                self.trouble = "cancelled by itself"
+                self.trouble = "cancelled unexpectedly"
             except Exception as e:  # noqa: BLE001 - the other links continue after any exception
                 self.trouble = explain(e)
             if self.trouble != self._told:

@@ -95,7 +95,7 @@ class Service:
             self.counts["rejected"] += 1
             return
         if left_out := self.latest.take(reading.values, tick, most):
-            self.say("link", f"more names that nothing uses than are kept; {left_out!r} and others are left out")
+            self.say("link", f"too many names that no model uses; {left_out!r} and others are ignored")
         fresh = {name: value for name, (value, at) in self.latest.items() if tick - at <= most}
         probings, learned = self.probings.take(), self.state.learned
         self.state, said = self.compensator.step(self.state, Reading(now, fresh), now, probings, tick)
@@ -138,9 +138,9 @@ class Service:
     def roll_back(self, target: str) -> str:
         """Undo the last probing used for a target; return the reason if impossible, else an empty string."""
         if target not in self.probings.before:
-            return "no probing was taken since the start, or it was taken back before"
+            return "no probing was used since the start, or the last one is already undone"
         self.state = self.probings.take_back(target, self.state)
-        self.say("probing", f"{target}: the last probing is taken back")
+        self.say("probing", f"{target}: the last probing is undone")
         self._dirty = True
         return ""
 
@@ -205,7 +205,7 @@ class Service:
                 await asyncio.to_thread(self.recorder.journal.flush)
                 if (trouble := self.recorder.journal.status().reason) != self._trouble:
                     self._trouble = trouble
-                    self.say("service", f"journal: {trouble or 'all is written again'}")
+                    self.say("service", f"journal: {trouble or 'all rows are written again'}")
 
     def _tell(self, said: Compensated, probings: Mapping[str, Probing]) -> None:
         before, self.said = self.said, said
@@ -216,12 +216,15 @@ class Service:
                 self.say("state", f"{target} {status.word}" + (f": {status.reason}" if status.reason else ""))
         for name, fault in said.failed.items():
             if before is None or before.failed.get(name) != fault:
-                self.say("sensor", f"{name} {fault}: what the others predict stands in")
+                self.say("sensor", f"{name} {fault}: it is replaced by its prediction from the other sensors")
         for name in (before.failed if before else {}).keys() - said.failed.keys():
-            self.say("sensor", f"{name} is believed again")
+            self.say("sensor", f"{name} is used again")
         for target in probings:
             why, moved = said.refused.get(target), said.moved.get(target, 0.0)
-            self.say("probing", f"{target} refused: {why}" if why else f"{target} taken: it moves by {moved:+.1f} um")
+            self.say(
+                "probing",
+                f"{target} refused: {why}" if why else f"{target} accepted: the prediction changes by {moved:+.1f} um",
+            )
         self.curves.take(self.clock.now(), said, self.latest)
         self._dirty = True
 

@@ -74,12 +74,15 @@ def loads(text: str, compensator: Compensator, source: str = "state") -> Saved:
     """Read the text of a state file."""
     (stored,) = jsonfile.unpack(KIND, _Stored, text, source).models[:1]
     if stored.models != fingerprint(compensator):
-        raise ModelFileError(f"{source}: the state of other models; start without it, or with the models it belongs to")
+        raise ModelFileError(
+            f"{source}: this state belongs to other models; start without the file, or with the models to which it "
+            "belongs"
+        )
     try:
         state = decode(CompensatorState, stored.state, "state")
         _check(state, compensator)
     except (ValueError, InputError) as e:
-        raise ModelFileError(f"{source}: not a possible state of these models: {e}") from e
+        raise ModelFileError(f"{source}: impossible as a state of these models: {e}") from e
     return Saved(stored.written, compensator.share(state.models, state))
 
 
@@ -109,9 +112,14 @@ def is_ours(path: Path) -> bool:
 def _check(state: CompensatorState, compensator: Compensator) -> None:
     """Raise `ValueError` unless `state` is a possible state of this compensator."""
     cold, lines = compensator.start(), compensator.lines
-    want(list(state.corrections) == list(lines), list(state.corrections), "corrections", f"those of {', '.join(lines)}")
+    want(
+        list(state.corrections) == list(lines),
+        list(state.corrections),
+        "corrections",
+        f"corrections of {', '.join(lines)}",
+    )
     for name in ("idle", "learned", "references", "raw", "orders", "probed"):
-        want(set(getattr(state, name)) <= set(lines), None, name, f"none but {', '.join(lines)}")
+        want(set(getattr(state, name)) <= set(lines), None, name, f"only targets among {', '.join(lines)}")
     most = compensator.limits.magnitude * (1 + 1e-9)
     for target, correction in state.corrections.items():
         largest = max(abs(correction.at(p)) for p in lines[target].travel)
@@ -143,8 +151,10 @@ def _check(state: CompensatorState, compensator: Compensator) -> None:
                 )
         instants = np.concatenate([np.ravel(getattr(seen, name)) for name in _INSTANTS])
         known = instants[np.isfinite(instants)]
-        want(not known.size or known.max() <= seen.time, None, f"watches.{k}", "no instant later than its last look")
-        want(bool(np.isfinite(seen.since[seen.fault > 0]).all()), None, f"watches.{k}.since", "when each failed")
+        want(not known.size or known.max() <= seen.time, None, f"watches.{k}", "no instant later than its last update")
+        want(
+            bool(np.isfinite(seen.since[seen.fault > 0]).all()), None, f"watches.{k}.since", "the time of each failure"
+        )
         want(bool(((seen.fault >= 0) & (seen.fault < len(WORDS))).all()), None, f"watches.{k}.fault", "a known fault")
         _check_gathered(seen.gathered, len(watch.inputs), f"watches.{k}.gathered")
     for target, learned in state.learned.items():
@@ -156,7 +166,12 @@ def _check(state: CompensatorState, compensator: Compensator) -> None:
         )
         sizes = 0.0 < learned.size <= learned.spread <= _LARGEST
         want(bool(sound) and sizes, None, place, "a mean with its covariance")
-        want(learned.most > 0.0 and 0.0 < learned.usual <= 100.0, None, place, "what a probing may move")
+        want(
+            learned.most > 0.0 and 0.0 < learned.usual <= 100.0,
+            None,
+            place,
+            "positive bounds of what a probing may change",
+        )
         models = compensator.models[lines[target].models]
         known = {1, 1 + len(getattr(models[0], "spread", ()))} if len(models) == 1 else {1}
         want(n in known, n, f"{place}.mean", f"{max(known)} numbers")

@@ -51,7 +51,7 @@ def _fitted_badly(judged: Judged) -> Iterator[str]:
     """Yield shortcomings found when the models were fitted."""
     for m in judged.models:
         if m.honest_error is None:
-            yield f"{m.target}: never judged on cycles it had not seen when it was fitted; it does not run."
+            yield f"{m.target}: never judged on unseen cycles when it was fitted; the model does not run."
         elif not m.accepted:
             yield f"{m.target}: {m.honest_error.word} when it was fitted: {m.honest_error.why}."
 

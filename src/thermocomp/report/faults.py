@@ -36,14 +36,18 @@ def section(judged: Judged, recordings: Sequence[Recording]) -> Section:
     logs = find_faults(judged, recordings)
     if not logs:
         known = any(m.watch is not None for m in judged.models)
-        why = "the recordings have not got what it needs" if known else "the model file holds none; fit it again"
-        return Section(TITLE, [f"No watch over the temperatures was asked: {why}."])
+        why = (
+            "the recordings do not contain what the watch needs"
+            if known
+            else "the model file contains no watch; fit the model again"
+        )
+        return Section(TITLE, [f"The temperatures were not watched: {why}."])
     if not any(log.faults for log in logs):
         watched = list(dict.fromkeys(name for log in logs for name in log.watch.names))
         return Section(TITLE, [f"None of the {len(watched)} temperatures failed: {', '.join(watched)}."])
     parts: list[str | Layout | Shown] = [
-        "The recordings were gone through as the machine would have read them: nothing is known before it is found. "
-        "What check finds afterwards is left out of the verdict above, not here."
+        "The recordings were replayed as the machine would have read them: a fault is known only once it is detected. "
+        "Rows in which check finds a fault afterwards are left out of the verdict above, but not here."
     ]
     for log in (log for log in logs if log.faults):
         recording = recordings[log.recording]
@@ -71,7 +75,9 @@ def describe_faults(logs: Sequence[FaultLog], recordings: Sequence[Recording]) -
         for f in log.faults[:TOLD]:
             recording = recordings[log.recording]
             until = f"to {_when(f.end, recording)}" if f.returned else "to the end"
-            beside = f"; it read {f.beside:+.1f} degC beside what stood in" if math.isfinite(f.beside) else ""
+            beside = (
+                f"; it read {f.beside:+.1f} degC relative to its substitute value" if math.isfinite(f.beside) else ""
+            )
             yield f"{log.name}: {f.sensor} {f.word} from {_when(f.begin, recording)} {until}{beside}"
         if len(log.faults) > TOLD:
             yield f"{log.name}: {len(log.faults) - TOLD} more failures, on the page that -o writes"
@@ -85,7 +91,7 @@ def describe_held(judged: Judged, logs: Sequence[FaultLog]) -> Iterator[str]:
 
 def _held_words(target: str, unit: str, cost: Cost) -> str:
     return (
-        f"{target}: with {', '.join(cost.failed)} failed its correction is held, then fades at the machine: "
+        f"{target}: while {', '.join(cost.failed)} failed, the correction is held, then fades at the machine: "
         f"{cost.rms:.2f} {unit} RMS in {cost.hours:.1f} h."
     )
 

@@ -22,7 +22,8 @@ def describe_losses(models: Sequence[ErrorModel]) -> Iterator[str]:
         if stood:
             worst = max(stood, key=lambda n: stood[n])
             said.append(
-                f"one temperature lost and stood in for leaves at most {stood[worst]:.2f} {model.unit} ({worst})"
+                f"one lost temperature, replaced by its prediction, leaves at most {stood[worst]:.2f} {model.unit} "
+                f"({worst})"
             )
         if gone := [n for n in single if n not in stood]:
             said.append(f"without {', '.join(gone)} its correction is held, then fades")
@@ -31,12 +32,12 @@ def describe_losses(models: Sequence[ErrorModel]) -> Iterator[str]:
         yield f"{model.target}: {found.rms:.2f} {model.unit} RMS on unseen cycles; {'; '.join(said)}"
     if dear:
         yield (
-            f"A spare is recommended beside {', '.join(dear)}: without it a correction is held, or leaves over "
+            f"A spare sensor is recommended for {', '.join(dear)}: without it a correction is held, or leaves over "
             f"{DEAR:g} times its error"
         )
     blind = [f"{n} ({s.off:.1f} degC)" for n, s in zip(watch.names, watch.sensors, strict=True) if s.off > FAR]
     if blind:
         yield (
-            f"Slow drift of {', '.join(blind)} is found only from there on: the others and the speed do not predict it "
-            "better; a spare beside it would"
+            f"Slow drift of {', '.join(blind)} is detected only beyond these values: the other temperatures and the "
+            "speed do not predict it better; a spare sensor would"
         )

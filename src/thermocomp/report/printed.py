@@ -112,9 +112,7 @@ def _disturbed(target: str, found: Robustness) -> Iterator[PrintedLine]:
     if found.harm:
         yield PrintedLine(f" {target}: {found.harm}", Toned("harmful when disturbed", "bad"))
     if found.outside > 0.1:
-        yield PrintedLine(
-            f" {100 * found.outside:.0f} % of the rows are outside the range {target} was trained in", BUT
-        )
+        yield PrintedLine(f" {100 * found.outside:.0f} % of the rows are outside the trained range of {target}", BUT)
     if found.unlike > 0.1:
         yield PrintedLine(f" {target}: {describe_unlike(found)}", BUT)
 
@@ -177,7 +175,7 @@ def _assessment_table(assessments: Sequence[Assessment]) -> Layout:
         columns,
         rows,
         caption="residual in um where it was judged"
-        + ("; in-sample: on the rows it has learned from" if any(a.caveat for a in assessments) else "")
+        + ("; in-sample: on the rows used for training" if any(a.caveat for a in assessments) else "")
         + _band_words(assessments),
         tones=dict.fromkeys(sections, "none"),
         sections=frozenset(sections),

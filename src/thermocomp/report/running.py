@@ -20,13 +20,13 @@ def describe_running(assessments: Sequence[Assessment]) -> list[str]:
         more = f", {len(other) - MOST} more by less" if len(other) > MOST else ""
         alone_words = f"{', '.join(shown)}{more}" if shown else "the same to 0.01 um"
         lines.append(
-            f"Judged is what would run, behind the gate and with limits ({limited[0].limits.in_words()}). RMS of "
-            f"the models alone: {alone_words}."
+            "The judged corrections are those that would run, behind the gate and with limits "
+            f"({limited[0].limits.in_words()}). RMS of the models alone: {alone_words}."
         )
     if without := list(dict.fromkeys(a.target for a in judged if a.limits is None)):
-        lines.append(f"No limits for {', '.join(without)}: they are limits of micrometres.")
+        lines.append(f"No limits for {', '.join(without)}: limits apply to micrometres only.")
     lines += [
-        f"The gate turned {a.rejected} of {len(a.measured)} readings of {a.model} for {a.target} away; the first: "
+        f"The gate rejected {a.rejected} of {len(a.measured)} readings of {a.model} for {a.target}; the first: "
         f"{a.turned_away}."
         for a in judged
         if a.rejected

@@ -92,7 +92,7 @@ def cautions(comparison: Comparison) -> list[str]:
     found += harms(comparison)
     beyond = [f"{a.target} ({100 * r.outside:.0f} %)" for a, r in known if r.outside > 0.1]
     if beyond:
-        found.append(f"many rows are outside the range the models were trained in: {_list(beyond)}.")
+        found.append(f"many rows are outside the trained range of the models: {_list(beyond)}.")
     # no caution if the error there is as elsewhere: such rows were judged in left-out cycles
     found += [
         f"{a.target}: {describe_unlike(r)}."
@@ -125,7 +125,7 @@ def describe_unlike(r: Robustness) -> str:
 
 def _covered(judged: Validity) -> Table:
     table = coverage.table({"judged": judged})
-    for_these = "The errors above speak for these conditions; beyond them nobody has looked."
+    for_these = "The errors above apply to these conditions; no other conditions were judged."
     return replace(table, caption=f"{table.caption} {for_these}")
 
 

@@ -169,11 +169,15 @@ def take(
         Repeatability of the probe, standard deviation [um].
     """
     if not (np.isfinite(error) and 0.0 <= repeatability < np.inf):
-        return before, f"{error} um with a repeatability of {repeatability} um: want finite numbers"
+        return (
+            before,
+            f"{error} um with a repeatability of {repeatability} um: expected finite numbers, and a repeatability that "
+            "is not negative",
+        )
     if abs(error) > before.most + IMPLAUSIBLE * repeatability:
         return before, (
-            f"{error:+.1f} um from the model, which can be wrong by {before.most:.1f} um at most: check the probe, the "
-            "tool and the unit; if the tool point did move so far, set the zero again"
+            f"{error:+.1f} um from the model, whose error can be {before.most:.1f} um at most: check the probe, the "
+            "tool and the unit; if the tool point did move this far, set the zero again"
         )
     (mean, covariance), spread = before.at(time), before.spread
     weights, own = _beside(directions, 1.0), (UNEXPLAINED * before.size) ** 2 + repeatability**2
@@ -182,14 +186,17 @@ def take(
     alike = abs(error - before.refused) <= AGREED * (2 * own) ** 0.5
     since = before.refused_since if alike else time
     if alike and time - since < APART:  # possibly the same chip as before
-        return before, f"as suspect as the one before: measure again {APART / 60:.0f} min or more after that"
+        return (
+            before,
+            f"as implausible as the previous probing: measure again, {APART / 60:.0f} min or more after that one",
+        )
     plausible = abs(surprise) <= IMPLAUSIBLE * typical
     if alike and not plausible:  # confirmed
         covariance[-1, -1] += surprise**2
         spread = max(spread, abs(surprise) / UNLIKE)
     elif not alike and not plausible:
-        limit = f"{IMPLAUSIBLE * typical:.1f} um are plausible"
-        why = f"{surprise:+.1f} um from what is expected, where {limit}: measure again after {APART / 60:.0f} min"
+        limit = f"at most {IMPLAUSIBLE * typical:.1f} um are plausible"
+        why = f"{surprise:+.1f} um from the expected value, where {limit}: measure again after {APART / 60:.0f} min"
         return before._replace(refused=error, refused_since=since), why
     elif not alike and abs(surprise) > SUSPECT * typical:  # possibly a bad probing
         noise, doubt = own + (known + own) * ((surprise / SUSPECT / typical) ** 2 - 1.0), (error, since)

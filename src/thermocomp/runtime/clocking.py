@@ -41,7 +41,7 @@ def place(state: CompensatorState, reading: Reading, now: float, tick: float, li
     time, last = reading.time - state.origin, state.time + state.origin
     back = time <= state.time
     if back and (last <= now + CLOCK_SKEW or passed <= 0.0):
-        why = f"reading of {reading.time:g} s is not later than the last one of {last:g} s"
+        why = f"reading at {reading.time:g} s is not later than the previous reading at {last:g} s"
         return Instant(math.nan, state.origin), why
     if back or abs(time - state.time - passed) > limits.reading_age:  # the clock was set
         return _set(state, reading, passed), ""

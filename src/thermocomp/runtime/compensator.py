@@ -125,7 +125,9 @@ class Compensator:
         lines: dict[str, DeviationLine] = {}
         for source in sources:
             if source.unit != "um":
-                raise InputError(f"model of {source.target} predicts {source.unit}; a compensator corrects um")
+                raise InputError(
+                    f"model of {source.target} predicts {source.unit}; a compensator needs models that predict um"
+                )
             begin = len(models)
             if isinstance(source, PositionModel):
                 models += source.models
@@ -234,7 +236,9 @@ class Compensator:
             state, reading = self._believe(state, reading, instant.time)
         if why := untimely or self.gate(state, reading):
             state, said = self.wait(state, tick, why)
-            return state, said._replace(refused=dict.fromkeys(probings or (), f"its reading is rejected: {why}"))
+            return state, said._replace(
+                refused=dict.fromkeys(probings or (), f"the reading to which the probing belongs is rejected: {why}")
+            )
         dt = 0.0 if state.time is None else instant.time - state.time
         travel = travel_time(state, tick, self.limits)
         stepped = advance(self.groups, state.models, state.gathered, reading, instant.time, dt)
@@ -350,5 +354,5 @@ def _unjudged(models: Sequence[ErrorModel], failed: Collection[str]) -> str:
     for model in models:
         lost = [n for n in failed if n in model.sensors]
         if lost and not model.may_lose(lost):
-            return f"{model.target} does harm without {' and '.join(lost)}, or was not judged without"
+            return f"without {' and '.join(lost)}, the model of {model.target} does harm or was not judged"
     return ""

@@ -53,10 +53,10 @@ class Fleet:
         model = self.model
         if not isinstance(model, LinearDynamic) or model.support.policy != "clip" or model.unit != "um":
             raise InputError(
-                f"model of {model.target}: a fleet runs linear models with lags [um] that clip their inputs"
+                f"model of {model.target}: a fleet supports only linear models with lags, in um, that clip their inputs"
             )
         if any(len(signal) != 1 for signal in model.signals):
-            raise InputError(f"model of {model.target}: a fleet runs models whose signals are single inputs")
+            raise InputError(f"model of {model.target}: a fleet supports only models whose signals are single inputs")
         model.check_may_run()
         zero = np.array(self.zeros, dtype=np.float64)
         if zero.ndim != 2 or zero.shape[1] != len(model.inputs):
@@ -64,7 +64,7 @@ class Fleet:
                 f"zeros: expected finite values of shape (n_machines, {len(model.inputs)}), got shape {zero.shape}"
             )
         if not np.isfinite(zero).all():
-            raise InputError("zeros: contains NaN or infinity")
+            raise InputError("zeros: must be finite; remove NaN and infinity")
         n, kind = len(zero), self.dtype
         ranges = [[find_plausible_range(i, z) for z in column] for i, column in zip(model.inputs, zero.T, strict=True)]
         bounds = np.array(ranges).reshape(len(model.inputs), n, 2)
@@ -105,7 +105,10 @@ class Fleet:
             Machines whose reading was used. Corrections of the others are held for `Limits.hold`, then fade.
         """
         if np.shape(readings) != self._values.shape or not 0.0 <= dt < np.inf:
-            raise InputError(f"readings of shape {np.shape(readings)} after {dt} s: expected {self._values.shape}")
+            raise InputError(
+                f"readings of shape {np.shape(readings)} after {dt} s: expected the shape {self._values.shape} and a "
+                "time that is finite and not negative"
+            )
         values, followed, memory = self._values, self._followed, self._memory
         with np.errstate(invalid="ignore", over="ignore"):
             values[...] = readings

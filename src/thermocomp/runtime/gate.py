@@ -67,9 +67,10 @@ def _no_start(offsets: Sequence[tuple[Input, float]]) -> str:
     for channel, offset in offsets:
         start = f"{channel.name} = {channel.reference + offset:g} {channel.unit} is not plausible as a start"
         if abs(middle) > DAY:
-            return f"{start}: the machine is {middle:+.1f} degC from the zero of its training"
+            return f"{start}: the machine differs by {middle:+.1f} degC from the zero of the training data"
         if abs(offset - middle) > max(channel.high - channel.low, MIN_SPAN):
-            return f"{start}: {offset - middle:+.1f} degC off the others, counted from the zero of its training"
+            apart = f"{offset - middle:+.1f} degC from the others"
+            return f"{start}: relative to the zero of the training data, it differs by {apart}"
     return ""
 
 
@@ -83,13 +84,13 @@ def explain_untimely(reading: Reading, now: float, limits: Limits) -> str:
     """
     values: object = reading.values
     if not isinstance(values, Mapping):
-        return f"reading holds {type(values).__name__} instead of values by channel"
+        return f"reading contains {type(values).__name__} instead of a mapping of values by channel"
     if not (is_number(reading.time) and is_number(now)):
         return f"time {reading.time} or clock {now} is not a number"
     if reading.time > now + CLOCK_SKEW:
         return f"reading is {reading.time - now:.1f} s ahead of the clock"
     if now - reading.time > limits.reading_age:
-        return f"reading is {now - reading.time:.1f} s old; at most {limits.reading_age:g} s"
+        return f"reading is {now - reading.time:.1f} s old; at most {limits.reading_age:g} s are allowed"
     return ""
 
 

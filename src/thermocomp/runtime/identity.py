@@ -11,7 +11,7 @@ from thermocomp.runtime.state import FORGOTTEN, CompensatorState
 
 #: maximum number of keys remembered for each target
 MOST_KEYS = 600
-KNOWN = "it was delivered before; give each probing its own id or time"
+KNOWN = "this probing was delivered before; give each probing its own id or time"
 
 
 def is_known(state: CompensatorState, target: str, probing: Probing) -> bool:

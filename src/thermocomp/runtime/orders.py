@@ -36,7 +36,7 @@ def order(compensator: Compensator, state: CompensatorState, target: str, status
         starts at zero again. None: run.
     """
     if target not in compensator.lines:
-        raise InputError(f"{target}: expected one of {', '.join(compensator.lines)}")
+        raise InputError(f"there is no target {target}: expected one of {', '.join(compensator.lines)}")
     if status is not None and status.word not in ("holding", "shadow", "suspended"):
         raise InputError(f"{target}: {status.word} cannot be ordered: expected holding, shadow or suspended")
     if target in compensator.shadow and (status is None or status.word != "suspended"):
@@ -68,7 +68,7 @@ def rezero(
         Present correction as reported by the controller. Default: the last one.
     """
     if target not in compensator.lines:
-        raise InputError(f"{target}: expected one of {', '.join(compensator.lines)}")
+        raise InputError(f"there is no target {target}: expected one of {', '.join(compensator.lines)}")
     if target not in state.references:
         raise InputError(f"{target}: its zero is still being averaged; wait until the zero is known")
     now, correction = state.raw[target], in_force or state.corrections[target]

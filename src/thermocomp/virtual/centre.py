@@ -193,7 +193,9 @@ class MachiningCentre:
 
     def _check(self, drive: FeedDrive) -> None:
         if not abs(drive.speed) <= self.heat.top_speed:
-            raise InputError(f"spindle speed {drive.speed} 1/min is beyond the machine's {self.heat.top_speed:g} 1/min")
+            raise InputError(
+                f"spindle speed {drive.speed} 1/min exceeds the top speed of the machine, {self.heat.top_speed:g} 1/min"
+            )
         for place in drive.loads:
             if place not in self.model.inputs:
                 near = get_close_matches(place, self.model.inputs, n=3, cutoff=0.4) or self.model.inputs

@@ -165,7 +165,7 @@ def component(code: str, position: float, z: float = TEST_POSITION["z"]) -> Virt
         if not 0.0 <= p <= TRAVEL[a]:
             raise SettingError(f"{a.upper()} = {p:g} mm is beyond the travel from 0 to {TRAVEL[a]:g} mm")
     if axis != "x" and z != TEST_POSITION["z"]:
-        raise SettingError(f"{code} cannot be measured with Z at {z:g} mm: only X can")
+        raise SettingError(f"{code} cannot be measured with Z at {z:g} mm: only the errors of X can")
     test, point = (np.array([TEST_POSITION[a] for a in AXES], dtype=np.float64) for _ in range(2))
     point[AXES.index(axis)], point[2] = position, position if axis == "z" else z
     weights, geometry = _between_two(code, position), float(find_cold_component(code, point))

@@ -151,7 +151,9 @@ class PlannedTest(RecordingSetup, Stretch):
         if self.longest / self.sampling > MOST_ROWS:
             rows = f"{self.longest / self.sampling:.3g} rows"
             raise SettingError(
-                f"{self.longest:g} s every {self.sampling:g} s make {rows}; at most {MOST_ROWS:,}", ("segments",)
+                f"{self.longest:g} s sampled every {self.sampling:g} s give {rows}; at most {MOST_ROWS:,} are "
+                "supported",
+                ("segments",),
             )
 
     def programme(self, name: str, rng: np.random.Generator) -> Programme:
@@ -172,7 +174,7 @@ class PlannedTest(RecordingSetup, Stretch):
             for speed in values(given.get("speed")):
                 if not abs(speed) <= kit.top_speed:
                     raise SettingError(
-                        f"{speed:g} 1/min: the spindle turns at most {kit.top_speed:g}", (*path, "speed")
+                        f"{speed:g} 1/min: the top speed of the spindle is {kit.top_speed:g} 1/min", (*path, "speed")
                     )
             if given.get("feed") and not kit.top_speed:
                 raise SettingError("the machine has no axes", (*path, "feed"))
@@ -207,7 +209,7 @@ class Experiment:
         if self.physics not in get_args(Physics):
             raise explain_unknown("physics", self.physics, get_args(Physics), ("physics",))
         if not self.tests:
-            raise SettingError("an experiment needs a test", ("tests",))
+            raise SettingError("an experiment needs at least one test", ("tests",))
         for k, plan in enumerate(self.tests):
             with add_path("tests", k):
                 plan.check(self.kit)

@@ -57,7 +57,9 @@ class Lot:
         if not (self.step > 0 and high > low) or abs(self._steps - round(self._steps)) > 1e-9:
             raise SettingError("from the lowest to the highest there must be a whole number of steps")
         if self._steps > MOST_VALUES:
-            raise SettingError(f"{self._steps:.3g} values to draw from; at most {MOST_VALUES}: take a larger step")
+            raise SettingError(
+                f"{self._steps:.3g} values to draw from, but at most {MOST_VALUES} are supported: use a larger step"
+            )
 
     @property
     def _steps(self) -> float:

@@ -55,10 +55,10 @@ def note_counted_twice(machine: Machine) -> tuple[str, ...]:
                     continue
                 straightness, square = f"E{towards}{other}", _squareness(letter, other)
                 found.append(
-                    f"{code} is {turn:.3g} urad at {axis} {stood['XYZ'.index(axis)]:g} mm, where {axis} stood while "
-                    f"{other} was measured: over the travel of {other} it moves the tip by {effect:.3g} um along "
-                    f"{towards}. {' or '.join((straightness, *square))} holds that already if it was read between "
-                    f"table and spindle: then count {code} from {axis} {stood['XYZ'.index(axis)]:g} mm"
+                    f"{code} is {turn:.3g} urad at {axis} {stood['XYZ'.index(axis)]:g} mm, its position while {other} "
+                    f"was measured: over the travel of {other} it moves the tip by {effect:.3g} um along {towards}. "
+                    f"{' or '.join((straightness, *square))} already contains this if it was measured between table "
+                    f"and spindle: then make {code} relative to its value at {axis} {stood['XYZ'.index(axis)]:g} mm"
                 )
     return tuple(found)
 
@@ -73,8 +73,8 @@ def note_short_profiles(machine: Machine) -> tuple[str, ...]:
             first, last = machine.axis(name).travel
             if low > first + _NEAR or high < last - _NEAR:
                 found.append(
-                    f"{code}: its {what} is known from {name} {low:g} to {high:g} mm, the axis goes from {first:g} to "
-                    f"{last:g} mm: beyond, the value at the end is held"
+                    f"{code}: its {what} is known for {name} = {low:g} to {high:g} mm, but the axis travels "
+                    f"from {first:g} to {last:g} mm: beyond, the value at the end is held"
                 )
     return tuple(found)
 

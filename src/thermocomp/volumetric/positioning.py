@@ -54,7 +54,7 @@ class Positioning:
         if not (np.diff(self.positions) > 0).all():
             raise InputError(f"{where}: target positions must increase and differ, found {self.positions.tolist()} mm")
         if not self.directions:
-            raise InputError(f"{where}: no deviations")
+            raise InputError(f"{where}: expected deviations of at least one direction")
         for name, deviations in self.directions.items():
             if deviations.ndim != 2 or deviations.shape[1] != len(self.positions):
                 raise InputError(
@@ -62,7 +62,9 @@ class Positioning:
                     f"{len(self.positions)} targets)"
                 )
             if len(deviations) < 1:
-                raise InputError(f"{where}: no run in direction {name}; ISO 230-2 requires 5, over more than 2 m one")
+                raise InputError(
+                    f"{where}: no run in direction {name}; ISO 230-2 requires 5 runs, or one over more than 2 m"
+                )
             if not np.isfinite(deviations).all():
                 raise InputError(f"{where}: a deviation in direction {name} must be finite; remove NaN and infinity")
 

@@ -141,7 +141,7 @@ def position(
     if not files:
         raise InputError("no recording given: name at least one CSV, XLSX or Parquet file")
     if s.jobs == 0:
-        raise InputError("--jobs 0: name a number of processes, or -1 for all cores")
+        raise InputError("--jobs 0: give a number of processes, or -1 for all cores")
     if not find_method(s.model).kind.freezable:
         raise InputError(f"{s.model} cannot be frozen to plain numbers: choose another method")
     components = [component] if isinstance(component, str) else list(component)
@@ -270,7 +270,7 @@ def volumetric(
     if tool_length is not None and not tool_length >= 0:
         raise InputError(f"--tool-length {tool_length:g}: must not be negative")
     if recording is None and mapping is not None:
-        raise InputError("--mapping is for a recording: name one by --recording")
+        raise InputError("--mapping applies to a recording: name one with --recording")
     if not isinstance(machine, Machine):
         source, machine = machine, read_machine(machine)
         progress(f"read {source}: {len(machine.axes)} axes, {len(machine.components)} components", 0)
@@ -302,7 +302,7 @@ def _read(paths: Sequence[Path], components: Sequence[str], s: PositionSettings)
     if _several(components):
         if s.columns or s.positions is not None or s.layout == "long":
             raise InputError(
-                "--columns, --positions and long tables are for one component: name a single one, or call the columns "
+                "--columns, --positions and long tables are for one component: name a single one, or name the columns "
                 "after their components, such as EXX_250_um"
             )
         wanted = [] if ALL in components else list(dict.fromkeys(components))

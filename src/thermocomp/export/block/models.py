@@ -158,7 +158,7 @@ class Formulas:
                 return f"abs({value(of)})"
             case e.Sigmoid(of):
                 return f"1.0 / (1.0 + math.exp(-{value(of)}))"
-        raise TypeError(f"{node}: no part of a formula")
+        raise TypeError(f"{node}: is not part of a formula")
 
 
 class _Clock(Clock):
@@ -185,5 +185,5 @@ class _Clock(Clock):
 def number(value: float) -> str:
     """Return a number as exact Python source."""
     if not math.isfinite(value):
-        raise ValueError(f"{value}: is not finite")
+        raise ValueError(f"{value}: must be finite")
     return repr(float(value))

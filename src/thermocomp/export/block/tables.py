@@ -49,7 +49,7 @@ def gather(compensator: Compensator) -> Tables:
     zeroings = {m.zeroing for m in models} | {w.zeroing for w in watches}
     if len(zeroings) > 1 or len(watches) > 1:
         raise InputError(
-            "models that are watched over, or average their zero, in different ways: export each file alone"
+            "the models have different watches or average their zero in different ways: export each file separately"
         )
     zeroing = zeroings.pop()
     watch = watches[0] if watches else None

@@ -84,7 +84,7 @@ class _Writer(Printer):
                 return [f"{pad}{head}", *self.block(body, inner), f"{pad}}}"]
             case ast.While(test, body):
                 return [f"{pad}while ({self.bare(test)}) {{", *self.block(body, inner), f"{pad}}}"]
-        raise TypeError(f"{ast.unparse(node)}: no statement of a block")
+        raise TypeError(f"{ast.unparse(node)}: is not a statement of a block")
 
     def _as(self, node: ast.expr, kind: Kind) -> str:
         text = self.bare(node, kind)

@@ -78,7 +78,7 @@ def write_fanuc(
     """Return all files by name, the page of instructions last."""
     marks = find_marks(reductions)
     if len(marks) > _ROOM:
-        raise InputError(f"{len(marks)} temperatures, and the macro has room for {_ROOM}")
+        raise InputError(f"{len(marks)} temperatures, but the macro has room for {_ROOM}: choose fewer with --sensors")
     place = {sensor: _FIRST + k for k, sensor in enumerate(marks)}
     most, step = (_cap(limits, option, times) for option, times in (("magnitude", 1.0), ("rate", INTERVAL)))
     first = [*head(reductions, facts, SIGN, UNITS), *UNCONFIRMED]
@@ -155,7 +155,7 @@ def _cap(limits: Limits, option: str, times: float) -> float:
     taken = float(Decimal(shorten(in_mm(float(Decimal(repr(asked)) * Decimal(times))), cap=True)).scaleb(3))
     if not taken:
         raise InputError(
-            f"--{option} {asked:g}: a Fanuc control takes eight digits, and this is 0 in them: give at least "
+            f"--{option} {asked:g}: a Fanuc control accepts eight digits, in which this value is 0: give at least "
             f"--{option} {1e-4 / times:.2g}"
         )
     return taken

@@ -170,7 +170,7 @@ def name_component(name: str) -> str:
     """Return the name of a compensator's component, different from the name of its source."""
     component = f"{name}_hal"
     if (over := len(component) + 1 + _BEHIND - _LONGEST) > 0:
-        raise InputError(f"--name: {over} characters too long: a name in HAL has {_LONGEST} at most")
+        raise InputError(f"--name: {over} characters too long: a name in HAL has at most {_LONGEST} characters")
     return component
 
 

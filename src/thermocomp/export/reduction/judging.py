@@ -175,7 +175,7 @@ def _beside(model: ErrorModel, method: str, judging: Judging) -> str:
     if method:
         return f"{method}, fitted again for this; both are judged alike: {judging.name}"
     if model.honest_error is None:
-        return "the model's method is not known here, and it was never judged on cycles it has not seen"
+        return "the model's method is not known here, and the model was never judged on unseen cycles"
     return (
         "the model's method is not known here with its settings: its error is that in the model file, on "
         f"{model.honest_error.protocol}, not on the cycles of these recordings"

@@ -80,7 +80,10 @@ class LinearReduction(TermRegressor):
             cycles.
         """
         if self.max_sensors < 1 or not 1 <= self.digits <= 17:
-            raise InputError(f"max_sensors {self.max_sensors}, digits {self.digits}: expected at least 1, and 1 to 17")
+            raise InputError(
+                f"max_sensors {self.max_sensors}, digits {self.digits}: expected max_sensors of at least 1, and digits "
+                "from 1 to 17"
+            )
         change, deviation, folds, self.chosen_by_ = self._learned(X, y, cycle)
         self.selected_, self.unseen_ = self._choose(change, deviation, folds)
         self._regress(change, deviation, self.selected_)

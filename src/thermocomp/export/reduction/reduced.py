@@ -124,15 +124,15 @@ class Reduced:
         """Return the reason why it must not be exported; empty if it may be."""
         found = self.model.honest_error
         if found is None:
-            return "it was never judged on cycles it has not seen"
+            return "it was never judged on unseen cycles"
         if found.word == "refused":
             return found.why
         if math.isnan(self.loss):
-            return "the loss cannot be stated: nobody knows what the full model leaves of unseen cycles"
+            return "the loss cannot be stated: the error of the full model on unseen cycles is not known"
         if self.loss > most_loss:
-            return f"loses too much: {self.loss_in_words}, at most {most_loss:g} are let pass (--most-loss)"
+            return f"loses too much: {self.loss_in_words}; at most {most_loss:g} times is permitted (--most-loss)"
         if found.word == "unproven" and not found.taken:
-            return f'unproven: {found.why} (--accept-unproven "NAME, REASON" takes it anyway)'
+            return f'unproven: {found.why} (to approve its use nevertheless: --accept-unproven "NAME, REASON")'
         return ""
 
     @property
@@ -189,7 +189,7 @@ def as_it_is(model: ErrorModel, axis: str) -> Reduced:
     return Reduced(
         model=model,
         axis=axis,
-        beside="the model is of that shape already, here with five digits; its error is that in the file",
+        beside="the model already has this form, here with five digits; its error is that in the model file",
         none=none,
         full=own,
         reduced=own,
@@ -256,8 +256,8 @@ def head(reductions: Sequence[Reduced], facts: Facts, sign: str, units: str) -> 
     for r in reductions:
         found = r.model.honest_error
         taken = found.taken if found is not None else ""
-        words.append(f"{r.model.target}: {'UNPROVEN, taken anyway' if taken else 'accepted on unseen cycles'}")
-        more += [f"{r.model.target}: unproven, taken by {taken}"] if taken else []
+        words.append(f"{r.model.target}: {'UNPROVEN, approved nevertheless' if taken else 'accepted on unseen cycles'}")
+        more += [f"{r.model.target}: unproven, approved by {taken}"] if taken else []
         more += [f"{r.model.target}: {r.loss_in_words}; {r.none.rms:.2f} um without compensation"]
     kind = "reduced to what the controller holds" if any(r.cycles for r in reductions) else "the model as it is"
     return [f"{'; '.join(words)}; {kind}", *more, *facts.origin(), sign, units]

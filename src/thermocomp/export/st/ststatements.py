@@ -129,7 +129,7 @@ class _Writer(Printer):
                 return [f"{pad}{head}", *self.block(body, inner), f"{pad}END_FOR;"]
             case ast.While(test, body):
                 return [f"{pad}WHILE {self.bare(test)} DO", *self.block(body, inner), f"{pad}END_WHILE;"]
-        raise TypeError(f"{ast.unparse(node)}: no statement of a block")
+        raise TypeError(f"{ast.unparse(node)}: is not a statement of a block")
 
     def _call(self, name: str, args: Sequence[ast.expr], bags: Sequence[str] = ()) -> str:
         given = [f"{v} := {self._local(v)}" for v in bags]

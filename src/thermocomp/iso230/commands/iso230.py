@@ -30,7 +30,7 @@ def read_tests(paths: list[Path], mapping: Path | None, *, tell: bool = True) ->
         return read_recordings(paths, mapping, tell=tell)
     except RecordingError as e:
         if "no time column" in str(e):
-            raise RecordingError(f"{e}; a table of a positioning test is named by --positioning") from e
+            raise RecordingError(f"{e}; give the table of a positioning test with --positioning") from e
         raise
 
 

@@ -96,14 +96,17 @@ class LearningCurve:
         levels = self.by_cycles()
         first, last = levels[0], levels[-1]
         of = f"{first.rms:.2f} um after {first.learned} cycle(s), {last.rms:.2f} after {last.learned}"
-        slope = f"each of the last took {self.last_gain:.2f} um off"
+        slope = f"each of the last cycles reduced the error by {self.last_gain:.2f} um"
         if last.rms >= self.none:
-            return f"{of}, {self.none:.2f} without compensation: the model has learned nothing that holds elsewhere"
+            return (
+                f"{of}, {self.none:.2f} without compensation: the model has learned nothing that applies to unseen "
+                "cycles"
+            )
         if self.enough:
             return (
                 f"{of}; {slope}: more cycles of the same kind are not worth their time (less than {self.worth:.2f} um)"
             )
-        return f"{of}; {slope}: it still falls, more cycles of the same kind help"
+        return f"{of}; {slope}: the error still decreases, more cycles of the same kind help"
 
 
 def learning_curve(
@@ -134,7 +137,7 @@ def learning_curve(
         speeds = _n_speeds(samples, np.any([blocks[k] for k in own], axis=0))
         points.append(Point(len(own), speeds, unseen, float("nan") if isinstance(found, str) else found))
     if len(errors) == len(points):
-        raise FitError(f"a learning curve of {model}: {errors[0]}")
+        raise FitError(f"no learning curve of {model}: {errors[0]}")
     return LearningCurve(model, tuple(points), float(np.mean([_none(samples, b) for b in blocks])))
 
 

@@ -139,9 +139,9 @@ def make_grid(top_speed: float, hours: float) -> tuple[Trial, ...]:
         Duration of each test, after a stop of 15 min [h].
     """
     if not 0 < top_speed < np.inf:
-        raise InputError(f"top speed {top_speed:g} 1/min: expected the highest of the machine, above 0")
+        raise InputError(f"top speed {top_speed:g} 1/min: expected the maximum speed of the machine, above 0")
     if not 2 <= hours <= 72:
-        raise InputError(f"a test of {hours:g} h: expected 2 to 72")
+        raise InputError(f"a test of {hours:g} h: expected 2 to 72 h")
     length = hours * 3600.0
     times = round(length / (2 * SHORT))
     found = []
@@ -174,7 +174,7 @@ def plan(samples: Samples, top_speed: float | None = None, *, hours: float = 12.
         its effect is proposed.
     """
     if not 0 <= swing <= 50:
-        raise InputError(f"a room that changes by {swing:g} degC: expected 0 to 50")
+        raise InputError(f"a room that changes by {swing:g} degC: expected 0 to 50 degC")
     doubt = find_doubt(samples)
     recorded = float(np.nanmax(np.abs(samples.values[:, doubt.speed])))
     if not recorded:

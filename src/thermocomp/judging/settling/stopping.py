@@ -107,7 +107,7 @@ class Running:
                 else "the test may end, or continue to the next speed"
             )
             return f"{what}: the steady state is known; {then}"
-        open_ = ", ".join(f"{n} (+-{s.uncertainty:.1f}, want {s.limit:.1f})" for n, s in self.states if not s.known)
+        open_ = ", ".join(f"{n} (+-{s.uncertainty:.1f}, required {s.limit:.1f})" for n, s in self.states if not s.known)
         return f"{what}: continue; not known yet: {open_}"
 
 

@@ -33,7 +33,7 @@ def read_message(payload: bytes | str, arrived: float, names: Mapping[str, str])
     """
     content = _table(payload, '{"t1_C": 21.3}')
     if len(content) > MOST_VALUES:
-        raise ReadingError(f"a message of {len(content):,} values; at most {MOST_VALUES:,}")
+        raise ReadingError(f"a message of {len(content):,} values; at most {MOST_VALUES:,} are accepted")
     stamp = content.pop("time", None)
     if stamp is not None and _number(stamp) is None:
         raise ReadingError(f"a message whose time is {escape(stamp, 40)!r}: expected seconds since 1970")
@@ -90,7 +90,7 @@ def write_message(corrections: Mapping[str, Correction], stamp: float) -> str:
 
 def _table(payload: bytes | str, example: str) -> dict[str, Any]:
     if len(payload) > MOST_BYTES:
-        raise ReadingError(f"a message of {len(payload):,} bytes; at most {MOST_BYTES:,}")
+        raise ReadingError(f"a message of {len(payload):,} bytes; at most {MOST_BYTES:,} are accepted")
     try:
         content = parse_json(payload)
     except ValueError as e:

@@ -55,7 +55,7 @@ class Broker:
         self._connection.to("closed")
 
     def _fail(self, error: Exception) -> ThermocompError:
-        reason = f"MQTT broker {self.host}:{self.port}, topic {self.topic}: {str(error) or 'lost'}"
+        reason = f"MQTT broker {self.host}:{self.port}, topic {self.topic}: {str(error) or 'connection lost'}"
         self._connection.to("failed", reason)
         return ThermocompError(reason)
 

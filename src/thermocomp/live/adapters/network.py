@@ -68,7 +68,9 @@ class MqttIn(OnBroker):
     def __post_init__(self) -> None:
         super().__post_init__()
         if twice := [name for name, count in Counter(self.names.values()).items() if count > 1]:
-            raise SettingError(f"names: several values for {', '.join(sorted(twice))}: expected one for each channel")
+            raise SettingError(
+                f"names: several entries name the channel {', '.join(sorted(twice))}: keep one entry for each channel"
+            )
 
     def open(self, folder: Path, speed: float) -> Source:  # noqa: ARG002 - part of the interface
         """Create the source; it connects later."""
@@ -127,27 +129,27 @@ def explain_host_name(host: str) -> str:
 def _faults_of_topic(topic: str, *, published: bool) -> Iterator[str]:
     levels = topic.split("/")
     if not topic.strip():
-        yield "name one, such as 'machine/7/temperatures'"
+        yield "name a topic, such as 'machine/7/temperatures'"
     if len(topic.encode()) > _TOPIC:
         yield f"longer than {_TOPIC:,} bytes"
     if published and set(topic) & set("+#"):
-        yield "one that is published to has no wildcards (+, #)"
+        yield "a topic to which the service publishes must not contain wildcards (+, #)"
     if published and topic.startswith("$"):
-        yield "topics that begin with $ are the broker's own"
+        yield "topics that begin with $ are reserved for the broker"
     if levels[0] == "$share":
         if len(levels) < 3 or not levels[1] or set(levels[1]) & set("+#") or not any(levels[2:]):
             yield "expected '$share/GROUP/TOPIC', with no wildcards in the group"
         levels = levels[2:]
     for level in levels:
         if len(level) > 1 and set(level) & set("+#"):
-            yield f"a wildcard must be a whole level: {level!r} has more; write it like 'machine/+/spindle'"
+            yield f"a wildcard must be a whole level: {level!r} contains more; write it like 'machine/+/spindle'"
     if "#" in levels[:-1]:
         yield "the wildcard # covers all further levels: put it at the end, such as 'machine/#'"
 
 
 def _faults_of_name(host: str) -> Iterator[str]:
     if not host.strip():
-        yield "name one, such as '127.0.0.1'"
+        yield "name a host, such as '127.0.0.1'"
     if "/" in host:
         yield "expected only the host, such as 'mill7' or '192.0.2.7'"
     if ":" in host:

@@ -68,7 +68,7 @@ class Played:
                 self._begun = time.monotonic() - at / self.speed
             await asyncio.sleep(max(0.0, self._begun + at / self.speed - time.monotonic()))
             yield Reading(time.time(), values)
-        self._connection.to("closed", "played to its end")
+        self._connection.to("closed", "replayed to the end")
 
     def _next(self) -> tuple[float, dict[str, float]] | None:
         """Return the next row; None after the last one."""

@@ -55,7 +55,7 @@ def journal(
 
     if what == "show":
         if output is not None:
-            raise InputError("journal show writes no file; thermocomp journal export does")
+            raise InputError("journal show writes no file: omit -o, or use thermocomp journal export")
         _show(JournalReader(path), last, as_json=json)
     else:
         if output is None:
@@ -111,7 +111,7 @@ def _show(reader: "JournalReader", last: int, *, as_json: bool) -> None:
         lines.append(f"from {_stamp(summary.first)} to {_stamp(summary.last)}")
     lines.append(", ".join(f"{n:,} {kind}" for kind, n in summary.counts.items() if n) or "nothing yet")
     if summary.lost:
-        lines.append(f"{summary.lost:,} rows were lost while the disk did not take them")
+        lines.append(f"{summary.lost:,} rows were lost while the disk could not be written")
     for line in (*lines, *(f"{_stamp(time)}  {kind}  {text}" for time, kind, text in events)):
         console.print(words(line), soft_wrap=True)
 

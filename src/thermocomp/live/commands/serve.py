@@ -63,7 +63,7 @@ def serve(
     with needs("live"):
         from thermocomp.live.config import read_config
     if (config is None) != demo:
-        raise InputError("name a configuration (a TOML file), or --demo")
+        raise InputError("give either a configuration (a TOML file) or --demo")
     path = _demo(output) if config is None else config
     settings = read_config(path)
     own, journal = settings.config.state, settings.config.journal
@@ -116,7 +116,7 @@ async def _run(service: "Service", fades: bool, work: Sequence[Coroutine[Any, An
         if not fades or fading:  # a second stop request skips the fade
             task.cancel()
             return
-        console.print("stopping: the corrections go to zero first; stop again not to wait for it")
+        console.print("stopping: the corrections go to zero first; stop again to skip this")
         fading.append(asyncio.create_task(service.fade_out()))
         fading[0].add_done_callback(lambda _: task.cancel())
 
@@ -151,7 +151,7 @@ def _demo(folder: Path) -> Path:
     return config
 
 
-_CONFIG = """# thermocomp serve --demo: the virtual machine, {speed} times as fast as the world
+_CONFIG = """# thermocomp serve --demo: the virtual machine, {speed} times as fast as real time
 models = ["model.json"]
 state = "state.json"
 speed = {speed}.0

@@ -165,7 +165,7 @@ class Journal:
 
     def _insert(self, batch: deque[tuple[int, float, str, str]]) -> None:
         if self._file is not None and not self._file.exists():
-            self._odd = f"{self._file.name} was removed: a new file is begun"
+            self._odd = f"{self._file.name} was removed: a new file is started"
             self._disconnect()
         connection = self._connection or self._connect()
         if not batch:
@@ -184,7 +184,7 @@ class Journal:
                 return found
         found = self._attach(self._next())
         if found is None:
-            raise sqlite3.OperationalError("a new file is none already")
+            raise sqlite3.OperationalError("the new file is not a journal")
         return found
 
     def _attach(self, path: Path) -> sqlite3.Connection | None:
@@ -194,7 +194,9 @@ class Journal:
             version = find_version(connection)
             if version is not None and version > VERSION:
                 connection.close()
-                self._odd = f"{path.name} is a journal of version {version}: left as it is, a new file is begun"
+                self._odd = (
+                    f"{path.name} is a journal of version {version}: it is left unchanged, and a new file is started"
+                )
                 return None
             if version is None or (path != self._sound and not _is_sound(connection)):
                 raise _Damaged
@@ -248,7 +250,7 @@ class Journal:
     def _set_aside(self, path: Path) -> None:
         """Rename a damaged file and its companion files."""
         refused = path.with_name(f"{path.name}.refused")
-        self._odd = f"{path.name} is damaged or no journal: kept as {refused.name}, a new file is begun"
+        self._odd = f"{path.name} is damaged or not a journal: it is kept as {refused.name}, and a new file is started"
         for end in ("", "-wal"):
             with suppress(FileNotFoundError):
                 path.with_name(f"{path.name}{end}").replace(refused.with_name(f"{refused.name}{end}"))

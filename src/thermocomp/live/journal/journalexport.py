@@ -122,18 +122,21 @@ def export(reader: JournalReader, every: float = 0.0) -> Exported:
             table[channel.name] = values
         if (unknown := told[-1].measured - told[-1].known) > 0:
             notes.append(
-                f"{target.name}: of {told[-1].measured:,} rows with a measurement {unknown:,} have no deviation: the "
+                f"{target.name}: of {told[-1].measured:,} rows with a measurement, {unknown:,} have no deviation: the "
                 "correction in force is not known"
             )
     left_out = sum(m.kind != "probing" for _, m in found.measured)
     if left_out:
-        notes.append(f"{left_out:,} work offsets and tool lengths are not in it: workpiece and tool are new each time")
+        notes.append(
+            f"{left_out:,} work offsets and tool lengths are not exported: workpiece and tool are new each time"
+        )
     if found.overtaken:
         notes.append(
-            f"{found.overtaken:,} rows are not in it: a clock was set back after them, and their times came again"
+            f"{found.overtaken:,} rows are not exported: the clock was set back after them, and their times occurred "
+            "again"
         )
     if lost := reader.summary().lost:
-        notes.append(f"{lost:,} rows were lost while the disk did not take them")
+        notes.append(f"{lost:,} rows were lost while the disk could not be written")
     known = any(t.known for t in told) or (in_force and not any(t.measured for t in told))
     time = np.round(found.time - found.time[0], 6)
     speed = next((table[c.name] for c in listed if c.quantity == "spindle_speed"), None)
@@ -216,7 +219,10 @@ def _parted(
     probings = [(run, m) for run, m in found.measured if m.target == target.name and m.kind == "probing"]
     if channel is not None and np.isfinite(channel).any():
         if probings:
-            notes.append(f"{target.name}: {len(probings):,} probings are not in it: a displacement channel is")
+            notes.append(
+                f"{target.name}: {len(probings):,} probings are not exported: the displacement channel is exported "
+                "instead"
+            )
         return channel, correction, uncompensated(channel, correction)
     residual, deviation = np.full(n, np.nan), np.full(n, np.nan)
     far = 0
@@ -233,7 +239,7 @@ def _parted(
         correction[k] = known
         residual[k] = m.value + known if m.includes_offset else m.value
     if far:
-        notes.append(f"{target.name}: {far:,} probings are not in it: there is no reading within {NEAR:g} s")
+        notes.append(f"{target.name}: {far:,} probings are not exported: there is no reading within {NEAR:g} s")
     return residual, correction, deviation
 
 

@@ -170,7 +170,7 @@ class JournalReader:
             raise InputError(f"{where} cannot be interpreted: {e}") from e
 
 
-_OTHERS = "and read the others"
+_OTHERS = "and read the other files"
 
 
 # -- files -------------------------------------------------------------------------------------------------------------
@@ -215,7 +215,10 @@ def telling(path: Path) -> Iterator[None]:
         if code == sqlite3.SQLITE_NOTADB:
             raise InputError(f"{path}: is not a journal of thermocomp, and not a database") from e
         if code == sqlite3.SQLITE_CANTOPEN:
-            hint = "may it be read? Else copy it, and what is named like it, into a folder where files may be made"
+            hint = (
+                "check that you may read it; otherwise copy it, with all files whose names begin alike, to a writable "
+                "folder"
+            )
             raise InputError(f"{path}: cannot be opened; {hint}") from e
         raise InputError(f"{path}: cannot be read ({e}); set the file aside, {_OTHERS}") from e
 
@@ -235,6 +238,6 @@ def reading(path: Path) -> Iterator[sqlite3.Connection | None]:
         if version > VERSION:
             raise InputError(
                 f"{path}: a journal of version {version}, but this thermocomp supports {VERSION}: read it with a "
-                "newer one"
+                "newer thermocomp"
             )
         yield connection if version else None

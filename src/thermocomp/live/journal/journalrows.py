@@ -177,7 +177,7 @@ def kind_of(row: Row) -> str:
     """Return the name of the kind of a row."""
     found = _NAMES.get(type(row))
     if found is None:
-        raise ValueError(f"{type(row).__name__} is no row of a journal")
+        raise ValueError(f"{type(row).__name__} is not a row of a journal")
     return found
 
 
@@ -200,7 +200,7 @@ def loads(kind: str, time: float, text: str, start: StartRow | None) -> Row:
     want(kind in KINDS, kind, "kind", f"one of {', '.join(KINDS)}")
     if kind == "start":
         return _checked(value)
-    want(start is not None, None, kind, "a start before it")
+    want(start is not None, None, kind, "a start row before it")
     assert start is not None
     if kind == "reading":
         names = [c.name for c in start.channels]
@@ -230,7 +230,12 @@ def _checked(value: Any) -> StartRow:
         to_number(number)
     want(0.0 < start.confirm_within < math.inf, start.confirm_within, "confirm_within", "a positive number")
     for names in ([t.name for t in start.targets], [c.name for c in start.channels]):
-        want(len(set(names)) == len(names) <= _MOST and all(names), None, "start", "names, each once, at most 10,000")
+        want(
+            len(set(names)) == len(names) <= _MOST and all(names),
+            None,
+            "start",
+            "at most 10,000 names, each of them once",
+        )
     known = {c.name: (c.quantity, c.unit) for c in start.channels}
     for t in start.targets:
         want(known.get(t.name, t[1:3]) == t[1:3], None, t.name, f"a channel of {t.quantity} in {t.unit}, as the target")

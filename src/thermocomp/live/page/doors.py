@@ -79,7 +79,7 @@ class Doorkeeper:
         from holding the machine's correction. A token of 16 characters or more cannot be guessed.
         """
         if not self._token:
-            raise HTTPException(403, "no token is configured: this page only shows ([page] token_file)")
+            raise HTTPException(403, "no token is configured: this page only displays values; set token_file in [page]")
         if hmac.compare_digest(given.encode(), self._token):
             return
         now = time.monotonic()
@@ -127,9 +127,9 @@ class Door:
             return 403, why
         length = headers.get("content-length", "0")
         if not (length.isascii() and length.isdigit() and len(length) < 20) or int(length) > MOST_BYTES:
-            return 413, f"at most {MOST_BYTES} bytes"
+            return 413, f"a request has at most {MOST_BYTES} bytes"
         if "transfer-encoding" in headers:
-            return 413, f"at most {MOST_BYTES} bytes, with their length stated (Content-Length)"
+            return 413, f"a request has at most {MOST_BYTES} bytes, and states its length (Content-Length)"
         return None
 
 
@@ -146,7 +146,7 @@ def explain_host(header: str, names: Collection[str], server: str) -> str:
     address = _address(name)
     if address is not None and (address == _address(server) or address.is_loopback or _is_here(address)):
         return ""
-    return f"this page is not called {shorten(header, 80)!r}: add the name to hosts in [page] if it should be"
+    return f"{shorten(header, 80)!r} is not a name of this page: add it to hosts in [page] if it should be one"
 
 
 def explain_foreign(request: Request) -> str:
@@ -160,7 +160,7 @@ def explain_foreign(request: Request) -> str:
         "same-origin",
         "none",
     ):
-        return "asked from the page of another site: open this page itself"
+        return "the request came from the page of another site: open this page directly"
     return ""
 
 

@@ -60,13 +60,13 @@ def give(service: Service, wanted: PageOrder) -> str:
     """Carry out an order; return the reason if impossible, else an empty string."""
     target = wanted.target
     if wanted.do == "rezero":
-        service.rezero(target, "by hand, at the page")
+        service.rezero(target, "by hand, on the page")
     elif wanted.do == "roll back":
         return service.roll_back(target)
     elif wanted.do == "run":
         if refused := service.compensator.shadow.get(target):
-            return f"it must not run: {refused.reason}"
+            return f"the target must not run: {refused.reason}"
         service.order(target, None)
     else:
-        service.order(target, Status("holding" if wanted.do == "hold" else "shadow", "by hand, at the page"))
+        service.order(target, Status("holding" if wanted.do == "hold" else "shadow", "by hand, on the page"))
     return ""

@@ -41,7 +41,7 @@ class Kinematics:
         if machine.structure.rotary:
             raise InputError(
                 f"{machine.name}: rotary axis {', '.join(machine.structure.rotary)} in the structure "
-                f"{machine.structure.code!r}: only machines of the linear axes X, Y and Z are computed; remove "
+                f"{machine.structure.code!r}: only machines of the linear axes X, Y and Z are supported; remove "
                 "the rotary axes from the structure if they are stationary"
             )
         self.machine = machine

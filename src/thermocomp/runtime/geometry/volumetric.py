@@ -114,13 +114,15 @@ class VolumetricModel:
         """
         times = np.asarray(time, dtype=np.float64)
         if not np.isfinite(times).all() or (np.diff(times) <= 0).any():
-            raise InputError(f"machine {self.machine.name}: the times of the recording must increase")
+            raise InputError(f"machine {self.machine.name}: the times of the recording must be finite and increase")
         for name in self.inputs:
             if name not in table:
                 there = ", ".join(table) or "none"
                 raise InputError(f"machine {self.machine.name}: there is no channel {name!r}; there are {there}")
             if np.shape(table[name]) != times.shape:
-                raise InputError(f"channel {name}: {len(table[name])} numbers for {len(times)} times")
+                raise InputError(
+                    f"channel {name}: {len(table[name])} values for {len(times)} times; their numbers must be equal"
+                )
         values = np.empty((len(times), len(self.inputs)))
         for column, name in enumerate(self.inputs):
             values[:, column] = table[name]

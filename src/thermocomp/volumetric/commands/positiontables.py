@@ -71,7 +71,7 @@ def show(found: PositionStudy, tests: Sequence[Profiles], left_open: Sequence[Se
     rest = ", ".join(f"m = {m}: {r:.2f}" for m, r in fit.remainders.items() if math.isfinite(r))
     console.print(f"Beside the cold profile {fit.thermal_rms:.2f} {unit} RMS; beside powers up to {words(rest)} {unit}")
     if model.powers and "slopes" not in left_open and fit.enough > max(model.powers):
-        console.print(f"[yellow]but[/] higher powers tell more: try --slopes {fit.enough}")
+        console.print(f"[yellow]but[/] higher powers describe more: try --slopes {fit.enough}")
     if model.slopes and "offset" not in left_open and fit.shifts:
         console.print(
             f"[yellow]but[/] the profiles do not turn about {model.reference_position:g} mm: with an offset "

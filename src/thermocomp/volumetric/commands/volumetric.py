@@ -47,7 +47,7 @@ def _show(found: VolumetricErrors, page: Path | None) -> None:
         print_table(known, console)
     others = [c["code"] for c in components if c["source"] == "nothing"]
     console.print(
-        f"{len(known.rows)} of {len(components)} components are known" + "; taken as zero: " * bool(others), end=""
+        f"{len(known.rows)} of {len(components)} components are known" + "; assumed to be zero: " * bool(others), end=""
     )
     console.print(", ".join(others), soft_wrap=True)
     if point:
@@ -61,7 +61,7 @@ def _show(found: VolumetricErrors, page: Path | None) -> None:
         if codes:
             console.print(f"[yellow]but[/] {what}: {words(', '.join(codes))}", soft_wrap=True)
     if study.missing:
-        console.print(f"[yellow]but[/] in {study.missing} rows an input is missing: the state before is held there")
+        console.print(f"[yellow]but[/] in {study.missing} rows an input is missing: the previous state is held there")
     for note in study.notes:
         console.print(f"[yellow]note[/] {words(note)}", soft_wrap=True)
     if volume:

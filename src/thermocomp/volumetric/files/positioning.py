@@ -131,8 +131,8 @@ def _matrix(
                 table,
                 mine[-1],
                 column,
-                f"run {name} in this direction ends here without the target {targets[missing[0]]:g} mm, which others "
-                "have: complete the run, or leave the target out of all",
+                f"run {name} in this direction ends here without the target {targets[missing[0]]:g} mm, which other "
+                "runs have: complete the run, or delete the target from all runs",
             )
     return filled
 
@@ -145,7 +145,7 @@ def _refuse_unsorted(table: CsvTable, column: int, rows: Sequence[int], position
     turned = np.flatnonzero(steps * np.sign(steps[0]) <= 0)
     if turned.size:
         before, row = rows[int(turned[0])], rows[int(turned[0]) + 1]
-        what = "comes twice" if position[row] == position[before] else "turns back"
+        what = "is repeated" if position[row] == position[before] else "reverses the direction"
         _refuse(
             table,
             row,

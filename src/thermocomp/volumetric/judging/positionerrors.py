@@ -148,7 +148,7 @@ def assess_together(one: ComponentStates, parts: Sequence[JudgedSplit], options:
     triples = [e for p in parts for e in p.errors]
     filled = np.array([e[0].size > 0 for e in triples], dtype=np.bool_)
     if not filled.any():
-        raise FitError(f"{tests[0].target}: no profile is left to judge on")
+        raise FitError(f"{tests[0].target}: no profile is left for validation")
     rms = np.array([[Size.of(e).rms for e in triple] for triple in triples])
     segments: list[tuple[str, BoolArray]] = []
     for split, part in zip(one.judging.splits, parts, strict=True):
@@ -166,7 +166,7 @@ def assess_together(one: ComponentStates, parts: Sequence[JudgedSplit], options:
         ),
         unit=unit,
         names=BESIDE,
-        caps=("judged on one stretch that continues from what was learned",) if one.judging.splits[0].stretch else (),
+        caps=("judged on one section that continues the training data",) if one.judging.splits[0].stretch else (),
     )
     measured, predicted = _factors(one, parts, options) if options.powers else (np.empty((len(rows), 0)),) * 2
     factors = []

@@ -203,7 +203,7 @@ def study(
     if grid < 2:
         raise InputError(f"a grid of {grid} points along an axis has no extent: expected at least 2")
     if recording is None and hours:
-        raise InputError("without a recording there is no time: name one, or omit the times")
+        raise InputError("the times refer to a recording, but none is given: name a recording, or omit the times")
     time, table, missing = _inputs(machine, recording) if recording is not None else (np.zeros(1), {}, 0)
     replayed = machine if recording is not None else in_reference_state(machine)
     point = middle(machine) if at is None else _inside(machine, at)

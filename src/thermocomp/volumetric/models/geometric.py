@@ -147,7 +147,7 @@ def fit_profile(
         if n_own > MIN_POSITIONS and (kind == "spline" or not others):
             tried.append(_try_through(ThroughMeans(points, axis), values, place, points, axis))
         if not tried or not np.isfinite(min(t.left_out for t in tried)):
-            raise FitError(f"profile along {axis}: {n_places} points are too few to choose an order; give it")
+            raise FitError(f"profile along {axis}: {n_places} points are too few to choose an order; give the order")
         tried.sort(key=lambda t: (t.n_terms, t.order))
         best = _choose(tried, n_own)
         chosen, through = best.order, best.through
@@ -186,7 +186,7 @@ def _suited(points: FloatArray, axis: str, kind: Kind, coordinates: str | None) 
         raise InputError(f"coordinates {used!r}: name the axis {axis} itself and, if required, others of X, Y, Z")
     others = "".join(a for a in used if a != axis and a in varying)
     if kind == "spline" and others and coordinates is not None:
-        raise InputError(f"a spline is one along {axis} alone: for {used} choose a polynomial")
+        raise InputError(f"a spline depends on {axis} only: for the coordinates {used} choose a polynomial")
     n_own = len(np.unique(points[:, "XYZ".index(axis)]))
     if n_own < MIN_POSITIONS:
         raise FitError(f"profile along {axis}: values at {n_own} positions; at least {MIN_POSITIONS} are needed")

@@ -137,7 +137,7 @@ def set_cold_profiles(
     for test in tests[1:]:
         if not np.array_equal(test.points, tests[0].points):
             raise InputError(
-                f"profiles of {test.target}: to count from one cold state all tests need the same positions"
+                f"profiles of {test.target}: to be relative to one cold state, all tests need the same positions"
             )
     zero = np.mean([test.cold(options.reference) for test in blank_unlearned(tests, options, learn)], axis=0)
     return tuple(replace(test, zero=zero) for test in tests)
@@ -162,7 +162,7 @@ def blank_unlearned(
             kept[test.reference_rows(options.reference)] = True
             found.append(replace(test, values=np.where(kept[:, None], test.values, np.nan)))
     if not found:
-        raise FitError(f"{tests[0].target}: no state is left to learn from")
+        raise FitError(f"{tests[0].target}: no state is left for training")
     return tuple(found)
 
 

@@ -236,7 +236,7 @@ def unproven(study: Volumetric) -> list[str]:
         code: next((m.honest_error.taken for m in models_of(source) if m.honest_error and m.honest_error.taken), "")
         for code, source in study.machine.components.items()
     }
-    return [f"{code}, taken by {by}" for code, by in found.items() if by]
+    return [f"{code}, approved by {by}" for code, by in found.items() if by]
 
 
 def said(point: Vector) -> str:

@@ -160,7 +160,11 @@ class Server:
         for letter, axis in self.axes.items():
             alarm = ""
             if not why and axis.aside is not None and now - axis.aside > PATIENCE:
-                alarm = "clipped at a soft limit" if limited else "does not follow: is OFFSET_AV_RATIO in the INI?"
+                alarm = (
+                    "clipped at a soft limit"
+                    if limited
+                    else "does not follow: check that OFFSET_AV_RATIO is in the INI file"
+                )
             share = 0.0 if why else 1.0  # LinuxCNC continues to show an offset that is now part of the position
             axes[letter] = {
                 "offset": share * self.get(axis, "offset-now") / micron,
@@ -236,7 +240,7 @@ class Server:
         for name in ("magnitude", "rate"):
             value = float(message.get(name, getattr(self.options, name)))
             if not 0.0 < value < math.inf:
-                raise ValueError(name)
+                raise ValueError(f"{name}: expected a positive finite number")
             limits[name] = min(value, getattr(self.options, name))
         lines = {letter: [float(v) for v in line] for letter, line in message.get("axes", {}).items()}
         for letter, line in lines.items():
@@ -347,7 +351,7 @@ def main() -> None:
     try:
         server = Server(options)
     except (hal.error, RuntimeError) as e:  # a restart would fail again
-        print(f"thermocomp: {e}: LinuxCNC does not run with thermocomp.hal", file=sys.stderr)
+        print(f"thermocomp: {e}: LinuxCNC is not running with thermocomp.hal", file=sys.stderr)
         return
     server.run()
 

@@ -114,7 +114,8 @@ def prepare(path: Path, folder: Path, settings: HalSettings) -> HalSetup:
         todo.insert(0, f"{path}: add to [HAL], after the other HALFILE lines: HALFILE = {_named(folder, path)}")
     for name in files.unread:
         todo.append(
-            f"{name}: cannot be seen through; a pin that it uses, or a module that it loads, can be used once only"
+            f"{name}: its commands cannot be analysed; a pin that it uses, or a module that it loads, must not be used "
+            "again"
         )
     component = Path(__file__).with_name("_hal_component.py").read_text(encoding="utf-8")
     return HalSetup(
@@ -153,9 +154,9 @@ def _axis(ini: Ini, letter: str, pattern: Pattern) -> HalAxis:
     if pattern == "offset":
         if not 0.0 < ini.number(section, "OFFSET_AV_RATIO", 0.0) <= 0.9:
             raise InputError(
-                f"{ini.path}: [{section}] has no OFFSET_AV_RATIO from 0 to 0.9, and without it LinuxCNC takes external "
-                f"offsets and does nothing; add OFFSET_AV_RATIO = 0.1 to [{section}] (the correction's share of the "
-                "axis' speed and acceleration, the rest is for programs), or use --pattern drive"
+                f"{ini.path}: [{section}] has no OFFSET_AV_RATIO from 0 to 0.9, and without it LinuxCNC accepts "
+                f"external offsets but does not apply them; add OFFSET_AV_RATIO = 0.1 to [{section}] (the share of the "
+                "axis' speed and acceleration for the correction; the rest is for programs), or use --pattern drive"
             )
     else:
         joint = _joint(ini, letter)
@@ -169,7 +170,10 @@ def _joint(ini: Ini, letter: str) -> int:
     """Return the joint number of an axis."""
     name, *rest = ini.get("KINS", "KINEMATICS").split()
     if name != "trivkins":
-        raise InputError(f"{ini.path}: [KINS] {name}: on the drive side an axis must be a joint (trivkins)")
+        raise InputError(
+            f"{ini.path}: [KINS] {name}: with --pattern drive each axis must be a joint (trivkins); use --pattern "
+            "offset"
+        )
     given = [word.partition("=")[2] for word in rest if word.startswith("coordinates=")]
     letters = (given[0] if given else "XYZABCUVW").upper()
     if letters.count(letter) != 1:
@@ -184,8 +188,8 @@ def _check_free(ini: Ini, files: HalFiles, axes: Sequence[HalAxis], pattern: Pat
     if pattern == "drive":
         if files.unread:
             raise InputError(
-                f"{ini.path}: HAL in {files.unread[0]} cannot be analysed (Tcl, or old commands); on the drive "
-                "side all connections of the drive must be known: use --pattern offset"
+                f"{ini.path}: HAL in {files.unread[0]} cannot be analysed (Tcl, or old commands); with "
+                "--pattern drive all connections of the drive must be known: use --pattern offset"
             )
         if not {"motion-command-handler", "motion-controller"} <= set(files.functions):
             raise InputError(f"{ini.path}: no HAL file adds motion-command-handler and motion-controller to a thread")

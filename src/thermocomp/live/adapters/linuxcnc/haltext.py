@@ -55,7 +55,7 @@ def load_modules(axes: Sequence[HalAxis], joints: int, pattern: str, files: HalF
         )
         if not set(names) <= set(before):
             todo.append(
-                f"{file}: line {line} loads {module} already, and LinuxCNC loads a module once; make it: "
+                f"{file}: line {line} already loads {module}, and LinuxCNC loads a module only once; change it to: "
                 f"loadrt {module} names={','.join([*before, *(n for n in names if n not in before)])}"
             )
     return lines

@@ -86,7 +86,8 @@ class LinuxCncSink:
             ) from e
         except PermissionError as e:
             raise self._fail(
-                "this user may not connect: set it up with --group, and make this user a member of that group"
+                "this user has no permission to connect: run 'thermocomp linuxcnc setup' with --group, and make this "
+                "user a member of that group"
             ) from e
         except (OSError, TimeoutError, ValueError) as e:
             raise self._fail(str(e) or "no answer") from e
@@ -94,7 +95,10 @@ class LinuxCncSink:
         await self._hear(b"")
         if missing := {a.upper() for a in self.axes.values()} - self._reports.keys():
             await self._hang_up()
-            raise self._fail(f"axis {', '.join(sorted(missing))} is not corrected there; set it up with --axes")
+            raise self._fail(
+                f"axis {', '.join(sorted(missing))} is not corrected there; run 'thermocomp linuxcnc setup' again with "
+                "--axes"
+            )
         self._connection.to("connected")
         self._beating = asyncio.create_task(self._live())
 
@@ -128,7 +132,7 @@ class LinuxCncSink:
     def alarms(self) -> dict[str, str]:
         """Return targets whose correction in force is not the demanded one, and the reason, as last reported."""
         if self._still:
-            return dict.fromkeys(self.axes, "the controller stands still")
+            return dict.fromkeys(self.axes, "the controller does not respond")
         found = {t: self._reports[a.upper()].alarm for t, a in self.axes.items() if a.upper() in self._reports}
         return {t: f"axis {self.axes[t].upper()} {alarm}" for t, alarm in found.items() if alarm}
 
@@ -183,9 +187,9 @@ class LinuxCncSink:
             async with asyncio.timeout(ANSWER):
                 writer.write(line)
                 await writer.drain()
-                answer = json.loads(await reader.readline() or b'{"error": "lost"}')
+                answer = json.loads(await reader.readline() or b'{"error": "connection lost"}')
             if answer.get("beat") != self._beat:
-                raise ValueError(_text(answer.get("error", "not the answer")))
+                raise ValueError(_text(answer.get("error", "unexpected answer")))
             self._why, self.ticks = _text(answer["suspended"]), int(answer["ticks"])
             self._still = bool(answer["still"])
             self._timeout = float(answer["timeout"])
@@ -195,7 +199,7 @@ class LinuxCncSink:
         except (OSError, TimeoutError, ValueError, LookupError, AttributeError, TypeError, OverflowError) as e:
             raise self._fail(str(e) or "no answer") from e
         except (RecursionError, ThermocompError) as e:
-            raise self._fail(f"not the answer: {e}") from e
+            raise self._fail(f"unexpected answer: {e}") from e
         finally:  # also if cancelled: a late answer would be taken as the reply to the next message
             if not heard:
                 await self._hang_up()
