@@ -212,6 +212,13 @@ def test_a_source(thermocomp: Thermocomp, tmp_path: Path) -> None:
     (tmp_path / "live.toml").write_text(CONFIG.format("to = 2.0"), encoding="utf-8")
     _, err = thermocomp("serve", "live.toml", "--check", code=2)
     assert "sources.1.to is not a known key" in err
+    second = '[[sources]]\nkind = "counting"\nby = {}\n'
+    (tmp_path / "live.toml").write_text(CONFIG.format("by = 2.0") + second.format(3.0), encoding="utf-8")
+    thermocomp("serve", "live.toml", "--check")
+    (tmp_path / "live.toml").write_text(CONFIG.format("by = 2.0") + second.format(2.0), encoding="utf-8")
+    assert "2 sources with the same CountingIn(" in thermocomp("serve", "live.toml", "--check", code=2)[1]
+    (tmp_path / "live.toml").write_text("speed = 60.0\n" + CONFIG.format(""), encoding="utf-8")
+    assert "read by kind = 'counting' runs in real time" in thermocomp("serve", "live.toml", "--check", code=2)[1]
     for kind, why in (
         ("broken", "of the package tinyplug cannot be loaded"),
         ("plain", "tinyplug:Counting is not a dataclass with a method open"),

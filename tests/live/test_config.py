@@ -72,7 +72,7 @@ def test_what_it_says(tmp_path: Path) -> None:
         ("port = 8080", "port = 80800", "page: port = 80800: expected a port from 0"),
         ("port = 8080", 'port = "8080"', "page.port: Input should be a valid integer, found '8080'"),
         ("[page]", "[pages]", "pages is not a known key"),
-        ('state = "state.json"', "speed = 60.0", "a machine that is read by MQTT runs in real time"),
+        ('state = "state.json"', "speed = 60.0", "a machine that is read by kind = 'mqtt' runs in real time"),
         ('state = "state.json"', "speed = 0.0", "speed: Input should be greater than 0, found 0.0"),
         ('state = "state.json"', 'state = "state.json', "not valid TOML"),
         ('state = "state.json"', 'own_compensation = "on"', "the same error would be corrected twice"),

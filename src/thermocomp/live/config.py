@@ -22,6 +22,7 @@ from thermocomp.live.adapters.network import MqttIn, MqttOut, MqttProbing, OnBro
 from thermocomp.live.adapters.sections import (
     LinuxCncOut,
     Names,
+    ReplayIn,
     SimulatedIn,
     SimulatedProbing,
     SinkSection,
@@ -196,10 +197,12 @@ class Config:
         machine = any(isinstance(s, SimulatedIn) for s in self.sources)
         if not machine and any(isinstance(p, SimulatedProbing) for p in self.probes):
             yield 'a probe of kind = "simulated" needs a source of kind = "simulated"'
-        if self.speed != 1.0 and any(isinstance(s, MqttIn) and not s.virtual for s in self.sources):
+        virtual = (SimulatedIn, ReplayIn)
+        real = [s.kind for s in self.sources if not (isinstance(s, virtual) or getattr(s, "virtual", False))]
+        if self.speed != 1.0 and real:
             yield (
-                f"speed = {self.speed:g}: a machine that is read by MQTT runs in real time: set speed = 1, or "
-                "virtual = true if the machine is a virtual one"
+                f"speed = {self.speed:g}: a machine that is read by kind = {real[0]!r} runs in real time: set "
+                "speed = 1, or virtual = true if the machine is a virtual one"
             )
 
 
@@ -207,8 +210,11 @@ def _place(one: SourceSection | SinkSection | Probings) -> str:
     """Return the resource of a link, which no other link may share."""
     if isinstance(one, OnBroker):
         return f"topic = {one.topic!r} of {one.host}:{one.port}"
+    if isinstance(one, SimulatedIn | SimulatedProbing):
+        return f"kind = {one.kind!r}"
     found = {"file": getattr(one, "file", ""), "socket": getattr(one, "socket", "")}
-    return next((f"{key} = {name!r}" for key, name in found.items() if name), f"kind = {one.kind!r}")
+    # a link of another package: its whole table
+    return next((f"{key} = {name!r}" for key, name in found.items() if name), str(one))
 
 
 class ServiceSettings(NamedTuple):
