@@ -344,7 +344,7 @@ def test_process_cannot_be_frozen_nor_written(samples: Samples) -> None:
     fitted = GaussianProcess(max_rows=40).fit(T, y)
     assert not GaussianProcess.freezable
     assert Ridge.freezable
-    with pytest.raises(FitError, match=r"gp cannot be frozen to plain numbers: .* 40 training rows .* deploy another"):
+    with pytest.raises(FitError, match=r"gp cannot be stored as coefficients: .* 40 training rows .* deploy another"):
         fitted.freeze(target="dx")
     model = fitted.unfrozen(target="dx")
     with pytest.raises(ModelFileError, match="model of dx: the family 'estimator' cannot be written"):
@@ -378,7 +378,7 @@ def test_process_is_judged_beside_the_others(samples: Samples, monkeypatch: pyte
         raise AssertionError("the work must not start")
 
     monkeypatch.setattr(study, "compare", never)
-    with pytest.raises(InputError, match="gp cannot be frozen to plain numbers: judge it with 'compare'"):
+    with pytest.raises(InputError, match="gp cannot be stored as coefficients: judge it with 'compare'"):
         study.fit(samples, "gp", judging)
 
 

@@ -29,7 +29,7 @@ class Beginning:
         Earlier files of the same test, in chronological order. With --start rezeroed they give the state of the
         machine, and all values are relative to the start of the recording.
     gap : float
-        Time from the end of each of these files to the start of the following one [s]. Default: from the time stamps,
+        Time from the end of each file of `--continues` to the start of the next one [s]. Default: from the time stamps,
         else one sampling interval.
     zero : str
         Temperatures of the known zero, such as t1_C=20.1,t2_C=20.4, or a recording that starts with them.

@@ -33,7 +33,7 @@ def dumps(models: Sequence[ErrorModel]) -> str:
     Raises
     ------
     ModelFileError
-        A model belongs to a family that cannot be stored, such as a Gaussian process, which is not plain numbers; or
+        A model belongs to a family that cannot be stored, such as a Gaussian process, which has no coefficients; or
         two models have different watches.
     """
     _check_judged(models, "model file")
@@ -98,7 +98,7 @@ def entry_of(model: ErrorModel) -> dict[str, Any]:
     """
     if model.family not in FAMILIES:
         raise ModelFileError(
-            f"model of {model.target}: the family {model.family!r} cannot be written, as it is not plain numbers; "
+            f"model of {model.target}: the family {model.family!r} cannot be stored as coefficients; "
             f"a file may hold {', '.join(FAMILIES)}"
         )
     entry = asdict(replace(model, watch=None))

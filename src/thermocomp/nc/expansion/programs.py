@@ -100,7 +100,7 @@ class File:
             if times and not told and last in self._programs:
                 raise ProgramError(
                     line,
-                    f"{who}: O{number}, or O{last:04d} {times} times? write the number of calls with L on the line",
+                    f"{who}: one call of O{number}, or {times} calls of O{last:04d}: write the number of calls with L",
                 )
             return self.find(number, line, who), 1
         return self.find(last, line, who), times

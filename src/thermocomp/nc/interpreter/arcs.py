@@ -34,7 +34,7 @@ def check_centre(start: Flat, end: Flat, centre: Flat, inch: bool) -> None:
     """
     first, last = math.dist(start, centre), math.dist(end, centre)
     if min(first, last) < _SMALLEST:
-        raise ArcError("the arc has no radius; check its centre")
+        raise ArcError("the radius of the arc is zero, its centre is its start; check I, J and K")
     apart, spiral = abs(first - last), _SPIRAL[inch]
     if apart > 100.0 * spiral or (apart > spiral and apart / max(first, last) > _RELATIVE):
         raise ArcError(

@@ -65,7 +65,10 @@ class Hooks:
         self.protect.argtypes = (P, ctypes.c_size_t, ctypes.c_int)
 
     def turn(self, library: str, functions: dict[str, tuple[Callable[..., Any], tuple[Any, ...]]]) -> dict[str, Any]:
-        """Replace functions by mangled name with (function, result and argument types); return the originals."""
+        """Replace the functions that have these mangled names; return the originals.
+
+        A replacement is a function with its result type and argument types.
+        """
         found = slots(library, set(functions))
         missing = sorted(set(functions) - set(found))
         if missing:

@@ -44,14 +44,15 @@ class ArcPath(NamedTuple):
 class Canonical(NamedTuple):
     """One canonical call.
 
-    `kind` is ``rapid``, ``feed``, ``arc``, ``probe``, ``tap``, ``curve`` for moves, else ``dwell`` (s), ``feedrate`` (F
-    in mm, F as written), ``feedmode`` (spindle, 1 for G95), ``unit`` (mm in a program's unit), ``plane``, ``m3``,
-    ``m4``, ``m5``, ``speed`` (spindle, 1/min), ``speedmode`` (spindle, highest speed of G96 or 0), ``select`` and
-    ``change`` (tool), ``toolnumber`` (M61), ``tooltable`` (G10 L1, L10, L11), ``length`` (tool offset), ``g5x``
-    (system, origin), ``g92``, ``rotation`` (degrees), ``sync`` (spindle, mm per turn, 1 for speed only), ``unsync``,
-    ``path`` (3 G64, 2 G61, 1 G61.1; tolerance), ``naive`` (G64 Q), ``mist``, ``flood``, ``mistoff``, ``floodoff``,
-    ``m0``, ``m1``, ``pallet`` (M60, and before the end in M30), ``end``, overrides, ``m62`` to ``m68``, ``wait`` (M66),
-    ``orient`` (M19), ``user`` (code, P, Q), ``comment`` and ``message``.
+    `kind` is ``rapid``, ``feed``, ``arc``, ``probe``, ``tap``, ``curve`` for moves, else ``dwell`` (s),
+    ``feedrate`` (F converted to mm, F as programmed), ``feedmode`` (spindle, 1 for G95), ``unit`` (mm per unit of
+    the program), ``plane``, ``m3``, ``m4``, ``m5``, ``speed`` (spindle, 1/min), ``speedmode`` (spindle, highest
+    speed of G96 or 0), ``select`` and ``change`` (tool), ``toolnumber`` (M61), ``tooltable`` (G10 L1, L10, L11),
+    ``length`` (tool offset), ``g5x`` (system, origin), ``g92``, ``rotation`` (degrees), ``sync`` (spindle, mm per
+    turn, 1 for speed only), ``unsync``, ``path`` (3 G64, 2 G61, 1 G61.1; tolerance), ``naive`` (G64 Q), ``mist``,
+    ``flood``, ``mistoff``, ``floodoff``, ``m0``, ``m1``, ``pallet`` (M60; M30 calls it before ``end``), ``end``,
+    overrides, ``m62`` to ``m68``, ``wait`` (M66), ``orient`` (M19), ``user`` (code, P, Q), ``comment`` and
+    ``message``.
     """
 
     kind: str

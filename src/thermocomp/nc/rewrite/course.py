@@ -33,7 +33,7 @@ class Run(NamedTuple):
 
 
 class Bound(NamedTuple):
-    """Error bound of the tool in a cut, of one axis [um]."""
+    """Bound of the error of the tool position during a cut, for one axis [um]."""
 
     axis: str
     low: float  #: lowest drift in the whole run

@@ -130,7 +130,7 @@ class LinuxCncSink:
         return dict.fromkeys(self.axes, f"the controller is {self._why}") if self._why else {}
 
     def alarms(self) -> dict[str, str]:
-        """Return targets whose correction in force is not the demanded one, and the reason, as last reported."""
+        """Return targets whose correction in force differs from the commanded one, and the reason, as last reported."""
         if self._still:
             return dict.fromkeys(self.axes, "the controller does not respond")
         found = {t: self._reports[a.upper()].alarm for t, a in self.axes.items() if a.upper() in self._reports}

@@ -175,7 +175,7 @@ class Writer(OriginWriter):
             yield from self.state(a)
 
     def state(self, call: Canonical) -> Iterator[tuple[str, str]]:
-        """Yield (kind, text) of a call that is equal in both runs."""
+        """Yield kind and text of a call with values that are the same in both runs."""
         kind, values = call.kind, call.values
         if kind == "unit":
             if self.feed is not None:
