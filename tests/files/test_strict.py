@@ -192,9 +192,9 @@ def test_of_a_long_list_the_first_error_is_enough() -> None:
 @pytest.mark.parametrize("name", ["", " ", "z\num", "z\x1b[2J", "z\u202e", "z\u2028", "x" * 201, "z\x00"])
 def test_names_are_names(name: str) -> None:
     for change in (put(name, "target"), put(name, "inputs", 1, "name")):
-        with pytest.raises(ModelFileError, match=r"is not a name|a name has 1 to 200 characters"):
+        with pytest.raises(ModelFileError, match=r"is not a valid name|a name has 1 to 200 characters"):
             modelfile.loads(signed(change))
-    with pytest.raises(InputError, match=r"is not a name|a name has 1 to 200 characters"):
+    with pytest.raises(InputError, match=r"is not a valid name|a name has 1 to 200 characters"):
         Input(name, "temperature", "degC", 20.0, True, -1.0, 1.0)
 
 

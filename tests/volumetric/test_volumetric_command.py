@@ -103,7 +103,7 @@ def test_for_people(mill: tuple[str, str], capsys: pytest.CaptureFixture[str]) -
     assert run(["volumetric", machine, "--recording", recording]) == 0
     said = capsys.readouterr().out
     assert "Mill [7], w X' b Z Y (C1) t: " in said
-    assert "4 of 32 components are known; taken as zero: EYX, EZX, EAX" in said
+    assert "4 of 32 components are known; assumed to be zero: EYX, EZX, EAX" in said
     assert "At X 300, Y 0, Z 250 mm, the tip at X 0, Y 0, Z -100 mm" in said
     assert "spindle drift in Z" in said
     assert "straight lines" in said

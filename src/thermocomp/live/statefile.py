@@ -18,7 +18,7 @@ from thermocomp.files.modelfile import entry_of
 from thermocomp.files.typed import decode, encode, want
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.state import CompensatorState
-from thermocomp.runtime.watch import WORDS
+from thermocomp.runtime.watch import WORDS, WatchState
 
 KIND = jsonfile.Format("thermocomp-state", 1, "state file", "thermocomp serve")
 
@@ -142,21 +142,7 @@ def _check(state: CompensatorState, compensator: Compensator) -> None:
         _alike(own.outside, (n,), f"{place}.outside")
         _check_gathered(begun, n, f"gathered.{k}")
     for k, (watch, seen, first) in enumerate(zip(compensator.watches, state.watches, cold.watches, strict=True)):
-        for name, value in seen._asdict().items():
-            if isinstance(value, np.ndarray):
-                # fields used in predictions are always numbers; instants may be unknown
-                sure = name in ("reference", "memory", "traces", "used", "predicted", "usual", "bridge")
-                _alike(
-                    value, getattr(first, name).shape, f"watches.{k}.{name}", finite=sure and not np.isnan(seen.time)
-                )
-        instants = np.concatenate([np.ravel(getattr(seen, name)) for name in _INSTANTS])
-        known = instants[np.isfinite(instants)]
-        want(not known.size or known.max() <= seen.time, None, f"watches.{k}", "no instant later than its last update")
-        want(
-            bool(np.isfinite(seen.since[seen.fault > 0]).all()), None, f"watches.{k}.since", "the time of each failure"
-        )
-        want(bool(((seen.fault >= 0) & (seen.fault < len(WORDS))).all()), None, f"watches.{k}.fault", "a known fault")
-        _check_gathered(seen.gathered, len(watch.inputs), f"watches.{k}.gathered")
+        _check_watch(seen, first, len(watch.inputs), f"watches.{k}")
     for target, learned in state.learned.items():
         place, n = f"learned.{target}", learned.mean.size
         _alike(learned.mean, (n,), f"{place}.mean")
@@ -175,6 +161,21 @@ def _check(state: CompensatorState, compensator: Compensator) -> None:
         models = compensator.models[lines[target].models]
         known = {1, 1 + len(getattr(models[0], "spread", ()))} if len(models) == 1 else {1}
         want(n in known, n, f"{place}.mean", f"{max(known)} numbers")
+
+
+def _check_watch(seen: WatchState, first: WatchState, n: int, place: str) -> None:
+    """Raise `ValueError` unless `seen` is a possible state of a watch that begins with `first`."""
+    for name, value in seen._asdict().items():
+        if isinstance(value, np.ndarray):
+            # fields used in predictions are always numbers; instants may be unknown
+            sure = name in ("reference", "memory", "traces", "used", "predicted", "usual", "bridge")
+            _alike(value, getattr(first, name).shape, f"{place}.{name}", finite=sure and not np.isnan(seen.time))
+    instants = np.concatenate([np.ravel(getattr(seen, name)) for name in _INSTANTS])
+    known = instants[np.isfinite(instants)]
+    want(not known.size or known.max() <= seen.time, None, place, "no instant later than its last update")
+    want(bool(np.isfinite(seen.since[seen.fault > 0]).all()), None, f"{place}.since", "the time of each failure")
+    want(bool(((seen.fault >= 0) & (seen.fault < len(WORDS))).all()), None, f"{place}.fault", "a known fault")
+    _check_gathered(seen.gathered, n, f"{place}.gathered")
 
 
 def _check_gathered(gathered: Gathered, n: int, place: str) -> None:

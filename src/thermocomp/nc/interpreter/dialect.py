@@ -299,7 +299,7 @@ def _line_words(code: str, words: list[tuple[str, str]]) -> LineWords:
     computed = (letter + value for letter, value in words if letter in "GM" and ("#" in value or "{" in value))
     values = {letter: value for letter, value in words if letter not in "GM"}
     p_of = find_owner_of_p((letter, read_number(value)) for letter, value in words) if "P" in values else ""
-    return LineWords(code, g, m, next(computed, ""), values, p_of)
+    return LineWords(code=code, g=g, m=m, computed=next(computed, ""), values=values, p_of=p_of)
 
 
 def _squeeze(text: str) -> str:

@@ -222,7 +222,15 @@ def cycle(state: InterpreterState, words: BlockWords, block: Block, again: bool)
         return
     repeats = words.whole("K" if "K" in values and state.fanuc else "L", least=1) or 1
     begin = triple(v / scale for v in start)
-    run = CannedCycle(modal, begin, named, state.sticky, state.level / scale, repeats, direct=state.fanuc)
+    run = CannedCycle(
+        modal=modal,
+        start=begin,
+        named=named,
+        sticky=state.sticky,
+        level=state.level / scale,
+        repeats=repeats,
+        direct=state.fanuc,
+    )
     _turn_for_a_tap(state, words, block)
     block.pause += repeats * dwell_seconds(state, pause(code, state.sticky))
     at = state.machine

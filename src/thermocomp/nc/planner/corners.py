@@ -104,7 +104,16 @@ class Corners:
             before.gives, after.gives = max(before.gives, KINK), max(after.gives, KINK)
             return None
         first, length, second = cut
-        arc = Segment(after.owner, length, u, w, speed, goal, a * ALONG, before.rapid)
+        arc = Segment(
+            owner=after.owner,
+            length=length,
+            entry=u,
+            leave=w,
+            top=speed,
+            speed=goal,
+            acceleration=a * ALONG,
+            rapid=before.rapid,
+        )
         before.length -= first
         after.length -= second
         if not before.radius and before.length < REST * self.cycle * speed:

@@ -136,7 +136,17 @@ class Segments:
         elif length == 0.0:
             return None
         speed = top if move.rapid else self._asked(move, length, block)
-        return Segment(serial, length, along, along, top, speed, a, move.rapid, move.rotary != 0.0)
+        return Segment(
+            owner=serial,
+            length=length,
+            entry=along,
+            leave=along,
+            top=top,
+            speed=speed,
+            acceleration=a,
+            rapid=move.rapid,
+            rotary=move.rotary != 0.0,
+        )
 
     def _asked(self, move: Move, length: float, block: Block) -> float:
         """Return the programmed speed [mm/s]."""
@@ -173,13 +183,13 @@ class Segments:
         axis = [0.0, 0.0, 0.0]
         axis[k] = sense
         return Segment(
-            serial,
-            length,
-            direction(pi, pj, first),
-            direction(qi, qj, second),
-            length / max(flat / min(vi, vj, math.sqrt(ACROSS * min(ai, aj) * first)), abs(climb) / vk),
-            self._asked(move, length, block),
-            length / max(flat / min(ai, aj), abs(climb) / ak),
+            owner=serial,
+            length=length,
+            entry=direction(pi, pj, first),
+            leave=direction(qi, qj, second),
+            top=length / max(flat / min(vi, vj, math.sqrt(ACROSS * min(ai, aj) * first)), abs(climb) / vk),
+            speed=self._asked(move, length, block),
+            acceleration=length / max(flat / min(ai, aj), abs(climb) / ak),
             radius=first,
             bend=first + climb * climb / first,
             sweep=turned,

@@ -77,7 +77,14 @@ class CorrectionMethod(ABC):
         self.before = block.known
         after = self.carried
         other = triple(o if d else c for o, d, c in zip(self.other, self.doubtful, after, strict=True))
-        return Change(texts, before, after, self.inner or after, None if other == after else other, placed)
+        return Change(
+            texts=texts,
+            before=before,
+            after=after,
+            inner=self.inner or after,
+            other=None if other == after else other,
+            placed=placed,
+        )
 
     @property
     def splits(self) -> bool:

@@ -167,11 +167,7 @@ class Revision:
             if cutting:
                 if block.kind == "cycle":
                     knots = [(0.0, change.inner), (1.0, change.inner)]
-                cut = self.left.take(line.number, beside(samples, knots))
-                self._note_held(block, demand, samples[0].deviation, (knots[0][1], knots[-1][1]), cut)
-                self.taken_system |= not block.modal.system_told
-                if self.drift.by_position:
-                    self.elsewhere.take(end, point, self.drift)
+                cut = self._note_cut(block, samples, knots, demand, (end, point))
             else:
                 self._why = ""
             self.idle += ended and bool(line.words)
@@ -198,6 +194,22 @@ class Revision:
         if not headed:
             raise ProgramError(max(self.lines, 1), "the program is empty")
         self._refuse_open(ended, carried)
+
+    def _note_cut(
+        self,
+        block: Block,
+        samples: list[Sample],
+        knots: list[tuple[float, Vector]],
+        demand: Vector,
+        end: tuple[float, Point],
+    ) -> CutErrors:
+        """Record what a cut leaves uncorrected, and why; `end` is its time [s] and position."""
+        cut = self.left.take(block.line.number, beside(samples, knots))
+        self._note_held(block, demand, samples[0].deviation, (knots[0][1], knots[-1][1]), cut)
+        self.taken_system |= not block.modal.system_told
+        if self.drift.by_position:
+            self.elsewhere.take(*end, self.drift)
+        return cut
 
     def _read(self, texts: Iterable[str]) -> Iterator[Line]:
         """Yield the lines of a program that has not been revised before."""

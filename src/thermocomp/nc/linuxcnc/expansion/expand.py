@@ -110,7 +110,15 @@ def expand(
     if not path.is_file():
         raise InputError(f"{path} is not a file")
     systems = _start_systems(path, block_delete)
-    around = _Around(inch, startup, diameters or {}, block_delete, subroutines, user_codes, systems)
+    around = _Around(
+        inch=inch,
+        startup=startup,
+        diameters=diameters or {},
+        block_delete=block_delete,
+        subroutines=subroutines,
+        user_codes=user_codes,
+        systems=systems,
+    )
     acts = 0
     # endless loops are refused before the moves are used
     run_through(InterpreterJob(path, around.controller(_WRITTEN[0]), **around.settings))

@@ -105,7 +105,13 @@ def prove(
         raise Unprovable(reason)
     with scratch() as folder:
         if setup.controller == "linuxcnc":
-            proving = _Proving(original, revised, ledger, setup, LineOrigins(lambda lines: lines, ledger.originals))
+            proving = _Proving(
+                original=original,
+                revised=revised,
+                ledger=ledger,
+                setup=setup,
+                origin=LineOrigins(lambda lines: lines, ledger.originals),
+            )
         else:
             try:
                 first = _Translated.of(original, folder / "original.ngc", setup)
@@ -113,7 +119,9 @@ def prove(
             except UntranslatableError as e:
                 raise Unprovable(f"line {e.line} cannot be translated for LinuxCNC: {e.reason}") from e
             origin = LineOrigins(first.lines, lambda lines: ledger.originals(second.lines(lines)), divided=False)
-            proving = _Proving(first.path, second.path, ledger, first.setup, origin)
+            proving = _Proving(
+                original=first.path, revised=second.path, ledger=ledger, setup=first.setup, origin=origin
+            )
         proof = _prove(proving, progress)
     return proof._replace(held=_assumed(setup, proof.held))
 
