@@ -12,7 +12,7 @@ from thermocomp.nc.parser.tokens import split_lines
 
 FANUC = sorted((Path(__file__).parent / "fanuc").glob("*.nc"))
 #: what both read in the same way
-BEGIN, END = "G21 G90 G17\nS3000 M3\nG0 X0 Y0 Z5.\nG1 Z-1. F100\n", "X0\nG0 Z5.\nM30\n"
+BEGIN, END = "G21 G90 G17\nS3000 M3\nG0 X0 Y0 Z5.\nG1 X-1. F100\n", "X0\nG0 Z5.\nM30\n"
 
 
 def question(text: str, **stated: Any) -> str:
@@ -86,6 +86,9 @@ def test_what_both_read_alike_is_not_asked_for(text: str) -> None:
         ("G98 G82 X1. Z-1. R1. P500", "G82 P500 is 500 s for LinuxCNC, and 0.5 s"),
         ("G81 X1. Z-1. R1.", "G81 before G98 or G99 returns to R in LinuxCNC (G99)"),
         ("G98 G81 X1. Z-1. R1. L3", "G81 L3 repeats"),
+        ("G0 Z2.\nG98 G81 X1. Z-5. R10. F100.", "G81 R10. is above the level at which the cycle begins"),
+        ("G0 Z2.\nG91 G99 G81 X1. Z-5. R0.5 F100.", "G81 R0.5 is above the level at which the cycle begins"),
+        ("G0 Z5.\nG99 G81 X1. Z-5. R1. F100.\nG80\nX2.\nG99 G81 X1. Z-5. R2.", "G81 R2. is above the level"),
         ("G98 G81 X1. Z-1. R1.\nX2. K3", "G81 K3 repeats"),
         ("G98 G83 X1. Z-1. R1. Q1.", "G83 stops 0.254 mm above the last depth"),
         ("G99 G84 X1. Z-1. R1.", "G84 needs a turning spindle"),

@@ -222,3 +222,33 @@ def test_a_sheet_is_bounded(writer: Writer, ending: str, tmp_path: Path) -> None
     writer(path, {"data": [*SHEET, [None] * 11_000 + [1.0]]})
     with pytest.raises(RecordingError, match=r"sheet 'data', row 16: over 10,000 columns .*\[limits\] columns"):
         read(path)
+
+
+@pytest.mark.parametrize(
+    ("head", "units", "said"),
+    [
+        ("time_s,T1_C,z_um", "min,°C,um", "column 1: the heading 'time_s' specifies s, row 2 below it 'min'"),
+        ("time [h],T1_C,z_um", "[s],[°C],[um]", "column 1: the heading 'time [h]' specifies h, row 2 below it 's'"),
+        ("Zeit (s),T1,z", "min,°C,um", "column 1: the heading 'Zeit (s)' specifies s, row 2 below it 'min'"),
+        ("time,T1 [°C],z", "s,°F,um", "column 2: the heading 'T1 [°C]' specifies degC, row 2 below it '°F'"),
+        ("time,T1,z [um]", "s,°C,mm", "column 3: the heading 'z [um]' specifies um, row 2 below it 'mm'"),
+    ],
+)
+def test_a_row_of_units_that_contradicts_the_headings_is_refused(
+    head: str, units: str, said: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(
+        f"{head}\n{units}\n" + "".join(f"{k},{20 + k / 60},{k / 10}\n" for k in range(60)), encoding="utf-8"
+    )
+    with pytest.raises(RecordingError) as refused:
+        read(path)
+    assert said in str(refused.value)
+
+
+def test_a_row_of_units_that_is_wrong_is_skipped_and_one_that_agrees_is_read(tmp_path: Path) -> None:
+    path, rows = tmp_path / "log.csv", "".join(f"{k},{20 + k / 60},{k / 10}\n" for k in range(60))
+    path.write_text(f"time_s,T1_C,z_um\nmin,°C,um\n{rows}", encoding="utf-8")
+    assert read(path, Mapping(read=ReadOptions(skip=(2,)))).time[-1] == 59.0
+    path.write_text(f"time_s,T1_C,z_um\nsec,degC,µm\n{rows}", encoding="utf-8")
+    assert read(path).time[-1] == 59.0

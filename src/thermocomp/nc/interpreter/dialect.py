@@ -176,8 +176,7 @@ class _Scan:
             if "length" not in self.found.open or motion not in (0.0, 1.0):
                 return False
             self.found.count["length"] += 1
-        self.force.motion = motion
-        self.force.milled = self.force.milled or "Y" in text or "y" in text
+        self.force.take_plain(motion, text)
         return True
 
     def take(self, number: int, text: str) -> None:

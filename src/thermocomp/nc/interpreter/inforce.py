@@ -1,5 +1,6 @@
 """Modal state of a program and words of a line, as far as relevant for detecting the dialect."""
 
+import re
 from dataclasses import dataclass
 from typing import Final
 
@@ -11,6 +12,7 @@ MOTIONS: Final = (0.0, 1.0, 2.0, 3.0, 33.0, *sorted(DRILLS))
 TAKES_AXES: Final = frozenset((4.0, 10.0, 28.0, 30.0, 52.0, 53.0, 92.0))
 ARCS: Final = (2.0, 3.0)
 ARC_WORDS: Final = "XYZIJKR"
+_Z: Final = re.compile(r"[Zz] *([-+.0-9]+)")
 _TURNS: Final = (7.0, 8.0, 18.0, 33.0, 76.0, 96.0)
 
 
@@ -69,6 +71,10 @@ class InForce:
         The feed is per revolution (G95).
     mixed : int
         Number of arcs with lengths both with and without decimal points: they close only if the latter are whole units.
+    level, plane : float or None
+        Z programmed before a cycle, and R of the last cycle, both in G90; None: unknown.
+    to_plane : bool
+        Cycles return to R (G99).
     drilled, changed, milled, lathe : bool
         The program has a drilling cycle, an M6, a Y word, a code of lathes.
     """
@@ -83,6 +89,9 @@ class InForce:
     unit: str = ""
     per_turn: bool = False
     mixed: int = 0
+    level: float | None = None
+    plane: float | None = None
+    to_plane: bool = False
     drilled: bool = False
     changed: bool = False
     milled: bool = False
@@ -102,6 +111,26 @@ class InForce:
     def feed(self) -> bool:
         """Whether a feed without a decimal point is ambiguous."""
         return not self.whole and (self.per_turn or self.unit == " in")
+
+    def begins_above(self, line: LineWords) -> bool:
+        """Return whether R of a cycle is above the level at which the cycle begins."""
+        level, plane = self.level if self.absolute else 0.0, _position(line.values.get("R", ""))
+        return level is not None and plane is not None and plane > level
+
+    def take_plain(self, motion: float, text: str) -> None:
+        """Process a line of moves without other codes, given the motion in force on it."""
+        before, self.motion = self.motion, motion
+        z = _Z.search(text)
+        if z or before in DRILLS:
+            self._take_level(before, z[1] if z else "", sure=self.absolute)
+        self.milled = self.milled or "Y" in text or "y" in text
+
+    def _take_level(self, before: float, z: str, *, sure: bool) -> None:
+        """Follow the level from which a cycle begins; `sure`: the Z of the line is a position."""
+        if before in DRILLS and self.motion not in DRILLS and self.to_plane:
+            self.level = self.plane
+        if z and self.motion not in DRILLS:
+            self.level = _position(z) if sure else None
 
     def take(self, line: LineWords) -> None:
         """Process the codes of a line."""
@@ -123,11 +152,24 @@ class InForce:
             self.unit = " in" if 20.0 in codes else " mm"
         if not codes.isdisjoint((93.0, 94.0, 95.0)):
             self.per_turn = 95.0 in codes
+        if not codes.isdisjoint((98.0, 99.0)):
+            self.to_plane = 99.0 in codes
+        self._take_level(before, line.values.get("Z", ""), sure=self.absolute and TAKES_AXES.isdisjoint(codes))
+        if self.motion in DRILLS and "R" in line.values:
+            self.plane = _position(line.values["R"]) if self.absolute else None
         self.drilled = self.drilled or not codes.isdisjoint(DRILLS)
         self.changed = self.changed or 6.0 in line.m
         self.milled = self.milled or "Y" in line.values
         self.lathe = self.lathe or not codes.isdisjoint(_TURNS)
         self.retract = self.retract or 98.0 in codes or 99.0 in codes
+
+
+def _position(value: str) -> float | None:
+    """Return the value of a plain number; None otherwise."""
+    try:
+        return float(value)
+    except ValueError:
+        return None
 
 
 def read_number(value: str) -> float:

@@ -115,7 +115,7 @@ def list_open_words(line: LineWords, force: InForce) -> Iterator[OpenWord]:
         what = f"is {int(values['F'])}{unit} in LinuxCNC, maybe in least increments in a Fanuc: write the decimal point"
         yield OpenWord("feed", f"F{values['F']}", f"{what} (F{values['F']}.)")
     if force.motion in DRILLS and not values.keys().isdisjoint("XYZABC") and codes.isdisjoint(TAKES_AXES):
-        yield from _open_cycle(codes, values, force)
+        yield from _open_cycle(codes, line, force)
     if 4.0 not in codes and not (force.whole or 19.0 in line.m):
         yield from _open_lengths(codes, values, force)
 
@@ -219,8 +219,14 @@ def _sets_origin(values: dict[str, str], force: InForce) -> bool:
     )
 
 
-def _open_cycle(codes: set[float], values: dict[str, str], force: InForce) -> Iterator[OpenWord]:
-    motion, code = force.motion, f"G{force.motion:g}"
+def _open_cycle(codes: set[float], line: LineWords, force: InForce) -> Iterator[OpenWord]:
+    values, motion, code = line.values, force.motion, f"G{force.motion:g}"
+    if force.begins_above(line):
+        what = (
+            "is above the level at which the cycle begins: LinuxCNC ends the cycle at R, and when the tool of a "
+            "Fanuc moves up depends on its model: move to that level before the cycle"
+        )
+        yield OpenWord("high R", f"{code} R{values['R']}", what)
     if motion == 86.0 and read_number(values.get("P", "0")) != 0.0:
         what = "dwells in LinuxCNC, and a Fanuc's G86 has no dwell: write P0, or single moves"
         yield OpenWord("cycle dwell", f"G86 P{values['P']}", what)

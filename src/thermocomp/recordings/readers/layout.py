@@ -3,11 +3,20 @@
 import re
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import cache
 from typing import NamedTuple
 
-from thermocomp.core.units import is_unit
-from thermocomp.recordings.headings import BRACKETS, find_date_order, is_foreign_unit, is_time_name, is_understood
+from thermocomp.core.exceptions import RecordingError, UnitError
+from thermocomp.core.units import find_unit, is_unit
+from thermocomp.recordings.headings import (
+    BRACKETS,
+    find_date_order,
+    is_foreign_unit,
+    is_time_name,
+    is_understood,
+    understand,
+)
 from thermocomp.recordings.readers.numbers import is_filler, is_number_like
 from thermocomp.recordings.words import read_words
 
@@ -139,8 +148,10 @@ def tell_rows(numbers: Sequence[int], word: str) -> str:
     return f"{word} {numbers[0]}" if len(numbers) == 1 else f"{word}s {numbers[0]} to {numbers[-1]}"
 
 
-def join_units(headings: Sequence[str], units: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Add the units of a row to the headings above them that have none.
+def join_units(
+    headings: Sequence[str], units: Sequence[str], rows: Sequence[Sequence[str]], where: str, number: int
+) -> list[str]:
+    """Add the units of row `number` of a file to the headings above them that have none.
 
     The contents of a column decide: dates, times of day and words have no unit, whatever the row contains (``Unit``,
     ``hh:mm:ss``), but the order of a date (``mm/dd/yyyy``) is kept. The first column may contain a label of the row.
@@ -158,8 +169,24 @@ def join_units(headings: Sequence[str], units: Sequence[str], rows: Sequence[Seq
         else:
             fits = known or not is_time_name(unit)
         fits = fits and unit.casefold().rstrip(".:") not in _NO_UNIT
+        if fits and (own := _contradicted(heading, unit)):
+            raise RecordingError(
+                f"{where}, column {k + 1}: the heading {heading!r} specifies {own}, row {number} below it {unit!r}: "
+                f"correct the wrong one; if it is row {number}, give a mapping with [read] skip = [{number}]"
+            )
         found.append(f"{heading} [{unit}]" if fits and heading and not BRACKETS.fullmatch(heading) else heading)
     return found
+
+
+def _contradicted(heading: str, symbol: str) -> str:
+    """Return the unit of a heading if a row of units gives another unit of the same quantity; else empty."""
+    with suppress(UnitError):
+        meant = understand(heading)
+        if meant is not None and is_unit(symbol):
+            given = find_unit(symbol)
+            same = (given.scale, given.shift) == (meant.unit.scale, meant.unit.shift)
+            return meant.unit.symbol if given.house == meant.unit.house and not same else ""
+    return ""
 
 
 def name_stamps(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> tuple[list[str], tuple[str, ...]]:

@@ -190,7 +190,8 @@ def open_csv(path: Path, options: ReadOptions, limits: FileLimits) -> CsvTable:
     headings += [""] * (body.width - len(headings))
     check_headings(path, headings, body.n_rows, limits)
     if layout.units != layout.heading:
-        headings = join_units(headings, split(first[layout.units][1]), rows)
+        number, text = first[layout.units]
+        headings = join_units(headings, split(text), rows, str(path), number + 1)
     headings, named = name_stamps(headings, rows)
     if body.odd and not options.encoding:
         told += (f"written in {encoding}, not in UTF-8",)

@@ -137,7 +137,7 @@ def _table(
     headings = [_text(cell).strip() for cell in first[layout.heading]]
     if layout.units != layout.heading:
         units, *below = ([_text(cell) for cell in row] for row in (first[layout.units], *first[begin:]))
-        headings = join_units(headings, units, below)
+        headings = join_units(headings, units, below, where, places[layout.units])
     remarks = _count_remarks(first[begin:], list(tail)[-max(len(places) - begin, 1) :])
     columns = body.close(first[begin:])
     n_rows = len(places) - begin - remarks
