@@ -84,7 +84,7 @@ def test_what_is_certain_or_stated_is_revised(job_folder: Path, capsys: pytest.C
             ("G64 P0.01\n" + BODY.format("G4 P500\n"), []),
             (BODY.format("G4 P500\n"), ["--controller", "linuxcnc"]),
             (BODY.format("X50\n"), ["--integers", "whole"]),
-            (BODY.format("G81 X1. Z-2. R1.\n"), ["--startup", "G98"]),
+            (BODY.format("G0 Z5.\nG81 X1. Z-2. R1.\nG0\n"), ["--startup", "G98"]),
             ("O1000\n" + BODY.format("G4 P500\n"), ["--controller", "fanuc"]),
         ]
     ):

@@ -7,8 +7,9 @@ the present state of the machine; the coefficients represent what the training l
 Without a probing, the output of the model is unchanged.
 
 A probing can be wrong: a chip on the sphere, the wrong tool, another unit. A single probing moves a model by no more
-than `SUSPECT` standard deviations of the expected error; two probings that agree and are separated in time count in
-full; and no probing, however often repeated, moves a model beyond its largest possible error (`find_most`).
+than `SUSPECT` standard deviations of the expected error, and the less, the further beyond that it is; two probings that
+agree and are separated in time count in full; and no probing, however often repeated, moves a model beyond its largest
+possible error (`find_most`).
 """
 
 from typing import NamedTuple
@@ -22,8 +23,9 @@ FloatArray = NDArray[np.float64]
 OFFSET, STRUCTURES = 4 * 3600.0, 7 * 86400.0
 #: error that neither the offset nor the structures explain, as a share of the error on left-out cycles
 UNEXPLAINED = 0.2
-#: beyond this many standard deviations from the expected value, the weight of a probing decreases with the distance
-SUSPECT = 2.5
+#: beyond this many standard deviations from the expected value, the weight of an unconfirmed probing decreases with the
+#: distance; of the first one for hours, earlier and to nothing at `IMPLAUSIBLE` (a redescending influence as of Hampel)
+SUSPECT, SUSPECT_FIRST = 2.5, 2.0
 #: beyond this many standard deviations from the expected value, a probing is refused
 IMPLAUSIBLE = 4.0
 #: errors in most cycles and days are smaller than the overall root mean square: lower bound of their share of it
@@ -191,6 +193,8 @@ def take(
             f"as implausible as the previous probing: measure again, {APART / 60:.0f} min or more after that one",
         )
     plausible = abs(surprise) <= IMPLAUSIBLE * typical
+    first = not time - before.time <= OFFSET
+    suspect = SUSPECT_FIRST if first else SUSPECT
     if alike and not plausible:  # confirmed
         covariance[-1, -1] += surprise**2
         spread = max(spread, abs(surprise) / UNLIKE)
@@ -198,8 +202,12 @@ def take(
         limit = f"at most {IMPLAUSIBLE * typical:.1f} um are plausible"
         why = f"{surprise:+.1f} um from the expected value, where {limit}: measure again after {APART / 60:.0f} min"
         return before._replace(refused=error, refused_since=since), why
-    elif not alike and abs(surprise) > SUSPECT * typical:  # possibly a bad probing
-        noise, doubt = own + (known + own) * ((surprise / SUSPECT / typical) ** 2 - 1.0), (error, since)
+    elif not alike and abs(surprise) > suspect * typical:  # possibly a bad probing
+        far = abs(surprise) / typical
+        weight = (suspect / far) ** 2
+        if first:
+            weight *= max(IMPLAUSIBLE - far, 1e-6) / (IMPLAUSIBLE - suspect)
+        noise, doubt = own + (known + own) * (1.0 / weight - 1.0), (error, since)
     usual = before.usual + (min(surprise**2 / (known + own), SUSPECT**2) - before.usual) / MEMORY
     usual = max(usual, LEAST_USUAL**2)
     gain = covariance @ weights
