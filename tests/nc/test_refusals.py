@@ -38,7 +38,7 @@ WRONG = [
     ("G2 X0 R1", "ends at its start point"),
     ("G2 X2 R0.9", "too small"),
     ("G2 X2 I1.03", "check centre and end"),
-    ("G2 X0 Y0 I0.001", "no radius"),
+    ("G2 X0 Y0 I0.001", "the radius of the arc is zero"),
     ("G2 X2 I1 P0", "whole number"),
     ("G90.1\nG2 X2 I1", "G90.1 needs"),
     ("G91 G53 G0 X1", "G91"),

@@ -211,7 +211,7 @@ REFUSED = [
     ("M98", 1, "M98 needs P"),
     ("M98 P2 L0\nM30\nO2\nM99", 1, "0 times"),
     ("M98 P2 L2 K2\nM30\nO2\nM99", 1, "at most one of L and K"),
-    ("M98 P20002\nM30\nO2\nM99\nO20002\nM99", 1, "or O0002 2 times"),
+    ("M98 P20002\nM30\nO2\nM99\nO20002\nM99", 1, "or 2 calls of O0002"),
     ("M98 P2\nM30\nO2\nM99\nO2\nM99", 1, "O2 appears in lines 3 and 5"),
     ("M98 P2\nM30\nO2\nX1.", 4, "without M99"),
     ("M98 P2\nO2\nX1.\nM99", 1, "no M30 or M2"),
