@@ -305,7 +305,7 @@ def test_simulate() -> None:
 
 
 def test_what_cannot_be_frozen_is_not_fitted(recording: Recording) -> None:
-    with pytest.raises(InputError, match="HistGradientBoostingRegressor cannot be frozen to plain numbers"):
+    with pytest.raises(InputError, match="HistGradientBoostingRegressor cannot be stored as coefficients"):
         tc.fit(recording, "z_um", HistGradientBoostingRegressor())
     with pytest.raises(InputError, match="treats every row as a machine at rest"):
         tc.compare(recording, "z_um", [tc.DynamicRidge(time="none")])

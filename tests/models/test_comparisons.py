@@ -347,7 +347,7 @@ def test_process_cannot_be_frozen_nor_written(samples: Samples) -> None:
     with pytest.raises(FitError, match=r"gp cannot be stored as coefficients: .* 40 training rows .* deploy another"):
         fitted.freeze(target="dx")
     model = fitted.unfrozen(target="dx")
-    with pytest.raises(ModelFileError, match="model of dx: the family 'estimator' cannot be written"):
+    with pytest.raises(ModelFileError, match="model of dx: the family 'estimator' cannot be stored as coefficients"):
         modelfile.dumps([model])
     assert model == GaussianProcess(max_rows=40).fit(T, y).unfrozen(target="dx")
     assert pickle.loads(pickle.dumps(model)) == model  # compare may share its work among processes

@@ -119,7 +119,7 @@ def test_the_replay_is_its_prediction(samples: Samples) -> None:
         got.append(float(deviation))
     np.testing.assert_allclose(got, expected, atol=1e-9)
     assert trained.method == "Plane"
-    with pytest.raises(FitError, match="Plane cannot be frozen to plain numbers: it is not a method of thermocomp"):
+    with pytest.raises(FitError, match="Plane cannot be stored as coefficients: it is not a method of thermocomp"):
         trained.estimator.freeze(target="z_um")
 
 

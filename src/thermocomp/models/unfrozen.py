@@ -54,7 +54,7 @@ class UnfrozenRegressor(StaticRegressor):
 
     def _frozen(self, inputs: Sequence[Input], header: dict[str, Any]) -> NoReturn:  # noqa: ARG002 - always raises
         raise FitError(
-            f"{self.name} cannot be frozen to plain numbers: {self._bulk()}; use it only in compare, and deploy "
+            f"{self.name} cannot be stored as coefficients: {self._bulk()}; use it only in compare, and deploy "
             "another method"
         )
 

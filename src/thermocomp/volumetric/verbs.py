@@ -143,7 +143,7 @@ def position(
     if s.jobs == 0:
         raise InputError("--jobs 0: give a number of processes, or -1 for all cores")
     if not find_method(s.model).kind.freezable:
-        raise InputError(f"{s.model} cannot be frozen to plain numbers: choose another method")
+        raise InputError(f"{s.model} cannot be stored as coefficients: choose another method")
     components = [component] if isinstance(component, str) else list(component)
     tests = _read(files, components, s)
     options = PositionOptions(
