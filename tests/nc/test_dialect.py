@@ -88,6 +88,7 @@ def test_what_both_read_alike_is_not_asked_for(text: str) -> None:
         ("G98 G81 X1. Z-1. R1. L3", "G81 L3 repeats"),
         ("G0 Z2.\nG98 G81 X1. Z-5. R10. F100.", "G81 R10. is above the level at which the cycle begins"),
         ("G0 Z2.\nG91 G99 G81 X1. Z-5. R0.5 F100.", "G81 R0.5 is above the level at which the cycle begins"),
+        ("G0 Z5.\nG91 G0 Z-3.\nG90\nG98 G81 X1. Z-5. R3. F100.", "G81 R3. is above the level"),
         ("G0 Z5.\nG99 G81 X1. Z-5. R1. F100.\nG80\nX2.\nG99 G81 X1. Z-5. R2.", "G81 R2. is above the level"),
         ("G98 G81 X1. Z-1. R1.\nX2. K3", "G81 K3 repeats"),
         ("G98 G83 X1. Z-1. R1. Q1.", "G83 stops 0.254 mm above the last depth"),

@@ -122,15 +122,18 @@ class InForce:
         before, self.motion = self.motion, motion
         z = _Z.search(text)
         if z or before in DRILLS:
-            self._take_level(before, z[1] if z else "", sure=self.absolute)
+            self._take_level(before, z[1] if z else "")
         self.milled = self.milled or "Y" in text or "y" in text
 
-    def _take_level(self, before: float, z: str, *, sure: bool) -> None:
-        """Follow the level from which a cycle begins; `sure`: the Z of the line is a position."""
+    def _take_level(self, before: float, z: str, *, sure: bool = True) -> None:
+        """Follow the level from which a cycle begins; `sure`: the Z of the line is that of a move."""
         if before in DRILLS and self.motion not in DRILLS and self.to_plane:
             self.level = self.plane
         if z and self.motion not in DRILLS:
-            self.level = _position(z) if sure else None
+            place = _position(z) if sure else None
+            if place is not None and not self.absolute:
+                place = None if self.level is None else self.level + place
+            self.level = place
 
     def take(self, line: LineWords) -> None:
         """Process the codes of a line."""
@@ -154,7 +157,7 @@ class InForce:
             self.per_turn = 95.0 in codes
         if not codes.isdisjoint((98.0, 99.0)):
             self.to_plane = 99.0 in codes
-        self._take_level(before, line.values.get("Z", ""), sure=self.absolute and TAKES_AXES.isdisjoint(codes))
+        self._take_level(before, line.values.get("Z", ""), sure=TAKES_AXES.isdisjoint(codes))
         if self.motion in DRILLS and "R" in line.values:
             self.plane = _position(line.values["R"]) if self.absolute else None
         self.drilled = self.drilled or not codes.isdisjoint(DRILLS)
