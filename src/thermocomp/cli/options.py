@@ -12,7 +12,6 @@ from thermocomp.core.exceptions import InputError
 if TYPE_CHECKING:
     from thermocomp.api.inputs import LeaveOne
 
-Quiet = Annotated[bool, Parameter(show=False, parse=False)]
 Output = Annotated[Path, Parameter(name=["--output", "-o"])]
 OptionalOutput = Annotated[Path | None, Parameter(name=["--output", "-o"])]
 
