@@ -101,5 +101,5 @@ def test_what_cannot_be_fitted_without_a_speed_says_so(method: str) -> None:
         tc.fit(without_speed(small_machine()), "z_um", method)
     assert any(text in str(found.value) for text in refusals())
     if documented()[method][1] == "no":
-        with pytest.raises(InputError, match="cannot be frozen"):
+        with pytest.raises(InputError, match="cannot be stored as coefficients"):
             tc.fit(small_machine(), "z_um", method)

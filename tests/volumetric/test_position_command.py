@@ -95,7 +95,7 @@ def test_a_refused_model_is_written_with_its_refusal(
         (["--component", "EAY"], "no column is like y_laser_250_urad"),
         (["--component", "E"], "E: it is not the code of a component; name a component such as EYY"),
         (["--component", "EYY", "--columns", "x_*"], "no column is called 'x_*'"),
-        (["--component", "EYY", "--model", "gp"], "gp cannot be frozen"),
+        (["--component", "EYY", "--model", "gp"], "gp cannot be stored as coefficients"),
         (["--component", "EYY", "--model", "magic"], "magic"),
         (["--component", "EYY", "--reference", "99"], "no reference state [99]; there are 0 to 71"),
         (["--component", "EYY", "--slopes", "12"], "12 factors cannot be fitted to 11 positions"),
