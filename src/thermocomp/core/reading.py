@@ -32,7 +32,7 @@ class Reading:
 
 
 class Measurement(NamedTuple):
-    """The tool point of a target or axis, measured while the machine runs."""
+    """Deviation of a target, or position error of an axis, measured at the tool point while the machine runs."""
 
     time: float  #: seconds since 1970
     target: str

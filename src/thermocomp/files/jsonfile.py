@@ -78,7 +78,7 @@ def _lay_out(value: Any, depth: int = 1) -> str:
 
 
 def unpack(kind: Format, entry: Any, text: str, source: str, **shared: Any) -> Any:
-    """Return the content of a file's text: its ``models``, and the data common to all of them."""
+    """Parse the text of a file; return its ``models`` and the data common to all of them."""
     content = _parse(text, f"{source}: not a {kind.words}", source, kind.command)
     _check_kind(kind, content, source)
     body = content.get("models")
@@ -193,7 +193,7 @@ def _refuse(constant: str) -> NoReturn:
 
 def _whole(digits: str) -> int:
     if len(digits) > _DIGITS:
-        raise ValueError(f"{digits[:_DIGITS]}...: an integer of {len(digits):,} digits")
+        raise ValueError(f"{digits[:_DIGITS]}...: an integer with {len(digits):,} digits; at most {_DIGITS} are read")
     return int(digits)
 
 

@@ -82,7 +82,7 @@ def loads(text: str, compensator: Compensator, source: str = "state") -> Saved:
         state = decode(CompensatorState, stored.state, "state")
         _check(state, compensator)
     except (ValueError, InputError) as e:
-        raise ModelFileError(f"{source}: impossible as a state of these models: {e}") from e
+        raise ModelFileError(f"{source}: not a valid state of these models: {e}; start without the file") from e
     return Saved(stored.written, compensator.share(state.models, state))
 
 

@@ -33,7 +33,7 @@ class TermRegressor(MemorylessRegressor):
     dependent_ : tuple of str
         Terms that depend linearly on others (or on the constant); their coefficient is 0.
     condition_ : float
-        Condition number of the terms, centred (if there is an intercept) and scaled.
+        Condition number of the design matrix, with its columns centred (if there is an intercept) and scaled.
     r_squared_, adjusted_r_squared_ : float
         On the training data; nan where undefined.
     r_squared_kind_ : {'centred', 'uncentred'}

@@ -84,17 +84,17 @@ class Row:
     Parameters
     ----------
     fit_rms : float
-        RMS of the replay in the training rows, pooled over several trainings [um].
+        RMS of the replay on the training rows, pooled over all training runs [um].
     rms, max_abs, peak_to_peak : float
-        Errors in the unseen rows [um].
+        Errors on the unseen rows [um].
     noise_rms : float
         RMS with uniform noise of +-0.4 degC on every temperature [um] (C-33).
     lost_rms : float
-        RMS with the most harmful input cut off [um] (C-34).
+        RMS without the input whose loss does most harm [um] (C-34).
     lost : str
         Name of that input.
     sensors : int
-        Number of inputs with an influence; the largest of several trainings.
+        Number of inputs that affect the result; the largest of all training runs.
     fit_s : float
         Duration of the fits [s].
     failure : str

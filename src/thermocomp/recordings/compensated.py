@@ -53,8 +53,8 @@ def _refuse(recording: Recording, target: str, where: str) -> None:
     if channel.quantity in ("residual", "correction"):
         own = channel.name.replace(f"_{channel.quantity}_um", "_um")
         raise RecordingError(
-            f"{where}: {channel.name} is a {channel.quantity} of a machine under compensation: name the uncompensated "
-            f"deviation as the target, {own}"
+            f"{where}: {channel.name} was recorded with compensation active ({channel.quantity}): name the "
+            f"uncompensated deviation as the target, {own}"
         )
     if not recording.has(correction):
         return

@@ -41,7 +41,7 @@ class PositionSettings:
     profile : str
         Form of the cold profile: polynomial or spline.
     order : int
-        Order of the polynomial, or number of knots of the spline. Default: chosen by leaving out points.
+        Degree of the polynomial, or number of knots of the spline. Default: chosen by cross-validation over the points.
     reference : list of int
         States of each test that count as cold, as indices from 0; their mean is the cold profile. Default: the first
         state.

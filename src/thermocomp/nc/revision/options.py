@@ -143,10 +143,10 @@ class Controller:
         Confirm that no G92 or G52 is in force at the start of the program, nor suspended by G92.2: the method offset
         would erase it.
     integers : str
-        Meaning of a length without a decimal point: whole millimetres or inches; the least increment; or a reason to
-        refuse the program. Default: whole for linuxcnc, refuse for fanuc.
+        How a length without a decimal point is read. whole: in millimetres or inches; least: in least input increments;
+        refuse: the program is refused. Default: whole for linuxcnc, refuse for fanuc.
     least : str
-        Least increment of the controller.
+        Least input increment of the controller.
     block_delete : str
         Block delete. on: lines that begin with / are not run. off: they may be run or not, and a program that depends
         on it is refused. Required with --expand: off writes them as plain lines.

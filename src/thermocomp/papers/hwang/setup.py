@@ -139,7 +139,7 @@ class Computed:
 
     @cached_property
     def worth(self) -> float:
-        """Number of independent rows equivalent to the fit of the optimal model."""
+        """Effective sample size of the training rows, from the residuals of the optimal model."""
         return effective_sample_size(self.drift - self.fitted(OPTIMAL))
 
     @cached_property

@@ -141,7 +141,7 @@ class _Comparison:
         self.moves, self.largest, self.slower = 0, 0.0, 0.0
 
     def compare(self, was: Calls, joined: _Joined) -> None:
-        """Compare an equal number of calls of both; raise `ProgramError` at the first difference."""
+        """Compare the next calls of both programs, one by one; raise `ProgramError` at the first difference."""
         now, pieces = joined
         moving = self.sides[0].is_kind(was.kind, *MOVES)
         shifts = self.ledger.of(was.line)
