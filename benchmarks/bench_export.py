@@ -18,7 +18,7 @@ import numpy as np
 
 from thermocomp.core.provenance import RULES, HonestError
 from thermocomp.core.reading import Reading
-from thermocomp.export.block.tables import gather
+from thermocomp.runtime.program.tables import gather
 from thermocomp.export.c99.c99 import translate
 from thermocomp.export.vectors import Readings, replay
 from thermocomp.models.training import train

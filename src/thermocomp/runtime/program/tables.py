@@ -1,4 +1,4 @@
-"""Numbers of a compensator, in the form of its block: see `thermocomp.export.block.layout`."""
+"""Numbers of a compensator, as constants of its program: see `thermocomp.runtime.program.variables`."""
 
 from typing import Any, NamedTuple
 
@@ -11,9 +11,10 @@ from thermocomp.core.inputs import Input
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.watch import Watch
 from thermocomp.core.zero import MOST
-from thermocomp.export.block.models import Formulas
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.gate import MIN_SPAN, PLAUSIBLE, WIDE
+from thermocomp.runtime.program.models import Formulas
+from thermocomp.runtime.program.tree import Function
 
 #: any number, in single precision too
 ANY = (-1e30, 1e30)
@@ -28,8 +29,10 @@ class Tables(NamedTuple):
     targets: tuple[str, ...]
     models: tuple[ErrorModel, ...]
     sizes: dict[str, int]  #: array dimensions of the variables by name, and flags of optional features
-    values: dict[str, Any]  #: numbers, or nested lists of them, by the names of `layout.TABLES`
-    formulas: dict[str, str]  #: functions generated from the models' formulas, in Python
+    values: dict[
+        str, Any
+    ]  #: numbers, or nested lists of them, by the names of `thermocomp.runtime.program.variables.Tables`
+    formulas: dict[str, Function]  #: functions generated from the models' formulas
 
 
 def gather(compensator: Compensator) -> Tables:
