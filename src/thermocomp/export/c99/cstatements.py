@@ -8,10 +8,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from thermocomp.core.bounds import round_single, round_within
-from thermocomp.export.printer import Printer
 from thermocomp.runtime.program import tree as n
 from thermocomp.runtime.program.assembly import functions, used_locals
 from thermocomp.runtime.program.declarations import Var
+from thermocomp.runtime.program.printer import Printer
 from thermocomp.runtime.program.tables import Tables
 from thermocomp.runtime.program.tree import Function, Kind, Operator
 from thermocomp.runtime.program.variables import RECORDS

@@ -5,10 +5,10 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
-from thermocomp.export.printer import Printer, written
 from thermocomp.runtime.program import tree as n
 from thermocomp.runtime.program.assembly import functions, used_locals
 from thermocomp.runtime.program.declarations import Var
+from thermocomp.runtime.program.printer import Printer, written
 from thermocomp.runtime.program.tables import Tables
 from thermocomp.runtime.program.tree import Function, Kind, Operator
 from thermocomp.runtime.program.variables import RECORDS

@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.expression import Clip, Node
 from thermocomp.core.expression import Input as Leaf
@@ -210,6 +211,27 @@ def _watch_sizes(watch: Watch | None) -> dict[str, int]:
         "SHAPES": 2,
         "watch_waits": int(any(i.rezero for i in watch.inputs)),
     }
+
+
+def constants_of_watch(watch: Watch, reference: FloatArray | None = None) -> tuple[dict[str, int], dict[str, Any]]:
+    """Return the sizes and numbers of a watch alone, whose inputs are the channels.
+
+    Parameters
+    ----------
+    reference : ndarray of shape (n_inputs,), optional
+        Zero of the inputs; nan where the first readings determine it, as by default for inputs with ``rezero``.
+    """
+    if reference is None:
+        reference = np.array([np.nan if i.rezero else i.reference for i in watch.inputs])
+    waits, zeroing = np.isnan(reference), watch.zeroing
+    sizes = _watch_sizes(watch) | {"CHANNELS": len(watch.inputs), "MOST": MOST, "COLUMN": max(MOST, len(watch.sensors))}
+    values = _watch(watch, {name: k for k, name in enumerate(i.name for i in watch.inputs)}) | {
+        "at_rest": zeroing.at_rest,
+        "otherwise": zeroing.otherwise,
+        "watch_rezero": waits,
+        "watch_reference": np.nan_to_num(reference),
+    }
+    return sizes | {"watch_waits": int(waits.any())}, values
 
 
 def _watch(watch: Watch | None, place: dict[str, int]) -> dict[str, Any]:

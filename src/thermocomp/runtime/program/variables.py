@@ -250,7 +250,19 @@ class Tables(Record):
     has_speed = option("a channel shows whether the spindle is stopped")
     watched = option("temperatures are watched")
     watch_waits = option("the watch is relative to the zero")
+    ROWS = size("rows of a test")
+
+
+class Rows(Record):
+    """Readings of a test, row by row, and what becomes of them."""
+
+    owner = "r"
+
+    time = numbers("time [s]", "ROWS", time=True)
+    resting = truths("the spindle is known to be stopped", "ROWS")
+    value = numbers("values by channel", "ROWS", "CHANNELS")
+    fault = wholes("state of each sensor", "ROWS", "SENSORS")
 
 
 #: groups of variables by letter
-RECORDS: dict[str, type[Record]] = {"s": State, "w": Work, "t": Tables}
+RECORDS: dict[str, type[Record]] = {"s": State, "w": Work, "t": Tables, "r": Rows}
