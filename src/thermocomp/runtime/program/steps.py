@@ -1,9 +1,9 @@
 """Processing chain of a reading as scalars and loops: exported to controllers in any language.
 
 Equivalent to `thermocomp.runtime.compensator` for models whose zero is the start, without probings and commands. The
-functions run in Python and are translated literally (`thermocomp.runtime.program.printer`): assignments, ``if``, ``for`` and
-``while`` on three groups of variables: ``s``, kept between calls; ``w``, recomputed; ``t``, constant. A procedure
-leaves its result in a variable; a function depends on numbers only.
+functions are written in the language `thermocomp.runtime.program.language`, on three groups of variables: ``s``, kept
+between calls; ``w``, recomputed; ``t``, constant. A procedure leaves its result in a variable; a function depends on
+numbers only.
 """
 
 from thermocomp.core.bounds import GAP
