@@ -2,6 +2,7 @@
 
 import inspect
 from functools import cache
+from typing import TYPE_CHECKING
 
 from thermocomp.runtime.program import tree as n
 from thermocomp.runtime.program.tree import Kind
@@ -118,7 +119,9 @@ class Record:
         found = {k: v for c in reversed(cls.__mro__) for k, v in vars(c).items() if isinstance(v, Var)}
         return {k: v for k, v in found.items() if not isinstance(v, size | option)}
 
-    def __setattr__(self, name: str, value: object) -> None:
-        if not isinstance(inspect.getattr_static(self, name, None), Var):
-            raise TypeError(f"{name}: is not a variable of {type(self).__name__}")
-        super().__setattr__(name, value)
+    if not TYPE_CHECKING:  # a type checker knows the variables and would accept any other name
+
+        def __setattr__(self, name: str, value: object) -> None:
+            if not isinstance(inspect.getattr_static(self, name, None), Var):
+                raise TypeError(f"{name}: is not a variable of {type(self).__name__}")
+            super().__setattr__(name, value)
