@@ -4,8 +4,8 @@ The leaves are the inputs minus their reference values. A tree represents the mo
 clipped to that range, widened by the margin; the effect of `Support` beyond it (``hold``, ``fade``) is not included.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from thermocomp.core.exceptions import InputError
@@ -214,6 +214,22 @@ def sum_weighted(weights: Sequence[float], of: Sequence[Node], constant: float =
     found: list[Node] = [Constant(constant)] if constant else []
     found += [Product((Constant(w), x)) for w, x in zip(weights, of, strict=True) if w != 0]
     return Sum(tuple(found))
+
+
+def replace_leaves(node: Node, leaf: Callable[[Node], Node | None]) -> Node:
+    """Return a tree in which each node for which `leaf` returns another one is replaced by it."""
+    if (found := leaf(node)) is not None:
+        return found
+    match node:
+        case Sum(terms):
+            return Sum(tuple(replace_leaves(t, leaf) for t in terms))
+        case Product(factors):
+            return Product(tuple(replace_leaves(f, leaf) for f in factors))
+        case Difference(of, minus):
+            return Difference(replace_leaves(of, leaf), replace_leaves(minus, leaf))
+        case Sigmoid() | Named() | Clip() | Magnitude() | Power() | Lookup():
+            return replace(node, of=replace_leaves(node.of, leaf))
+    return node
 
 
 def format_node(node: Node) -> str:  # noqa: PLR0911, PLR0912 - a case for every kind of node

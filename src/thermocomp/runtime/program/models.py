@@ -11,7 +11,7 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.runtime.program.clocks import run_clock
 from thermocomp.runtime.program.language import choose, exp, expm1, let, raised, record, when
 from thermocomp.runtime.program.numbers import clip, find_linear, find_step
-from thermocomp.runtime.program.recurrences import Clock
+from thermocomp.core.recurrences import Clock
 from thermocomp.runtime.program.supporting import Supports
 from thermocomp.runtime.program.tree import Expression, Function, Name
 from thermocomp.runtime.program.values import Number, Truth, Whole, integer, real

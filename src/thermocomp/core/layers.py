@@ -1,0 +1,351 @@
+"""Expressions compiled to array operations: the same for one reading or many, for one model or several.
+
+Equal nodes are computed once. Sums are linear forms of other values; values of one kind that depend on equally many
+others are computed by one operation on an array, a layer.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core import expression as e
+from thermocomp.core.arrays import FloatArray
+from thermocomp.core.curves import Curve
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.recurrences import Clock
+from thermocomp.core.ticker import Ticker
+
+IntArray = NDArray[np.intp]
+
+
+class Form(NamedTuple):
+    """A linear form: constant + sum of weight * value."""
+
+    weights: tuple[tuple[int, float], ...]  #: by slot
+    constant: float
+
+    def scaled(self, factor: float) -> "Form":
+        """Return the form multiplied by a number."""
+        return Form(tuple((k, factor * w) for k, w in self.weights), factor * self.constant)
+
+
+def _added(forms: Sequence[Form]) -> Form:
+    weights: dict[int, float] = {}
+    for form in forms:
+        for k, w in form.weights:
+            weights[k] = weights.get(k, 0.0) + w
+    return Form(tuple(weights.items()), sum(f.constant for f in forms))
+
+
+class Forms:
+    """Several linear forms of values."""
+
+    def __init__(self, forms: Sequence[Form]) -> None:
+        self._single = all(len(f.weights) == 1 for f in forms)
+        self._constant = np.array([f.constant for f in forms], dtype=np.float64)
+        self._any_constant = bool(self._constant.any())
+        if self._single:
+            self._slots = np.array([f.weights[0][0] for f in forms], dtype=np.intp)
+            self._weights = np.array([f.weights[0][1] for f in forms], dtype=np.float64)
+            self._scales = bool((self._weights != 1.0).any())
+            return
+        used = sorted({k for f in forms for k, _ in f.weights})
+        self._slots = np.array(used, dtype=np.intp)
+        self._weights = np.zeros((len(used), len(forms)))
+        for j, form in enumerate(forms):
+            for k, w in form.weights:
+                self._weights[used.index(k), j] = w
+
+    def evaluate(self, values: FloatArray) -> FloatArray:
+        """Return the forms, (..., n_forms), of values, (..., n_slots)."""
+        found = values.take(self._slots, axis=-1)
+        if not self._single:
+            found = found @ self._weights
+        elif self._scales:
+            found = found * self._weights
+        return found + self._constant if self._any_constant else found
+
+
+class _Layer(NamedTuple):
+    """Values in adjacent slots, computed by one operation on the values of each operand."""
+
+    slots: slice
+    operands: tuple[Forms, ...]
+    work: Callable[..., FloatArray]
+
+
+class _Lags(NamedTuple):
+    """First-order lags, in adjacent slots; rate = rest + pace * gain."""
+
+    slots: slice
+    memory: slice
+    signals: Forms
+    rest: FloatArray  #: [1/s]
+    gain: FloatArray  #: [1/s]
+    paces: Forms | None
+
+
+class _Ticks(NamedTuple):
+    """A value with a clock of its own."""
+
+    slots: slice
+    memory: slice
+    inputs: Forms
+    ticker: Ticker
+
+
+@dataclass(frozen=True)
+class _Slot:
+    """A value before it has a place."""
+
+    level: int
+    kind: str
+    operands: tuple[Form, ...]
+    numbers: tuple[float, ...] = ()
+    curve: Curve | None = None
+    recurrence: e.Recurrence | None = None
+
+
+_WORK: dict[str, Callable[..., FloatArray]] = {
+    "linear": lambda of: of,
+    "product": lambda *of: np.multiply.reduce(of),
+    "magnitude": np.abs,
+    "sigmoid": lambda of: 0.5 + 0.5 * np.tanh(0.5 * of),
+}
+
+
+class Layers:
+    """Expressions as layers.
+
+    Parameters
+    ----------
+    outputs : sequence of Node
+    n_inputs : int
+        Number of inputs; the leaves of the expressions are inputs.
+    """
+
+    def __init__(self, outputs: Sequence[e.Node], n_inputs: int) -> None:
+        self.n_inputs = n_inputs
+        builder = _Builder(n_inputs)
+        forms = [builder.form(node) for node in outputs]
+        places, self._layers, self.n_memory = builder.lay()
+        self._forms = [_moved(f, places) for f in forms]
+        self._outputs = Forms(self._forms)
+        self._n = n_inputs + len(places)
+
+    @property
+    def linear(self) -> list[tuple[FloatArray, float]]:
+        """Weights, (n_inputs,), and constant of each output, if all outputs are linear forms of the inputs; else empty."""
+        if self._layers:
+            return []
+        found = []
+        for form in self._forms:
+            weights = np.zeros(self.n_inputs)
+            for k, w in form.weights:
+                weights[k] = w
+            found.append((weights, form.constant))
+        return found
+
+    def begin(self, change: FloatArray) -> FloatArray:
+        """Return the memory, (..., n_memory), of a machine at steady state for `change`, (..., n_inputs)."""
+        memory = np.empty((*change.shape[:-1], self.n_memory))
+        self._run(memory, change, np.inf)
+        return memory
+
+    def advance(self, memory: FloatArray, change: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
+        """Return the memory `dt` seconds later, after the inputs changed to `change`, and the outputs, (..., n_outputs)."""
+        if memory.shape[:-1] != change.shape[:-1]:  # one state for many readings, or many for one
+            shape = np.broadcast_shapes(memory.shape[:-1], change.shape[:-1])
+            memory = np.broadcast_to(memory, (*shape, self.n_memory))
+            change = np.broadcast_to(change, (*shape, self.n_inputs))
+        memory = memory.copy()
+        return memory, self._outputs.evaluate(self._run(memory, change, dt))
+
+    def _run(self, memory: FloatArray, change: FloatArray, dt: float) -> FloatArray:
+        """Advance `memory` in place; return the values of all slots."""
+        values = np.empty((*change.shape[:-1], self._n))
+        values[..., : self.n_inputs] = change
+        for layer in self._layers:
+            if isinstance(layer, _Layer):
+                values[..., layer.slots] = layer.work(*(f.evaluate(values) for f in layer.operands))
+                continue
+            if isinstance(layer, _Ticks):
+                inputs = layer.inputs.evaluate(values)
+                if dt == np.inf:
+                    memory[..., layer.memory] = layer.ticker.begin(inputs)
+                else:
+                    memory[..., layer.memory], values[..., layer.slots.start] = layer.ticker.advance(
+                        memory[..., layer.memory], inputs, dt
+                    )
+                continue
+            signals = layer.signals.evaluate(values)
+            if dt == np.inf:
+                memory[..., layer.memory] = signals
+            else:
+                held = memory[..., layer.memory]
+                rates = layer.rest if layer.paces is None else layer.rest + layer.paces.evaluate(values) * layer.gain
+                signals -= held
+                signals *= np.expm1(-dt * rates)
+                held -= signals
+            values[..., layer.slots] = memory[..., layer.memory]
+        return values
+
+
+def _moved(form: Form, places: Sequence[int]) -> Form:
+    """Return a form with each slot at its place."""
+    return Form(tuple((places[k], w) for k, w in form.weights), form.constant)
+
+
+class _Builder:
+    """Values of expressions, each once, and their order."""
+
+    def __init__(self, n_inputs: int) -> None:
+        self._n_inputs = n_inputs
+        self._slots: dict[_Slot, int] = {}
+        self._levels = [0] * n_inputs
+        self._forms: dict[int, tuple[e.Node, Form]] = {}  #: by identity of the node, which is kept alive
+
+    def form(self, node: e.Node) -> Form:
+        """Return a node as a linear form of slots."""
+        known = self._forms.get(id(node))
+        if known is None:
+            known = self._forms[id(node)] = node, self._new_form(node)
+        return known[1]
+
+    def _new_form(self, node: e.Node) -> Form:  # noqa: PLR0911 - one case per node type
+        match node:
+            case e.Constant(value):
+                return Form((), value)
+            case e.Input(index):
+                return Form(((index, 1.0),), 0.0)
+            case e.Named(_, of):
+                return self.form(of)
+            case e.Sum(terms):
+                return _added([self.form(t) for t in terms])
+            case e.Difference(of, minus):
+                return _added([self.form(of), self.form(minus).scaled(-1.0)])
+            case e.Product(factors):
+                forms = [self.form(f) for f in factors]
+                factor = float(np.prod([f.constant for f in forms if not f.weights]))
+                others = [f for f in forms if f.weights]
+                if not others:
+                    return Form((), factor)
+                own = others[0] if len(others) == 1 else self._value("product", *others)
+                return own.scaled(factor)
+            case e.Power(of, exponent):
+                return self._value("power", self.form(of), numbers=(exponent,))
+            case e.Magnitude(of):
+                return self._value("magnitude", self.form(of))
+            case e.Sigmoid(of):
+                return self._value("sigmoid", self.form(of))
+            case e.Clip(of, low, high):
+                return self._value("clip", self.form(of), numbers=(low, high))
+            case e.Lookup(of, x, y, kind):
+                return self._value("curve", self.form(of), curve=Curve(x, y, kind))
+            case e.Lag(of, tau):
+                return self._value("lag", self.form(of), numbers=(1.0 / tau, 0.0))
+            case e.PacedLag(of, stopped, running, pace):
+                numbers = (1.0 / stopped, 1.0 / running - 1.0 / stopped)
+                return self._value("paced", self.form(of), self.form(pace), numbers=numbers)
+            case e.Recurrence(tick, interval):
+                inputs = [self.form(leaf) for leaf in Clock(tick, interval).leaves]
+                return self._value("recurrence", *inputs, recurrence=node)
+        raise InputError(f"{node!r} cannot be compiled")
+
+    def _value(
+        self,
+        kind: str,
+        *operands: Form,
+        numbers: tuple[float, ...] = (),
+        curve: Curve | None = None,
+        recurrence: e.Recurrence | None = None,
+    ) -> Form:
+        """Return the form of a value that is computed."""
+        if kind not in ("linear", "recurrence"):
+            operands = tuple(self._single(f) for f in operands)
+        level = 1 + max((self._levels[k] for f in operands for k, _ in f.weights), default=0)
+        slot = _Slot(level, kind, operands, numbers, curve, recurrence)
+        if slot not in self._slots:
+            self._slots[slot] = len(self._levels)
+            self._levels.append(level)
+        return Form(((self._slots[slot], 1.0),), 0.0)
+
+    def _single(self, form: Form) -> Form:
+        """Return a form of a single slot: the result of a form of several is a value of its own."""
+        return form if len(form.weights) == 1 else self._value("linear", form)
+
+    def lay(self) -> tuple[list[int], list[_Layer | _Lags | _Ticks], int]:
+        """Return the place of each slot, the layers in the order of computation, and the number of lags."""
+        groups: dict[tuple[object, ...], list[_Slot]] = {}
+        for slot in sorted(self._slots, key=lambda s: s.level):
+            key = (slot.level, slot.kind, len(slot.operands), slot.curve, slot.recurrence)
+            groups.setdefault(key, []).append(slot)
+        places = list(range(self._n_inputs)) + [0] * len(self._slots)
+        begin = self._n_inputs
+        for members in groups.values():
+            for k, slot in enumerate(members):
+                places[self._slots[slot]] = begin + k
+            begin += len(members)
+        layers, memory = list[_Layer | _Lags | _Ticks](), 0
+        for members in groups.values():
+            first = places[self._slots[members[0]]]
+            own = slice(first, first + len(members))
+            if (recurrence := members[0].recurrence) is not None:
+                (slot,) = members
+                ticker = _ticker(recurrence)
+                inputs = Forms([_moved(f, places) for f in slot.operands])
+                layers.append(_Ticks(own, slice(memory, memory + ticker.n_memory), inputs, ticker))
+                memory += ticker.n_memory
+                continue
+            operands = tuple(
+                Forms([_moved(f, places) for f in column])
+                for column in zip(*(s.operands for s in members), strict=True)
+            )
+            numbers = np.array([s.numbers for s in members]).T
+            if (kind := members[0].kind) in ("lag", "paced"):
+                rest, gain = numbers
+                paces = operands[1] if kind == "paced" else None
+                layers.append(_Lags(own, slice(memory, memory + len(members)), operands[0], rest, gain, paces))
+                memory += len(members)
+            else:
+                layers.append(_Layer(own, operands, _work_of(members[0], numbers)))
+        return places, layers, memory
+
+
+def _work_of(slot: _Slot, numbers: FloatArray) -> Callable[..., FloatArray]:
+    """Return the operation of a layer."""
+    if slot.kind == "power":
+        (exponents,) = numbers
+        return lambda of: of**exponents
+    if slot.kind == "clip":
+        low, high = numbers
+        return lambda of: np.minimum(np.maximum(of, low), high)
+    if slot.curve is not None:
+        return slot.curve
+    return _WORK[slot.kind]
+
+
+def _ticker(node: e.Recurrence) -> Ticker:
+    clock = Clock(node.tick, node.interval)
+    k, n = clock.past, len(clock.leaves)
+    tick = Layers([_regressed(node.tick, clock)], k + (clock.means + 1) * n)
+    nothing = np.empty(0)
+    linear = tick.linear[0] if tick.linear else None
+    return Ticker(lambda given: tick.advance(nothing, given, 0.0)[1][..., 0], linear, node.interval, k, clock.means, n)
+
+
+def _regressed(node: e.Node, clock: Clock) -> e.Node:
+    """Return an expression of a tick with its past values and means as inputs."""
+
+    def leaf(node: e.Node) -> e.Node | None:
+        match node:
+            case e.Past(ticks):
+                return e.Input(ticks - 1, "")
+            case e.Mean(of, ticks):
+                return e.Input(clock.past + ticks * len(clock.leaves) + clock.leaves.index(of), "")
+        return None
+
+    return e.replace_leaves(node, leaf)

@@ -1,0 +1,114 @@
+"""A value that is updated at every tick of a clock of its own (P-01): see `thermocomp.core.autoregressive`."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from thermocomp.core.arrays import FloatArray
+from thermocomp.core.exceptions import InputError
+
+#: fraction of the interval by which a reading may come early and still trigger the tick; covers rounding of clocks
+EARLY = 1e-6
+#: maximum number of ticks made at once of a value that is no linear form: one day at 15 s; after that it has settled
+MOST_TICKS = 5760
+
+
+class Ticker:
+    """Such a value, of one reading or many; the runs of a batch share one clock.
+
+    Parameters
+    ----------
+    tick : callable
+        Returns the next value, (...), from the last `k` values, the means of the inputs over the interval that ends now
+        and over each of the last `m` intervals, newest first: (..., k + (m + 1) n_inputs).
+    linear : tuple of (ndarray of shape (k + (m + 1) n_inputs,), float) or None
+        Weights and constant, if the next value is a linear form: a long gap is then one matrix power.
+    interval : float
+        Time between two ticks [s].
+    k, m, n_inputs : int
+    """
+
+    def __init__(
+        self,
+        tick: Callable[[FloatArray], FloatArray],
+        linear: tuple[FloatArray, float] | None,
+        interval: float,
+        k: int,
+        m: int,
+        n_inputs: int,
+    ) -> None:
+        self._tick, self._linear, self._interval = tick, linear, interval
+        self._k, self._m, self._n = k, m, n_inputs
+        #: time since the last tick, integral of the inputs since then, last values, means over the last m intervals
+        self.n_memory = 1 + n_inputs + max(k, 1) + m * n_inputs
+
+    def begin(self, inputs: FloatArray) -> FloatArray:
+        """Return the memory, (..., n_memory), of a cold start: value and inputs were zero until now."""
+        memory = np.zeros((*inputs.shape[:-1], self.n_memory))
+        if self._m:
+            first = 1 + self._n + max(self._k, 1)
+            memory[..., first : first + self._n] = inputs
+        return memory
+
+    def advance(self, memory: FloatArray, inputs: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
+        """Return the memory and the value `dt` seconds later; between two ticks it is interpolated."""
+        n, m, h = self._n, self._m, self._interval
+        phase, total = self._phase(memory), memory[..., 1 : 1 + n]
+        own, past = memory[..., 1 + n : 1 + n + max(self._k, 1)], memory[..., 1 + n + max(self._k, 1) :]
+        ticks = math.floor((phase + dt) / h + EARLY)
+        if ticks == 0:
+            phase, total = phase + dt, total + dt * inputs
+        else:
+            mean = (total + (h - phase) * inputs) / h  # over the interval that ends at the first tick
+            for _ in range(min(ticks, m + 1)):
+                own, past = self._one(own, mean, past)
+                mean = inputs
+            if ticks > m + 1:
+                own = self._coast(own, inputs, past, ticks - m - 1)
+            phase = min(max(phase + dt - ticks * h, -EARLY * h), h)  # clipped: rounding over a very long gap
+            total = phase * inputs
+        value = own[..., 0]
+        if phase > EARLY * h:
+            ahead = self._tick(np.concatenate([own[..., : self._k], total / phase, past], axis=-1))
+            value = value + (phase / h) * (ahead - value)
+        clock = np.full((*own.shape[:-1], 1), phase)
+        return np.concatenate([clock, total, own, past], axis=-1), value
+
+    def _one(self, own: FloatArray, mean: FloatArray, past: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Make one tick; return the last values and the means over the last m intervals, newest first."""
+        value = self._tick(np.concatenate([own[..., : self._k], mean, past], axis=-1))
+        own = np.concatenate([value[..., None], own[..., :-1]], axis=-1)
+        return own, np.concatenate([mean, past], axis=-1)[..., : self._m * self._n]
+
+    def _coast(self, own: FloatArray, inputs: FloatArray, past: FloatArray, ticks: int) -> FloatArray:
+        """Return the last values after more ticks at constant inputs, which all of `past` are."""
+        if self._linear is None:
+            for _ in range(min(ticks, MOST_TICKS)):
+                before = own
+                own, _ = self._one(own, inputs, past)
+                if np.array_equal(own, before):
+                    break
+            return own
+        weights, constant = self._linear  # the difference from the settled value decays with the companion matrix
+        a = weights[: self._k]
+        driven = np.concatenate([inputs, past], axis=-1) @ weights[self._k :] + constant
+        settled = driven / (1.0 - a.sum())
+        rest = own - settled[..., None]
+        return np.asarray(settled[..., None] + rest @ np.linalg.matrix_power(companion(a), ticks).T)
+
+    @staticmethod
+    def _phase(memory: FloatArray) -> float:
+        """Return the time since the last tick."""
+        clocks = memory[..., 0]
+        first = float(clocks.flat[0]) if clocks.size else 0.0
+        if (clocks != first).any():
+            raise InputError("the runs of a batch must have been started at the same time")
+        return first
+
+
+def companion(a: FloatArray) -> FloatArray:
+    """Return the matrix that advances the last values by one tick, without inputs."""
+    matrix = np.eye(max(len(a), 1), k=-1)
+    matrix[0, : len(a)] = a
+    return matrix
