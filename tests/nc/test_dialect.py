@@ -183,7 +183,9 @@ def test_a_word_with_two_readings_is_asked_for(text: str, asked: str) -> None:
     assert asked in found
     line = 5 + text.count("\n") - (text.endswith("\nG90"))
     assert found.startswith(f"line {line}: ")
-    assert found.endswith("write it so that both read it alike, or give --controller linuxcnc or --controller fanuc")
+    assert found.endswith(
+        "write the line so that both controls read it alike, or give --controller linuxcnc or --controller fanuc"
+    )
     # LinuxCNC's own word anywhere decides it
     assert question(f"o100 sub\no100 endsub\n{program}") == ""
 

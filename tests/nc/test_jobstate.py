@@ -88,5 +88,5 @@ def test_what_is_no_state_is_refused(left: JobState, change: dict[str, object], 
 
 def test_a_file_is_of_one_job(left: JobState) -> None:
     body = json.loads(jobstate.dumps(left, NOON))["models"]
-    with pytest.raises(ModelFileError, match="holds the states of 2 jobs: expected one"):
+    with pytest.raises(ModelFileError, match="contains the states of 2 jobs; expected one"):
         jobstate.loads(jsonfile.pack(jobstate.KIND, body * 2))

@@ -196,7 +196,7 @@ def test_a_measured_start(job_folder: Path) -> None:
         (["--carried", "gone.json"], "gone.json: no such state file of a job"),
         (["--carried", "model.json"], "model.json: not a state file of a job"),
         (["--measured", "z=12"], "expected an axis or target, and a value with its unit"),
-        (["--cold", "--zero", "last"], "needs a state that is carried over"),
+        (["--cold", "--zero", "last"], "requires the state carried over"),
     ],
 )
 def test_the_start_has_to_be_stated(

@@ -50,14 +50,17 @@ def test_a_stored_rotation_has_to_be_told_if_x_is_corrected(
 ) -> None:
     write_models([judged(lags("x_um"))], "x.json")
     assert revise("--model", "x.json", *options) == code
-    assert ("(--rotation none) or which (--rotation 'G54=12 deg')" in said(capsys)) == (code == 2)
+    assert ("(--rotation none) or the angle (--rotation 'G54=12 deg')" in said(capsys)) == (code == 2)
 
 
 def test_where_no_system_is_named_each_may_be_in_force(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_models([judged(lags("x_um"))], "x.json")
     Path("part.ngc").write_text(PLATE.replace(" G54", ""), encoding="ascii")
     assert revise("--model", "x.json", "--rotation", "G54=12.5 deg") == 2
-    assert "(--rotation none) or write G54 before the first move, and which (--rotation 'G54=12 deg')" in said(capsys)
+    assert (
+        "(--rotation none) or write G54 before the first move, and state the angle (--rotation 'G54=12 deg')"
+        in said(capsys)
+    )
     assert revise("--model", "x.json", "--rotation", "none", proved=True) == 0
     assert "G92 (in half of them), G98/G99, system in force, origins" in capsys.readouterr().out
 

@@ -246,8 +246,11 @@ def test_what_the_interpreter_does_not_run_is_told(job_folder: Path, capsys: pyt
     before = set(job_folder.iterdir())
     assert revise(proved=True) == 2
     message = said(capsys)
-    assert "part.ngc: it cannot be proved: LinuxCNC's interpreter does not run the original: line 14: " in message
-    assert message.endswith("; --unproved writes it anyway, and its header says so")
+    assert (
+        "part.ngc: the revised program cannot be proved: LinuxCNC's interpreter does not run the original: line 14: "
+        in message
+    )
+    assert message.endswith("; --unproved writes it anyway, and its header states this")
     assert set(job_folder.iterdir()) == before
 
 

@@ -55,9 +55,9 @@ def revise(
 
     The program is interpreted and timed as by the controller, and its spindle speed drives the models; the predicted
     drift is subtracted from its coordinates. A program that cannot be corrected safely is refused with line and reason.
-    The original program is not changed. Next to the new program are written: the differences (.diff), a table of all
-    lines (.csv), a figure (.png), and the thermal state of the machine at the end (.job.json), from which the next job
-    can start.
+    The original program is not changed. These files are written next to the new program: the differences (.diff), a
+    table of all lines (.csv), a figure (.png), and the thermal state of the machine at the end (.job.json), from which
+    the next job can start.
 
     Parameters
     ----------

@@ -32,8 +32,8 @@ _ANGLE = re.compile(r"(?<![A-Z])(?:ASIN|ATAN)(?![A-Z])")
 _VARIABLE = re.compile(r"#(?:0*[1-9][0-9]{3,}|#[#0-9]*|\[)")
 
 _SHIFT = (
-    "shares one store with G92 and G52 in LinuxCNC, which keeps it after the end of the program; a Fanuc stores it "
-    "separately and clears it: shift by G54 to G59"
+    "shares one stored offset with G92 and G52 in LinuxCNC, which keeps it after the end of the program; a Fanuc "
+    "stores it separately and clears it: shift by G54 to G59"
 )
 _OTHER = "is a different cycle in LinuxCNC and in a Fanuc: replace it with its moves"
 _TILTED = "sets the tool length offset to its words in LinuxCNC, and applies the length along a tilted tool in a Fanuc"
@@ -186,7 +186,7 @@ def _open_expressions(line: LineWords) -> Iterator[OpenWord]:
 
 
 def _open_lathe(codes: set[float], values: dict[str, str], force: InForce) -> Iterator[OpenWord]:
-    """Yield words that a Fanuc lathe interprets differently; the whole program decides if it is a lathe (`DOUBTS`)."""
+    """Yield words that a Fanuc lathe interprets differently, unless the whole program rules out a lathe (`DOUBTS`)."""
     if 99.0 in codes or (98.0 in codes and force.per_turn):
         code = "G99" if 99.0 in codes else "G98"
         what = "without cycles is feed per turn (G99) or minute (G98) on a Fanuc's lathe: write G95 or G94 instead"
@@ -284,7 +284,7 @@ def _open_lengths(codes: set[float], values: dict[str, str], force: InForce) -> 
 
 
 def _counts(value: str | None) -> bool:
-    """Return whether a dwell may be in seconds or milliseconds: all controls read fractions as seconds."""
+    """Return whether a dwell may be either in seconds or in milliseconds: all controls read fractions as seconds."""
     return value is not None and (number := read_number(value)) != 0.0 and number % 1.0 == 0.0
 
 

@@ -26,7 +26,7 @@ def count_lines(models: Sequence[str], taken: Sequence[str], states: str, *, by_
 
 
 def describe_models(models: Sequence[str]) -> list[str]:
-    """Return the lines about the models, with all excess models on the last line."""
+    """Return the lines about the models; the last line lists all models for which no line is left."""
     said = [f"model {m}" for m in models]
     return said if len(said) <= _MODELS else [*said[: _MODELS - 1], ", ".join(said[_MODELS - 1 :])]
 
@@ -49,7 +49,7 @@ def describe_proof(proof: Proof | None, lines: int) -> list[str]:
 
 
 def describe_place(revision: Revision, axes: Sequence[str]) -> list[str]:
-    """Return the lines about the origins and tools of the revision, and the error with other ones."""
+    """Return the lines about the origins and tools of the revision, and the error with others."""
     return [*wrap_text(f"made for {describe_origins(revision)}", _PLACE - 1), cost(revision.elsewhere, axes)]
 
 

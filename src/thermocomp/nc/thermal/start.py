@@ -27,7 +27,7 @@ _LONG = 2 * 86400.0
 
 
 class ThermalStart(NamedTuple):
-    """State of the models at the start of the program, or earlier by a pause of the spindle."""
+    """State of the models at the start of the program, or at the start of a pause before it."""
 
     states: tuple[State, ...]  #: per station
     known: bool  #: the state is not a prediction: the machine is cold or measured
@@ -103,7 +103,7 @@ def begin_measured(stations: Sequence[Station], deviations: Mapping[str, float],
         if len(named) not in (1, len(mine)) and axis not in deviations:
             missing = next(s for s in mine if not told[str(s)])
             what, name = (missing, _names(missing)[0]) if named else (axis, axis)
-            raise InputError(f"measured start: that of {what} is missing; also give {name}=VALUEum")
+            raise InputError(f"measured start: the deviation of {what} is missing; also give {name}=VALUEum")
         for group, seen, deviation in parts:
             found, speed = _explaining(group, seen, others, deviation)
             states |= {str(s): state for s, state in zip(group, found, strict=True)}
