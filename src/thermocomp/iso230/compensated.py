@@ -68,7 +68,7 @@ def replay_models(
             notes.append(f"the model of {target}: {share} are outside its trained range")
     if models and not found:
         raise InputError(
-            f"{recording.name}: the models are of {', '.join(m.target for m in models)}, but the recording has no such "
-            "channel"
+            f"{recording.name}: the models predict {', '.join(m.target for m in models)}, but the recording has no "
+            "such channel"
         )
     return found, notes

@@ -146,7 +146,7 @@ class _Stretch(NamedTuple):
 
     @property
     def part(self) -> slice:
-        """Its rows, including those before it."""
+        """Rows of the test, including the preceding rows that define its initial state."""
         return slice(self.rows[0] - self.lead, self.rows[2] + 1)
 
     def curve(self, label: str, unit: str, place: str, measured: FloatArray, left: FloatArray | None) -> ThermalCurve:
@@ -346,7 +346,7 @@ def _about_rows(recording: Recording, kind: Kind, rows: tuple[int, int, int], nu
 
 
 def _load(recording: Recording, kind: Kind, start: int, stop: int) -> str:
-    """Return the load of the spindle or the axis during running, as text."""
+    """Return the load of the spindle or the axis while it runs, as text."""
     if kind == "etve":
         return "machine at rest" if recording.of_quantity("spindle_speed") else "regarded as at rest"
     quantity, word = ("spindle_speed", "spindle at") if kind == "spindle" else ("feed", "feed of")

@@ -110,7 +110,9 @@ class Kit:
     def place(self, name: str, *, perfect: bool) -> str:
         """Return the description of a temperature place."""
         if name in self.inner and not perfect:
-            raise SettingError(f"{name!r} is a rotation: it can only be calculated, with perfect = true")
+            raise SettingError(
+                f"{name!r} is on a rotating part: its temperature can only be calculated, with perfect = true"
+            )
         known = {**self.places, **self.inner} if perfect else self.places
         if name not in known:
             raise explain_unknown("place", name, [*known, *self.outfits])
