@@ -252,7 +252,7 @@ def _about_curves(kind: Kind, curves: Sequence[ThermalCurve], targets: Sequence[
     for c in (*curves, *(c for t in targets for c in t.curves)):
         if c.after_figures is not None and c.after_figures.range_all > c.figures.range_all:
             grown = f"{c.figures.range_all:.3g} to {c.after_figures.range_all:.3g} {c.unit}"
-            notes.append(f"{c.name}: with the model its range grows, from {grown}")
+            notes.append(f"{c.name}: with the model its range increases, from {grown}")
     return notes
 
 
@@ -275,7 +275,7 @@ def _about(recording: Recording, kind: Kind, pairs: Sequence[Pair], air: Channel
     if stations := find_stations(recording):
         notes.append(_stations_words(stations))
     if air is None:
-        notes.append("no temperature is known to be that of the surroundings: name its channel (ambient)")
+        notes.append("no ambient temperature was identified: name its channel (ambient)")
     if kind == "axis" and not _target_groups(recording):
         notes.append(
             "no channel is a target position of an axis: name the channels by axis and position, such as x_laser_0, "

@@ -213,8 +213,8 @@ CENTRE = Kit(
         "squareness": tuple(SQUARENESS),
     },
     loads={
-        "tool_tip": "cutting edge: what of the cutting power goes into the tool",
-        "coolant": "coolant tank; negative: taken from it",
+        "tool_tip": "cutting edge: share of the cutting power that enters the tool",
+        "coolant": "coolant tank; negative: heat removed",
         "cabinet": "electric cabinet, on the column's rear",
         "hydraulics": "hydraulic unit, at the bed's rear",
         **{f"{a}_bearing": f"motor and bearing of the {a.upper()} screw" for a in AXES},

@@ -142,12 +142,12 @@ def _bounds(bounds: Sequence[Bound]) -> Layout:
         Column("drift from", lambda b: b.low, "um"),
         Column("to", lambda b: b.high, "um"),
         Column("in the cuts", lambda b: b.without, "um"),
-        Column("left in the cuts", lambda b: b.left, "um"),
+        Column("residual in the cuts", lambda b: b.left, "um"),
         Column("at line", lambda b: b.line or "", ">"),
         Column("model", lambda b: _known(b, b.model), "um"),
         Column("bound", lambda b: _known(b, b.most), "um"),
     )
-    caption = "um; bound of a cut = what is left between updates + largest error of the model on unseen cycles"
+    caption = "um; bound of a cut = residual between updates + largest error of the model on unseen cycles"
     return Layout(columns, bounds, caption=caption)
 
 

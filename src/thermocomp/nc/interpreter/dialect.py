@@ -234,7 +234,7 @@ class _Scan:
             self._sign("fanuc", _BEGINS)
             return
         if len(head["delete"] or "") > 1 or head["again"]:
-            self._sign("fanuc", "a block delete with a number, or behind N, which only a Fanuc or Haas has")
+            self._sign("fanuc", "a block delete with a number, or after N, which only a Fanuc or Haas has")
         if _FANUC_FLOW.match(body) or _FANUC_OUTPUT.match(body):
             self._sign("fanuc", "a macro word of a Fanuc or Haas")
             return

@@ -120,7 +120,7 @@ class ProgramReading:
         if self.calls - self.before > MOST_OF_LINE:
             return f"this line makes more than {MOST_OF_LINE:,} moves: write fewer repeats (L) or larger pecks (Q)"
         if self.calls > self.most_calls:
-            return f"more than {self.most_calls:,} moves have been made up to here: let one program do less"
+            return f"more than {self.most_calls:,} moves have been made up to here: divide the program"
         return None
 
     def check_output(self, told: int) -> str | None:

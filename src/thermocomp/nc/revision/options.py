@@ -236,7 +236,7 @@ class Timing:
             return MotionLimits(tool_change=change, stop=stop), [guess]
         axes = sorted((a for a in machine.axes if a.name in "XYZ"), key=lambda a: a.name)
         notes = [
-            f"{self.machine}: no {what} of {', '.join(silent)}: taken as {taken}"
+            f"{self.machine}: no {what} of {', '.join(silent)}: assumed to be {taken}"
             for what, taken in (("rapid", "30 m/min"), ("acceleration", "3 m/s2"))
             if (silent := [a.name for a in axes if getattr(a, what) is None])
         ]

@@ -110,8 +110,8 @@ def begin_measured(stations: Sequence[Station], deviations: Mapping[str, float],
             if len(group) > 1:
                 what = f"the mean of its {len(mine)} models" if seen is group else told[str(seen[0])]
                 assumed.append(
-                    f"{axis} was measured once: all its models begin as {speed:.0f} 1/min, held for long, leaves "
-                    f"them: there {what} is {deviation:g} um"
+                    f"{axis} was measured once: all its models start from the state after a long run at {speed:.0f} "
+                    f"1/min, where {what} is {deviation:g} um"
                 )
     return ThermalStart(tuple(states[str(s)] for s in stations), known=True, assumed=tuple(assumed))
 
