@@ -206,7 +206,7 @@ def test_a_fanuc_program_is_written_out(job_folder: Path, capsys: pytest.Capture
     )
     Path("part.nc").write_text(program.format("100."), encoding="ascii")
     assert revise("--controller", "fanuc", program="part.nc", out="out.nc") == 2
-    assert "line 8: M98 (subprogram call): subprograms are not followed; --expand writes it" in said(capsys)
+    assert "line 8: M98 (subprogram call): subprograms are not supported; --expand writes it" in said(capsys)
     assert revise("--controller", "fanuc", "--expand", program="part.nc", out="out.nc") == 0
     plain = Path("out.nc.expanded").read_text("ascii").splitlines()
     assert plain[6:13] == ["G1 Z0. F30.", "G91 Z-1.", "G90 X100.", "G91 Z-1.", "G90 X100.", "/X0.", "G90 G0 Z50."]

@@ -59,7 +59,7 @@ class Follower:
             raise line.fault(line.error)
         if line.flow:
             remedy = "writes them as plain lines" if self.state.fanuc else "lets the interpreter unroll them"
-            raise line.fault(f"{line.flow}: loops, branches and subprograms are not followed; --expand {remedy}")
+            raise line.fault(f"{line.flow}: loops, branches and subprograms are not supported; --expand {remedy}")
         if not line.words and not line.assignments:
             return self._idle(line)
         words = self._reader.read(line)
