@@ -49,8 +49,8 @@ Lines = Generator[tuple[str, int], None, int]
 def unroll(lines: Iterable[str], setup: Setup) -> Iterator[tuple[str, int]]:
     """Expand a program into plain lines.
 
-    It expands M98 and M97 with the called programs of the same file, M99, G65 with arguments, variables, ``IF``,
-    ``GOTO`` and ``WHILE``. Lines and programs without these remain unchanged.
+    M98 and M97 with the called programs of the same file, M99, G65 with arguments, variables, ``IF``, ``GOTO`` and
+    ``WHILE`` are expanded. Lines and programs without these remain unchanged.
     """
     return _Unroller(list(lines), setup).lines()
 

@@ -34,10 +34,8 @@ class Check:
     def check(self, block: Block, change: Change) -> None:
         """Compare a block with its revision."""
         longest = max(map(len, change.texts))
-        if longest > max(LONGEST, len(block.line.text)):
-            raise block.error(
-                f"would become a line of {longest} characters, more than the controller reads; divide the line"
-            )
+        if longest > (most := max(LONGEST, len(block.line.text))):
+            raise block.error(f"would become a line of {longest} characters; at most {most} are allowed; divide it")
         self._texts.extend(change.texts)
         try:
             moves = [m for _ in change.texts for m in next(self._blocks).moves]

@@ -160,7 +160,7 @@ def _range(vectors: Sequence[tuple[float, ...]]) -> tuple[Vector, Vector]:
 
 @dataclass
 class Elsewhere:
-    """Error with other work offsets: the drift in the cuts, compared with that 100 mm away, along each axis both ways.
+    """Error with other work offsets: the drift in the cuts, compared with that 100 mm away in both axis directions.
 
     Parameters
     ----------

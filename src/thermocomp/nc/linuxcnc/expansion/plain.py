@@ -197,7 +197,7 @@ class Writer(OriginWriter):
         elif kind in PLAIN:
             yield kind, PLAIN[kind].format(*map(format_number, values))
         elif kind not in {"rotation", "naive"}:
-            raise self.refuse(f"a call {kind!r} of the interpreter is not supported; please report this", call.file)
+            raise self.refuse(f"'{kind}' has no equivalent in plain codes", call.file)
 
     # --- moves ---
     def move(self, a: Canonical, b: Canonical) -> Iterator[str]:
