@@ -330,7 +330,7 @@ def test_what_falls_short_is_said() -> None:
     assert "the test ran for 29 min only" in notes
     assert "the spindle or an axis moves" in notes
     assert "the test is 0.5 h long" in notes
-    assert "no temperature is known to be that of the surroundings" in notes
+    assert "no ambient temperature was identified" in notes
     (unrecorded,) = assess(recorded({"z_um": np.arange(90.0)}), "axis")
     notes = " | ".join(unrecorded.notes)
     assert "the whole recording counts as warm-up; record the feed rate" in notes

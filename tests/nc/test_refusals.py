@@ -202,7 +202,7 @@ def test_a_speed_that_was_never_told() -> None:
         ),
         ("G2 X1. Y0. I0.5 P2", "LinuxCNC's G2 has P"),
         ("M19 R90.", "M19 with R90. orients the spindle in a way that the machine builder has defined"),
-        ("M19 P90", "revise the program without P90, and put it back after M19 in the revised program"),
+        ("M19 P90", "revise the program without P90, and put P90 back after M19 in the revised program"),
         ("G107 C10", "cylindrical"),
         ("G0 X1.\nG5.1 Q1 X5.", "on a separate line"),
         ("G0 G8 P1 X5.", "on a separate line"),

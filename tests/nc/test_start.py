@@ -187,7 +187,7 @@ def test_one_measurement_fixes_all_stations_of_an_axis(other: Callable[..., Erro
     for name, value, told in [("z_at_0", low, 1), ("z_at_600_um", high, 0)]:
         found = start.begin_measured(stations, {name: value}, {})
         assert float(found.states[told].deviation) == pytest.approx((low, high)[told], abs=1e-5)
-        assert f"there {name} is {value:g} um" in found.assumed[0]
+        assert f"where {name} is {value:g} um" in found.assumed[0]
     both = Drift(stations, start.begin_measured(stations, {"z_at_0": low, "z_at_600": high}, {}), zero="cold")
     mine = Drift(stations, whole, zero="cold")
     assert mine.assumed == whole.assumed
