@@ -109,7 +109,7 @@ def test_what_another_offset_would_cost_is_told(job_folder: Path, capsys: pytest
     # half of the drift is gone at 600 mm: a sixth of that in 100 mm; at Z 300 three quarters are there
     assert most == pytest.approx(told["axes"][0]["without_um"] / 0.75 * 0.5 / 6, rel=0.05)
     assert told["other_offset_um"]["x"] == 0.0
-    sentence = f"a work offset that differs by 100 mm causes an error of up to Z {most:.1f} um"
+    sentence = f"100 mm offset change: error up to Z {most:.1f} um"
     assert f"the correction is made for G54 X0 Y0 Z300, T1 120 mm; {sentence}" in told["notes"]
     header = Path("out.ngc").read_text(encoding="ascii").splitlines()
     assert f"({MARK} made for G54 X0 Y0 Z300, T1 120 mm)" in header

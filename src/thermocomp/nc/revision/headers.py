@@ -68,4 +68,4 @@ def describe_origins(revision: Revision) -> str:
 def cost(elsewhere: Elsewhere, axes: Sequence[str]) -> str:
     """Return the error that another work offset or tool length would cause."""
     costs = ", ".join(f"{axis} {elsewhere.most['XYZ'.index(axis)]:.1f} um" for axis in axes)
-    return f"a work offset that differs by {AWAY:g} mm causes an error of up to {costs}"
+    return f"{AWAY:g} mm offset change: error up to {costs}"
