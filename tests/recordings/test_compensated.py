@@ -60,7 +60,7 @@ def test_what_fits_together_passes() -> None:
 
 def test_targets_are_what_a_model_can_learn() -> None:
     assert [c.name for c in compensated().displacements] == ["z_um", "x_um"]
-    with pytest.raises(InputError, match="input z_correction_um is a correction: it is what a model makes"):
+    with pytest.raises(InputError, match="input z_correction_um is a correction: it is the output of a model"):
         tc.fit(compensated(), "z_um", inputs=["t1_C", "z_correction_um"], jobs=1)
     with pytest.raises(InputError, match="input z_residual_um is a residual"):
         tc.fit(compensated(), "z_um", inputs=["t1_C", "z_residual_um"], jobs=1)

@@ -47,7 +47,7 @@ def told(recording: Recording, part: str) -> bool:
             ["01/12/2024 8:00", "02/01/2024 8:00"],
             "2024-01-12T08:00:00",
             1728000,
-            "otherwise time would not rise",
+            "otherwise time would not increase",
         ),
         ("Date (DD-MM-YYYY)", ["03-04-2024 08:00:00", "03-04-2024 08:00:09"], "2024-04-03T08:00:00", 9, "heading says"),
         ("Datum [TT/MM/JJJJ]", ["03/04/2024 08:00", "03/04/2024 08:01"], "2024-04-03T08:00:00", 60, "heading says"),
@@ -114,7 +114,7 @@ def test_an_hour_that_is_missing_at_the_change_to_summer_time_is_asked_for(tmp_p
 def test_a_time_of_day_goes_over_midnight(tmp_path: Path, clocks: list[str]) -> None:
     recording = read(table(tmp_path, "Zeit", clocks))
     assert recording.time.tolist() == [0, 10, 20, 30]
-    assert told(recording, "the time of day goes over midnight in line 4")
+    assert told(recording, "the time of day passes midnight in line 4")
 
 
 @pytest.mark.parametrize(
@@ -416,7 +416,7 @@ def test_a_clock_that_is_set_needs_its_zone(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="02:00:00 is before 2024-10-27 02:59:00"):
         read(autumn, utc)
     missing = stamps(tmp_path / "missing.csv", "2024-03-31 01:58:00", "2024-03-31 02:30:00")
-    with pytest.raises(RecordingError, match=r"these are not times in Europe/Berlin: .*02:30:00"):
+    with pytest.raises(RecordingError, match=r"these cannot be times in Europe/Berlin: .*02:30:00"):
         read(missing, berlin)
     with pytest.raises(InputError, match=r"\[time\]: zone = 'Europe/Berln' is not known"):
         Mapping(TimeColumn(zone="Europe/Berln"))

@@ -253,7 +253,7 @@ def test_time_that_passed_under_another_name_is_asked_for(tmp_path: Path) -> Non
         with pytest.raises(InputError) as caught:
             read(path)
         if count == 100:
-            assert "time that passed, or a pause of a whole day?" in str(caught.value)
+            assert "is it an elapsed time, or was there a pause of a whole day?" in str(caught.value)
             remedy = check_content(dict(caught.value.remedies[0]), "m")
             assert read(path, remedy).time.tolist() == [600.0 * k for k in range(count)]
 
