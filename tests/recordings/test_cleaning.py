@@ -149,9 +149,9 @@ def test_what_is_not_there_is_refused(step: Step, message: str) -> None:
 def test_steps_that_say_nothing_are_refused() -> None:
     for make, message in (
         (lambda: Cut(("z_um",)), "specify the rows to cut"),
-        (lambda: Shift(("z_um",)), "by how much"),
+        (lambda: Shift(("z_um",)), "wrong clock and its correction"),
         (lambda: Shift(by_s=4.0), "specify the channels with the wrong clock"),
-        (lambda: Rezero(at=4.0), "name which probe"),
+        (lambda: Rezero(at=4.0), "specify the probe"),
         (lambda: Swap(("z_um",)), "specify the two"),
         (Resample, "give the interval"),
         (lambda: Resample(("z_um",), every_s=4.0), "no channels"),

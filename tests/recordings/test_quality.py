@@ -221,7 +221,7 @@ def test_an_implausible_value_is_trouble_and_hides_nothing_else(quantity: str, v
 
     assert (found.severity, found.kind) == (severity, "implausible")
     assert "2 values of 2000" in found.text
-    assert f"the farthest {value:g} at row 300 (4500 s)" in found.text
+    assert f"the most extreme {value:g} at row 300 (4500 s)" in found.text
     assert [f.kind for f in _check(stuck, quantity)] == ["implausible", "stuck"]
 
 

@@ -304,7 +304,7 @@ def test_a_clock_that_is_off_is_told(which: str, minutes: float, request: pytest
         (found,) = [f for f in _trouble(_late(recording, group, minutes)) if f.kind == "clock"]
         told = float(found.text.split("about ")[1].split()[0])
         assert told == pytest.approx(abs(minutes), abs=4)
-        assert f"min {'before' if minutes < 0 else 'after'} the spindle speed" in found.text
+        assert f"min {'before' if minutes < 0 else 'after'} the changes of the spindle speed" in found.text
         names = found.text.split("responses of ")[1].split(" come about")[0].split(" and ")[0].split(", ")
         assert set(names) <= set(group)
         assert found.rows is None

@@ -49,8 +49,20 @@ def told(recording: Recording, part: str) -> bool:
             1728000,
             "otherwise time would not increase",
         ),
-        ("Date (DD-MM-YYYY)", ["03-04-2024 08:00:00", "03-04-2024 08:00:09"], "2024-04-03T08:00:00", 9, "heading says"),
-        ("Datum [TT/MM/JJJJ]", ["03/04/2024 08:00", "03/04/2024 08:01"], "2024-04-03T08:00:00", 60, "heading says"),
+        (
+            "Date (DD-MM-YYYY)",
+            ["03-04-2024 08:00:00", "03-04-2024 08:00:09"],
+            "2024-04-03T08:00:00",
+            9,
+            "heading specifies",
+        ),
+        (
+            "Datum [TT/MM/JJJJ]",
+            ["03/04/2024 08:00", "03/04/2024 08:01"],
+            "2024-04-03T08:00:00",
+            60,
+            "heading specifies",
+        ),
         ("Datum", ["06.05.24 08:00:00", "06.05.24 08:00:10"], "2024-05-06T08:00:00", 10, ""),
         ("Datum", ["27. Mai 2024 08:00", "27. Mai 2024 08:01"], "2024-05-27T08:00:00", 60, ""),
         ("Datum", ["27.Okt.2024 08:00:00", "27.Okt.2024 08:00:10"], "2024-10-27T08:00:00", 10, ""),
@@ -206,7 +218,7 @@ def test_a_point_is_the_decimal_sign_where_commas_separate_columns(tmp_path: Pat
 
 
 def test_thousands_with_and_without_separator_in_one_column_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"line 2 has '20.512' with a separator of thousands, line 3 has '1234,5'"):
+    with pytest.raises(InputError, match=r"line 2 has '20.512' with a thousands separator, line 3 has '1234,5'"):
         read(table(tmp_path, "time_s", ["0", "1"], ["20.512", "1234,5"]))
 
 
