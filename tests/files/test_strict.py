@@ -59,11 +59,11 @@ def test_the_whole_file_is_used() -> None:
         (put(1, "inputs", 1, "rezero"), "model 1: inputs.1.rezero: Input should be a valid boolean, found 1"),
         (put(0.0, "signals", 0, 0), "model 1: signals.0.0: Input should be a valid integer, found 0.0"),
         (put("K", "unit"), "model 1: unit: model of z_um: unit 'K': expected um, urad or, along an axis, um/m"),
-        (put("K", "inputs", 1, "unit"), "model 1: inputs.1.unit: input t3_C: a temperature is in degC, found 'K'"),
+        (put("K", "inputs", 1, "unit"), "model 1: inputs.1.unit: input t3_C: expected a temperature in degC, found 'K'"),
         (put("banana", "unit"), "model 1: unit: model of z_um: unit 'banana': expected um"),
         (
             put("banana", "inputs", 0, "unit"),
-            "inputs.0.unit: input spindle_rpm: a spindle_speed is in 1/min",
+            "inputs.0.unit: input spindle_rpm: expected a spindle_speed in 1/min",
         ),
         (
             put("temperatur", "inputs", 1, "quantity"),
@@ -125,8 +125,8 @@ def test_a_verdict_by_other_rules_does_not_run_even_if_taken(rules: int, word: s
         ('"intercept": 0.0', '"intercept": -Infinity', "not a model file: -Infinity is not a number"),
         ('"intercept": 0.0', '"intercept": 1e999', "invalid content: 'Out of range float"),
         ('"target": "z_um"', '"target": "\\ud800"', "invalid content: \"'utf-8' codec"),
-        ('"intercept": 0.0', f'"intercept": {"9" * 4301}', "an integer of 4,301 digits"),
-        ('"intercept": 0.0', f'"intercept": {"9" * 19}', "999999999999999999...: an integer of 19 digits"),
+        ('"intercept": 0.0', f'"intercept": {"9" * 4301}', "an integer with 4,301 digits"),
+        ('"intercept": 0.0', f'"intercept": {"9" * 19}', "999999999999999999...: an integer with 19 digits"),
         ('"intercept": 0.0', f'"intercept": {"[" * 50_000}', "not a model file: nested too deeply"),
     ],
 )
@@ -157,7 +157,7 @@ def test_all_errors_are_listed() -> None:
         )
     assert str(raised.value).split("\n") == [
         "model: 4 errors",
-        "  model 1: inputs.1.unit: input t3_C: a temperature is in degC, found 'K'",
+        "  model 1: inputs.1.unit: input t3_C: expected a temperature in degC, found 'K'",
         "  model 1: intercept: Input should be a valid number, found '1'",
         "  model 1: honest_error: honest error: rms must be from 0 to 1e+15, found -2",
         "  model 1: more: unknown key",
