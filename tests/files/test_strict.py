@@ -59,7 +59,10 @@ def test_the_whole_file_is_used() -> None:
         (put(1, "inputs", 1, "rezero"), "model 1: inputs.1.rezero: Input should be a valid boolean, found 1"),
         (put(0.0, "signals", 0, 0), "model 1: signals.0.0: Input should be a valid integer, found 0.0"),
         (put("K", "unit"), "model 1: unit: model of z_um: unit 'K': expected um, urad or, along an axis, um/m"),
-        (put("K", "inputs", 1, "unit"), "model 1: inputs.1.unit: input t3_C: expected a temperature in degC, found 'K'"),
+        (
+            put("K", "inputs", 1, "unit"),
+            "model 1: inputs.1.unit: input t3_C: expected a temperature in degC, found 'K'",
+        ),
         (put("banana", "unit"), "model 1: unit: model of z_um: unit 'banana': expected um"),
         (
             put("banana", "inputs", 0, "unit"),
