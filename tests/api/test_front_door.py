@@ -307,12 +307,12 @@ def test_simulate() -> None:
 def test_what_cannot_be_frozen_is_not_fitted(recording: Recording) -> None:
     with pytest.raises(InputError, match="HistGradientBoostingRegressor cannot be stored as coefficients"):
         tc.fit(recording, "z_um", HistGradientBoostingRegressor())
-    with pytest.raises(InputError, match="treats every row as a machine at rest"):
+    with pytest.raises(InputError, match="treats every row as a steady state"):
         tc.compare(recording, "z_um", [tc.DynamicRidge(time="none")])
     # found out in its fit: the others have their results
     still = make_pipeline(tc.SensorSelector(), tc.DynamicRidge(time="none"))
     table = tc.compare(recording, "z_um", [still, "ols"]).to_frame().set_index("model")
-    assert "treats every row as a machine at rest" in table["reason"]["SensorSelector + DynamicRidge"]
+    assert "treats every row as a steady state" in table["reason"]["SensorSelector + DynamicRidge"]
     assert np.isfinite(table["rms"]["ols"])
 
 

@@ -156,7 +156,7 @@ def test_recordings_that_cannot_be_planned_from_are_refused() -> None:
         plan(samples.only(["t_bearing_C", "t_air_C"]), TOP)
     with pytest.raises(InputError, match="one spindle speed and at least one temperature"):
         plan(samples.only(["spindle_rpm"]), TOP)
-    with pytest.raises(FitError, match="0 rows with all inputs and targets"):
+    with pytest.raises(FitError, match="0 rows contain all inputs and targets"):
         plan(replace(samples, deviations=np.full_like(samples.deviations, np.nan)), TOP)
     still = stack([recorded([(0.0, 300.0)])], ["z_um"])
     with pytest.raises(InputError, match="never turned in these recordings: record a run"):

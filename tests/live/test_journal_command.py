@@ -110,7 +110,7 @@ def test_a_run_beside_another_compensation_is_refused(
     assert "compensation: unknown" in capsys.readouterr().out
     for words in (["fit", "-o", "model.json"], ["compare"]):
         assert run([words[0], "week.csv", "--target", "z_um", "--jobs", "1", *words[1:]]) == 2
-        assert "week.csv: compensation: unknown: nobody knows which correction" in capsys.readouterr().err
+        assert "week.csv: compensation: unknown: the correction in force" in capsys.readouterr().err
     assert not Path("model.json").exists()
 
 
@@ -121,7 +121,7 @@ def test_a_run_beside_another_compensation_is_refused(
         (["show", "live.db", "-o", "x.csv"], "journal show writes no file"),
         (["show", "live.db", "--last", "-1"], "--last -1: must not be negative"),
         (["export", "live.db"], "name the recording to write"),
-        (["export", "live.db", "-o", "x.xlsx"], "a recording is written as .csv or .parquet"),
+        (["export", "live.db", "-o", "x.xlsx"], "a recording can only be written as .csv or .parquet"),
         (["export", "live.db", "-o", "x.csv", "--every", "-1"], "--every -1: must not be negative"),
         (["export", "live.000001.db", "-o", "live.000001.db", "--overwrite"], "is also an input"),
     ],

@@ -60,7 +60,7 @@ def test_damage_is_refused(left: JobState, tmp_path: Path) -> None:
     content["models"][0]["state"]["stations"][2]["zero"] += 1e-9
     with pytest.raises(ModelFileError, match="checksum"):
         jobstate.loads(json.dumps(content))
-    with pytest.raises(ModelFileError, match="ends in the middle"):
+    with pytest.raises(ModelFileError, match="is incomplete"):
         jobstate.loads(text[: len(text) // 2])
     with pytest.raises(ModelFileError, match="version 2"):
         jobstate.loads(text.replace('"version": 1', '"version": 2'))
