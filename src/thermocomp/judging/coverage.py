@@ -1,11 +1,11 @@
-"""Conditions covered by the judged units, and their similarity: the conditions for which an honest error is valid.
+"""Conditions covered by the judged units, for which an honest error is valid, and the similarity of these units.
 
 Similarity: each unit's inputs (as recorded, so that the ambient temperature counts) are averaged over `PLACES` parts of
 its duration. The squared distance of two units is the mean square difference over these parts, summed over the inputs
 of a quantity and divided by their summed variance over all judged rows, averaged over the quantities; plus the squared
-logarithm of the ratio of their durations. So sensors are weighted by their variation: the noise of an idle sensor makes
-no two units different. Two units with a distance below `ALIKE` are alike: a copy of a unit, or the same program on a
-similar day, adds no information. Alike units count once (single linkage).
+logarithm of the ratio of their durations. So sensors are weighted by their variation: the noise of an idle sensor does
+not make two units different. Two units with a distance below `ALIKE` are alike: a copy of a unit, or the same program
+on a similar day, adds no information. Alike units count once (single linkage).
 """
 
 from collections.abc import Sequence

@@ -165,7 +165,7 @@ def _next(found: Budget, model: str, place: int) -> Table:
 
 
 def _joins(found: Budget, place: int) -> str:
-    """Return the name of the sensor that joins next; for the step from the largest set to all, their number."""
+    """Return the name of the sensor added next; for the step from the largest set to all, the number added."""
     new = [s for s in found.sensors[place + 1] if s not in found.sensors[place]]
     return new[0] if len(new) == 1 else f"all {len(new)} others"
 
@@ -267,7 +267,7 @@ def _repeats(candidates: Sequence[Candidates], sensors: Sequence[str]) -> Table:
 
 
 def trade_off(found: Budget, model: str, place: int) -> str:
-    """Return the loss of accuracy due to fewer sensors than those of the best set, and than all sensors."""
+    """Return the loss of accuracy with fewer sensors, compared with the best set and with all sensors."""
     mean = found.mean()
     m, n = found.models.index(model), found.sizes[place]
     best = np.unravel_index(int(np.nanargmin(mean)), mean.shape)

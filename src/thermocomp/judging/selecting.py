@@ -190,7 +190,7 @@ def _by_steps(candidates: Candidates, method: str) -> Choice:
 
 
 def _by_subsets(candidates: Candidates, settings: Settings, *, jobs: int, progress: Progress) -> Choice:
-    """Select the exact best subset of every size (H-05), and a size."""
+    """Find the exact best subset of every size (H-05), and choose a size."""
     most = min(settings.most("subsets"), len(candidates.names))
     found = BestSubset(
         criterion=settings.criterion,

@@ -92,7 +92,7 @@ def by_time(samples: Samples, train_s: float, test_s: float) -> Judging:
 
 
 def join_short_cycles(cycle: IntArray, test: IntArray, least: int = MIN_ROWS) -> list[IntArray]:
-    """Return the thermal cycles for judging: cycles that are too short are joined to the previous one of their test.
+    """Return the thermal cycles for judging: cycles that are too short are joined to the previous cycle.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def leave_one_file_out(samples: Samples) -> Judging:
     """Judge on each file in turn, train on all others; each file is judged as one unit."""
     n = len(samples.test_names)
     if n < 2:
-        raise InputError("leaving one file out needs at least two recordings")
+        raise InputError("leaving one file out needs at least two recordings, found one")
     splits = [
         Split(f"file {samples.test_names[k]}", samples.test != k, samples.test == k, whole=True) for k in range(n)
     ]
