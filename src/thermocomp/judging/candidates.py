@@ -43,10 +43,10 @@ class Candidates:
         if rows.sum() < 3:
             raise FitError(f"{name}: {int(rows.sum())} complete rows; at least 3 are needed for selecting sensors")
         if np.ptp(samples.deviations[rows, target]) == 0:
-            raise FitError(f"{name} is constant: no sensors can be selected for it")
+            raise FitError(f"{name} is constant; name a target that changes")
         X = samples.frame().iloc[rows, temperatures].reset_index(drop=True)
         if not (np.ptp(X.to_numpy(), axis=0) > 0).any():
-            raise FitError(f"{name}: all temperatures are constant: no sensors can be selected")
+            raise FitError(f"{name}: all temperatures are constant; give recordings in which they change")
         return cls(name, X, samples.deviations[rows, target], samples.cycle[rows])
 
     @property

@@ -61,7 +61,7 @@ def fingerprint(compensator: Compensator) -> str:
 def dumps(state: CompensatorState, compensator: Compensator, written: datetime) -> str:
     """Return the text of a state file."""
     if written.tzinfo is None:
-        raise InputError(f"state of a compensator: {written} has no time zone")
+        raise InputError(f"state of a compensator: the time of writing {written} has no time zone")
     entry = {
         "written": written.astimezone(UTC).isoformat(),
         "models": fingerprint(compensator),

@@ -152,7 +152,7 @@ class Server:
         return "in joint mode" if self.pins["enabled"] else "off"
 
     def report(self, beat: int) -> dict[str, Any]:
-        """Return the report of the correction in force for a message."""
+        """Return the report of the correction in force, in answer to a message."""
         now = time.monotonic()
         why, limited = self.why(), self.pins["limited"]
         micron = 1e-3 * self.unit
@@ -182,7 +182,7 @@ class Server:
     # -- the service ---------------------------------------------------------------------------------------------------
 
     def accept(self) -> None:
-        """Accept a connection of the service; if another service is connected, reply so and close."""
+        """Accept a connection of the service; if another service is connected, report this and close."""
         connection, _ = self.listener.accept()
         if self.client is not None and self.left():
             self.drop()
@@ -198,7 +198,7 @@ class Server:
         self.since = time.monotonic()
 
     def left(self) -> bool:
-        """Return whether the connected service has hung up; checked only when another one connects."""
+        """Return whether the connected service has disconnected; checked only when another one connects."""
         assert self.client is not None
         try:
             return self.client.recv(1, socket.MSG_PEEK) == b""
