@@ -68,7 +68,7 @@ def measured(recording: Recording) -> Drawn:
 
 
 def overview(comparison: Comparison) -> Drawn:
-    """Plot the RMS of all models on unseen blocks, compared with no compensation; hollow dots are refused."""
+    """Plot the RMS of all models on unseen blocks, compared with no compensation; hollow dots are refused models."""
     overall = comparison.overall()
     targets = list(dict.fromkeys(a.target for a in overall))
     models = list(dict.fromkeys(a.model for a in overall))
@@ -153,7 +153,7 @@ def _draw_band(ax: Axes, block: Assessment, hours: FloatArray, points: int) -> N
 
 
 def robustness(comparison: Comparison, model: str) -> Drawn:
-    """Plot the effect of noise and of a lost sensor: RMS clean, with noise, and with each sensor cut off."""
+    """Plot the effect of noise and of a lost sensor: RMS undisturbed, with noise, and with each sensor lost."""
     found = [a for a in comparison.overall() if a.model == model and a.robustness is not None]
     with drawing("robustness" + model):
         figure = Figure(figsize=(9.6, 0.6 + 0.42 * len(found)), layout="constrained")

@@ -7,7 +7,7 @@ from thermocomp.core.model import ErrorModel
 
 
 def describe_losses(models: Sequence[ErrorModel]) -> Iterator[str]:
-    """Yield lines about watched models: the effect of each lost sensor, and sensors that are watched poorly."""
+    """Yield lines about watched models: the effect of each lost sensor, and sensors that are monitored poorly."""
     watch = next((m.watch for m in models if m.watch is not None), None)
     if watch is None:
         return

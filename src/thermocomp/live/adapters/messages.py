@@ -58,7 +58,9 @@ def read_measurement(payload: bytes | str, arrived: float) -> Measurement:
     wrong += ["id"] * (type(own) not in (str, int) or len(str(own)) > _LONG or ("id" in content and own == ""))
     wrong += ["under_correction"] * (not isinstance(left, bool)) + sorted(content.keys() - _KNOWN)
     if wrong:
-        raise ReadingError(f"a measurement with missing or invalid {escape(', '.join(wrong), 80)}; expected {example}")
+        raise ReadingError(
+            f"a measurement with missing, invalid or unknown keys: {escape(', '.join(wrong), 80)}; expected {example}"
+        )
     if why := explain_unfit(str(target)):
         raise ReadingError(f"a measurement whose target is not a valid name: {why}")
     if max(abs(found[k] or 0.0) for k in _NUMBERS) > _FAR or (found["repeatability_um"] or 0.0) < 0.0:
