@@ -243,7 +243,7 @@ def tables(found: Unseen) -> list[StudyTable]:
     }
     errors = common.errors_table("New tests: error without and with compensation", residuals)
     rows = [[*row, f"{effective_sample_size(e):.0f}"] for row, e in zip(errors.rows, residuals.values(), strict=True)]
-    return [StudyTable(errors.caption, (*errors.header, "independent rows"), rows)]
+    return [StudyTable(errors.caption, (*errors.header, "effective rows"), rows)]
 
 
 def figures(found: Unseen) -> list[Figure]:
