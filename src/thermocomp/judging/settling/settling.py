@@ -102,7 +102,7 @@ class Settling:
         if not self.moves:
             return "does not move"
         if not self.clear:
-            return "moves too little for a time"
+            return "moves too little to determine a time"
         if self.returns:
             return "comes back"
         if self.overshoots:

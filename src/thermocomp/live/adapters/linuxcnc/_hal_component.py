@@ -334,15 +334,15 @@ def keep(arguments: list[str]) -> None:
 
 def main() -> None:
     """Run the component."""
-    parser = argparse.ArgumentParser(description="The end of thermocomp inside LinuxCNC.")
+    parser = argparse.ArgumentParser(description="The thermocomp component inside LinuxCNC.")
     parser.add_argument("--pattern", choices=("offset", "drive"), required=True)
     parser.add_argument("--axis", action="append", required=True, help="letter,low,high: z,-200,100 [units of the INI]")
     parser.add_argument("--socket", required=True)
-    parser.add_argument("--group", default="", help="whose members may connect")
+    parser.add_argument("--group", default="", help="user group whose members may connect")
     parser.add_argument("--unit", choices=("mm", "inch"), default="mm")
     for name, unit in (("magnitude", "um"), ("rate", "um/s"), ("timeout", "s"), ("hold", "s"), ("fade", "um/s")):
         parser.add_argument(f"--{name}", type=float, required=True, help=unit)
-    parser.add_argument("--once", action="store_true", help="do not start it again when it is killed")
+    parser.add_argument("--once", action="store_true", help="do not restart the component if it is killed")
     options = parser.parse_args()
     if not options.once:
         keep(sys.argv[1:])
