@@ -70,7 +70,7 @@ def test_show(live: Journal, capsys: pytest.CaptureFixture[str]) -> None:
         "measurement  z_um work_offset +12.00 um under a correction of -10.00 um, included in the value; "
         "deviation +12.00 um; the correction counts twice while it remains in force",
         "measurement  z_um tool_length +12.00 um under no correction, included in the value; deviation +12.00 um",
-        "measurement  z_um probing +12.00 um under unknown correction, not included in the value; "
+        "measurement  z_um probing +12.00 um under an unknown correction, not included in the value; "
         "the deviation is not known",
         "alarm  sensor: t1_C stuck",
         "update  z_um measured +12.00 um, +10.00 to +11.50 um",

@@ -130,7 +130,7 @@ def told(stored: "StoredRun", reader: "JournalReader") -> tuple[str, str]:
     row, kind = stored.row, kind_of(stored.row)
     if isinstance(row, MeasurementRow):
         known = measured_by(row, reader.starts[stored.run])
-        under = {None: "unknown correction", False: "no correction"}.get(row.compensated, "a correction")
+        under = {None: "an unknown correction", False: "no correction"}.get(row.compensated, "a correction")
         if row.in_force is not None and row.compensated:
             under = f"a correction of {row.in_force.at(row.position):+.2f} um"
         text = f"{row.target} {row.kind} {row.value:+.2f} um under {under}, "
