@@ -115,7 +115,7 @@ class Verdict:
     p : float or None
         P-value of the test, corrected for the number of methods; None: computed from the units.
     about : str
-        Reason why the P-value is not corrected for the number of methods; empty if it is.
+        Reason why the p-value is not corrected for the number of methods; empty if it is.
     names : tuple of str
         Names of the baselines.
     stated : float or None
