@@ -56,7 +56,7 @@ def test_grouping_puts_the_repeating_sensors_together(choices: dict[str, tuple[C
     groups = [set(str(row[1]).split()) for row in table(choice, "Groups").rows]
     assert any({"t1_C", "t4_C"} <= g for g in groups)
     assert isinstance(choice.details, CorrelationGrouping)
-    thresholds = table(choice, "What other")
+    thresholds = table(choice, "Results with other")
     assert thresholds.marked is not None
     low, high, n_groups, sensors = thresholds.rows[thresholds.marked][:4]
     assert isinstance(low, float)
