@@ -142,7 +142,7 @@ def test_one_cycle_is_enough_to_plan_from() -> None:
         ({"top_speed": float("inf")}, "top speed inf"),
         ({"hours": 1.0}, "a test of 1 h: expected 2 to 72"),
         ({"hours": float("nan")}, "expected 2 to 72"),
-        ({"swing": -3.0}, "a room that changes by -3 degC"),
+        ({"swing": -3.0}, "a change of the room temperature by -3 degC"),
     ],
 )
 def test_a_setting_that_cannot_be_is_refused(given: dict[str, float], words: str) -> None:
