@@ -19,12 +19,12 @@ from thermocomp.core.terms import Variable
 from thermocomp.core.zero import Zeroing
 from thermocomp.export.axes import find_drives, write_values
 from thermocomp.export.beckhoff import package as beckhoff
-from thermocomp.export.block.tables import gather
 from thermocomp.export.facts import Facts
 from thermocomp.export.siemens import package as siemens
 from thermocomp.export.st.structuredtext import translate
 from thermocomp.export.vectors import Readings
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.program.tables import gather
 
 FACTS = Facts("model.json", "0" * 64, "0", "2026-01-31")
 FREE = Limits(magnitude=1e9, rate=1e9)

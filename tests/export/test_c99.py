@@ -22,10 +22,10 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Variable
 from thermocomp.core.zero import Zeroing
-from thermocomp.export.block.tables import gather
 from thermocomp.export.c99.c99 import translate
 from thermocomp.export.vectors import Readings, make_readings, replay
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.program.tables import gather
 
 FloatArray = NDArray[np.float64]
 FREE = Limits(magnitude=1e9, rate=1e9)

@@ -16,11 +16,11 @@ from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.position import PositionModel
-from thermocomp.export.block.tables import gather
 from thermocomp.export.facts import Facts
 from thermocomp.export.linuxcnc.package import write_package
 from thermocomp.export.vectors import Readings, make_readings, replay
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.program.tables import gather
 
 FACTS = Facts("model.json", "0" * 64, "1", "2026-01-31")
 #: what an order of the servo thread brings at most [mm]: half a count

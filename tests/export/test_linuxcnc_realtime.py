@@ -14,11 +14,11 @@ from linuxcncexported import MODULES, fill_in, installed, live_export
 from linuxcnclive import Live
 
 from thermocomp.core.correction import Limits
-from thermocomp.export.block.tables import gather
 from thermocomp.export.facts import Facts
 from thermocomp.export.linuxcnc.package import write_package
 from thermocomp.export.vectors import Readings, replay
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.program.tables import gather
 
 FACTS = Facts("model.json", "0" * 64, "1", "2026-01-31")
 #: of the thread [ns], and how many of its periods are looked at

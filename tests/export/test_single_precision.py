@@ -25,13 +25,13 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Variable
 from thermocomp.core.watch import Watch
-from thermocomp.export.block.tables import gather
 from thermocomp.export.c99 import package as cpackage
 from thermocomp.export.facts import Facts
 from thermocomp.export.onnx import package as onnxpackage
 from thermocomp.export.st import package as stpackage
 from thermocomp.export.vectors import make_readings, round_all
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.program.tables import gather
 
 FACTS = Facts("model.json", "0" * 64, "1.0", "2026-01-31")
 needs_compiler = pytest.mark.skipif(not COMPILERS, reason="there is no C compiler")

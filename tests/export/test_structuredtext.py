@@ -22,7 +22,6 @@ from thermocomp.core.inputs import Support
 from thermocomp.core.joint import JointSupport
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.zero import Zeroing
-from thermocomp.export.block.tables import gather
 from thermocomp.export.facts import Facts
 from thermocomp.export.st.package import write_package
 from thermocomp.export.st.structuredtext import SourceUnit, translate
@@ -31,6 +30,7 @@ from thermocomp.export.st.sttest import write_test
 from thermocomp.export.vectors import Readings, make_readings, replay
 from thermocomp.recordings.readers.recordings import read
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.program.tables import gather
 
 FREE = Limits(magnitude=1e9, rate=1e9)
 SLOW: dict[str, Any] = {

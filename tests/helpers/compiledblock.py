@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.export.block.tables import gather
 from thermocomp.export.c99.c99 import translate
 from thermocomp.export.vectors import Answers, Readings, replay
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.program.tables import gather
 
 FloatArray = NDArray[np.float64]
 

@@ -6,12 +6,12 @@ import numpy as np
 import onnxruntime
 from numpy.typing import NDArray
 
-from thermocomp.export.block.tables import Tables, gather
 from thermocomp.export.onnx.graph import translate
 from thermocomp.export.onnx.nodes import serialize
 from thermocomp.export.onnx.vectors import without_watch
 from thermocomp.export.vectors import Readings
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.program.tables import Tables, gather
 
 FloatArray = NDArray[np.float64]
 

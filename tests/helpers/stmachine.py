@@ -14,10 +14,10 @@ import numpy as np
 from blark import transform as b
 from stparsing import PYTHON, Array, Block, Type, block_of, declared
 
-from thermocomp.export.block.tables import gather
 from thermocomp.export.st.structuredtext import NOTHING, SourceUnit, translate
 from thermocomp.export.vectors import Answers, Readings, replay
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.program.tables import gather
 
 _COMPARE = {"=": "==", "<>": "!=", "<": "<", "<=": "<=", ">": ">", ">=": ">="}
 _NUMBERS = {"EXP": math.exp, "LN": math.log, "SQRT": math.sqrt}

@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.export.block.tables import Tables
 from thermocomp.export.reduction.reduced import find_axis
 from thermocomp.export.st.structuredtext import SourceUnit
 from thermocomp.export.st.ststatements import SCL, Dialect, array, number, quoted, section
+from thermocomp.runtime.program.tables import Tables
 
 
 class Drive(NamedTuple):

@@ -1,7 +1,7 @@
 """Instruction page of an exported compensator, for all languages: inputs, outputs, and their meaning."""
 
-from thermocomp.export.block.tables import Tables
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.program.tables import Tables
 
 
 def describe(compensator: Compensator, tables: Tables, of: str = "") -> dict[str, object]:

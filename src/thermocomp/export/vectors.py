@@ -15,9 +15,9 @@ from thermocomp.core.provenance import HonestError, Provenance
 from thermocomp.core.reading import Reading
 from thermocomp.core.validity import Validity
 from thermocomp.core.zero import Zeroing
-from thermocomp.export.block.tables import Tables
 from thermocomp.export.warming import Warming
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.program.tables import Tables
 from thermocomp.runtime.state import CompensatorState
 from thermocomp.runtime.watch import RETURN, WORDS
 

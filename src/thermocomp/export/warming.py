@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.export.block.tables import Tables
+from thermocomp.runtime.program.tables import Tables
 
 FloatArray = NDArray[np.float64]
 

@@ -131,10 +131,11 @@ def _log(watch: Watch, samples: Samples, test: int, recording: Recording) -> Fau
         if name in names:
             read[:, j] = samples.values[(samples.test == test) & (samples.row >= 0), names.index(name)]
     fault, stood_in = np.zeros(read.shape, np.int8), np.full(read.shape, np.nan)
-    for row, state, let in look_through(watch, samples, test):
-        if (own := int(samples.row[row])) >= 0:  # not a row of the file that it continues from
-            fault[own] = state.fault
-            stood_in[own] = np.where(state.fault != GOOD, let[heat], np.nan)
+    rows, passed, faults = look_through(watch, samples, test)
+    mine = samples.row[rows] >= 0  # not a row of the file that it continues from
+    own = samples.row[rows[mine]]
+    fault[own] = faults[mine]
+    stood_in[own] = np.where(faults[mine] != GOOD, passed[mine][:, heat], np.nan)
     found = [
         Fault(
             sensor=name,

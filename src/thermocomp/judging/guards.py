@@ -5,14 +5,13 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.watch import Watch
 from thermocomp.judging.replay import rows_until
+from thermocomp.judging.watchrun import run_watch
 from thermocomp.models.watching import find_watch
 from thermocomp.recordings.samples import Samples
-from thermocomp.runtime.watch import begin, look
 
 #: largest number of temperatures for which simultaneous failures of two are tried
 FEW = 6
@@ -73,7 +72,10 @@ def let_fail(watch: Watch, samples: Samples, rows: BoolArray) -> Guard:
     for test in np.unique(samples.test[rows]).tolist():
         mine = rows_until(samples, rows, test, watch.zeroing, columns)
         mine = mine[samples.valid[mine]]
-        _go_through(watch, samples, mine, columns, cut, found)
+        zero, given = samples.reference()[test][columns], samples.given_zero(test, columns)
+        for k, failed in enumerate(cut):  # the sensors read their zero
+            values = np.where(failed, zero, samples.values[mine][:, columns])
+            found[k, mine], _ = run_watch(watch, samples.time[mine], values, samples.stands[mine], given)
     changed = found != samples.values[:, columns]
     changed &= ~np.isnan(found)
     return Guard(
@@ -83,19 +85,3 @@ def let_fail(watch: Watch, samples: Samples, rows: BoolArray) -> Guard:
             for k, lost in enumerate(failing)
         },
     )
-
-
-def _go_through(
-    watch: Watch,
-    samples: Samples,
-    mine: NDArray[np.intp],
-    columns: Sequence[int],
-    cut: BoolArray,
-    found: FloatArray,
-) -> None:
-    """Replay a test with the sensors of each row of `cut` reading their zero; store the passed readings in `found`."""
-    zero = samples.reference()[samples.test[mine[0]]][columns] if mine.size else np.empty(0)
-    state = begin(watch, samples.given_zero(samples.test[mine[0]], columns) if mine.size else None, (len(cut),))
-    for row in mine.tolist():
-        values = np.where(cut, zero, samples.values[row, columns])
-        state, found[:, row] = look(watch, state, float(samples.time[row]), values, resting=bool(samples.stands[row]))

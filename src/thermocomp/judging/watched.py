@@ -1,18 +1,19 @@
 """Samples as a model's watch passes them: values of failed sensors are replaced, and the band is wider."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.watch import Watch
+from thermocomp.judging.watchrun import run_watch
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.stacking import stack
 from thermocomp.recordings.starts import Start
-from thermocomp.runtime.watch import WatchState, begin, look
 
 
 def believe(
@@ -38,18 +39,15 @@ def believe(
     names, values = [c.name for c in samples.inputs], samples.values.copy()
     known = [i.name in names for i in watch.inputs]
     places = [names.index(i.name) for i in watch.inputs if i.name in names]
-    fault, wider = np.zeros(len(watch.names), dtype=np.int8), 1.0
     for test in np.unique(samples.test[rows]).tolist():
-        for row, state, let in look_through(watch, seen, test):
-            values[row, places] = let[known]
-            if (state.fault != fault).any():
-                fault = state.fault
-                failed = [n for n, f in zip(watch.names, fault.tolist(), strict=True) if f and n in model.sensors]
-                wider = 1.0
-                if failed:
-                    wider = model.widening(failed) if model.may_lose(failed) else np.inf
-            widening[row] = wider
-        fault, wider = np.zeros_like(fault), 1.0
+        mine, passed, faults = look_through(watch, seen, test)
+        values[mine[:, None], places] = passed[:, known]
+        cases, which = np.unique(faults != 0, axis=0, return_inverse=True)
+        for case, failed in enumerate(cases.tolist()):
+            lost = [n for n, f in zip(watch.names, failed, strict=True) if f and n in model.sensors]
+            if lost:
+                wider = model.widening(lost) if model.may_lose(lost) else np.inf
+                widening[mine[which == case]] = wider
     return replace(samples, values=values), widening
 
 
@@ -72,20 +70,23 @@ def can_look(watch: Watch, samples: Samples) -> bool:
     return all(i.name in names for i in watch.inputs if i.quantity != "temperature")
 
 
-def look_through(watch: Watch, samples: Samples, test: int) -> Iterator[tuple[int, WatchState, FloatArray]]:
+def look_through(watch: Watch, samples: Samples, test: int) -> tuple[NDArray[np.intp], FloatArray, NDArray[np.int8]]:
     """Replay a watch over a test; inputs of the watch that the samples lack are treated as missing.
 
-    Yields
-    ------
-    let : ndarray of shape (n_inputs,)
+    Returns
+    -------
+    rows : ndarray of int of shape (n_rows,)
+        Rows of the test.
+    passed : ndarray of shape (n_rows, n_inputs)
         Readings passed, in the order of the watch's inputs.
+    faults : ndarray of int of shape (n_rows, n_sensors)
+        See `thermocomp.runtime.watch.WORDS`.
     """
     names = [c.name for c in samples.inputs]
     known = [i.name in names for i in watch.inputs]
     places = [names.index(i.name) for i in watch.inputs if i.name in names]
-    state = begin(watch, samples.given_zero(test, places) if all(known) else None)
-    for row in np.flatnonzero(samples.test == test).tolist():
-        given = np.full(len(watch.inputs), np.nan)
-        given[known] = samples.values[row, places]
-        state, let = look(watch, state, float(samples.time[row]), given, resting=bool(samples.stands[row]))
-        yield row, state, let
+    rows = np.flatnonzero(samples.test == test)
+    given = np.full((len(rows), len(watch.inputs)), np.nan)
+    given[:, known] = samples.values[rows][:, places]
+    zero = samples.given_zero(test, places) if all(known) else None
+    return rows, *run_watch(watch, samples.time[rows], given, samples.stands[rows], zero)

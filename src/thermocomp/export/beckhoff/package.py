@@ -3,12 +3,12 @@
 from collections.abc import Mapping
 
 from thermocomp.export.axes import Value, find_drives, write_values
-from thermocomp.export.block.tables import gather
 from thermocomp.export.c99.c99 import identifier
 from thermocomp.export.facts import Facts
 from thermocomp.export.st.package import write_blocks
 from thermocomp.export.target import Target
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.program.tables import gather
 
 #: P-AXIS-00273, P-AXIS-00274, P-AXIS-00272
 TAKEN = {

@@ -5,8 +5,8 @@ import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from thermocomp.export.block.tables import Tables
 from thermocomp.export.c99.cstatements import write_functions, write_tables, write_variables
+from thermocomp.runtime.program.tables import Tables
 
 _HEADER = """{facts}#ifndef {guard}
 #define {guard}

@@ -1,18 +1,20 @@
 """The block's functions in C99."""
 
-import ast
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
 
 from thermocomp.core.bounds import round_single, round_within
-from thermocomp.export.block.layout import Kind, Var
-from thermocomp.export.block.program import VARIABLES, Function, called, functions
-from thermocomp.export.block.tables import Tables
-from thermocomp.export.printer import Printer
+from thermocomp.runtime.program import tree as n
+from thermocomp.runtime.program.assembly import functions, used_locals
+from thermocomp.runtime.program.declarations import Var
+from thermocomp.runtime.program.printer import Printer
+from thermocomp.runtime.program.tables import Tables
+from thermocomp.runtime.program.tree import Function, Kind, Operator
+from thermocomp.runtime.program.variables import RECORDS
 
 TYPES: dict[Kind, str] = {"real": "tc_real", "time": "double", "int": "int", "bool": "int"}
 
@@ -25,22 +27,7 @@ def write_functions(tables: Tables, state: str) -> str:
 class _Writer(Printer):
     """Writer of one function."""
 
-    operators: ClassVar = {
-        ast.Add: "+",
-        ast.Sub: "-",
-        ast.Mult: "*",
-        ast.Div: "/",
-        ast.FloorDiv: "/",
-        ast.Mod: "%",
-        ast.And: "&&",
-        ast.Or: "||",
-        ast.Eq: "==",
-        ast.NotEq: "!=",
-        ast.Lt: "<",
-        ast.LtE: "<=",
-        ast.Gt: ">",
-        ast.GtE: ">=",
-    }
+    operators: ClassVar[Mapping[Operator, str]] = {"and": "&&", "or": "||", "//": "/"}
 
     def __init__(self, function: Function, sizes: Mapping[str, int], state: str) -> None:
         super().__init__(function, sizes)
@@ -48,50 +35,48 @@ class _Writer(Printer):
 
     def text(self) -> str:
         f = self.function
-        rest = [f"{TYPES[kind]} {name}" for name, kind in self.parameters.items()]
-        head = f"/* {f.about[0].lower()}{f.about[1:].splitlines()[0].rstrip('.')} */\nstatic "
+        rest = [f"{TYPES[kind]} {name}" for name, kind in f.parameters.items()]
+        head = f"/* {f.about[0].lower()}{f.about[1:].rstrip('.')} */\nstatic "
         if f.is_of_numbers:
             head += f"tc_real tc_{f.name}({', '.join(rest)})"
         else:
             head += f"void tc_{f.name}({', '.join([f'{self._state}_state *s', f'{self._state}_work *w', *rest])})"
-        lines = self.block(self.statements, 1)
-        declared = [f"    {TYPES[kind]} {name};" for name, kind in self.own.items()]
+        lines = self.block(f.body, 1)
         text = "\n".join(lines)
+        declared = [f"    {TYPES[kind]} {name};" for name, kind in used_locals(f).items()]
         passed = [] if f.is_of_numbers or "(s, w" in text else [v for v in "sw" if f"{v}->" not in text]
         unused = [f"    (void){v};" for v in passed]
         return f"{head}\n{{\n" + "\n".join([*declared, *([""] if declared else []), *unused, *lines]) + "\n}\n"
 
-    def statement(self, node: ast.stmt, depth: int) -> list[str]:  # noqa: PLR0911 - one case per node type
+    def statement(self, node: n.Statement, depth: int) -> list[str]:  # noqa: PLR0911 - one case per node type
         pad, inner = "    " * depth, depth + 1
         match node:
-            case ast.Assign([target], value):
-                return [f"{pad}{self.value(target)} = {self._as(value, self.kind(target))};"]
-            case ast.Expr(ast.Call() as call):
-                given = [self._as(a, "real" if self.kind(a) == "time" else self.kind(a)) for a in call.args[3:]]
-                return [f"{pad}tc_{called(call)}({', '.join(['s', 'w', *given])});"]
-            case ast.Return(value) if value is not None:
+            case n.Assign(target, value):
+                return [f"{pad}{self.value(target)} = {self._as(value, target.kind)};"]
+            case n.Run(name, arguments):
+                given = [self._as(a, "real" if a.kind == "time" else a.kind) for a in arguments]
+                return [f"{pad}tc_{name}({', '.join(['s', 'w', *given])});"]
+            case n.Return(value):
                 return [f"{pad}return {self._as(value, 'real')};"]
-            case ast.If(test, body, orelse):
+            case n.If(test, body, other):
                 lines = [f"{pad}if ({self.bare(test)}) {{", *self.block(body, inner)]
-                if len(orelse) == 1 and isinstance(orelse[0], ast.If):
-                    chained = self.statement(orelse[0], depth)
+                if len(other) == 1 and isinstance(other[0], n.If):
+                    chained = self.statement(other[0], depth)
                     return [*lines, f"{pad}}} else {chained[0].lstrip()}", *chained[1:]]
-                other = [f"{pad}}} else {{", *self.block(orelse, inner)] if orelse else []
-                return [*lines, *other, f"{pad}}}"]
-            case ast.For(ast.Name(name), ast.Call(args=bounds), body):
-                begin, end = bounds if len(bounds) == 2 else (ast.Constant(0), bounds[0])
+                rest = [f"{pad}}} else {{", *self.block(other, inner)] if other else []
+                return [*lines, *rest, f"{pad}}}"]
+            case n.For(n.Name(_, name), begin, end, body):
                 head = f"for ({name} = {self.value(begin)}; {name} < {self.value(end)}; {name}++) {{"
                 return [f"{pad}{head}", *self.block(body, inner), f"{pad}}}"]
-            case ast.While(test, body):
+            case n.While(test, body):
                 return [f"{pad}while ({self.bare(test)}) {{", *self.block(body, inner), f"{pad}}}"]
-        raise TypeError(f"{ast.unparse(node)}: is not a statement of a block")
 
-    def _as(self, node: ast.expr, kind: Kind) -> str:
+    def _as(self, node: n.Expression, kind: Kind) -> str:
         text = self.bare(node, kind)
-        return f"(tc_real)({text})" if kind == "real" and self.kind(node) == "time" else text
+        return f"(tc_real)({text})" if kind == "real" and node.kind == "time" else text
 
-    def variable(self, owner: str, name: str) -> str:
-        return "TC_ZERO_READINGS" if name == "MOST" else f"c_{name}" if owner == "t" else f"{owner}->{name}"
+    def variable(self, record: str, name: str) -> str:
+        return "TC_ZERO_READINGS" if name == "MOST" else f"c_{name}" if record == "t" else f"{record}->{name}"
 
     def choice(self, test: str, one: str, other: str) -> str:
         return f"({test} ? {one} : {other})"
@@ -99,9 +84,9 @@ class _Writer(Printer):
     def negated(self, text: str) -> str:
         return f"!{text}"
 
-    def call(self, name: str, args: list[ast.expr]) -> str:
-        time = self.kind(args[0]) == "time" and name == "abs"
-        given = ", ".join(self._as(a, "time" if time else "real") for a in args)
+    def call(self, name: str, arguments: Sequence[n.Expression]) -> str:
+        time = arguments[0].kind == "time" and name == "abs"
+        given = ", ".join(self._as(a, "time" if time else "real") for a in arguments)
         if name == "abs":
             return f"fabs({given})" if time else f"TC_MATH(fabs)({given})"
         return f"TC_MATH({name})({given})" if hasattr(math, name) else f"tc_{name}({given})"
@@ -135,7 +120,7 @@ def write_tables(tables: Tables, used: str) -> str:
 
 def _used(owner: str, used: str, before: str) -> dict[str, Var]:
     names = set(re.findall(rf"\b{before}(\w+)", used))
-    return {n: v for n, v in VARIABLES[owner].items() if n in names}
+    return {n: v for n, v in RECORDS[owner].variables().items() if n in names}
 
 
 def _dims(var: Var, sizes: Mapping[str, int]) -> str:

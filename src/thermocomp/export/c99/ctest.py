@@ -3,8 +3,8 @@
 import math
 from collections.abc import Iterable
 
-from thermocomp.export.block.tables import Tables
 from thermocomp.export.vectors import Answers, Readings
+from thermocomp.runtime.program.tables import Tables
 
 _PROGRAM = """/* runs {name}.c over its test vectors: {name}.md says how */
 #include "{name}.h"

@@ -9,7 +9,6 @@ import numpy as np
 
 from thermocomp.core.bounds import round_single
 from thermocomp.core.exceptions import SettingError
-from thermocomp.export.block.tables import Tables, gather
 from thermocomp.export.c99.c99 import translate
 from thermocomp.export.c99.ctest import write_test
 from thermocomp.export.facts import Facts
@@ -17,6 +16,7 @@ from thermocomp.export.pages import describe
 from thermocomp.export.target import Target
 from thermocomp.export.vectors import Answers, FloatArray, Readings, find_tolerance, make_readings, replay, round_all
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.program.tables import Tables, gather
 
 _README = """{facts}
 

@@ -4,8 +4,8 @@ import textwrap
 from collections.abc import Mapping, Sequence
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.export.block.tables import Tables
 from thermocomp.export.c99.c99 import comment
+from thermocomp.runtime.program.tables import Tables
 
 #: resolution of the external offset counts [mm]
 RESOLUTION = 1e-5

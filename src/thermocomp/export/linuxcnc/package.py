@@ -4,7 +4,6 @@ import re
 from collections.abc import Mapping
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.export.block.tables import gather
 from thermocomp.export.c99 import package as cpackage
 from thermocomp.export.c99.c99 import identifier
 from thermocomp.export.facts import Facts
@@ -13,6 +12,7 @@ from thermocomp.export.pages import describe
 from thermocomp.export.reduction.reduced import find_axis
 from thermocomp.export.target import Target
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.program.tables import gather
 
 _README = """{facts}
 

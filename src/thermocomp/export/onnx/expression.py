@@ -6,7 +6,7 @@ import numpy as np
 
 from thermocomp.core import expression as e
 from thermocomp.export.onnx.nodes import Graph
-from thermocomp.export.recurrences import Clock
+from thermocomp.runtime.program.recurrences import Clock
 
 #: largest number of ticks in one call (0.6 s of computing time): a model with roots below 0.9997 has settled by then
 MOST_TICKS = 100_000

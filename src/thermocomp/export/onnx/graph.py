@@ -1,6 +1,6 @@
 """A compensator as one step of ONNX: values and a state in, corrections and the next state out.
 
-The processing chain is that of `thermocomp.export.block.steps`, without the watch over the sensors and without the
+The processing chain is that of `thermocomp.runtime.program.steps`, without the watch over the sensors and without the
 averaging of the zero: the caller supplies the zero.
 """
 
@@ -10,12 +10,12 @@ from itertools import pairwise
 import numpy as np
 
 from thermocomp.core.bounds import GAP, MEMORY, READING
-from thermocomp.export.block.steps import ACTIVE, FADING, HOLDING, SHADOW
-from thermocomp.export.block.tables import Tables, formula
 from thermocomp.export.onnx.expression import Memory, Walk
 from thermocomp.export.onnx.limits import Drive
 from thermocomp.export.onnx.nodes import Graph
 from thermocomp.export.onnx.support import support
+from thermocomp.runtime.program.steps import ACTIVE, FADING, HOLDING, SHADOW
+from thermocomp.runtime.program.tables import Tables, formula
 
 #: elements at the beginning of the state: has begun, clock, values were used, time of last use
 CLOCKS = 4

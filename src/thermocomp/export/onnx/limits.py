@@ -3,12 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.export.block.tables import Tables
 from thermocomp.export.onnx.nodes import Graph
+from thermocomp.runtime.program.tables import Tables
 
 
 class Drive:
-    """Movement of corrections, equivalent to ``drive`` and ``idle`` of `thermocomp.export.block.steps`."""
+    """Movement of corrections, equivalent to ``drive`` and ``idle`` of `thermocomp.runtime.program.steps`."""
 
     def __init__(self, graph: Graph, tables: Tables) -> None:
         t, self._graph = tables.values, graph

@@ -1,7 +1,6 @@
 """All files of an export to ONNX: the graph, its test vectors with a program that runs them, and the instructions."""
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.export.block.tables import Tables, gather
 from thermocomp.export.c99.c99 import identifier
 from thermocomp.export.facts import Facts
 from thermocomp.export.onnx.graph import GraphBlock, translate
@@ -10,6 +9,7 @@ from thermocomp.export.onnx.vectors import PROGRAM, answer, pick_readings, pick_
 from thermocomp.export.target import Target
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.gate import DAY
+from thermocomp.runtime.program.tables import Tables, gather
 
 #: stated with the facts in all files
 NOT_INSIDE = (

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core.zero import FIRST_READING
-from thermocomp.export.block.tables import Tables
 from thermocomp.export.vectors import Answers, Readings, find_tolerance, make_readings, replay
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.gate import CLOCK_SKEW
+from thermocomp.runtime.program.tables import Tables
 
 FloatArray = NDArray[np.float64]
 

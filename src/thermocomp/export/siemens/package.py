@@ -3,12 +3,12 @@
 from collections.abc import Mapping
 
 from thermocomp.export.axes import Drive, Value, find_drives, write_values
-from thermocomp.export.block.tables import gather
 from thermocomp.export.c99.c99 import identifier
 from thermocomp.export.facts import Facts
 from thermocomp.export.st.package import write_blocks
 from thermocomp.export.target import Target
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.program.tables import gather
 
 #: SD43900, SD43910, SD43920: K0 [mm], tan beta, P0 [mm]
 TAKEN = {

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import get_args
 from uuid import NAMESPACE_URL, uuid5
 
-from thermocomp.export.block.tables import Tables, gather
 from thermocomp.export.c99.c99 import identifier
 from thermocomp.export.facts import Facts
 from thermocomp.export.pages import describe
@@ -14,6 +13,7 @@ from thermocomp.export.st.sttest import allow, write_test
 from thermocomp.export.target import Target
 from thermocomp.export.vectors import make_readings, replay
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.program.tables import Tables, gather
 
 _INSTALL: dict[Dialect, str] = {
     "codesys": """`{name}.st` holds types, functions and the function block `{name}`, in IEC 61131-3 structured text.

@@ -3,8 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from thermocomp.export.block.layout import Kind
-from thermocomp.export.block.tables import Tables
 from thermocomp.export.st.ststatements import (
     BAGS,
     SCL,
@@ -21,6 +19,8 @@ from thermocomp.export.st.ststatements import (
     write_functions,
     write_type,
 )
+from thermocomp.runtime.program.tables import Tables
+from thermocomp.runtime.program.tree import Kind
 
 #: represents NaN and infinity: a controller may stop at a NaN
 NOTHING = 1e31

@@ -1,15 +1,17 @@
 """The block's functions in structured text (IEC 61131-3), in the dialects of CODESYS, TwinCAT and Siemens SCL."""
 
-import ast
 import re
 import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
-from thermocomp.export.block.layout import Kind, Var
-from thermocomp.export.block.program import VARIABLES, Function, called, functions, parameters_of
-from thermocomp.export.block.tables import Tables
-from thermocomp.export.printer import Printer, written
+from thermocomp.runtime.program import tree as n
+from thermocomp.runtime.program.assembly import functions, used_locals
+from thermocomp.runtime.program.declarations import Var
+from thermocomp.runtime.program.printer import Printer, written
+from thermocomp.runtime.program.tables import Tables
+from thermocomp.runtime.program.tree import Function, Kind, Operator
+from thermocomp.runtime.program.variables import RECORDS
 
 Dialect = Literal["codesys", "twincat", "scl"]
 
@@ -53,28 +55,20 @@ def number(value: float, kind: Kind = "real") -> str:
 def write_functions(tables: Tables, name: str, dialect: Dialect) -> dict[str, tuple[str, str]]:
     """Return declaration and statements of the functions that a block needs, by name."""
     found = functions(tables, {"expm1": "exp_less_one", "pow": "power"})
-    parameters = {f.name: parameters_of(f) for f in found}
+    parameters = {f.name: f.parameters for f in found}
     return {f"{name}_{f.name}": _Writer(f, tables, name, dialect, parameters).text() for f in found}
 
 
 class _Writer(Printer):
     """Writer of one function."""
 
-    operators: ClassVar = {
-        ast.Add: "+",
-        ast.Sub: "-",
-        ast.Mult: "*",
-        ast.Div: "/",
-        ast.FloorDiv: "/",
-        ast.Mod: "MOD",
-        ast.And: "AND",
-        ast.Or: "OR",
-        ast.Eq: "=",
-        ast.NotEq: "<>",
-        ast.Lt: "<",
-        ast.LtE: "<=",
-        ast.Gt: ">",
-        ast.GtE: ">=",
+    operators: ClassVar[Mapping[Operator, str]] = {
+        "//": "/",
+        "%": "MOD",
+        "and": "AND",
+        "or": "OR",
+        "==": "=",
+        "!=": "<>",
     }
 
     def __init__(
@@ -90,51 +84,47 @@ class _Writer(Printer):
 
     def text(self) -> tuple[str, str]:
         f = self.function
-        given = {n: TYPES[kind] for n, kind in self.parameters.items()}
+        given = {p: TYPES[kind] for p, kind in f.parameters.items()}
         bags = {} if f.is_of_numbers else {v: quoted(f"{self._name}_{b}", self._scl) for v, b in BAGS.items()}
-        own = {n: TYPES[kind] for n, kind in self.own.items()}
+        own = {v: TYPES[kind] for v, kind in used_locals(f).items()}
         gives = "LREAL" if f.is_of_numbers else "Void" if self._scl else "BOOL"
         head = f"FUNCTION {quoted(f'{self._name}_{f.name}', self._scl)} : {gives}"
-        parts = [head, *(SCL if self._scl else []), f"(* {f.about.splitlines()[0]} *)"]
+        parts = [head, *(SCL if self._scl else []), f"(* {f.about} *)"]
         parts += [section("VAR_IN_OUT", bags), section("VAR_INPUT", given)]
         parts += [section("VAR_TEMP" if self._scl else "VAR", own)]
-        return "\n".join(filter(None, parts)), "\n".join(wrapped(x) for x in self.block(self.statements, 0))
+        return "\n".join(filter(None, parts)), "\n".join(wrapped(x) for x in self.block(f.body, 0))
 
-    def statement(self, node: ast.stmt, depth: int) -> list[str]:  # noqa: PLR0911 - one case per node type
+    def statement(self, node: n.Statement, depth: int) -> list[str]:  # noqa: PLR0911 - one case per node type
         pad, inner = "    " * depth, depth + 1
         match node:
-            case ast.Assign([target], ast.IfExp(test, body, orelse)):
-                one, other = ast.Assign([target], body), ast.Assign([target], orelse)
-                return self.statement(ast.If(test, [one], [other]), depth)
-            case ast.Assign([target], value):
-                return [f"{pad}{self.value(target)} := {self.bare(value, self.kind(target))};"]
-            case ast.Return(ast.IfExp(test, body, orelse)):
-                return self.statement(ast.If(test, [ast.Return(body)], [ast.Return(orelse)]), depth)
-            case ast.Return(value) if value is not None:
-                return [f"{pad}{self._local(f'{self._name}_{self.function.name}')} := {self.bare(value, 'real')};"]
-            case ast.Expr(ast.Call() as call):
-                return [f"{pad}{self._call(called(call), call.args[3:], list(BAGS))};"]
-            case ast.If(test, body, orelse):
+            case n.Assign(target, n.Choice(_, test, one, other)):
+                return self.statement(n.If(test, [n.Assign(target, one)], [n.Assign(target, other)]), depth)
+            case n.Assign(target, value):
+                return [f"{pad}{self.value(target)} := {self.bare(value)};"]
+            case n.Return(n.Choice(_, test, one, other)):
+                return self.statement(n.If(test, [n.Return(one)], [n.Return(other)]), depth)
+            case n.Return(value):
+                return [f"{pad}{self._local(f'{self._name}_{self.function.name}')} := {self.bare(value)};"]
+            case n.Run(name, arguments):
+                return [f"{pad}{self._call(name, arguments, list(BAGS))};"]
+            case n.If(test, body, other):
                 lines = [f"{pad}IF {self.bare(test)} THEN", *self.block(body, inner)]
-                if len(orelse) == 1 and isinstance(orelse[0], ast.If):
-                    chained = self.statement(orelse[0], depth)
+                if len(other) == 1 and isinstance(other[0], n.If):
+                    chained = self.statement(other[0], depth)
                     return [*lines, f"{pad}ELS{chained[0].lstrip()}", *chained[1:]]
-                rest = [f"{pad}ELSE", *self.block(orelse, inner)] if orelse else []
+                rest = [f"{pad}ELSE", *self.block(other, inner)] if other else []
                 return [*lines, *rest, f"{pad}END_IF;"]
-            case ast.For(ast.Name(name), ast.Call(args=bounds), body):
-                begin, end = bounds if len(bounds) == 2 else (ast.Constant(0), bounds[0])
-                last = self.value(end, "int")
+            case n.For(n.Name(_, name), begin, end, body):
+                last = self.value(end)
                 last = str(int(last) - 1) if last.isdecimal() else f"{last} - 1"
                 head = f"FOR {self.local(name)} := {self.value(begin)} TO {last} DO"
                 return [f"{pad}{head}", *self.block(body, inner), f"{pad}END_FOR;"]
-            case ast.While(test, body):
+            case n.While(test, body):
                 return [f"{pad}WHILE {self.bare(test)} DO", *self.block(body, inner), f"{pad}END_WHILE;"]
-        raise TypeError(f"{ast.unparse(node)}: is not a statement of a block")
 
-    def _call(self, name: str, args: Sequence[ast.expr], bags: Sequence[str] = ()) -> str:
+    def _call(self, name: str, arguments: Sequence[n.Expression], bags: Sequence[str] = ()) -> str:
         given = [f"{v} := {self._local(v)}" for v in bags]
-        wanted = zip(self._others[name].items(), args, strict=True)
-        given += [f"{safe(n)} := {self.bare(a, kind)}" for (n, kind), a in wanted]
+        given += [f"{safe(p)} := {self.bare(a)}" for p, a in zip(self._others[name], arguments, strict=True)]
         return f"{quoted(f'{self._name}_{name}', self._scl)}({', '.join(given)})"
 
     def local(self, name: str) -> str:
@@ -143,15 +133,14 @@ class _Writer(Printer):
     def _local(self, name: str) -> str:
         return f"#{name}" if self._scl else name
 
-    def variable(self, owner: str, name: str) -> str:
-        return str(self.sizes[name]) if name == "MOST" else f"{self._local(owner)}.{safe(name)}"
+    def variable(self, record: str, name: str) -> str:
+        return str(self.sizes[name]) if name == "MOST" else f"{self._local(record)}.{safe(name)}"
 
-    def element(self, array: ast.expr, at: list[ast.expr]) -> str:
-        assert isinstance(array, ast.Attribute)
-        assert isinstance(array.value, ast.Name)
+    def element(self, array: n.Name, at: Sequence[n.Expression]) -> str:
         index = at[0]
-        for dim, inner in zip(VARIABLES[array.value.id][array.attr].dims[1:], at[1:], strict=True):
-            index = ast.BinOp(ast.BinOp(index, ast.Mult(), ast.Constant(max(self.sizes[dim], 1))), ast.Add(), inner)
+        for dim, inner in zip(array.dims[1:], at[1:], strict=True):
+            width = n.Constant("int", max(self.sizes[dim], 1))
+            index = n.Operation("int", "+", n.Operation("int", "*", index, width), inner)
         return f"{self.value(array)}[{self.bare(index)}]"
 
     def choice(self, test: str, one: str, other: str) -> str:
@@ -160,15 +149,15 @@ class _Writer(Printer):
     def negated(self, text: str) -> str:
         return f"(NOT {text})"
 
-    def real(self, text: str, kind: Kind) -> str:  # noqa: ARG002 - only one precision
+    def real(self, text: str) -> str:
         return f"DINT_TO_LREAL({text[1:-1] if text.startswith('(') else text})"
 
-    def call(self, name: str, args: list[ast.expr]) -> str:
+    def call(self, name: str, arguments: Sequence[n.Expression]) -> str:
         if name == "floor":  # the argument is never negative
-            return f"DINT_TO_LREAL(TRUNC({self.bare(args[0], 'real')}))"
+            return f"DINT_TO_LREAL(TRUNC({self.bare(arguments[0])}))"
         if name in _LIBRARY:
-            return f"{_LIBRARY[name]}({self.bare(args[0], self.kind(args[0]))})"
-        return self._call(name, args)
+            return f"{_LIBRARY[name]}({self.bare(arguments[0])})"
+        return self._call(name, arguments)
 
     def constant(self, value: float, kind: Kind) -> str:
         return number(value, kind) if value >= 0 else f"({number(value, kind)})"
@@ -214,17 +203,17 @@ def write_type(tables: Tables, name: str, bag: str, used: str, dialect: Dialect)
     lines = [f"TYPE {quoted(f'{name}_{BAGS[bag]}', scl)}{'' if scl else ' :'}"]
     lines += SCL[1:] if scl else []
     lines += ["STRUCT"]
-    for n, var in used_in(bag, used).items():
+    for name_, var in used_in(bag, used).items():
         size = size_of(var, tables.sizes)
         what = array(var.kind, size) if var.dims else TYPES[var.kind]
-        start = f" := {values(tables.values[n], var.kind)}" if bag == "t" else ""
-        lines += [wrapped(f"    {safe(n)} : {what}{start};"), f"    (* {var.about} *)"]
+        start = f" := {values(tables.values[name_], var.kind)}" if bag == "t" else ""
+        lines += [wrapped(f"    {safe(name_)} : {what}{start};"), f"    (* {var.about} *)"]
     return "\n".join([*lines, f"END_STRUCT{';' if scl else ''}", "END_TYPE"])
 
 
 def used_in(bag: str, used: str) -> dict[str, Var]:
     """Return the variables of a structure that are used in a text."""
-    return {n: v for n, v in VARIABLES[bag].items() if re.search(rf"\b{bag}\.{safe(n)}\b", used)}
+    return {k: v for k, v in RECORDS[bag].variables().items() if re.search(rf"\b{bag}\.{safe(k)}\b", used)}
 
 
 def size_of(var: Var, sizes: Mapping[str, int]) -> int:

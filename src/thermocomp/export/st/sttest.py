@@ -5,11 +5,11 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from thermocomp.export.block.layout import Kind
-from thermocomp.export.block.tables import Tables
 from thermocomp.export.st.structuredtext import NOTHING, SourceUnit
 from thermocomp.export.st.ststatements import SCL, Dialect, array, number, quoted, section, values, wrapped
 from thermocomp.export.vectors import Answers, Readings, find_tolerance
+from thermocomp.runtime.program.tables import Tables
+from thermocomp.runtime.program.tree import Kind
 
 #: minimum tolerance, as a fraction of the correction, or in um for corrections below 1 um
 _TOLERANCE = 1e-9

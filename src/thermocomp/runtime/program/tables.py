@@ -1,9 +1,10 @@
-"""Numbers of a compensator, in the form of its block: see `thermocomp.export.block.layout`."""
+"""Numbers of a compensator, as constants of its program: see `thermocomp.runtime.program.variables`."""
 
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.expression import Clip, Node
 from thermocomp.core.expression import Input as Leaf
@@ -11,9 +12,10 @@ from thermocomp.core.inputs import Input
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.watch import Watch
 from thermocomp.core.zero import MOST
-from thermocomp.export.block.models import Formulas
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.gate import MIN_SPAN, PLAUSIBLE, WIDE
+from thermocomp.runtime.program.models import Formulas
+from thermocomp.runtime.program.tree import Function
 
 #: any number, in single precision too
 ANY = (-1e30, 1e30)
@@ -28,8 +30,10 @@ class Tables(NamedTuple):
     targets: tuple[str, ...]
     models: tuple[ErrorModel, ...]
     sizes: dict[str, int]  #: array dimensions of the variables by name, and flags of optional features
-    values: dict[str, Any]  #: numbers, or nested lists of them, by the names of `layout.TABLES`
-    formulas: dict[str, str]  #: functions generated from the models' formulas, in Python
+    values: dict[
+        str, Any
+    ]  #: numbers, or nested lists of them, by the names of `thermocomp.runtime.program.variables.Tables`
+    formulas: dict[str, Function]  #: functions generated from the models' formulas
 
 
 def gather(compensator: Compensator) -> Tables:
@@ -207,6 +211,27 @@ def _watch_sizes(watch: Watch | None) -> dict[str, int]:
         "SHAPES": 2,
         "watch_waits": int(any(i.rezero for i in watch.inputs)),
     }
+
+
+def constants_of_watch(watch: Watch, reference: FloatArray | None = None) -> tuple[dict[str, int], dict[str, Any]]:
+    """Return the sizes and numbers of a watch alone, whose inputs are the channels.
+
+    Parameters
+    ----------
+    reference : ndarray of shape (n_inputs,), optional
+        Zero of the inputs; nan where the first readings determine it, as by default for inputs with ``rezero``.
+    """
+    if reference is None:
+        reference = np.array([np.nan if i.rezero else i.reference for i in watch.inputs])
+    waits, zeroing = np.isnan(reference), watch.zeroing
+    sizes = _watch_sizes(watch) | {"CHANNELS": len(watch.inputs), "MOST": MOST, "COLUMN": max(MOST, len(watch.sensors))}
+    values = _watch(watch, {name: k for k, name in enumerate(i.name for i in watch.inputs)}) | {
+        "at_rest": zeroing.at_rest,
+        "otherwise": zeroing.otherwise,
+        "watch_rezero": waits,
+        "watch_reference": np.nan_to_num(reference),
+    }
+    return sizes | {"watch_waits": int(waits.any())}, values
 
 
 def _watch(watch: Watch | None, place: dict[str, int]) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Models outside their training range: ``hold`` and ``fade``, as statements of a block, and their numbers."""
+"""Models outside their training range: ``hold`` and ``fade``, as statements of a program, and their numbers."""
 
 import math
 from collections.abc import Sequence
@@ -8,6 +8,11 @@ from typing import Any
 from thermocomp.core.inputs import Input
 from thermocomp.core.joint import JointSupport
 from thermocomp.core.model import ErrorModel
+from thermocomp.runtime.program.distances import find_distances
+from thermocomp.runtime.program.language import let, when
+from thermocomp.runtime.program.numbers import larger
+from thermocomp.runtime.program.values import Number, integer, real
+from thermocomp.runtime.program.variables import State, Tables, Work
 
 
 class Supports:
@@ -23,38 +28,43 @@ class Supports:
         self._ranges = ranges
         self._known: dict[str, int] = {}
         self._models: list[ErrorModel] = []
+        self._distances: dict[int, tuple[Number, Number]] = {}
 
-    def statements(self, model: ErrorModel, place: int, said: str, worked_out: set[int]) -> list[str]:
-        """Return the statements applied to the output of a model: they change ``s.deviation[place]``.
+    def record(self, model: ErrorModel, place: int, said: Number, worked_out: set[int]) -> None:
+        """Record the statements applied to the output of a model: they change ``s.deviation[place]``.
 
         Parameters
         ----------
-        model : ErrorModel
         place : int
             Index of the model.
-        said : str
+        said : Number
             Output of the model.
         worked_out : set of int
             Indices of the distances already computed in the function.
         """
-        own, policy = f"s.deviation[{place}]", model.support.policy
+        s, w, t = State(), Work(), Tables()
+        policy = model.support.policy
         if policy == "clip":
-            return [f"{own} = {said}"]
+            s.deviation[place] = said
+            return
         key = repr((model.inputs, *model.bounds, model.joint))
         k = self._known.setdefault(key, len(self._known))
-        lines = []
         if k == len(self._models):
             self._models.append(model)
         if k not in worked_out:
             worked_out.add(k)
-            lines = [f"find_distances(s, w, t, {k})", f"excess{k} = w.excess", f"far{k} = w.distance"]
+            find_distances(s, w, t, integer(k))
+            self._distances[k] = let(f"excess{k}", w.excess), let(f"far{k}", w.distance)
+        excess, far = self._distances[k]
         if policy == "hold":
-            return [*lines, f"if not (excess{k} > 0.0 or far{k} > 1.0):", f"    {own} = {said}"]
-        most = f"larger((far{k} - 1.0) / {float(model.support.fade_over)!r}, excess{k})"
-        return [*lines, f"{own} = {said} * larger(0.0, 1.0 - {most})"]
+            with when(~((excess > 0.0) | (far > 1.0))):
+                s.deviation[place] = said
+        else:
+            most = larger((far - 1.0) / float(model.support.fade_over), excess)
+            s.deviation[place] = said * larger(real(0.0), 1.0 - most)
 
     def finish(self) -> tuple[dict[str, int], dict[str, list[Any]]]:
-        """Return the sizes and numbers of `thermocomp.export.block.distances`."""
+        """Return the sizes and numbers of `thermocomp.runtime.program.distances`."""
         models = self._models
         bounds = [m.bounds for m in models]
         joints = [

@@ -1,0 +1,159 @@
+"""Sensor failure that explains the residuals of readings, as scalars and loops: see `thermocomp.runtime.blame`."""
+
+from thermocomp.runtime.blame import AGAINST, USUAL
+from thermocomp.runtime.program.language import choose, each, let, procedure, when
+from thermocomp.runtime.program.numbers import follow, larger
+from thermocomp.runtime.program.values import Number, flag, real
+from thermocomp.runtime.program.variables import State, Tables, Work
+from thermocomp.runtime.watch import GOOD, OFF, REST, STEPPED, STUCK, SWAPPED
+
+
+@procedure
+def blame(s: State, w: Work, t: Tables, elapsed: Number) -> None:
+    """Exclude failed sensors: a swapped pair if it explains all, and better than one sensor; else single sensors."""
+    for i in each("i", t.SENSORS):
+        w.able[i] = w.calm[i] | w.waiting[i]
+        with when(~w.able[i]):
+            w.x[i] = s.used[i]
+    weigh_swaps(s, w, t, choose(~s.was_fast | (w.now - s.fast > REST), elapsed, 0.0))
+    alone = let("alone", flag(False))
+    for i in each("i", t.SENSORS):
+        with when(w.stepped[i] | w.stuck[i]):
+            alone.set(True)
+    with when(w.lasting | alone):
+        find_one(s, w, t)
+        swapped = let("swapped", (w.both >= 0) & (w.both_worst <= 1.0) & ((w.one < 0) | (w.both_rest < w.one_rest)))
+        with when(swapped):
+            for i in each("i", t.SENSORS):
+                w.failing[i] = i.equals(t.pair_first[w.both]) | i.equals(t.pair_second[w.both])
+                w.onset[i] = 0.0
+            w.new_fault = SWAPPED
+            fail(s, w, t)
+        for i in each("i", t.SENSORS):
+            w.failing[i] = w.stepped[i] & ~swapped & s.fault[i].equals(GOOD)
+            w.onset[i] = s.usual[i]
+        w.new_fault = STEPPED
+        fail(s, w, t)
+        for i in each("i", t.SENSORS):
+            w.failing[i] = w.stuck[i] & ~swapped & s.fault[i].equals(GOOD)
+            w.onset[i] = w.x[i] - s.then_predicted[i]
+        w.new_fault = STUCK
+        fail(s, w, t)
+        for i in each("i", t.SENSORS):
+            w.able[i] = w.able[i] & ~s.has_jumped[i]
+            w.weighed[i] = choose(w.able[i], w.x[i] - s.predicted[i], 0.0)
+        weigh_one(s, w, t)
+        # otherwise no single failure explains the difference: the machine behaves differently from its training
+        with when(w.lasting & ~swapped & ~alone & (w.one >= 0) & (w.one_worst <= 1.0)):
+            for i in each("i", t.SENSORS):
+                w.failing[i] = i.equals(w.one)
+                w.onset[i] = 0.0
+            w.new_fault = OFF
+            fail(s, w, t)
+
+
+@procedure
+def find_one(s: State, w: Work, t: Tables) -> None:
+    """Find the sensor whose failure explains most of the current readings."""
+    differ(s, w, t)
+    for i in each("i", t.SENSORS):
+        with when(~w.able[i]):
+            w.weighed[i] = 0.0
+    weigh_one(s, w, t)
+
+
+@procedure
+def differ(s: State, w: Work, t: Tables) -> None:
+    """Compute in `weighed` the differences between the current readings and the predictions from the other sensors."""
+    for i in each("i", t.SENSORS):
+        w.weighed[i] = w.x[i]
+        for k in each("k", t.SENSORS):
+            w.weighed[i] = w.weighed[i] - w.x[k] * t.direct[k, i]
+        for k in each("k", t.MEMORY):
+            w.weighed[i] = w.weighed[i] - s.memory[k] * t.weight[k, i]
+
+
+@procedure
+def weigh_one(s: State, w: Work, t: Tables) -> None:
+    """Find the sensor whose failure, immediate or lagged, leaves the smallest differences."""
+    w.one = -1
+    w.one_rest = 0.0
+    w.one_worst = 0.0
+    for h in each("h", t.SHAPES):
+        for j in each("j", t.SENSORS):
+            with when(w.able[j]):
+                amount = let("amount", real(0.0))
+                square = let("square", real(0.0))
+                for i in each("i", t.SENSORS):
+                    amount.set(amount + w.weighed[i] / t.unseen[i] * t.shape[h, i, j])
+                    square.set(square + t.shape[h, i, j] * t.shape[h, i, j])
+                amount.set(amount / square)
+                rest = let("rest", real(0.0))
+                worst = let("worst", real(0.0))
+                for i in each("i", t.SENSORS):
+                    left = let("left", w.weighed[i] / t.unseen[i] - t.shape[h, i, j] * amount)
+                    rest.set(rest + left * left)
+                    worst.set(larger(worst, abs(left * t.unseen[i] / t.off_limit[i])))
+                with when((w.one < 0) | (rest < w.one_rest)):
+                    w.one = j
+                    w.one_rest = rest
+                    w.one_worst = worst
+
+
+@procedure
+def weigh_swaps(s: State, w: Work, t: Tables, counts: Number) -> None:
+    """Weigh the evidence for swapped sensors, and find the pair whose exchange leaves the smallest differences."""
+    differ(s, w, t)
+    w.both = -1
+    w.both_rest = 0.0
+    w.both_worst = 0.0
+    whole = let("whole", real(0.0))
+    for i in each("i", t.SENSORS):
+        with when(w.able[i]):
+            whole.set(whole + w.weighed[i] / t.unseen[i] * (w.weighed[i] / t.unseen[i]))
+    for p in each("p", t.PAIRS):
+        with when(~s.cleared[p]):
+            a = let("a", t.pair_first[p])
+            b = let("b", t.pair_second[p])
+            rest = let("rest", real(0.0))
+            worst = let("worst", real(0.0))
+            for i in each("i", t.SENSORS):
+                with when(w.able[i]):
+                    own = let("own", t.direct[b, i] - t.direct[a, i])
+                    with when(i.equals(a)):
+                        own.set(own + 1.0)
+                    with when(i.equals(b)):
+                        own.set(own - 1.0)
+                    left = let("left", w.weighed[i] + (w.x[b] - w.x[a]) * own)
+                    for k in each("k", t.TAUS):
+                        apart = let("apart", s.memory[k * t.SENSORS + b] - s.memory[k * t.SENSORS + a])
+                        left.set(left - apart * (t.weight[k * t.SENSORS + a, i] - t.weight[k * t.SENSORS + b, i]))
+                    rest.set(rest + left / t.unseen[i] * (left / t.unseen[i]))
+                    worst.set(larger(worst, abs(left / t.off_limit[i])))
+            with when(w.able[a] & w.able[b]):
+                s.evidence[p] = follow(s.evidence[p], whole - rest, counts / USUAL)
+                with when((w.both < 0) | (rest < w.both_rest)):
+                    w.both = p
+                    w.both_rest = rest
+                    w.both_worst = worst
+            s.cleared[p] = ~(s.evidence[p] > -AGAINST * t.SENSORS.real)
+
+
+@procedure
+def fail(s: State, w: Work, t: Tables) -> None:
+    """Exclude sensors, and remove the effect of their last readings on the predictions."""
+    fails = let("fails", flag(False))
+    for i in each("i", t.SENSORS):
+        with when(w.failing[i]):
+            fails.set(True)
+            for k in each("k", t.TAUS):
+                s.memory[k * t.SENSORS + i] = s.memory[k * t.SENSORS + i] - s.traces[k * t.SENSORS + i]
+                s.traces[k * t.SENSORS + i] = 0.0
+            s.fault[i] = w.new_fault
+            s.since[i] = w.now
+            s.bridge[i] = w.onset[i]
+            s.used[i] = s.predicted[i] + w.onset[i]
+            s.has_jumped[i] = False
+    with when(fails & (w.new_fault.equals(OFF) | w.new_fault.equals(SWAPPED))):
+        for i in each("i", t.SENSORS):
+            s.is_off[i] = False

@@ -1,0 +1,93 @@
+"""Variables of the program of any compensator in flat arrays: real numbers and integers of each record."""
+
+from collections.abc import Mapping
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.runtime.program.declarations import Var
+from thermocomp.runtime.program.tree import Kind
+from thermocomp.runtime.program.variables import RECORDS, Tables
+
+IntArray = NDArray[np.int64]
+
+
+class Place(NamedTuple):
+    """Where a variable stands."""
+
+    array: str  #: letter of its record, then ``r`` for real numbers or ``i`` for integers
+    place: int  #: of a number in this array; of an array in ``at``, where its first element is found
+
+
+def letter_of(kind: Kind) -> str:
+    """Return ``r`` for real numbers and times, ``i`` for integers and conditions."""
+    return "r" if kind in ("real", "time") else "i"
+
+
+def _dimensions() -> list[str]:
+    options = [k for k, v in vars(Tables).items() if isinstance(v, Var) and k not in Tables.variables()]
+    dims = [d for r in RECORDS.values() for v in r.variables().values() for d in v.dims]
+    return list(dict.fromkeys([*options, *dims]))
+
+
+#: place of each size and option of a compensator
+SIZES: dict[str, int] = {name: k for k, name in enumerate(_dimensions())}
+#: arrays of a program, in the order of its arguments
+ARRAYS = (*(f"{letter}{kind}" for letter in RECORDS for kind in "ri"), "at", "sizes")
+
+
+@cache
+def find_places() -> dict[tuple[str, str], Place]:
+    """Return the place of each variable, by record and name."""
+    found: dict[tuple[str, str], Place] = {}
+    counts, arrays = dict.fromkeys(ARRAYS, 0), 0
+    for letter, record in RECORDS.items():
+        for name, var in record.variables().items():
+            array = f"{letter}{letter_of(var.kind)}"
+            if var.dims:
+                found[letter, name], arrays = Place(array, arrays), arrays + 1
+            else:
+                found[letter, name] = Place(array, counts[array])
+                counts[array] += 1
+    return found
+
+
+class Memory:
+    """All variables of a compensator before its first call.
+
+    Parameters
+    ----------
+    sizes : mapping of str to int
+    values : mapping of str to object
+        Constants by name; those that are missing are 0.
+    """
+
+    def __init__(self, sizes: Mapping[str, int], values: Mapping[str, Any]) -> None:
+        lengths, at = dict.fromkeys(ARRAYS[:-2], 0), list[int]()
+        self._shapes: dict[tuple[str, str], tuple[int, ...]] = {}
+        for (letter, name), place in find_places().items():
+            dims = RECORDS[letter].variables()[name].dims
+            self._shapes[letter, name] = shape = tuple(sizes.get(d, 0) for d in dims)
+            if not dims:
+                lengths[place.array] += 1
+        for key, place in find_places().items():
+            if shape := self._shapes[key]:
+                at.append(lengths[place.array])
+                lengths[place.array] += int(np.prod(shape))
+        self.arrays: dict[str, NDArray[Any]] = {
+            name: np.zeros(length, dtype=np.float64 if name[1] == "r" else np.int64) for name, length in lengths.items()
+        }
+        self.arrays |= {"at": np.array(at), "sizes": np.array([sizes.get(name, 0) for name in SIZES])}
+        for name, value in values.items():
+            self.find("t", name)[...] = value
+
+    def find(self, record: str, name: str) -> NDArray[Any]:
+        """Return a view of a variable, without dimensions for a single number."""
+        place, shape = find_places()[record, name], self._shapes[record, name]
+        held = self.arrays[place.array]
+        if not shape:
+            return held[place.place : place.place + 1].reshape(())
+        begin = int(self.arrays["at"][place.place])
+        return held[begin : begin + int(np.prod(shape))].reshape(shape)

@@ -1,0 +1,205 @@
+"""Formulas of models as functions of a program: one variable per node, with lags and clocks in the state."""
+
+from collections.abc import Iterable, Sequence
+from functools import reduce
+from operator import add, mul
+from typing import Any
+
+from thermocomp.core import expression as e
+from thermocomp.core.inputs import Input
+from thermocomp.core.model import ErrorModel
+from thermocomp.runtime.program.clocks import run_clock
+from thermocomp.runtime.program.language import choose, exp, expm1, let, raised, record, when
+from thermocomp.runtime.program.numbers import clip, find_linear, find_step
+from thermocomp.runtime.program.recurrences import Clock
+from thermocomp.runtime.program.supporting import Supports
+from thermocomp.runtime.program.tree import Expression, Function, Name
+from thermocomp.runtime.program.values import Number, Truth, Whole, integer, real
+from thermocomp.runtime.program.variables import State, Tables, Work
+
+#: beyond every argument of a table
+_BEYOND = 1e30
+#: a larger exponent is left to a library, which may reject a negative base
+_FACTORS = 16
+
+
+class Formulas:
+    """Functions `thermocomp.runtime.program.formulas` of a compensator, and the numbers that they need.
+
+    Parameters
+    ----------
+    ranges : sequence of Input
+        Inputs of the models, without duplicates.
+    channels : sequence of int
+        Index of each input among the values of a reading.
+    """
+
+    def __init__(self, ranges: Sequence[Input], channels: Sequence[int]) -> None:
+        self.channels = channels
+        self._supports = Supports(ranges)
+        self.lags = 0
+        self.clocks: list[_Clock] = []
+        self.x, self.y = list[float](), list[float]()
+        self.functions: dict[str, Function] = {}  #: by name
+
+    def add(self, name: str, models: Iterable[tuple[int, ErrorModel, e.Node]]) -> None:
+        """Record a function that computes the outputs of models.
+
+        Parameters
+        ----------
+        name : str
+            Name of the function; ``models_`` is prefixed.
+        models : iterable of (int, ErrorModel, Node)
+            Index, model and formula; the inputs of a formula are numbered like the ranges.
+        """
+        s = State()
+        with record(f"models_{name}") as self.functions[f"models_{name}"]:
+            formula, worked_out = (
+                _Formula(self, s.begun_absolute if name == "absolute" else s.begun_rezeroed),
+                set[int](),
+            )
+            for place, model, node in models:
+                self._supports.record(model, place, formula.value(node), worked_out)
+            if name == "absolute":
+                s.begun_absolute = True
+            else:
+                s.begun_rezeroed = True
+
+    def finish(self) -> tuple[dict[str, int], dict[str, list[Any]]]:
+        """Record the last function; return all sizes and numbers that the functions need."""
+        w = Work()
+        with record("tick") as self.functions["tick"]:
+            for k, clock in enumerate(self.clocks):
+                with when(Whole(Name("int", "c")).equals(k)):
+                    w.next = _Ticking(clock).value(clock.tick)
+        sizes, values = self._supports.finish()
+        clocks = self.clocks
+        sizes |= {
+            "LAGS": self.lags,
+            "CLOCKS": len(clocks),
+            "ENDS_OF_CLOCKS": len(clocks) + 1,
+            "PASTS": sum(c.past for c in clocks),
+            "LEAVES": sum(len(c.leaves) for c in clocks),
+            "AVERAGES": sum(c.means * len(c.leaves) for c in clocks),
+            "POINTS_OF_TABLES": len(self.x),
+        }
+        values |= {
+            "interval": [c.interval for c in clocks],
+            "past_begin": [c.past_begin for c in clocks] + [sizes["PASTS"]],
+            "leaf_begin": [c.leaf_begin for c in clocks] + [sizes["LEAVES"]],
+            "average_begin": [c.average_begin for c in clocks] + [sizes["AVERAGES"]],
+            "table_x": self.x,
+            "table_y": self.y,
+        }
+        return sizes, values
+
+
+class _Arithmetic:
+    """Values of an expression's nodes as local variables; a repeated node is computed once."""
+
+    def __init__(self) -> None:
+        self._known: dict[e.Node, Number] = {}
+
+    def value(self, node: e.Node) -> Number:
+        """Return the value of a node."""
+        if isinstance(node, e.Named):
+            return self.value(node.of)
+        if isinstance(node, e.Constant):
+            return real(node.value)
+        if (known := self._known.get(node)) is None:
+            found = self._found(node)
+            known = self._known[node] = let(f"v{len(self._known)}", found)
+        return known
+
+    def _found(self, node: e.Node) -> Number:  # noqa: PLR0911 - one case per node type
+        match node:
+            case e.Clip(of, low, high):
+                return clip(self.value(of), real(low), real(high))
+            case e.Sum(terms):
+                return reduce(add, map(self.value, terms)) if terms else real(0.0)
+            case e.Difference(of, minus):
+                return self.value(of) - self.value(minus)
+            case e.Product(factors):
+                return reduce(mul, map(self.value, factors)) if factors else real(1.0)
+            case e.Power(of, exponent) if exponent in range(1, _FACTORS + 1):
+                return reduce(mul, [self.value(of)] * int(exponent))
+            case e.Power(of, exponent):
+                return raised(self.value(of), real(exponent))
+            case e.Magnitude(of):
+                return abs(self.value(of))
+            case e.Sigmoid(of):
+                return 1.0 / (1.0 + exp(-self.value(of)))
+        raise TypeError(f"{node}: is not part of a formula")
+
+
+class _Formula(_Arithmetic):
+    """Formula of models, with lags, tables and clocks."""
+
+    def __init__(self, formulas: Formulas, begun: Truth) -> None:
+        super().__init__()
+        self._formulas, self._begun = formulas, begun
+        self._gains: dict[Expression, Number] = {}
+
+    def _found(self, node: e.Node) -> Number:
+        own, s, w, t = self._formulas, State(), Work(), Tables()
+        match node:
+            case e.Input(index):
+                return w.input[own.channels[index]] - s.zero[index]
+            case e.Lag(of, tau):
+                return self._lag(self.value(of), w.step / tau)
+            case e.PacedLag(of, stopped, running, pace):
+                signal, share = self.value(of), self.value(pace)
+                return self._lag(signal, w.step * (1.0 / stopped + share * (1.0 / running - 1.0 / stopped)))
+            case e.Recurrence(tick, interval):
+                clock = _Clock(tick, interval, own.clocks)
+                for k, leaf in enumerate(clock.leaves, clock.leaf_begin):
+                    w.leaf[k] = self.value(leaf)
+                run_clock(s, w, t, integer(len(own.clocks)), self._begun)
+                own.clocks.append(clock)
+                return w.found
+            case e.Lookup(of, x, y, kind):
+                at, first = self.value(of), len(own.x)
+                own.x += [*x, _BEYOND] if kind == "step" else x
+                own.y += y
+                find = find_step if kind == "step" else find_linear
+                find(s, w, t, at, integer(first), integer(len(own.x)))
+                return w.found
+        return super()._found(node)
+
+    def _lag(self, signal: Number, paces: Number) -> Number:
+        s, place = State(), self._formulas.lags
+        self._formulas.lags += 1
+        if paces.node not in self._gains:
+            self._gains[paces.node] = let(f"gain{len(self._gains)}", -expm1(-paces))
+        lag, gain = s.lag[place], self._gains[paces.node]
+        s.lag[place] = choose(self._begun, lag + gain * (signal - lag), signal)
+        return lag
+
+
+class _Clock(Clock):
+    """A value with a separate clock, and the location of its past values in the arrays of the program."""
+
+    def __init__(self, tick: e.Node, interval: float, before: Sequence["_Clock"]) -> None:
+        super().__init__(tick, interval)
+        self.past_begin = sum(c.past for c in before)
+        self.leaf_begin = sum(len(c.leaves) for c in before)
+        self.average_begin = sum(c.means * len(c.leaves) for c in before)
+
+
+class _Ticking(_Arithmetic):
+    """Expression of a clock's next value."""
+
+    def __init__(self, clock: _Clock) -> None:
+        super().__init__()
+        self._clock = clock
+
+    def _found(self, node: e.Node) -> Number:
+        clock, s, w = self._clock, State(), Work()
+        match node:
+            case e.Past(ticks):
+                return s.past[clock.past_begin + ticks - 1]
+            case e.Mean(of, 0):
+                return w.average[clock.leaf_begin + clock.leaves.index(of)]
+            case e.Mean(of, ticks):
+                return s.averages[clock.average_begin + (ticks - 1) * len(clock.leaves) + clock.leaves.index(of)]
+        return super()._found(node)

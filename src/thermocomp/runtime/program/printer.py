@@ -1,0 +1,107 @@
+"""Translation of a compensator's program to another language: the part common to all languages."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ClassVar
+
+from thermocomp.runtime.program import tree as n
+from thermocomp.runtime.program.tree import Expression, Function, Kind, Operator, Statement
+
+#: operators of equal precedence: evaluated from left to right, they need no parentheses
+_RANKS: tuple[set[Operator], ...] = ({"+", "-"}, {"*", "/"}, {"and"}, {"or"})
+
+
+class Printer(ABC):
+    """Translator of one function.
+
+    Parameters
+    ----------
+    sizes : mapping of str to int
+        Sizes of the program's tables.
+    """
+
+    #: operators of the language that differ from those of the tree
+    operators: ClassVar[Mapping[Operator, str]]
+
+    def __init__(self, function: Function, sizes: Mapping[str, int]) -> None:
+        self.function, self.sizes = function, sizes
+
+    def block(self, statements: Sequence[Statement], depth: int) -> list[str]:
+        """Return statements as lines of text, at least one per statement."""
+        return [line for s in statements for line in self.statement(s, depth)]
+
+    @abstractmethod
+    def statement(self, node: Statement, depth: int) -> list[str]:
+        """Return the lines of a statement."""
+
+    @abstractmethod
+    def constant(self, value: float, kind: Kind) -> str:
+        """Return a numeric constant."""
+
+    @abstractmethod
+    def variable(self, record: str, name: str) -> str:
+        """Return a variable of a record; a size is printed as a number."""
+
+    @abstractmethod
+    def choice(self, test: str, one: str, other: str) -> str:
+        """Return a conditional expression: one of two values."""
+
+    @abstractmethod
+    def negated(self, text: str) -> str:
+        """Return the negation of a condition."""
+
+    @abstractmethod
+    def call(self, name: str, arguments: Sequence[Expression]) -> str:
+        """Return a call of a numeric function."""
+
+    def local(self, name: str) -> str:
+        """Return a local variable of the function."""
+        return name
+
+    def element(self, array: n.Name, at: Sequence[Expression]) -> str:
+        """Return an element of an array."""
+        return self.value(array) + "".join(f"[{self.bare(a)}]" for a in at)
+
+    def real(self, text: str) -> str:
+        """Return an integer as a real number."""
+        return text
+
+    def bare(self, node: Expression, kind: Kind | None = None) -> str:
+        """Return an expression without outer parentheses."""
+        text = self.value(node, kind)
+        outer = text.startswith("(") and isinstance(node, n.Operation | n.Choice)
+        return text[1:-1] if outer else text
+
+    def value(self, node: Expression, kind: Kind | None = None) -> str:  # noqa: PLR0911 - one case per node type
+        """Return an expression; a real constant is written as a time if `kind` is ``time``."""
+        match node:
+            case n.Constant(own, value):
+                return self.constant(value, "time" if own == "real" and kind == "time" else own)
+            case n.Name(own, name, "t") if name in self.sizes and name != "MOST":
+                return self.constant(self.sizes[name], own)
+            case n.Name(_, name, ""):
+                return self.local(name)
+            case n.Name(_, name, record):
+                return self.variable(record, name)
+            case n.Element(_, of, at):
+                return self.element(of, at)
+            case n.Not(_, of):
+                return self.negated(self.value(of))
+            case n.Negative(_, of):
+                return f"-{self.value(of, kind)}"
+            case n.Real(_, of):
+                return self.real(self.value(of))
+            case n.Operation(_, operator, left, right):
+                timed: Kind | None = "time" if "time" in (left.kind, right.kind) else None
+                chained = isinstance(left, n.Operation) and any({operator, left.operator} <= rank for rank in _RANKS)
+                one = self.bare(left, timed) if chained else self.value(left, timed)
+                return f"({one} {self.operators.get(operator, operator)} {self.value(right, timed)})"
+            case n.Choice(own, test, one, other):
+                return self.choice(self.value(test), self.value(one, own), self.value(other, own))
+            case n.Call(_, name, arguments):
+                return self.call(name, arguments)
+
+
+def written(value: Any, one: Callable[[float], str]) -> list[str]:
+    """Return the numbers of a table as text, row by row."""
+    return [text for v in value for text in written(v, one)] if isinstance(value, list) else [one(value)]

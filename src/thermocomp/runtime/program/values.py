@@ -1,0 +1,225 @@
+"""Symbols of a program while it is recorded: numbers, integers, conditions and arrays that a type checker sees."""
+
+from typing import NoReturn, cast
+
+from thermocomp.runtime.program import tree as n
+from thermocomp.runtime.program.recording import add
+from thermocomp.runtime.program.tree import Expression, Kind, Operator
+
+
+class Value:
+    """An expression of the program."""
+
+    def __init__(self, node: Expression) -> None:
+        self.node = node
+
+    def _assign(self, value: Expression) -> None:
+        if not isinstance(self.node, n.Name | n.Element):
+            raise TypeError(f"{self.node}: cannot be assigned")
+        add(n.Assign(self.node, value))
+
+    def __bool__(self) -> NoReturn:
+        raise TypeError("a symbol is neither true nor false: use `when`, `choose`, & and |")
+
+
+class Truth(Value):
+    """A condition; ``&`` and ``|`` evaluate their right side only if it decides."""
+
+    def __and__(self, other: "Truth") -> "Truth":
+        return Truth(n.Operation("bool", "and", self.node, other.node))
+
+    def __or__(self, other: "Truth") -> "Truth":
+        return Truth(n.Operation("bool", "or", self.node, other.node))
+
+    def __invert__(self) -> "Truth":
+        return Truth(n.Not("bool", self.node))
+
+    def equals(self, other: "Truth") -> "Truth":
+        """Return the condition that both hold, or neither."""
+        return Truth(n.Operation("bool", "==", self.node, other.node))
+
+    def set(self, value: "Truth | bool") -> None:
+        """Assign a value to this variable."""
+        self._assign(flag(value).node)
+
+
+class Whole(Value):
+    """An integer."""
+
+    def _with(self, operator: Operator, other: "Whole | int") -> "Whole":
+        return Whole(n.Operation("int", operator, self.node, integer(other).node))
+
+    def __add__(self, other: "Whole | int") -> "Whole":
+        return self._with("+", other)
+
+    def __sub__(self, other: "Whole | int") -> "Whole":
+        return self._with("-", other)
+
+    def __mul__(self, other: "Whole | int") -> "Whole":
+        return self._with("*", other)
+
+    def __floordiv__(self, other: "Whole | int") -> "Whole":
+        return self._with("//", other)
+
+    def __mod__(self, other: "Whole | int") -> "Whole":
+        return self._with("%", other)
+
+    def _compared(self, operator: Operator, other: "Whole | int") -> Truth:
+        return Truth(n.Operation("bool", operator, self.node, integer(other).node))
+
+    def __lt__(self, other: "Whole | int") -> Truth:
+        return self._compared("<", other)
+
+    def __le__(self, other: "Whole | int") -> Truth:
+        return self._compared("<=", other)
+
+    def __gt__(self, other: "Whole | int") -> Truth:
+        return self._compared(">", other)
+
+    def __ge__(self, other: "Whole | int") -> Truth:
+        return self._compared(">=", other)
+
+    def equals(self, other: "Whole | int") -> Truth:
+        """Return the condition that both are equal."""
+        return self._compared("==", other)
+
+    def differs(self, other: "Whole | int") -> Truth:
+        """Return the condition that the two are not equal."""
+        return self._compared("!=", other)
+
+    @property
+    def real(self) -> "Number":
+        """The same as a real number."""
+        return Number(n.Real("real", self.node))
+
+    def set(self, value: "Whole | int") -> None:
+        """Assign a value to this variable."""
+        self._assign(integer(value).node)
+
+
+class Number(Value):
+    """A real number, or a time: the result of an operation with a time is a time, in double precision."""
+
+    def _with(self, operator: Operator, other: "Number | float", *, swapped: bool = False) -> "Number":
+        pair = (self, real(other))
+        left, right = reversed(pair) if swapped else pair
+        return Number(n.Operation(common_kind(*pair), operator, left.node, right.node))
+
+    def __add__(self, other: "Number | float") -> "Number":
+        return self._with("+", other)
+
+    def __radd__(self, other: float) -> "Number":
+        return self._with("+", other, swapped=True)
+
+    def __sub__(self, other: "Number | float") -> "Number":
+        return self._with("-", other)
+
+    def __rsub__(self, other: float) -> "Number":
+        return self._with("-", other, swapped=True)
+
+    def __mul__(self, other: "Number | float") -> "Number":
+        return self._with("*", other)
+
+    def __rmul__(self, other: float) -> "Number":
+        return self._with("*", other, swapped=True)
+
+    def __truediv__(self, other: "Number | float") -> "Number":
+        return self._with("/", other)
+
+    def __rtruediv__(self, other: float) -> "Number":
+        return self._with("/", other, swapped=True)
+
+    def __neg__(self) -> "Number":
+        return Number(n.Negative(self.node.kind, self.node))
+
+    def __abs__(self) -> "Number":
+        return Number(n.Call(self.node.kind, "abs", (self.node,)))
+
+    def _compared(self, operator: Operator, other: "Number | float") -> Truth:
+        return Truth(n.Operation("bool", operator, self.node, real(other).node))
+
+    def __lt__(self, other: "Number | float") -> Truth:
+        return self._compared("<", other)
+
+    def __le__(self, other: "Number | float") -> Truth:
+        return self._compared("<=", other)
+
+    def __gt__(self, other: "Number | float") -> Truth:
+        return self._compared(">", other)
+
+    def __ge__(self, other: "Number | float") -> Truth:
+        return self._compared(">=", other)
+
+    def equals(self, other: "Number | float") -> Truth:
+        """Return the condition that both are equal."""
+        return self._compared("==", other)
+
+    def differs(self, other: "Number | float") -> Truth:
+        """Return the condition that the two are not equal."""
+        return self._compared("!=", other)
+
+    def set(self, value: "Number | float") -> None:
+        """Assign a value to this variable."""
+        self._assign(real(value).node)
+
+
+def flag(value: Truth | bool) -> Truth:
+    """Return a condition, or a truth value as one."""
+    return value if isinstance(value, Truth) else Truth(n.Constant("bool", value))
+
+
+def integer(value: Whole | int) -> Whole:
+    """Return an integer as an expression."""
+    return value if isinstance(value, Whole) else Whole(n.Constant("int", value))
+
+
+def real(value: Number | float) -> Number:
+    """Return a number as an expression."""
+    return value if isinstance(value, Number) else Number(n.Constant("real", float(value)))
+
+
+def common_kind(*values: Number) -> Kind:
+    """Return the kind of the result of an operation: ``time`` if an operand is a time."""
+    return "time" if any(v.node.kind == "time" for v in values) else "real"
+
+
+Index = Whole | int | tuple[Whole | int, ...]
+
+
+class _Array(Value):
+    def _element(self, at: Index) -> n.Element:
+        array = cast("n.Name", self.node)
+        places = at if isinstance(at, tuple) else (at,)
+        if len(places) != len(array.dims):
+            raise TypeError(f"{array.name}: {len(places)} indices for {len(array.dims)} dimensions")
+        return n.Element(array.kind, array, tuple(integer(k).node for k in places))
+
+
+class Numbers(_Array):
+    """An array of numbers."""
+
+    def __getitem__(self, at: Index) -> Number:
+        return Number(self._element(at))
+
+    def __setitem__(self, at: Index, value: Number | float) -> None:
+        self[at].set(value)
+
+
+class Wholes(_Array):
+    """An array of integers."""
+
+    def __getitem__(self, at: Index) -> Whole:
+        return Whole(self._element(at))
+
+    def __setitem__(self, at: Index, value: Whole | int) -> None:
+        self[at].set(value)
+
+
+class Truths(_Array):
+    """An array of conditions."""
+
+    def __getitem__(self, at: Index) -> Truth:
+        return Truth(self._element(at))
+
+    def __setitem__(self, at: Index, value: Truth | bool) -> None:
+        self[at].set(value)

@@ -1,0 +1,295 @@
+"""Monitoring of the temperatures as scalars and loops: see `thermocomp.runtime.watch` for explanations."""
+
+from thermocomp.core.watch import FASTER, LASTING
+from thermocomp.runtime.blame import USUAL
+from thermocomp.runtime.gate import DAY, PLAUSIBLE
+from thermocomp.runtime.program import blaming
+from thermocomp.runtime.program.language import (
+    choose,
+    each,
+    exp,
+    let,
+    otherwise,
+    otherwise_when,
+    procedure,
+    raised,
+    when,
+)
+from thermocomp.runtime.program.numbers import find_mean, follow, larger, smaller, sort
+from thermocomp.runtime.program.values import Number, Whole, flag, integer, real
+from thermocomp.runtime.program.variables import State, Tables, Work
+from thermocomp.runtime.watch import FADE, GOOD, HEATS, MISSING, REST, RETURN, TICK
+
+COLDEST, HOTTEST = PLAUSIBLE["temperature"]
+FASTEST = PLAUSIBLE["spindle_speed"][1]
+HOLDING = 2
+
+
+@procedure
+def believe(s: State, w: Work, t: Tables) -> None:
+    """Replace each temperature that is not trusted."""
+    w.made = True
+    for k in each("k", t.SPEEDS):
+        c = let("c", t.watch_channel[t.speed_input[k]])
+        with when(~(w.given[c] & (abs(w.value[c]) <= FASTEST))):
+            w.made = False
+    with when(w.made & ~s.looked):
+        make_up(s, w, t)
+        begin(s, w, t)
+    with otherwise_when(w.made):
+        for i in each("i", t.SENSORS):
+            c.set(t.sensor_channel[i])
+            w.there[i] = False
+            w.x[i] = 0.0
+            with when(w.given[c] & (w.value[c] >= COLDEST) & (w.value[c] <= HOTTEST)):
+                w.x[i] = w.value[c] - s.watch_zero[t.sensor_input[i]]
+                w.there[i] = (w.x[i] >= t.sensor_low[i] - t.sensor_span[i]) & (
+                    w.x[i] <= t.sensor_high[i] + t.sensor_span[i]
+                )
+        with when(w.now - s.look >= TICK):
+            look(s, w, t)
+        for i in each("i", t.SENSORS):
+            with when(s.fault[i].differs(GOOD) | ~w.there[i] | s.has_jumped[i]):
+                w.value[t.sensor_channel[i]] = s.watch_zero[t.sensor_input[i]] + s.used[i]
+                w.given[t.sensor_channel[i]] = True
+
+
+@procedure
+def make_up(s: State, w: Work, t: Tables) -> None:
+    """Replace first readings whose distance from their training zero is not plausible given the other sensors."""
+    w.rows = 0
+    for i in each("i", t.SENSORS):
+        c = let("c", t.sensor_channel[i])
+        with when(w.given[c] & (w.value[c] >= COLDEST) & (w.value[c] <= HOTTEST)):
+            w.column[w.rows] = w.value[c] - t.start_zero[i]
+            w.rows = w.rows + 1
+    w.middle = 0.0
+    with when(w.rows > 0):
+        sort(s, w, t)
+        w.middle = w.column[(w.rows - 1) // 2]
+    for i in each("i", t.SENSORS):
+        c.set(t.sensor_channel[i])
+        fits = let("fits", w.given[c] & (w.value[c] >= COLDEST) & (w.value[c] <= HOTTEST))
+        fits.set(fits & (abs(w.value[c] - t.start_zero[i] - w.middle) <= t.start_span[i]))
+        with when(~fits):
+            w.value[c] = t.start_zero[i] + larger(real(-DAY), smaller(real(DAY), w.middle))
+            w.given[c] = True
+
+
+@procedure
+def begin(s: State, w: Work, t: Tables) -> None:
+    """Add a reading to the zero if it is unknown; start from rest at the zero, or at the first reading."""
+    belongs = let("belongs", t.watch_waits & s.watch_gathered.equals(0))
+    with when(t.watch_waits & ~belongs & (s.watch_gathered < t.MOST) & (w.stands | ~s.watch_resting)):
+        belongs.set(w.now - s.watch_gathered_at[0] <= choose(s.watch_resting, t.at_rest, t.otherwise))
+    ready = let("ready", ~belongs)
+    with when(belongs):
+        with when(s.watch_gathered.equals(0)):
+            s.watch_resting = w.stands
+        s.watch_gathered_at[s.watch_gathered] = w.now
+        for k in each("k", t.WATCHED):
+            s.watch_gathered_value[s.watch_gathered, k] = w.value[t.watch_channel[k]]
+        s.watch_gathered = s.watch_gathered + 1
+        ready.set(
+            (s.watch_gathered >= t.MOST)
+            | (w.now - s.watch_gathered_at[0] >= choose(s.watch_resting, t.at_rest, t.otherwise))
+        )
+    with when(ready):
+        for k in each("k", t.WATCHED):
+            w.middle = w.value[t.watch_channel[k]]
+            with when(t.watch_waits):
+                w.rows = s.watch_gathered
+                for m in each("m", w.rows):
+                    w.column[m] = s.watch_gathered_value[m, k]
+                find_mean(s, w, t)
+            s.watch_zero[k] = choose(t.watch_rezero[k], w.middle, t.watch_reference[k])
+            w.change[k] = w.middle - s.watch_zero[k]
+        for i in each("i", t.SENSORS):
+            s.used[i] = w.change[t.sensor_input[i]]
+            s.still[i] = w.now
+        calm_down(s, w, t)
+        for k in each("k", t.TAUS):
+            for i in each("i", t.SENSORS):
+                s.memory[k * t.SENSORS + i] = s.used[i]
+        for k in each("k", t.STATES):
+            s.memory[t.LAGGED + k] = raised(abs(w.change[t.state_input[k]]) / t.top_speed, t.power[k])
+        predict(s, w, t)
+        s.looked = True
+        s.look = w.now
+
+
+@procedure
+def calm_down(s: State, w: Work, t: Tables) -> None:
+    """Limit speeds to a multiple of the top speed."""
+    for k in each("k", t.SPEEDS):
+        most = let("most", HEATS * t.top_speed)
+        w.change[t.speed_input[k]] = larger(-most, smaller(most, w.change[t.speed_input[k]]))
+
+
+@procedure
+def predict(s: State, w: Work, t: Tables) -> None:
+    """Predict each temperature from the others, their lags and the states of the speed."""
+    for i in each("i", t.SENSORS):
+        s.predicted[i] = 0.0
+        for k in each("k", t.SENSORS):
+            s.predicted[i] = s.predicted[i] + s.used[k] * t.direct[k, i]
+        for k in each("k", t.MEMORY):
+            s.predicted[i] = s.predicted[i] + s.memory[k] * t.weight[k, i]
+
+
+@procedure
+def look(s: State, w: Work, t: Tables) -> None:
+    """Check all sensors and advance the predictions."""
+    elapsed = let("elapsed", w.now - s.look)
+    s.look = w.now
+    find_jumps(s, w, t, elapsed)
+    for i in each("i", t.SENSORS):
+        with when(~w.there[i] & s.fault[i].equals(GOOD)):
+            s.fault[i] = MISSING
+            s.since[i] = w.now
+            s.bridge[i] = s.usual[i]
+            s.is_back[i] = False
+            s.has_jumped[i] = False
+        w.waiting[i] = s.has_jumped[i] & s.fault[i].equals(GOOD) & w.there[i]
+    for i in each("i", t.SENSORS):
+        s.used[i] = w.x[i]
+        with when(s.fault[i].differs(GOOD)):
+            s.used[i] = s.predicted[i] + s.bridge[i] * exp(-(w.now - s.since[i]) / FADE)
+        with otherwise_when(w.waiting[i]):
+            s.used[i] = s.usual[i] + s.predicted[i]
+    advance(s, w, t, elapsed)
+    predict(s, w, t)
+    for i in each("i", t.SENSORS):
+        with when(s.fault[i].differs(GOOD)):
+            s.used[i] = s.predicted[i] + s.bridge[i] * exp(-(w.now - s.since[i]) / FADE)
+        w.difference[i] = w.x[i] - s.predicted[i]
+        w.calm[i] = s.fault[i].equals(GOOD) & w.there[i] & ~w.waiting[i]
+        with when(w.calm[i]):
+            s.usual[i] = follow(s.usual[i], w.difference[i], elapsed / USUAL)
+    for k in each("k", t.TAUS):
+        for i in each("i", t.SENSORS):
+            inner = let("inner", choose(w.calm[i], w.difference[i], 0.0))
+            s.traces[k * t.SENSORS + i] = follow(s.traces[k * t.SENSORS + i], inner, elapsed / t.tau[k])
+    find_stuck(s, w, t)
+    find_off(s, w, t)
+    blaming.blame(s, w, t, elapsed)
+    believe_again(s, w, t)
+
+
+@procedure
+def find_jumps(s: State, w: Work, t: Tables, elapsed: Number) -> None:
+    """Find jumps, discard spikes, and confirm lasting jumps."""
+    for i in each("i", t.SENSORS):
+        slack = let("slack", t.jump_limit[i])
+        with when(elapsed > t.pace):
+            slack.set(slack * (elapsed / t.pace))
+        w.before[i] = choose(s.has_jumped[i], s.predicted[i] + s.usual[i], s.used[i])
+        w.stepped[i] = False
+        with when(w.there[i] & s.fault[i].equals(GOOD)):
+            w.far[i] = abs(w.x[i] - w.before[i]) > slack
+            with when(~w.far[i]):
+                s.has_jumped[i] = False
+            with otherwise_when(s.has_jumped[i]):
+                w.stepped[i] = w.now - s.jumped[i] >= LASTING
+            with otherwise():
+                s.has_jumped[i] = True
+                s.jumped[i] = w.now
+
+
+@procedure
+def advance(s: State, w: Work, t: Tables, elapsed: Number) -> None:
+    """Advance the lags of the temperatures and the states of the speed."""
+    for k in each("k", t.SPEEDS):
+        w.change[t.speed_input[k]] = w.value[t.watch_channel[t.speed_input[k]]] - s.watch_zero[t.speed_input[k]]
+    calm_down(s, w, t)
+    for k in each("k", t.TAUS):
+        for i in each("i", t.SENSORS):
+            s.memory[k * t.SENSORS + i] = follow(s.memory[k * t.SENSORS + i], s.used[i], elapsed / t.tau[k])
+    for k in each("k", t.STATES):
+        share = let("share", abs(w.change[t.state_input[k]]) / t.top_speed)
+        quick = let("quick", t.resting_rate[k] + share * t.gain[k])
+        s.memory[t.LAGGED + k] = follow(s.memory[t.LAGGED + k], raised(share, t.power[k]), elapsed * quick)
+    for k in each("k", t.SPEEDS):
+        with when(abs(w.change[t.speed_input[k]]) > FASTER * t.top_speed):
+            s.was_fast = True
+            s.fast = w.now
+
+
+@procedure
+def find_stuck(s: State, w: Work, t: Tables) -> None:
+    """Find sensors with constant readings although the prediction, or for too long another sensor, has changed."""
+    lives = let("lives", flag(False))
+    for i in each("i", t.SENSORS):
+        same = let("same", w.there[i] & s.read_once[i] & w.x[i].equals(s.same[i]))
+        w.changed[i] = ~same
+        with when(w.calm[i] & w.changed[i]):
+            lives.set(True)
+    for i in each("i", t.SENSORS):
+        moves = let("moves", ~w.changed[i] & w.calm[i] & (abs(s.predicted[i] - s.then_predicted[i]) > t.moved_limit[i]))
+        with when(w.changed[i]):
+            s.read_once[i] = w.there[i]
+            s.same[i] = w.x[i]
+            s.still[i] = w.now
+            s.then_predicted[i] = s.predicted[i]
+        with when(moves & ~s.is_moving[i]):
+            s.moving[i] = w.now
+        s.is_moving[i] = moves
+        w.stuck[i] = moves & (w.now - s.moving[i] >= LASTING)
+        with when(~w.changed[i] & w.calm[i] & lives & (w.now - s.still[i] > t.still_limit[i])):
+            w.stuck[i] = True
+
+
+@procedure
+def find_off(s: State, w: Work, t: Tables) -> None:
+    """Find differences that have been too large for too long."""
+    rested = let("rested", ~s.was_fast | (w.now - s.fast > REST))
+    for i in each("i", t.SENSORS):
+        with when((s.fault[i] > MISSING) & (w.now - s.since[i] <= REST)):
+            rested.set(False)
+    w.lasting = False
+    for i in each("i", t.SENSORS):
+        beyond = let("beyond", rested & w.calm[i] & (abs(w.difference[i] / t.off_limit[i]) > 1.0))
+        with when(beyond & ~s.is_off[i]):
+            s.off_since[i] = w.now
+        s.is_off[i] = beyond
+        with when(beyond & (w.now - s.off_since[i] >= LASTING)):
+            w.lasting = True
+
+
+@procedure
+def believe_again(s: State, w: Work, t: Tables) -> None:
+    """Trust a missing sensor again once its readings agree with the prediction."""
+    for i in each("i", t.SENSORS):
+        fits = let("fits", s.fault[i].equals(MISSING) & w.there[i] & (abs(w.difference[i]) <= t.off_limit[i]))
+        with when(fits & ~s.is_back[i]):
+            s.back[i] = w.now
+        s.is_back[i] = fits
+        with when(fits & (w.now - s.back[i] >= RETURN)):
+            s.fault[i] = GOOD
+            s.usual[i] = w.difference[i]
+            s.used[i] = s.predicted[i] + w.difference[i]
+            s.read_once[i] = False
+            s.is_back[i] = False
+
+
+@procedure
+def judge(s: State, w: Work, t: Tables, k: Whole) -> None:
+    """Hold a correction if its models were judged harmful, or not judged at all, without the failed sensors."""
+    for m in each("m", t.line_begin[k], t.line_begin[k + 1]):
+        lost = let("lost", integer(0))
+        allowed = let("allowed", flag(True))
+        for i in each("i", t.SENSORS):
+            with when(s.fault[i].differs(GOOD) & t.leans_on[m, i]):
+                lost.set(lost + 1)
+                allowed.set(allowed & t.may_lose[m, i])
+        with when(lost > 1):
+            found = let("found", flag(False))
+            for j in each("j", t.JUDGED):
+                fits = let("fits", t.judged_model[j].equals(m))
+                for i in each("i", t.SENSORS):
+                    gone = let("gone", s.fault[i].differs(GOOD) & t.leans_on[m, i])
+                    fits.set(fits & t.judged_without[j, i].equals(gone))
+                found.set(found | fits)
+            allowed.set(allowed & found)
+        with when(~allowed):
+            s.status[k] = HOLDING
